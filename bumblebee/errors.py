@@ -1,0 +1,19 @@
+"""The errors that a user is meant to read: one line each, and the process ends with status 2."""
+
+EXIT_BAD_INPUT = 2
+
+
+class BadInput(Exception):
+    """Input that cannot be used; the text names the place, the expectation, what came and the remedy.
+
+    Args:
+        where: file, and row, column, field or key in it.
+        expected: what would have been accepted.
+        came: what was found instead.
+        do: what the user can do about it.
+    """
+
+    def __init__(self, where: object, expected: str, came: str, do: str = "") -> None:
+        self.where, self.expected, self.came, self.do = str(where), expected, came, do
+        line = f"{where}: expected {expected}, came {came}"
+        super().__init__(" ".join((f"{line}. {do}" if do else line).split()))
