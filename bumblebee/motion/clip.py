@@ -1,0 +1,93 @@
+"""A motion of the robot as arrays, and what follows from them: velocities and foot contacts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bumblebee.motion import quaternions
+
+_CONTACT_HEIGHT = 0.03  # m: a sole lower than this may touch the floor
+_CONTACT_SPEED = 0.5  # m/s: and does, if it moves slower than this
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One motion of the G1, sampled evenly; arrays are float32.
+
+    `root_pos` (T, 3) [m, world], `root_quat` (T, 4) [wxyz, body to world], `joint_pos` (T, 23) [rad] in the order of
+    `joint_names()`, `key_pos` (T, 14, 3) [m, world] of `KEY_BODIES` by forward kinematics.
+    """
+
+    name: str
+    fps: float
+    root_pos: np.ndarray
+    root_quat: np.ndarray
+    joint_pos: np.ndarray
+    key_pos: np.ndarray
+    captions: tuple[str, ...] = ()
+    """Lines of HumanML3D: `caption#tokens/POS#from#to`, seconds."""
+    source: str = ""
+    """The file or generator that it comes from."""
+    licence: str = ""
+    """Licence of the source, "unknown" where none was found."""
+    sha256: str = ""
+    """Of the source file; of the arrays if the clip was made."""
+    family: str = ""
+    """Kind of motion: stand, squat, walk, jump ...; "" if unknown."""
+    split: str = "train"
+    """"train", or "test" if held out."""
+    caption_source: str = ""
+    """Where the captions come from: "file", "name" (derived from the file's name), "made"; "" without captions."""
+
+    @property
+    def frames(self) -> int:
+        """Number of samples T."""
+        return len(self.root_pos)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return (self.frames - 1) / self.fps
+
+
+@dataclass(frozen=True)
+class ClipVelocities:
+    """Velocities by central differences, float32: `root_lin_vel_w` (T, 3) [m/s], `root_ang_vel_b` (T, 3) [rad/s], `joint_vel` (T, 23) [rad/s]."""
+
+    root_lin_vel_w: np.ndarray
+    root_ang_vel_b: np.ndarray
+    joint_vel: np.ndarray
+
+
+def velocities(clip: Clip) -> ClipVelocities:
+    """Central differences of a clip; one-sided at both ends, zero if there is one frame only."""
+    return ClipVelocities(
+        differences(clip.root_pos, clip.fps),
+        angular_velocity(clip.root_quat, clip.fps).astype(np.float32),
+        differences(clip.joint_pos, clip.fps),
+    )
+
+
+def differences(values: np.ndarray, fps: float) -> np.ndarray:
+    """Central differences of (T, ...) over time, float32, per second."""
+    if len(values) < 2:
+        return np.zeros_like(values, dtype=np.float32)
+    return (np.gradient(values.astype(np.float64), axis=0) * fps).astype(np.float32)
+
+
+def angular_velocity(quat: np.ndarray, fps: float) -> np.ndarray:
+    """Central differences of the rotation (T, 4), in the body's own frame: (T, 3) [rad/s]."""
+    quat = quaternions.normalised(quat.astype(np.float64))
+    before = np.maximum(np.arange(len(quat)) - 1, 0)
+    after = np.minimum(np.arange(len(quat)) + 1, len(quat) - 1)
+    turn = quaternions.rotation_vector(quaternions.multiply(quaternions.conjugate(quat[before]), quat[after]))
+    return turn * fps / np.maximum(after - before, 1)[:, None]
+
+
+def foot_contacts(clip: Clip) -> np.ndarray:
+    """Which foot stands on the floor, (T, 2) bool (left, right): a sole point that is low and slow."""
+    from bumblebee.motion.kinematics import sole_points  # kinematics builds clips: it comes after this file
+
+    points = sole_points(clip.root_pos, clip.root_quat, clip.joint_pos)  # (T, 2, 4, 3)
+    speed = np.linalg.norm(differences(points, clip.fps), axis=-1)
+    return np.any((points[..., 2] < _CONTACT_HEIGHT) & (speed < _CONTACT_SPEED), axis=-1)

@@ -1,0 +1,72 @@
+"""Unit quaternions as arrays (..., 4), scalar first (wxyz), Hamilton convention."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+FloatArray = np.ndarray
+
+
+def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
+    """Product `left * right` (..., 4): the rotation `right` followed by `left`."""
+    w1, x1, y1, z1 = np.moveaxis(np.asarray(left), -1, 0)
+    w2, x2, y2, z2 = np.moveaxis(np.asarray(right), -1, 0)
+    return np.stack(
+        [
+            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
+            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
+            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
+            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(quat: ArrayLike) -> FloatArray:
+    """The inverse rotation (..., 4)."""
+    return np.asarray(quat) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotate(quat: ArrayLike, vector: ArrayLike) -> FloatArray:
+    """Rotate vectors (..., 3) by quaternions (..., 4); leading axes broadcast."""
+    quat, vector = np.asarray(quat), np.asarray(vector)
+    axis = quat[..., 1:]
+    twice = 2.0 * np.cross(axis, vector)
+    return vector + quat[..., :1] * twice + np.cross(axis, twice)
+
+
+def normalised(quat: ArrayLike) -> FloatArray:
+    """Scaled to unit length (..., 4)."""
+    quat = np.asarray(quat)
+    return quat / np.linalg.norm(quat, axis=-1, keepdims=True)
+
+
+def continuous(quat: ArrayLike) -> FloatArray:
+    """Signs (T, 4) flipped so that neighbours are close; the first has w >= 0. The rotations stay the same."""
+    quat = np.asarray(quat)
+    flips = np.where(np.sum(quat[1:] * quat[:-1], axis=-1) < 0, -1.0, 1.0)
+    first = -1.0 if len(quat) and quat[0, 0] < 0 else 1.0
+    return quat * (first * np.concatenate([np.ones(min(len(quat), 1)), np.cumprod(flips)]))[:, None]
+
+
+def from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
+    """Rotation by `angle` (...,) [rad] about the unit vector `axis` (3,), as (..., 4)."""
+    half = np.asarray(angle)[..., None] / 2
+    return np.concatenate([np.cos(half), np.sin(half) * np.asarray(axis)], axis=-1)
+
+
+def rotation_vector(quat: ArrayLike) -> FloatArray:
+    """Logarithm (..., 3) [rad], the shorter way round."""
+    quat = np.asarray(quat)
+    quat = np.where(quat[..., :1] < 0, -quat, quat)
+    sine = np.linalg.norm(quat[..., 1:], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(sine, quat[..., :1])
+    return quat[..., 1:] * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 2.0)
+
+
+def slerp(start: ArrayLike, end: ArrayLike, share: ArrayLike) -> FloatArray:
+    """Spherical interpolation (..., 4) from `start` (share 0) to `end` (share 1), the shorter way round."""
+    start, share = np.asarray(start), np.asarray(share)
+    vector = rotation_vector(multiply(conjugate(start), end)) * share[..., None]
+    angle = np.linalg.norm(vector, axis=-1)
+    axis = vector / np.maximum(angle, 1e-12)[..., None]
+    return normalised(multiply(start, np.concatenate([np.cos(angle / 2)[..., None], np.sin(angle / 2)[..., None] * axis], -1)))

@@ -1,0 +1,154 @@
+"""A library of clips on disk: a folder of Parquet files with an index.
+
+    <folder>/index.parquet          one row a clip
+    <folder>/clips/<name>.parquet   the arrays; facts about the clip in the schema's metadata
+    <folder>/skipped.csv            source files that are not in the library, and why
+"""
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from bumblebee.errors import BadInput
+from bumblebee.motion.clip import Clip
+from bumblebee.robot.facts import KEY_BODIES, joint_names
+
+INDEX_COLUMNS = (
+    "name", "family", "split", "source", "licence", "sha256", "frames", "duration", "captions", "caption_source",
+)  # fmt: skip
+_FACTS = ("captions", "source", "licence", "sha256", "family", "split", "caption_source")
+_META = b"bumblebee.clip"
+
+
+def write_library(folder: Path, clips: Iterable[Clip], skipped: pd.DataFrame | None = None) -> None:
+    """Write a library, replacing what `folder` held; on any failure the folder stays as it was.
+
+    Args:
+        folder: where the library goes.
+        clips: with distinct names.
+        skipped: columns `file`, `reason`.
+    """
+    folder = Path(folder)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        fresh = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    try:
+        fresh.chmod(0o755)
+        _fill(fresh, clips, skipped)
+        _swap(fresh, folder)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+def read_library(folder: Path, names: Sequence[str] | None = None) -> list[Clip]:
+    """All clips of a library in the index's order, or those that are named, in that order."""
+    folder = Path(folder)
+    known = list(read_index(folder)["name"])
+    for name in names or ():
+        if name not in known:
+            raise BadInput(folder / "index.parquet", f"a clip named {name!r}", f"{len(known)} clips without it")
+    return [read_clip(folder / "clips" / f"{name}.parquet") for name in (known if names is None else names)]
+
+
+def read_index(folder: Path) -> pd.DataFrame:
+    """The library's table, one row a clip, columns `INDEX_COLUMNS`."""
+    path = Path(folder) / "index.parquet"
+    if not path.is_file():
+        raise BadInput(path, "the index of a motion library", "no such file", "Run the stage that writes it.")
+    try:
+        index = pd.read_parquet(path)
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise BadInput(path, "a readable Parquet file", str(error)) from error
+    missing = [column for column in INDEX_COLUMNS if column not in index]
+    if missing:
+        raise BadInput(path, f"columns {', '.join(INDEX_COLUMNS)}", f"none named {missing[0]}")
+    return index
+
+
+def write_clip(path: Path, clip: Clip) -> None:
+    """Write one clip as Parquet."""
+    table = np.concatenate(
+        [clip.root_pos, clip.root_quat, clip.joint_pos, clip.key_pos.reshape(clip.frames, -1)], axis=1
+    )
+    facts = {"name": clip.name, "fps": clip.fps, **{fact: getattr(clip, fact) for fact in _FACTS}}
+    schema = pa.schema([(name, pa.float32()) for name in _columns()], metadata={_META: json.dumps(facts)})
+    arrays = [pa.array(column) for column in np.ascontiguousarray(table.T, dtype=np.float32)]
+    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), path, compression="zstd")
+
+
+def read_clip(path: Path) -> Clip:
+    """Read one clip that `write_clip` wrote."""
+    try:
+        table = pq.read_table(path)
+    except FileNotFoundError:
+        raise BadInput(path, "a clip of a motion library", "no such file") from None
+    except (pa.ArrowException, OSError) as error:
+        raise BadInput(path, "a clip of a motion library (Parquet)", str(error)) from error
+    metadata = table.schema.metadata or {}
+    if _META not in metadata or tuple(table.column_names) != tuple(_columns()):
+        raise BadInput(path, "the columns and metadata of a bumblebee clip", f"{table.num_columns} other columns")
+    facts = json.loads(metadata[_META])
+    facts["captions"] = tuple(facts["captions"])
+    values = np.stack([column.to_numpy() for column in table.columns], axis=1)
+    root_pos, root_quat, joint_pos, key_pos = np.split(values, [3, 7, 7 + len(joint_names())], axis=1)
+    key_pos = key_pos.reshape(-1, len(KEY_BODIES), 3)
+    arrays = [np.ascontiguousarray(a) for a in (root_pos, root_quat, joint_pos, key_pos)]
+    return Clip(facts.pop("name"), facts.pop("fps"), *arrays, **facts)
+
+
+def index_of(clips: Iterable[Clip]) -> pd.DataFrame:
+    """The index as a table, without writing anything."""
+    rows = [{column: getattr(clip, column) for column in INDEX_COLUMNS} for clip in clips]
+    frame = pd.DataFrame(rows, columns=list(INDEX_COLUMNS))
+    frame["captions"] = [list(captions) for captions in frame["captions"]]
+    return frame
+
+
+def _columns() -> list[str]:
+    keys = [f"{body}_{axis}" for body in KEY_BODIES for axis in "xyz"]
+    return [*(f"root_{a}" for a in "xyz"), *(f"root_q{a}" for a in "wxyz"), *joint_names(), *keys]
+
+
+def _fill(folder: Path, clips: Iterable[Clip], skipped: pd.DataFrame | None) -> None:
+    (folder / "clips").mkdir()
+    rows: list[Clip] = []
+    for clip in clips:
+        if any(clip.name == row.name for row in rows):
+            raise BadInput(clip.source or clip.name, "distinct clip names", f"two clips named {clip.name!r}")
+        write_clip(folder / "clips" / f"{clip.name}.parquet", clip)
+        rows.append(clip)
+    index_of(rows).to_parquet(folder / "index.parquet", index=False)
+    if skipped is None:
+        skipped = pd.DataFrame(columns=["file", "reason"])
+    skipped.to_csv(folder / "skipped.csv", index=False)
+
+
+def _swap(fresh: Path, folder: Path) -> None:
+    """Put `fresh` where `folder` is; renames only, so that no reader meets a half-written library."""
+    old = folder.with_name(f".{folder.name}.old-{os.getpid()}")
+    if folder.exists():
+        os.rename(folder, old)
+    try:
+        os.rename(fresh, folder)
+    except OSError:
+        if old.exists():
+            os.rename(old, folder)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _unwritable(folder: Path, error: OSError) -> BadInput:
+    remedy = "Free space on that disk or choose another folder." if error.errno == 28 else "Choose another folder."
+    return BadInput(folder, "a folder that can be written", error.strerror or str(error), remedy)
