@@ -1,0 +1,79 @@
+"""The metadata of a rollout file: one JSON object under the Parquet key `bumblebee.rollout`, schema 1."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+METADATA_KEY = b"bumblebee.rollout"
+SCHEMA = 1
+REQUIRED_KEYS = ("schema", "rollout_id", "joints", "control_hz")
+OPTIONAL_KEYS = ("robot", "kp", "kd", "motion", "cluster", "policy", "recorded_at", "operator", "notes")
+
+
+@dataclass(frozen=True)
+class Metadata:
+    """What a rollout file says about itself."""
+
+    rollout_id: str
+    joints: tuple[str, ...]
+    control_hz: float
+    rest: dict[str, Any]
+
+
+def encode_metadata(meta: Metadata) -> bytes:
+    """The JSON object of the contract; keys that are None are left out."""
+    table = {"schema": SCHEMA, "rollout_id": meta.rollout_id}
+    table |= {"joints": list(meta.joints), "control_hz": meta.control_hz}
+    rest = {key: value for key, value in meta.rest.items() if value is not None and key not in table}
+    return json.dumps(table | rest, default=_plain, ensure_ascii=False).encode()
+
+
+def decode_metadata(path: Path, raw: bytes | None, bad: Callable[..., Exception]) -> Metadata:
+    """Parse and check the metadata; `bad(file, column, rule, expected, came, do)` makes the error that is raised."""
+    column = METADATA_KEY.decode()
+    if raw is None:
+        raise bad(path, column, "metadata", f"JSON under the Parquet metadata key {column}", "no such key")
+    try:
+        table = json.loads(raw)
+    except ValueError as error:
+        raise bad(path, column, "metadata", "a JSON object", f"text that is not JSON ({error})") from None
+    if not isinstance(table, dict):
+        raise bad(path, column, "metadata", "a JSON object", type(table).__name__)
+    for key in REQUIRED_KEYS:
+        if key not in table:
+            raise bad(path, column, "metadata", f"the key {key}", f"only {', '.join(sorted(table))}")
+    if table["schema"] != SCHEMA:
+        raise bad(path, column, "schema", f"schema {SCHEMA}", repr(table["schema"]))
+    _check_fields(path, table, lambda rule, expected, came: bad(path, column, rule, expected, came))
+    rest = {key: value for key, value in table.items() if key not in REQUIRED_KEYS and value is not None}
+    return Metadata(table["rollout_id"], tuple(table["joints"]), float(table["control_hz"]), rest)
+
+
+def _check_fields(path: Path, table: dict[str, Any], bad: Callable[[str, str, str], Exception]) -> None:
+    joints, rate, name = table["joints"], table["control_hz"], table["rollout_id"]
+    if not isinstance(name, str) or not name or name.startswith(".") or any(c in name for c in "/\\\0"):
+        raise bad("rollout-id", "a name without slashes", repr(name))
+    if name != path.stem:
+        raise bad("rollout-id", f"the name of the file, {path.stem}", repr(name))
+    if not isinstance(joints, list) or not joints or not all(isinstance(joint, str) for joint in joints):
+        raise bad("metadata", "joints: a list of names", repr(joints)[:80])
+    if len(set(joints)) != len(joints):
+        raise bad("joint-names", "every joint once", f"{sorted({j for j in joints if joints.count(j) > 1})[0]} twice")
+    if not _is_number(rate) or not 0 < rate < 1e5:
+        raise bad("metadata", "control_hz: a positive number", repr(rate))
+    for key in ("kp", "kd"):
+        values = table.get(key)
+        if values is not None and not (
+            isinstance(values, list) and len(values) == len(joints) and all(_is_number(value) for value in values)
+        ):
+            raise bad("metadata", f"{key}: {len(joints)} numbers", repr(values)[:80])
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 (numpy scalars and arrays, as json hands them over)
+    return value.tolist() if hasattr(value, "tolist") else str(value)
