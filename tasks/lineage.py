@@ -1,0 +1,69 @@
+"""What a stage was made from: the MD5 of each of its inputs as DVC counts it, and the git commit."""
+
+import hashlib
+import json
+import os
+import subprocess
+from functools import cache
+from pathlib import Path
+
+
+def path_hash(path: Path) -> str:
+    """DVC's hash of a file or folder (`.dir` at the end for a folder); "missing" where there is none."""
+    if path.is_dir():
+        listing = [
+            {"md5": _file_md5(file), "relpath": file.relative_to(path).as_posix()}
+            for file in sorted(path.rglob("*"))
+            if file.is_file() and "__pycache__" not in file.parts
+        ]
+        listing.sort(key=lambda entry: entry["relpath"])
+        return hashlib.md5(json.dumps(listing, sort_keys=True).encode()).hexdigest() + ".dir"
+    return _file_md5(path) if path.is_file() else "missing"
+
+
+def _file_md5(path: Path) -> str:
+    digest = hashlib.md5()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def stage_inputs(stage: str, root: Path = Path(".")) -> dict[str, str]:
+    """Path -> hash of every dependency of a DVC stage, and `params:<section>` -> hash of its parameters."""
+    from dvc.dependency.param import ParamsDependency
+    from dvc.repo import Repo
+
+    found: dict[str, str] = {}
+    with Repo(str(root)) as repo:
+        for loaded in repo.stage.load_all("dvc.yaml"):
+            if loaded.addressing != stage:
+                continue
+            for dep in loaded.deps:
+                if isinstance(dep, ParamsDependency):
+                    for section, values in dep.read_params().items():
+                        text = json.dumps(values, sort_keys=True, default=str)
+                        found[f"params:{section}"] = hashlib.md5(text.encode()).hexdigest()
+                else:
+                    found[str(dep.def_path)] = path_hash(Path(dep.fs_path))
+    return found
+
+
+@cache
+def current_inputs() -> dict[str, str]:
+    """The inputs of the stage that DVC runs in this process; empty when it was started by hand."""
+    stage = os.environ.get("DVC_STAGE")
+    return stage_inputs(stage) if stage else {}
+
+
+@cache
+def git_sha() -> str:
+    """The commit of the code, "-dirty" at the end where tracked files differ; "unknown" outside git."""
+    here = Path(__file__).resolve().parent
+    git = ["git", "-C", str(here)]
+    try:
+        sha = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+        dirty = subprocess.run([*git, "status", "--porcelain", "-uno"], capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return sha + ("-dirty" if dirty.stdout.strip() else "")

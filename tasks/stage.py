@@ -1,0 +1,193 @@
+"""What every stage shares: its command line, its parameters, outputs that appear whole or not at all.
+
+A stage's module reads:
+
+    def main(cluster: str, round: int) -> None:      # options --cluster and --round; no parameters, no options
+        config = load("experts", ExpertConfig)       # the section of params.yaml, checked
+        with output_folder(f"models/experts/r{round}/{cluster}") as folder:
+            ...                                      # write into `folder`; it is renamed at the end
+        log_run("experts", cluster=cluster, round=round, params=config, metrics={...}, curve=..., artifacts=[...])
+
+    if __name__ == "__main__":
+        run_stage(main)
+"""
+
+import argparse
+import hashlib
+import inspect
+import os
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from tasks.params import load
+
+__all__ = ["load", "log_run", "output_file", "output_folder", "run_stage", "scratch"]
+
+SCRATCH = Path(".scratch")
+_used_scratch: set[Path] = set()
+
+
+def run_stage(main: Callable[..., object], argv: list[str] | None = None) -> None:
+    """Run a stage's `main` from the command line and leave the process with its status.
+
+    The parameters of `main` become options (`cluster: str` is `--cluster`, `round: int` is `--round`). Bad input
+    and a full disk end in one line on standard error and status 2; any other exception keeps its traceback.
+    """
+    options = _parser(main).parse_args(argv)
+    _end_with_parent()
+    try:
+        main(**vars(options))
+    except BadInput as error:
+        print(error, file=sys.stderr, flush=True)
+        raise SystemExit(EXIT_BAD_INPUT) from None
+    except OSError as error:
+        line = disk_line(error)
+        if line is None:
+            raise
+        print(line, file=sys.stderr, flush=True)
+        raise SystemExit(EXIT_BAD_INPUT) from None
+    for folder in _used_scratch:
+        shutil.rmtree(folder, ignore_errors=True)
+    _used_scratch.clear()
+
+
+def disk_line(error: OSError) -> str | None:
+    """The one line for a full disk or a folder without write access; None for any other error."""
+    import errno
+
+    place = error.filename or Path.cwd()
+    came = {errno.ENOSPC: "no space left", errno.EDQUOT: "quota used up", errno.EROFS: "a read-only disk"}
+    came[errno.EACCES] = "no permission to write"
+    if error.errno not in came:
+        return None
+    wanted = "a disk that takes the stage's output"
+    return str(BadInput(place, wanted, came[error.errno], "Free some space or choose another folder, then run again."))
+
+
+def _parser(main: Callable[..., object]) -> argparse.ArgumentParser:
+    module = inspect.getmodule(main)
+    name = getattr(getattr(module, "__spec__", None), "name", None) or main.__module__
+    summary = (module.__doc__ or "").strip().splitlines()[0] if module and module.__doc__ else None
+    parser = argparse.ArgumentParser(prog=f"python -m {name}", description=summary)
+    for parameter in inspect.signature(main).parameters.values():
+        kind = int if parameter.annotation in (int, "int") else str
+        required = parameter.default is inspect.Parameter.empty
+        default = None if required else parameter.default
+        flag = "--" + parameter.name.rstrip("_").replace("_", "-")
+        parser.add_argument(flag, dest=parameter.name, type=kind, required=required, default=default)
+    return parser
+
+
+def _end_with_parent() -> None:
+    """Under DVC, end when DVC is killed: otherwise a second run would meet this one still writing."""
+    parent = os.getppid()
+    if "DVC_STAGE" not in os.environ or parent == 1:
+        return
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        print("the process that started this stage is gone: ending", file=sys.stderr, flush=True)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def output_folder(path: str | Path) -> Iterator[Path]:
+    """A folder to write a stage's output into: it takes the place of `path` at the end, whole, or never."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    fresh = target.parent / f".{target.name}.writing"
+    shutil.rmtree(fresh, ignore_errors=True)
+    fresh.mkdir()
+    try:
+        yield fresh
+    except BaseException:
+        shutil.rmtree(fresh, ignore_errors=True)
+        raise
+    if target.exists():
+        old = target.parent / f".{target.name}.old"
+        shutil.rmtree(old, ignore_errors=True)
+        target.rename(old)
+        fresh.rename(target)
+        shutil.rmtree(old)
+    else:
+        fresh.rename(target)
+
+
+@contextmanager
+def output_file(path: str | Path) -> Iterator[Path]:
+    """The same for a single file; the name to write to keeps the suffix."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    fresh = target.parent / f".writing-{target.name}"
+    try:
+        yield fresh
+        fresh.replace(target)
+    finally:
+        fresh.unlink(missing_ok=True)
+
+
+def scratch(stage: str, *inputs: object) -> Path:
+    """The folder for checkpoints that survive a kill: `.scratch/<stage>/`.
+
+    It is emptied here when what the stage reads has changed since (DVC's dependencies when DVC runs the stage, else
+    `inputs`: paths and configurations), and removed by `run_stage` when the stage completes.
+
+    Args:
+        stage: a name of its own for each instance, such as "experts-r0-c1".
+        inputs: paths or configurations that the checkpoint depends on, where DVC does not say so.
+    """
+    folder = SCRATCH / stage
+    key = _inputs_key(inputs)
+    stamp = folder / ".inputs"
+    if folder.exists() and (not stamp.exists() or stamp.read_text() != key):
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    stamp.write_text(key)
+    _used_scratch.add(folder)
+    return folder
+
+
+def _inputs_key(inputs: tuple[object, ...]) -> str:
+    from tasks.lineage import current_inputs, path_hash
+
+    parts = [f"{name} {value}" for name, value in sorted(current_inputs().items())]
+    for item in inputs:
+        parts.append(path_hash(item) if isinstance(item, Path) else repr(item))
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def log_run(
+    stage: str,
+    *,
+    cluster: str | None = None,
+    round: int | None = None,
+    params: object = None,
+    metrics: dict[str, float] | None = None,
+    curve: Path | None = None,
+    artifacts: list[Path] | tuple[Path, ...] = (),
+    tags: dict[str, str] | None = None,
+) -> None:
+    """Write the stage's run to MLflow: parameters, numbers, learning curve, files, and what it was made from.
+
+    Args:
+        stage: the stage's name.
+        cluster: the cluster, where the stage has one.
+        round: the round, where the stage has one.
+        params: the configuration (dataclass or mapping); nested fields are flattened with dots.
+        metrics: final numbers.
+        curve: a CSV file whose first column is the step and each other one a metric.
+        artifacts: files or folders to keep beside the run.
+        tags: anything else worth searching for.
+    """
+    from tasks import registry
+
+    registry.log_run(stage, cluster, round, params, metrics or {}, curve, list(artifacts), tags or {})
