@@ -1,0 +1,1 @@
+"""Networks and how they learn: PPO experts, the delta action, the generalist."""

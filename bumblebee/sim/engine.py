@@ -1,0 +1,66 @@
+"""The simulator as the rest of the code sees it: many robots, stepped together at the control rate.
+
+Everything is float32 torch, batch first; the order of joints is `joint_names()`, of key bodies `KEY_BODIES`.
+"""
+
+from dataclasses import dataclass, fields
+from typing import Protocol
+
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class RobotState:
+    """What B robots' sensors and forward kinematics say at one control tick.
+
+    `root_pos_w` (B, 3) m and `root_quat_w` (B, 4) wxyz are the pelvis in the world; `root_lin_vel_b` (B, 3) m/s and
+    `root_ang_vel_b` (B, 3) rad/s its velocity in its own frame; `joint_pos` (B, J) rad and `joint_vel` (B, J) rad/s;
+    `key_pos_w` (B, 14, 3) m the key bodies' origins in the world.
+    """
+
+    root_pos_w: Tensor
+    root_quat_w: Tensor
+    root_lin_vel_b: Tensor
+    root_ang_vel_b: Tensor
+    joint_pos: Tensor
+    joint_vel: Tensor
+    key_pos_w: Tensor
+
+    def __getitem__(self, ids: Tensor) -> "RobotState":
+        """The state of some of the robots."""
+        return RobotState(**{f.name: getattr(self, f.name)[ids] for f in fields(self)})
+
+
+class Engine(Protocol):
+    """B independent robots on a floor; `num_worlds` of them, stepped by `control_dt` seconds a call."""
+
+    num_worlds: int
+    control_dt: float
+
+    def reset(self, ids: Tensor, qpos: Tensor, qvel: Tensor, targets: Tensor) -> None:
+        """Put the robots `ids` (n,) at qpos (n, 7 + J), qvel (n, 6 + J), as if `targets` (n, J) had long been held.
+
+        qpos is root position, orientation wxyz, joints; qvel is root velocity in the world, angular velocity in the
+        base frame, joints (MuJoCo's convention).
+        """
+
+    def step(self, targets: Tensor) -> None:
+        """Hold the joint targets (B, J) [rad] for one control period."""
+
+    def state(self) -> RobotState:
+        """Sensors and key bodies now; the tensors are the caller's to keep."""
+
+    def torque(self) -> Tensor:
+        """Motor torques (B, J) [N m] of the last physics step."""
+
+    def foot_force_w(self) -> Tensor:
+        """Contact force of the floor on each foot, (B, 2, 3) [N] in the world, left then right."""
+
+    def foot_quat_w(self) -> Tensor:
+        """Orientation of each foot, (B, 2, 4) wxyz, left then right."""
+
+    def push(self, velocity_w: Tensor) -> None:
+        """Add velocity_w (B, 3) [m/s] to the roots' velocity."""
+
+    def unstable(self) -> Tensor:
+        """Worlds (B,) bool whose state stopped being a number in the last step; they must be reset."""

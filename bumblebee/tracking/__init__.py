@@ -1,0 +1,1 @@
+"""The task: follow a reference motion. Observations, rewards, terminations, sampling, and the environment."""

@@ -1,0 +1,87 @@
+"""What the policy sees: the robot, the reference one control step ahead, and the difference, all in the base frame.
+
+Everything here is computable on the robot from orientation, gyro, odometry (velocity, position), encoders and forward
+kinematics; nothing depends on the heading or the place in the world (paper, section 3.2: proprioception and goal).
+"""
+
+import torch
+from torch import Tensor
+
+from bumblebee.robot.facts import KEY_BODIES
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.rotations import conjugate, matrix, multiply, rotate_inverse
+from bumblebee.tracking.library import ReferenceFrame
+
+_PELVIS = KEY_BODIES.index("pelvis")
+_OTHERS = [i for i in range(len(KEY_BODIES)) if i != _PELVIS]
+
+
+def layout(joints: int = 23, ahead: int = 0) -> list[tuple[str, int]]:
+    """Names and sizes of the parts of the observation in order; `ahead` is the number of further reference frames."""
+    keys = len(KEY_BODIES)
+    parts = [
+        ("gravity_b", 3),
+        ("root_lin_vel_b", 3),
+        ("root_ang_vel_b", 3),
+        ("root_height", 1),
+        ("joint_pos", joints),
+        ("joint_vel", joints),
+        ("last_action", joints),
+        ("key_pos_b", 3 * (keys - 1)),
+        ("key_error_b", 3 * keys),
+        ("ref_rotation", 6),
+        ("ref_lin_vel_b", 3),
+        ("ref_ang_vel", 3),
+        ("ref_height", 1),
+        ("ref_joint_pos", joints),
+        ("ref_joint_vel", joints),
+    ]
+    for i in range(1, ahead + 1):
+        parts += [(f"ahead{i}_root_pos_b", 3), (f"ahead{i}_rotation", 6), (f"ahead{i}_joint_pos", joints)]
+    return parts
+
+
+def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tensor:
+    """Observation (B, D), parts as in `layout`.
+
+    Args:
+        state: the robots now.
+        ref: the reference at the end of the coming control period (frame t+1), with its frames further ahead.
+        last_action: (B, J) the policy's previous output, zeros at the start.
+    """
+    quat = state.root_quat_w
+    inverse = conjugate(quat)
+    to_base = matrix(inverse)  # (B, 3, 3)
+    keys_b = (state.key_pos_w - state.root_pos_w[:, None]) @ to_base.mT
+    error_b = (ref.key_pos_w - state.key_pos_w) @ to_base.mT
+    parts = [
+        -to_base[:, :, 2],
+        state.root_lin_vel_b,
+        state.root_ang_vel_b,
+        state.root_pos_w[:, 2:],
+        state.joint_pos,
+        state.joint_vel,
+        last_action,
+        keys_b[:, _OTHERS].flatten(1),
+        error_b.flatten(1),
+        _six(multiply(inverse, ref.root_quat_w)),
+        rotate_inverse(quat, ref.root_lin_vel_w),
+        ref.root_ang_vel_b,
+        ref.root_pos_w[:, 2:],
+        ref.joint_pos,
+        ref.joint_vel,
+    ]
+    for i in range(ref.ahead):
+        shift_b = ((ref.ahead_root_pos_w[:, i] - state.root_pos_w)[:, None] @ to_base.mT)[:, 0]
+        parts += [shift_b, _six(multiply(inverse, ref.ahead_root_quat_w[:, i])), ref.ahead_joint_pos[:, i]]
+    return torch.cat(parts, dim=-1)
+
+
+def joint_targets(ref: ReferenceFrame, action: Tensor, scale: Tensor) -> Tensor:
+    """Targets (B, J) [rad] of the position servos: the reference one step ahead plus scale (J,) [rad] times action."""
+    return ref.joint_pos + scale * action
+
+
+def _six(quat: Tensor) -> Tensor:
+    """First two columns of the rotation matrix, (B, 6): continuous, unlike the quaternion."""
+    return matrix(quat)[..., :2].flatten(-2)
