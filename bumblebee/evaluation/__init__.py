@@ -1,0 +1,1 @@
+"""Evaluation: success rate, MPJPE, MPKPE with intervals, under one frozen and hashed contract."""
