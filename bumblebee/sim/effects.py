@@ -1,0 +1,81 @@
+"""Effects that a model may lack: one import for the catalogue, `effects.yaml`, native MJCF and runtime hooks.
+
+Values are absolute (N m, kg, s, rad ...), so that the effects applied to the declared model *are* the corrected
+model; `motor_strength`, `kp` and `kd` alone are factors on the declared gains.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from bumblebee.errors import BadInput
+from bumblebee.sim.effect_catalogue import CATALOGUE, Effect, Kind, single
+from bumblebee.sim.effect_hooks import RuntimeHooks, runtime_hooks
+from bumblebee.sim.effect_spec import add_to_spec
+
+__all__ = [
+    "CATALOGUE",
+    "Effect",
+    "Kind",
+    "RuntimeHooks",
+    "add_to_spec",
+    "read_effects",
+    "runtime_hooks",
+    "single",
+    "write_effects",
+]
+
+
+def write_effects(path: Path, effects: Sequence[Effect]) -> None:
+    """Write `effects.yaml`; it appears whole or not at all."""
+    path = Path(path)
+    entries = [{"effect": e.effect, "where": list(e.where), "parameters": dict(e.parameters)} for e in effects]
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary.write_text(yaml.safe_dump({"schema": 1, "effects": entries}, sort_keys=False))
+    os.replace(temporary, path)
+
+
+def read_effects(path: Path) -> list[Effect]:
+    """Read `effects.yaml`; a key, an id or a value that is not the catalogue's is named in a `BadInput`."""
+    try:
+        document = yaml.safe_load(Path(path).read_text())
+    except FileNotFoundError:
+        raise BadInput(path, "an effects file", "no such file") from None
+    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
+        raise BadInput(path, "YAML of plain values", type(error).__name__, "Write it with `bumblebee diagnose`.") from None
+    _only_keys(path, document, {"schema", "effects"})
+    if document.get("schema") != 1:
+        raise BadInput(f"{path}: schema", "1", repr(document.get("schema")))
+    entries = document.get("effects")
+    if not isinstance(entries, list):
+        raise BadInput(f"{path}: effects", "a list", type(entries).__name__)
+    return [_effect(f"{path}: effects[{i}]", entry) for i, entry in enumerate(entries)]
+
+
+def _only_keys(where: object, table: Any, keys: set[str]) -> None:  # noqa: ANN401 (whatever YAML holds)
+    if not isinstance(table, dict):
+        raise BadInput(where, f"a mapping with keys {sorted(keys)}", type(table).__name__)
+    if unknown := sorted(str(key) for key in table if key not in keys):
+        raise BadInput(where, f"only the keys {sorted(keys)}", f"unknown key {unknown[0]!r}")
+
+
+def _effect(where: str, entry: Any) -> Effect:  # noqa: ANN401 (whatever YAML holds)
+    _only_keys(where, entry, {"effect", "where", "parameters"})
+    name = entry.get("effect")
+    if not isinstance(name, str) or name not in CATALOGUE:
+        raise BadInput(f"{where}: effect", f"one of {sorted(CATALOGUE)}", repr(name)[:80])
+    places = entry.get("where")
+    if not isinstance(places, list) or not places or not all(isinstance(place, str) for place in places):
+        raise BadInput(f"{where}: where", f"a list of {CATALOGUE[name].on} names", repr(places)[:80])
+    kind = CATALOGUE[name]
+    _only_keys(f"{where}: parameters", entry.get("parameters"), {kind.parameter})
+    value = entry["parameters"].get(kind.parameter)
+    number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if not number or not kind.lower <= value <= kind.upper:
+        expected = f"a number from {kind.lower:g} to {kind.upper:g} {kind.unit}".strip()
+        raise BadInput(f"{where}: parameters.{kind.parameter}", expected, repr(value)[:80])
+    return Effect(name, tuple(places), {kind.parameter: float(value)})
