@@ -27,8 +27,8 @@ class RuntimeHooks:
 
 def runtime_hooks(effects: Sequence[Effect], model: mujoco.MjModel) -> RuntimeHooks:
     """The hooks that `effects` need on `model`."""
-    scalar = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-    names = tuple(model.joint(j).name for j in range(model.njnt) if model.jnt_type[j] in scalar)
+    scalar = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+    names = tuple(model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) in scalar)
     offset = np.zeros(len(names))
     for effect in effects:
         for place in effect.where if effect.effect == "encoder_offset" else ():
