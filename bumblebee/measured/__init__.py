@@ -1,1 +1,1 @@
-"""Measured rollouts: the contract's files, importers for other layouts, checks, and the intake that sets bad files aside."""
+"""Measured rollouts: the contract's files, importers, checks, and an intake that sets bad files aside."""

@@ -1,0 +1,53 @@
+"""Every check of the contract on one rollout, in an order in which each may rely on the ones before it."""
+
+from typing import Any
+
+import mujoco
+
+from bumblebee.measured.checks_base import check_base
+from bumblebee.measured.checks_order import check_names, check_order, check_response, check_velocity
+from bumblebee.measured.checks_time import check_time
+from bumblebee.measured.checks_units import check_degrees, check_gains
+from bumblebee.measured.checks_values import check_finite, check_frozen, check_range, check_steps
+from bumblebee.measured.finding import Finding
+from bumblebee.measured.rollout import Rollout
+from bumblebee.measured.thresholds import Thresholds
+from bumblebee.measured.view import View
+
+__all__ = ["Finding", "Thresholds", "check_rollout"]
+
+
+def check_rollout(
+    rollout: Rollout,
+    model: mujoco.MjModel,
+    contract: dict[str, Any] | None = None,
+    file: str = "",
+    limits: Thresholds | None = None,
+) -> list[Finding]:
+    """All findings on one rollout.
+
+    Args:
+        rollout: as read from its file.
+        model: the declared model.
+        contract: the deployed policy's contract.json (`joints`, `kp`, `kd`), where there is one.
+        file: the name that the findings carry; the rollout's own by default.
+        limits: what still passes.
+    """
+    view = View(file or f"{rollout.rollout_id}.parquet", rollout, model, contract, limits or Thresholds())
+    check_names(view)
+    check_finite(view)
+    check_gains(view)
+    if view.found("finite", "time"):
+        return view.findings
+    check_time(view)
+    if view.found("time-order") or view.found("time-duplicate") or view.found("finite") or rollout.frames < 4:
+        return view.findings
+    check_degrees(view)
+    check_frozen(view)
+    check_range(view)
+    check_velocity(view)
+    check_steps(view)
+    check_order(view)
+    check_response(view)
+    check_base(view)
+    return view.findings

@@ -1,0 +1,71 @@
+"""The limits of the checks, each with its reason. They leave room for sensor noise, falls and vigorous motion."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What still passes. Usual noise: joint_pos 5e-4 rad, joint_vel 0.02 rad/s, gyro 0.01 rad/s, quaternion 0.002."""
+
+    gap_warn: float = 1.8
+    """Periods between two rows: from here on a tick is missing. Loggers wander by less than half a period."""
+    gap_fatal: float = 5.0
+    """Periods: from here on no one knows which commands the robot got in between (0.1 s at 50 Hz)."""
+    gap_share_fatal: float = 0.05
+    """Share of the file's ticks that may be missing in all before it is not one rollout any more."""
+    jitter_warn: float = 0.15
+    """Spread of the period over its median (gaps left out): control loops on Linux reach 5 %."""
+    jitter_fatal: float = 0.6
+    """Spread at which a held command cannot be placed in time."""
+    rate_warn: float = 0.02
+    """Relative error of the rate: a real arm's logger ran at 49.85 Hz for 50 Hz, 0.3 %."""
+    rate_fatal: float = 0.1
+    """Relative error of the rate from which the metadata are wrong rather than rounded."""
+    freeze_seconds: float = 0.4
+    """An exactly constant reading for this long, at least 10 rows, is a dead channel if its command moves."""
+    freeze_command: float = 0.15
+    """Motion of the target [rad] that no servo answers with an unchanged encoder reading."""
+    freeze_speed: float = 0.3
+    """Mean reported speed [rad/s] during which a position cannot stay the same."""
+    step_speed: float = 8.0
+    """Speed [rad/s] that may hide between two rows without showing in joint_vel (impacts in falls)."""
+    step_floor: float = 0.08
+    """Smallest jump [rad] that is called one, whatever the rate."""
+    speed_limit: float = 60.0
+    """No joint of a legged robot or arm turns faster [rad/s]; the fastest G1 motor is rated at 37."""
+    range_brief: float = 0.2
+    """Beyond the range [rad] at any moment: falls press simulated soft stops in by up to 0.17."""
+    range_held: float = 0.05
+    """Beyond the range [rad] throughout half a second: no stop gives way so long, a zero off by 3 degrees shows."""
+    range_fatal: float = 0.35
+    """Beyond the range [rad]: no calibration error, a wrong column, unit or zero."""
+    moving_speed: float = 0.15
+    """Mean speed over 40 ms [rad/s, rms] from which velocity and derivative can be compared."""
+    velocity_correlation_warn: float = 0.7
+    """Correlation of displacement and integrated velocity; a real servo with 0.077 rad/s steps gives above it."""
+    velocity_correlation_fatal: float = 0.3
+    """Below it the velocity belongs to another joint or to nothing."""
+    velocity_scale_warn: float = 1.5
+    """Factor between displacement and integrated velocity, either way: filters and coarse steps stay within."""
+    velocity_scale_fatal: float = 2.5
+    """Factor from which the unit is wrong."""
+    response_z: float = 8.0
+    """Standard errors by which a joint's response must oppose its command to be called reversed."""
+    response_correlation: float = -0.3
+    """Correlation of command and position changes below which a response may be called reversed."""
+    order_gain: float = 0.5
+    """Share of the tracking error that must remain when the columns are exchanged, to call them exchanged."""
+    order_error: float = 0.08
+    """Tracking error [rad] below which exchanged columns cannot be told from good tracking."""
+    norm_warn: float = 0.02
+    """Deviation of a quaternion's norm from 1; noise of 0.002 stays ten times below."""
+    norm_fatal: float = 0.1
+    """Norm error of a vector that is no unit quaternion."""
+    frame_gain: float = 0.4
+    """Share of the squared mismatch that must remain under another reading (frame, order) for it to be called so."""
+    turn_floor: float = 0.01
+    """Rotation over 0.2 s [rad, rms] that quaternion noise alone cannot make."""
+    drift_floor: float = 0.05
+    """Mismatch of velocities [m/s, rms] below which frames are not told apart."""
+    gains_relative: float = 0.02
+    """Relative difference of gains: rounding in a file is smaller, a changed gain larger."""
