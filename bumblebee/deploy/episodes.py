@@ -1,0 +1,178 @@
+"""Runs policies on robots, one clip each, and records what the sensors said: the measured rollouts."""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.deploy.robots import CONTROL_HZ, Robots
+from bumblebee.deploy.runner import PolicyRunner
+from bumblebee.deploy.sensors import SensorNoise, Sensors, add_noise, draws
+from bumblebee.measured.rollout import Rollout
+from bumblebee.motion import quaternions
+from bumblebee.motion.clip import Clip, velocities
+from bumblebee.motion.kinematics import sole_points
+from bumblebee.robot.facts import joint_names
+from bumblebee.robot.model import gains
+from bumblebee.robot.facts import joints as robot_joints
+
+FALL_TILT = np.radians(60)  # of the pelvis' up axis against the reference's
+FALL_DROP = 0.35  # m: of the pelvis below the reference's
+MAX_LIFT = 0.10  # m: a start is lifted or lowered by no more than this to stand on the floor
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One policy on one clip from one seed."""
+
+    rollout_id: str
+    """Name of the rollout; unique in a run."""
+    policy: str
+    """Key of the policy among those given to `run_episodes`."""
+    motion: str
+    """Name of the clip."""
+    seed: int
+    """Of the start state and the sensor noise; the same seed and motion give the same draws whatever runs beside."""
+    meta: dict[str, Any] = field(default_factory=dict)
+    """Further fields of the rollout's metadata (cluster, operator, ...)."""
+
+
+@dataclass(frozen=True)
+class StartNoise:
+    """Standard deviation of the start state around the clip's first frame."""
+
+    joint_pos: float = 0.01
+    """[rad]"""
+    joint_vel: float = 0.05
+    """[rad/s]"""
+
+
+def run_episodes(
+    make_robots: Callable[[int], Robots],
+    episodes: Sequence[Episode],
+    policies: dict[str, ExportedPolicy],
+    clips: dict[str, Clip],
+    noise: SensorNoise,
+    start: StartNoise | None = None,
+    on_tick: Callable[[int], None] = lambda ended: None,
+) -> list[Rollout]:
+    """Run all episodes side by side and return their rollouts in order; a robot that falls stops there.
+
+    Args:
+        make_robots: robots for a number of episodes.
+        episodes: what to run.
+        policies: by the episodes' keys.
+        clips: by name, 50 frames a second.
+        noise: on what the policy and the log get.
+        start: noise of the start state.
+        on_tick: told after each control tick how many robot ticks were simulated in it.
+    """
+    robots = make_robots(len(episodes))
+    own = [clips[episode.motion] for episode in episodes]
+    lengths = np.array([clip.frames for clip in own])
+    rngs = [_generator(episode) for episode in episodes]
+    qpos, qvel = start_states(own, rngs, start or StartNoise())
+    robots.reset(qpos, qvel, qpos[:, 7:])
+    normal = [rng.standard_normal((clip.frames, draws(qpos.shape[1] - 7))) for rng, clip in zip(rngs, own, strict=True)]
+    groups = _groups(episodes, policies, own)
+    log, ended = _Log(len(episodes)), np.zeros(len(episodes), dtype=bool)
+    for tick in range(int(lengths.max())):
+        alive = np.flatnonzero(~ended & (tick < lengths))
+        true = robots.read()
+        fallen = alive[_fallen(true, [own[i] for i in alive], alive, tick)] if tick else alive[:0]
+        ended[fallen] = True
+        alive = np.setdiff1d(alive, fallen)
+        if not len(alive):
+            break
+        sensors = add_noise(true[alive], noise, np.stack([normal[i][tick] for i in alive]))
+        action, target = _act(groups, alive, tick, sensors)
+        log.add(alive, sensors, action, target)
+        robots.step(alive, target)
+        on_tick(len(alive))
+    return [log.rollout(i, episode, policies[episode.policy], clips[episode.motion]) for i, episode in enumerate(episodes)]
+
+
+def start_states(clips: Sequence[Clip], rngs: Sequence[np.random.Generator], noise: StartNoise) -> tuple[np.ndarray, np.ndarray]:
+    """Start states at the clips' first frames with noise on the joints, soles on the floor: qpos (B, 7+J), qvel (B, 6+J).
+
+    A clip whose first frame is further than 10 cm from the floor (it starts in the air) is left where it is.
+    """
+    first = [velocities(clip) for clip in clips]
+    joints = np.stack([clip.joint_pos[0] for clip in clips]).astype(np.float64)
+    speed = np.stack([v.joint_vel[0] for v in first]).astype(np.float64)
+    joints += noise.joint_pos * np.stack([rng.standard_normal(joints.shape[1]) for rng in rngs])
+    speed += noise.joint_vel * np.stack([rng.standard_normal(joints.shape[1]) for rng in rngs])
+    ranges = np.array([joint.range for joint in robot_joints()])
+    joints = np.clip(joints, ranges[:, 0], ranges[:, 1])
+    place = np.stack([clip.root_pos[0] for clip in clips]).astype(np.float64)
+    quat = quaternions.normalised(np.stack([clip.root_quat[0] for clip in clips]).astype(np.float64))
+    height = sole_points(place, quat, joints)[..., 2].min(axis=(1, 2))
+    place[:, 2] -= np.where(np.abs(height) <= MAX_LIFT, height, 0.0)
+    root = [np.stack([getattr(v, name)[0] for v in first]) for name in ("root_lin_vel_w", "root_ang_vel_b")]
+    return np.concatenate([place, quat, joints], axis=1), np.concatenate([*root, speed], axis=1)
+
+
+class _Log:
+    """Rows of all robots, tick by tick."""
+
+    def __init__(self, count: int) -> None:
+        self._rows: list[list[dict[str, np.ndarray]]] = [[] for _ in range(count)]
+
+    def add(self, robots: np.ndarray, sensors: Sensors, action: np.ndarray, target: np.ndarray) -> None:
+        columns = {f.name: getattr(sensors, f.name) for f in fields(sensors)} | {"action": action, "joint_target": target}
+        for row, robot in enumerate(robots):
+            self._rows[robot].append({name: values[row] for name, values in columns.items()})
+
+    def rollout(self, robot: int, episode: Episode, policy: ExportedPolicy, clip: Clip) -> Rollout:
+        rows = self._rows[robot]
+        stacked = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+        servo = [gains(joint) for joint in robot_joints()]
+        meta = {
+            "robot": policy.contract.get("robot", "g1_23dof"),
+            "kp": [kp for kp, _ in servo],
+            "kd": [kd for _, kd in servo],
+            "motion": clip.name,
+            "policy": {"name": episode.policy, "version": "", "sha256": policy.sha256},
+            **episode.meta,
+        }
+        time = np.arange(len(rows)) / CONTROL_HZ
+        return Rollout(episode.rollout_id, joint_names(), CONTROL_HZ, time, meta=meta, **stacked)
+
+
+def _groups(episodes: Sequence[Episode], policies: dict[str, ExportedPolicy], clips: list[Clip]) -> list[tuple[np.ndarray, PolicyRunner]]:
+    """Episodes by policy: their indices and a runner over them."""
+    members: dict[str, list[int]] = {}
+    for index, episode in enumerate(episodes):
+        members.setdefault(episode.policy, []).append(index)
+    return [(np.array(ids), PolicyRunner(policies[key], [clips[i] for i in ids])) for key, ids in members.items()]
+
+
+def _act(groups: list, alive: np.ndarray, tick: int, sensors: Sensors) -> tuple[np.ndarray, np.ndarray]:
+    """Actions and targets (n, J) of the living robots, each by its own policy."""
+    action, target = np.zeros_like(sensors.joint_pos), np.zeros_like(sensors.joint_pos)
+    for ids, runner in groups:
+        rows = np.flatnonzero(np.isin(alive, ids))
+        if len(rows):
+            inside = np.searchsorted(ids, alive[rows])
+            action[rows], target[rows] = runner.step(inside, tick, sensors[rows])
+    return action, target
+
+
+def _fallen(true: Sensors, clips: list[Clip], robots: np.ndarray, tick: int) -> np.ndarray:
+    """Which of the robots lie or are no longer numbers: (n,) bool."""
+    if not len(robots):
+        return np.zeros(0, dtype=bool)
+    quat, height = true.base_quat[robots], true.base_pos[robots, 2]
+    wanted = np.stack([clip.root_quat[tick] for clip in clips])
+    up = np.array([0.0, 0.0, 1.0])
+    cosine = np.sum(quaternions.rotate(quat, up) * quaternions.rotate(wanted, up), axis=1)
+    drop = np.array([clip.root_pos[tick, 2] for clip in clips]) - height
+    return ~((cosine > np.cos(FALL_TILT)) & (drop < FALL_DROP))
+
+
+def _generator(episode: Episode) -> np.random.Generator:
+    digest = hashlib.sha256(f"{episode.motion}/{episode.seed}".encode()).digest()
+    return np.random.default_rng(int.from_bytes(digest[:8], "little"))

@@ -1,0 +1,129 @@
+"""A policy as it is deployed: the ONNX file and the contract that says what goes in and out."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bumblebee.errors import BadInput
+from bumblebee.robot.facts import joint_names
+from bumblebee.tracking.observations import layout
+
+if TYPE_CHECKING:
+    import onnxruntime
+
+_REQUIRED = ("joints", "kp", "kd", "control_hz", "action", "observation", "onnx_sha256")
+
+
+@dataclass(frozen=True)
+class ExportedPolicy:
+    """An exported policy; `load` is the only way in, so that what runs is what the contract describes."""
+
+    folder: Path
+    """Where policy.onnx and contract.json lie."""
+    contract: dict[str, Any]
+    """contract.json."""
+    session: "onnxruntime.InferenceSession"
+    """One thread; input "obs" (N, D), output "actions" (N, J)."""
+
+    @classmethod
+    def load(cls, folder: Path) -> "ExportedPolicy":
+        """Load and check a policy folder: the file's hash, joint order and observation layout must be this code's."""
+        import onnxruntime
+
+        folder = Path(folder)
+        contract = read_policy_contract(folder / "contract.json")
+        model = _read(folder / "policy.onnx")
+        actual = hashlib.sha256(model).hexdigest()
+        if actual != contract["onnx_sha256"]:
+            raise BadInput(
+                f"{folder / 'policy.onnx'}: sha256",
+                f"{str(contract['onnx_sha256'])[:12]} as in contract.json",
+                actual[:12],
+                "Export the policy again.",
+            )
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 3
+        try:
+            session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+        except Exception as error:  # onnxruntime raises its own types for a file that is no model
+            raise BadInput(folder / "policy.onnx", "an ONNX model", str(error)) from None
+        policy = cls(folder, contract, session)
+        _check_sizes(policy)
+        return policy
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the exported file."""
+        return str(self.contract["onnx_sha256"])
+
+    @property
+    def scale(self) -> np.ndarray:
+        """(J,) [rad] of joint target per unit of action."""
+        return np.asarray(self.contract["action"]["scale"], dtype=np.float64)
+
+    @property
+    def ahead(self) -> int:
+        """Number of further reference frames in the observation."""
+        return ahead_frames(self.contract)
+
+    def act(self, obs: np.ndarray) -> np.ndarray:
+        """Actions (N, J) for observations (N, D), float32."""
+        return self.session.run(["actions"], {"obs": np.ascontiguousarray(obs, dtype=np.float32)})[0]
+
+
+def read_policy_contract(path: Path) -> dict[str, Any]:
+    """Read and check contract.json: keys, joint order and observation layout."""
+    try:
+        contract = json.loads(_read(path))
+    except ValueError as error:
+        raise BadInput(path, "JSON", str(error)) from None
+    missing = [key for key in _REQUIRED if key not in contract] if isinstance(contract, dict) else list(_REQUIRED)
+    if missing:
+        raise BadInput(f"{path}: field {missing[0]}", "a policy contract", "no such field", "Export the policy again.")
+    _check_joints(path, contract)
+    expected = [[name, size] for name, size in layout(len(contract["joints"]), ahead_frames(contract))]
+    came = [[part["name"], part["size"]] for part in contract["observation"]]
+    for index in range(max(len(expected), len(came))):
+        one, other = (parts[index] if index < len(parts) else None for parts in (expected, came))
+        if one != other:
+            raise BadInput(f"{path}: observation[{index}]", str(one), str(other), "Export it with this version.")
+    return contract
+
+
+def ahead_frames(contract: dict[str, Any]) -> int:
+    """Number of further reference frames that the contract's observation holds."""
+    return sum(str(part["name"]).startswith("ahead") and str(part["name"]).endswith("_root_pos_b") for part in contract["observation"])
+
+
+def _check_joints(path: Path, contract: dict[str, Any]) -> None:
+    expected, came = list(joint_names()), list(contract["joints"])
+    if came != expected:
+        index = next((i for i, pair in enumerate(zip(expected, came, strict=False)) if pair[0] != pair[1]), min(len(expected), len(came)))
+        one, other = (names[index] if index < len(names) else "nothing" for names in (expected, came))
+        raise BadInput(f"{path}: joints[{index}]", one, other, "The policy was made for another robot or joint order.")
+    for field, values in (("kp", contract["kp"]), ("kd", contract["kd"]), ("action.scale", contract["action"]["scale"])):
+        if len(values) != len(expected):
+            raise BadInput(f"{path}: {field}", f"{len(expected)} numbers", str(len(values)))
+
+
+def _check_sizes(policy: ExportedPolicy) -> None:
+    size = sum(part["size"] for part in policy.contract["observation"])
+    inputs = {value.name: value.shape for value in policy.session.get_inputs()}
+    outputs = {value.name: value.shape for value in policy.session.get_outputs()}
+    where = policy.folder / "policy.onnx"
+    if set(inputs) != {"obs"} or inputs["obs"][-1] != size:
+        raise BadInput(f"{where}: inputs", f"obs (N, {size})", str(inputs))
+    if "actions" not in outputs or outputs["actions"][-1] != len(policy.contract["joints"]):
+        raise BadInput(f"{where}: outputs", f"actions (N, {len(policy.contract['joints'])})", str(outputs))
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise BadInput(path, "a file of an exported policy", error.strerror or str(error)) from None

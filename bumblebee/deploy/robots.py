@@ -1,0 +1,105 @@
+"""Many robots in MuJoCo behind one small face: put them somewhere, read them, hold joint targets for one tick."""
+
+from typing import Protocol
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from bumblebee.deploy.sensors import Sensors
+from bumblebee.motion import quaternions
+from bumblebee.robot.facts import FEET
+from bumblebee.robot.model import RobotConfig, build_spec
+
+CONTROL_HZ = 50.0
+
+
+class Robots(Protocol):
+    """B robots on a floor, moved by joint targets at 50 Hz."""
+
+    model: mujoco.MjModel
+
+    def reset(self, qpos: np.ndarray, qvel: np.ndarray, targets: np.ndarray) -> None:
+        """Put all robots at qpos (B, 7 + J), qvel (B, 6 + J), as if targets (B, J) had long been held."""
+
+    def read(self) -> Sensors:
+        """True readings of all B robots."""
+
+    def step(self, robots: np.ndarray, targets: np.ndarray) -> None:
+        """Hold targets (n, J) for one control period on `robots` (n,); the others stand still in time."""
+
+
+class NominalRobots:
+    """The declared model as it is trained on: position servos, 5 ms steps, no noise.
+
+    Args:
+        count: number of robots.
+        threads: of the simulation.
+    """
+
+    def __init__(self, count: int, threads: int = 2) -> None:
+        self.model = spec_with_foot_sensors(RobotConfig()).compile()
+        self.batch = Batch(self.model, count, threads)
+        self._steps = round(1.0 / CONTROL_HZ / self.model.opt.timestep)
+        self._view = BatchView(self.batch)
+
+    def reset(self, qpos: np.ndarray, qvel: np.ndarray, targets: np.ndarray) -> None:
+        """Put all robots at qpos (B, 7 + J), qvel (B, 6 + J) with their servos at targets (B, J)."""
+        self._view.reset(qpos, qvel)
+        self._view.ctrl[:] = targets
+        self.batch.forward()
+
+    def read(self) -> Sensors:
+        """True readings of all robots; torque and foot force are those of the last physics step."""
+        return self._view.sensors(self._view.actuator_force)
+
+    def step(self, robots: np.ndarray, targets: np.ndarray) -> None:
+        """Hold targets (n, J) [rad] for 20 ms on `robots` (n,)."""
+        self._view.ctrl[robots] = targets
+        self.batch.step(ids=robots, nstep=self._steps)
+
+
+class BatchView:
+    """Live arrays of a batch of G1s (free base first, then the joints) and the readings made of them."""
+
+    def __init__(self, batch: Batch) -> None:
+        self._batch = batch
+        self.qpos, self.qvel, self.ctrl = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
+        self._warm, self._sensor = batch.bind("qacc_warmstart"), batch.bind("sensordata")
+        self.actuator_force = batch.bind("actuator_force")
+
+    def reset(self, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Write the state; nothing is left of what was before."""
+        self._batch.reset()
+        self.qpos[:], self.qvel[:], self._warm[:] = qpos, qvel, 0.0
+
+    def sensors(self, joint_torque: np.ndarray) -> Sensors:
+        """True readings, with the torque that the drives report, (B, J)."""
+        quat = quaternions.normalised(self.qpos[:, 3:7])
+        return Sensors(
+            joint_pos=self.qpos[:, 7:].copy(),
+            joint_vel=self.qvel[:, 6:].copy(),
+            base_quat=quat,
+            base_ang_vel=self.qvel[:, 3:6].copy(),
+            base_lin_vel=quaternions.rotate(quaternions.conjugate(quat), self.qvel[:, :3]),
+            base_pos=self.qpos[:, :3].copy(),
+            joint_torque=joint_torque.copy(),
+            # The sensor gives the force of the foot on the floor: the contract wants that of the floor on the foot.
+            foot_force=-self._sensor[:, :6].reshape(-1, 2, 3),
+        )
+
+
+def spec_with_foot_sensors(config: RobotConfig) -> mujoco.MjSpec:
+    """The declared model with one net contact force sensor for each foot, left first, in the world frame."""
+    spec = build_spec(config)
+    for foot in FEET:
+        sensor = spec.add_sensor(
+            name=f"{foot}_force",
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            objname=foot,
+            reftype=mujoco.mjtObj.mjOBJ_GEOM,
+            refname="floor",
+        )
+        sensor.intprm[:3] = (1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1)  # force, reduced to the net force, once
+    return spec

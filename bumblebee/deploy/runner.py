@@ -1,0 +1,77 @@
+"""The policy's 50 Hz step on the robot: from sensor readings to joint targets.
+
+The observation is the training environment's own (`tracking.observations.observe`), fed with forward kinematics of the
+measured joints where the simulator would know the bodies' places.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.deploy.sensors import Sensors
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.kinematics import forward_key_positions
+from bumblebee.sim.engine import RobotState
+from bumblebee.tracking.library import AHEAD, MotionLibrary
+from bumblebee.tracking.observations import joint_targets, observe
+
+
+def robot_state(sensors: Sensors) -> RobotState:
+    """The state that the observation takes, from readings alone; key bodies by forward kinematics."""
+    keys = forward_key_positions(sensors.base_pos, sensors.base_quat, sensors.joint_pos)
+    return RobotState(
+        root_pos_w=_float(sensors.base_pos),
+        root_quat_w=_float(sensors.base_quat),
+        root_lin_vel_b=_float(sensors.base_lin_vel),
+        root_ang_vel_b=_float(sensors.base_ang_vel),
+        joint_pos=_float(sensors.joint_pos),
+        joint_vel=_float(sensors.joint_vel),
+        key_pos_w=_float(keys),
+    )
+
+
+class PolicyRunner:
+    """One policy on B robots, each following its own clip from its first frame.
+
+    Args:
+        policy: what acts.
+        clips: (B) the clip of each robot, all at the policy's rate.
+    """
+
+    def __init__(self, policy: ExportedPolicy, clips: Sequence[Clip]) -> None:
+        self.policy = policy
+        distinct = {clip.name: clip for clip in clips}
+        order = {name: index for index, name in enumerate(distinct)}
+        self._library = MotionLibrary(list(distinct.values()), ahead=look_ahead(policy))
+        self._ids = torch.tensor([order[clip.name] for clip in clips])
+        self._scale = torch.as_tensor(policy.scale, dtype=torch.float32)
+        self._dt = 1.0 / float(policy.contract["control_hz"])
+        self._last_action = torch.zeros(len(clips), len(self._scale))
+
+    def observe(self, robots: np.ndarray, tick: int, sensors: Sensors) -> Tensor:
+        """Observations (n, D) of `robots` (n,) at control tick `tick`; sensors are those of these robots."""
+        return observe(robot_state(sensors), self._reference(robots, tick), self._last_action[torch.as_tensor(robots)])
+
+    def step(self, robots: np.ndarray, tick: int, sensors: Sensors) -> tuple[np.ndarray, np.ndarray]:
+        """Actions and joint targets [rad], (n, J) each, of `robots` (n,) at control tick `tick`."""
+        action = torch.as_tensor(self.policy.act(self.observe(robots, tick, sensors).numpy()))
+        self._last_action[torch.as_tensor(robots)] = action
+        target = joint_targets(self._reference(robots, tick), action, self._scale)
+        return action.numpy().astype(np.float64), target.numpy().astype(np.float64)
+
+    def _reference(self, robots: np.ndarray, tick: int):  # noqa: ANN202 (ReferenceFrame)
+        ids = self._ids[torch.as_tensor(robots)]
+        return self._library.frames(ids, torch.full((len(robots),), (tick + 1) * self._dt))
+
+
+def look_ahead(policy: ExportedPolicy) -> tuple[float, ...]:
+    """Times [s] of the further reference frames; the contract's own where it states them."""
+    stated = policy.contract.get("ahead")
+    return tuple(stated) if stated is not None else AHEAD[: policy.ahead]
+
+
+def _float(values: np.ndarray) -> Tensor:
+    return torch.as_tensor(np.asarray(values), dtype=torch.float32)

@@ -1,0 +1,110 @@
+"""The stand-in robot, a process of its own: runs exported policies and writes measured rollouts by the contract.
+
+    python -m bumblebee.deploy.stand_in --sealed data/sealed/robot.json --policy DIR --clips LIBRARY \
+        --names squat_01 squat_02 --rollouts 2 --seed 1 --out DIR
+    python -m bumblebee.deploy.stand_in --sealed data/sealed/robot.json --clips LIBRARY --plan plan.json --out DIR
+
+It takes the robot's place: its effects are sealed in a file that nothing else reads before the loop's report.
+A plan is {"policies": {key: folder}, "episodes": [{"rollout_id", "policy", "motion", "seed", "meta"}]}.
+"""
+
+import argparse
+import json
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import mujoco
+
+from bumblebee.deploy.episodes import Episode, run_episodes
+from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.deploy.sensors import SensorNoise
+from bumblebee.deploy.stand_in_effects import read_sealed
+from bumblebee.deploy.stand_in_robots import StandInRobots
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.measured.rollout import write_rollout
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.store import read_library
+from bumblebee.progress import progress
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the process; returns its exit status."""
+    options = _options(argv)
+    mujoco.set_mju_user_warning(lambda text: None)  # a robot that falls apart is a fall, not a log file
+    try:
+        run(options)
+    except BadInput as error:
+        print(error, file=sys.stderr, flush=True)
+        return EXIT_BAD_INPUT
+    return 0
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run all episodes and write one file each."""
+    effects = read_sealed(options.sealed) if options.sealed else []
+    folders, episodes = _plan(options) if options.plan else _named(options)
+    if not episodes:
+        raise BadInput(options.plan or "--names", "at least one episode", "none")
+    policies = {key: ExportedPolicy.load(Path(folder)) for key, folder in folders.items()}
+    clips = {clip.name: clip for clip in read_library(options.clips, sorted({e.motion for e in episodes}))}
+    existing = [e.rollout_id for e in episodes if (options.out / f"{e.rollout_id}.parquet").exists()]
+    if existing:
+        raise BadInput(options.out / f"{existing[0]}.parquet", "a new file", "one that exists", "Choose another --out.")
+    total = sum(clips[e.motion].frames for e in episodes)
+    recorded = {"recorded_at": datetime.now(UTC).isoformat(timespec="seconds"), "operator": options.operator}
+    with progress(total, f"stand-in robot, {len(episodes)} rollouts", "ticks") as bar:
+        make = lambda count: StandInRobots(count, effects, options.threads)  # noqa: E731
+        rollouts = run_episodes(make, episodes, policies, clips, SensorNoise(), on_tick=bar.update)
+    for rollout in rollouts:
+        rollout.meta.update({key: value for key, value in recorded.items() if key not in rollout.meta})
+        rollout.meta["notes"] = _ending(rollout.frames, clips[rollout.meta["motion"]])
+        write_rollout(options.out / f"{rollout.rollout_id}.parquet", rollout)
+
+
+def _ending(frames: int, clip: Clip) -> str:
+    return "ran to the end" if frames == clip.frames else f"fell after {frames / clip.fps:.2f} s of {clip.duration:.2f} s"
+
+
+def _named(options: argparse.Namespace) -> tuple[dict[str, Path], list[Episode]]:
+    """Every named clip, `--rollouts` times, by one policy."""
+    if not options.policy or not options.names:
+        raise BadInput("command line", "--policy and --names, or --plan", "neither")
+    key = options.policy_name or options.policy.name
+    meta = {"cluster": options.cluster} if options.cluster else {}
+    episodes = [
+        Episode(f"{options.prefix}{name}-{run}", key, name, options.seed + run, dict(meta))
+        for name in options.names
+        for run in range(options.rollouts)
+    ]
+    return {key: options.policy}, episodes
+
+
+def _plan(options: argparse.Namespace) -> tuple[dict[str, str], list[Episode]]:
+    try:
+        plan = json.loads(options.plan.read_text())
+        return dict(plan["policies"]), [Episode(**episode) for episode in plan["episodes"]]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BadInput(options.plan, "a plan with policies and episodes", f"{type(error).__name__}: {error}") from None
+
+
+def _options(argv: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m bumblebee.deploy.stand_in", description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--sealed", type=Path, help="file of undeclared effects; without it there are none")
+    parser.add_argument("--clips", type=Path, required=True, help="motion library")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the rollouts")
+    parser.add_argument("--plan", type=Path, help="JSON file of policies and episodes")
+    parser.add_argument("--policy", type=Path, help="policy folder, where there is no plan")
+    parser.add_argument("--policy-name", default="", help="its name in the rollouts' metadata")
+    parser.add_argument("--names", nargs="+", default=[], help="clips to run")
+    parser.add_argument("--rollouts", type=int, default=1, help="rollouts of each clip")
+    parser.add_argument("--cluster", default="", help="cluster, for the metadata")
+    parser.add_argument("--prefix", default="", help="of the rollouts' names")
+    parser.add_argument("--seed", type=int, default=0, help="of start states and sensor noise")
+    parser.add_argument("--threads", type=int, default=2, help="of the simulation")
+    parser.add_argument("--operator", default="stand-in", help="for the metadata")
+    return parser.parse_args(argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
