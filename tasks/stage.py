@@ -18,14 +18,13 @@ import inspect
 import os
 import shutil
 import sys
-import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from tasks.params import load
+from tasks.parent import end_with_parent
 
 __all__ = ["load", "log_run", "output_file", "output_folder", "run_stage", "scratch"]
 
@@ -40,7 +39,8 @@ def run_stage(main: Callable[..., object], argv: list[str] | None = None) -> Non
     and a full disk end in one line on standard error and status 2; any other exception keeps its traceback.
     """
     options = _parser(main).parse_args(argv)
-    _end_with_parent()
+    if "DVC_STAGE" in os.environ:
+        end_with_parent()
     try:
         main(**vars(options))
     except BadInput as error:
@@ -82,21 +82,6 @@ def _parser(main: Callable[..., object]) -> argparse.ArgumentParser:
         flag = "--" + parameter.name.rstrip("_").replace("_", "-")
         parser.add_argument(flag, dest=parameter.name, type=kind, required=required, default=default)
     return parser
-
-
-def _end_with_parent() -> None:
-    """Under DVC, end when DVC is killed: otherwise a second run would meet this one still writing."""
-    parent = os.getppid()
-    if "DVC_STAGE" not in os.environ or parent == 1:
-        return
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        print("the process that started this stage is gone: ending", file=sys.stderr, flush=True)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager

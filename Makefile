@@ -1,0 +1,72 @@
+# make demo: set up and run the whole loop. make test: set up and pass all tests. make help: the rest.
+SHELL := /bin/bash
+PYTHON ?= python3
+VENV ?= .venv
+MOTIONS ?=
+NAME ?=
+PORTS ?=
+
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.bumblebee-installed
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+export DO_NOT_TRACK := true
+export PREFECT_SERVER_ANALYTICS_ENABLED := false
+export MLFLOW_DISABLE_TELEMETRY := true
+export DVC_NO_ANALYTICS := 1
+export HF_HUB_OFFLINE := 1
+# TORCH_INDEX: the address of PyTorch's index of CPU builds, where pip would otherwise fetch CUDA's (several GB)
+ifdef TORCH_INDEX
+PIP_OPTIONS += --extra-index-url $(TORCH_INDEX)
+endif
+
+.PHONY: help setup demo smoke serve test unit e2e format check type lock clean
+
+help:  ## these lines
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+
+setup: $(STAMP)  ## a virtual environment with the locked packages; does nothing when it is up to date
+
+$(STAMP): requirements.lock pyproject.toml
+	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found. Install Python 3.11 or later, or say make PYTHON=<path>." >&2; exit 2; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or later is needed: make PYTHON=<path>." >&2; exit 2; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { echo "make: $(PYTHON) -m venv $(VENV) failed. On Debian and Ubuntu: install python3-venv." >&2; rm -rf $(VENV); exit 2; }
+	$(BIN)/python -m pip install -q $(PIP_OPTIONS) -r requirements.lock
+	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
+	@touch $@
+
+demo: setup  ## the whole loop on embedded motions, or on MOTIONS=<folder> in a workspace under runs/
+	@$(BIN)/python -m flows.demo $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(NAME),--name "$(NAME)") $(PORTS)
+
+smoke: setup  ## the loop with tiny budgets, in runs/smoke
+	@$(BIN)/python -m flows.demo --profile smoke --name $(or $(NAME),smoke) $(if $(MOTIONS),--motions "$(MOTIONS)") $(PORTS)
+
+serve: setup  ## open both servers again, with runs started and resumed from Prefect's pages; NAME=<workspace under runs/>
+	@$(BIN)/python -m flows.serve $(if $(NAME),--name "$(NAME)") $(PORTS)
+
+test: setup check  ## everything: style, import rule, unit tests, the loop end to end
+	$(BIN)/python -m pytest -q
+
+unit: setup  ## the tests without the end-to-end run
+	$(BIN)/python -m pytest -q -m "not e2e"
+
+e2e: setup  ## the end-to-end run alone
+	$(BIN)/python -m pytest -q -m e2e
+
+format: setup  ## lay out the code
+	$(BIN)/ruff check --fix --select I .
+	$(BIN)/ruff format .
+
+check: setup  ## ruff's rules
+	$(BIN)/ruff check .
+
+type: setup  ## mypy
+	$(BIN)/mypy
+
+lock: setup  ## write requirements.lock from what is installed
+	$(BIN)/python -m tests.lock > requirements.lock.new && mv requirements.lock.new requirements.lock
+
+clean:  ## remove caches, workspaces and servers' data; keeps .venv, data/ and models/
+	rm -rf runs .servers .scratch .pytest_cache .ruff_cache .mypy_cache build *.egg-info
+	find bumblebee tasks flows tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

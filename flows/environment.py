@@ -1,0 +1,45 @@
+"""The environment that every process of the loop gets: this Python first, no telemetry, everything in the workspace."""
+
+import os
+import sys
+from pathlib import Path
+
+SERVERS = ".servers"  # folder of the workspace with both servers' databases, logs and addresses
+
+QUIET = {
+    "DO_NOT_TRACK": "true",
+    "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
+    "MLFLOW_DISABLE_TELEMETRY": "true",
+    "DVC_NO_ANALYTICS": "1",
+    "HF_HUB_OFFLINE": "1",
+    "HF_HUB_DISABLE_TELEMETRY": "1",
+}
+# One BLAS thread a process: several would fight torch and the simulator for the same cores.
+THREADS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
+
+def environment(workspace: Path) -> dict[str, str]:
+    """The variables of a process that works in `workspace`, built on those of this process."""
+    workspace = workspace.resolve()
+    servers = workspace / SERVERS
+    found = dict(os.environ)
+    found |= QUIET
+    for name, value in THREADS.items():
+        found.setdefault(name, value)
+    found["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), found.get("PATH", os.defpath)])
+    found["PREFECT_HOME"] = str(servers / "prefect")
+    found["PREFECT_PROFILES_PATH"] = str(servers / "prefect" / "profiles.toml")
+    found["PREFECT_SERVER_ALLOW_EPHEMERAL_MODE"] = "false"
+    found["PREFECT_LOGGING_TO_API_WHEN_MISSING_FLOW"] = "ignore"
+    found["PREFECT_RESULTS_PERSIST_BY_DEFAULT"] = "false"
+    # Without it DVC keeps its indices in a folder of the machine, shared by all users.
+    found["DVC_SITE_CACHE_DIR"] = str(workspace / ".dvc" / "tmp" / "site")
+    found["PYTHONUNBUFFERED"] = "1"
+    found["SHELL"] = "/bin/sh"  # DVC runs commands in it; a login shell's settings have no place in a stage
+    for level in ("TASK", "FLOW"):
+        name = f"%({level.lower()}_run_name)s"
+        found[f"PREFECT_LOGGING_FORMATTERS_STANDARD_{level}_RUN_FMT"] = f"%(asctime)s {name} | %(message)s"
+    found.pop("PYTHONPATH", None)
+    found.pop("DVC_STAGE", None)
+    found.pop("DVC_ROOT", None)
+    return found

@@ -1,0 +1,138 @@
+"""The loop as a Prefect flow: the stages of dvc.yaml, clusters side by side, a person at each gate.
+
+DVC decides what is stale; Prefect decides what runs beside what and shows it. Every task is one stage in a process
+of its own, brought up to date by DVC; Prefect's own cache is off, so that there is one.
+"""
+
+import os
+import subprocess
+import sys
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+from prefect import flow, get_run_logger, task
+from prefect.cache_policies import NO_CACHE
+from prefect.futures import PrefectFuture
+from prefect.task_runners import ThreadPoolTaskRunner
+
+from flows import gates
+from flows.environment import environment
+from flows.stages import Stage, changed_stages, read_stages, to_run
+
+KEPT = 5  # last lines of a failed stage that its error repeats
+
+
+class StageFailed(Exception):
+    """A stage ended with an error; the text says which and its last words."""
+
+
+class WaitingForAnswer(Exception):
+    """A gate has no answer yet; the text says how to give one."""
+
+
+@task(task_run_name="{title}", cache_policy=NO_CACHE, persist_result=False, retries=0)
+def run_stage(title: str, name: str, workspace: str) -> None:
+    """Bring one stage up to date in a process of its own; its output goes to the log line by line."""
+    log = get_run_logger()
+    command = [sys.executable, "-m", "flows.reproduce", name]
+    last: deque[str] = deque(maxlen=KEPT)
+    with subprocess.Popen(
+        command,
+        cwd=workspace,
+        env=environment(Path(workspace)),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    ) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if line.strip() and not is_chatter(line):
+                last.append(line.rstrip())
+                log.info(line.rstrip())
+    if process.returncode:
+        raise StageFailed(f"{title}: " + " / ".join(last))
+
+
+def is_chatter(line: str) -> bool:
+    """Lines of DVC that help nobody who watches the whole loop."""
+    chatter = ("Running stage", "> python", "Updating lock file", "Generating lock file", "Use `dvc push`")
+    return line.startswith(chatter) or "To track the changes with git" in line or "git add dvc.lock" in line
+
+
+@flow(name="loop", log_prints=False, persist_result=False, validate_parameters=False)
+def loop(workspace: str = "") -> list[str]:
+    """Walk the stages; returns the names of those that had work to do.
+
+    Args:
+        workspace: the folder with dvc.yaml and params.yaml; by default what BUMBLEBEE_WORKSPACE says, or this one.
+    """
+    folder = Path(workspace or os.environ.get("BUMBLEBEE_WORKSPACE", "."))
+    log = get_run_logger()
+    stages = read_stages(folder)
+    busy = to_run(stages, changed_stages(folder))
+    log.info(f"{len(busy)} of {len(stages)} stages have work to do" if busy else "everything is up to date")
+    running: dict[str, PrefectFuture[Any]] = {}
+    waiting: str | None = None
+    for stage in gates_last(stages):
+        if stage.name not in busy:
+            continue
+        if waiting is not None and depends_on(stage, waiting, stages):
+            continue
+        before = [running[name] for name in sorted(stage.needs) if name in running]
+        if stage.kind == "gate" and not any(failed(future) for future in before):
+            question = gates.hold(folder, stage)
+            if question is not None:
+                waiting = stage.name
+                log.warning(question)
+                continue
+        running[stage.name] = run_stage.submit(stage.title, stage.name, str(folder.resolve()), wait_for=before)
+    report(running, stages, waiting)
+    return sorted(busy)
+
+
+def failed(future: PrefectFuture[Any]) -> bool:
+    """Wait for a stage; whether it did not complete."""
+    future.wait()
+    return not future.state.is_completed()
+
+
+def report(running: dict[str, PrefectFuture[Any]], stages: list[Stage], waiting: str | None) -> None:
+    """Wait for everything; raise when a stage failed or a gate waits, after all the others have saved their work."""
+    titles = {stage.name: stage.title for stage in stages}
+    bad = [name for name, future in running.items() if failed(future)]
+    causes = [name for name in bad if running[name].state.is_failed() or running[name].state.is_crashed()]
+    if bad:
+        first = [running[name].state.message or "" for name in causes]
+        kept = len(running) - len(bad)
+        skipped = ", ".join(titles[name] for name in bad if name not in causes)
+        text = f"{len(causes)} stage(s) failed, {kept} completed and are kept; not started: {skipped or 'none'}. "
+        raise StageFailed(text + " | ".join(first))
+    if waiting is not None:
+        raise WaitingForAnswer(f"{titles[waiting]} waits for an answer; what came before it is kept")
+
+
+def depends_on(stage: Stage, other: str, stages: list[Stage]) -> bool:
+    """Whether `stage` reads, directly or not, what `other` makes."""
+    known = {each.name: each for each in stages}
+    return any(name == other or depends_on(known[name], other, stages) for name in stage.needs)
+
+
+def gates_last(stages: list[Stage]) -> list[Stage]:
+    """A valid order in which a gate comes only after all that can start without it: holding it holds up nobody."""
+    open_stages, order = list(stages), []
+    done: set[str] = set()
+    while open_stages:
+        ready = [stage for stage in open_stages if stage.needs <= done]
+        chosen = next((stage for stage in ready if stage.kind != "gate"), ready[0])
+        order.append(chosen)
+        done.add(chosen.name)
+        open_stages.remove(chosen)
+    return order
+
+
+def runner(workers: int) -> ThreadPoolTaskRunner[Any]:
+    """A thread for each stage that may run at once; each only waits for its process."""
+    return ThreadPoolTaskRunner(max_workers=workers)

@@ -1,0 +1,156 @@
+"""The servers of Prefect and MLflow on this machine alone: SQLite files under .servers/, free ports, a clean end."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from bumblebee.errors import BadInput
+from flows.environment import SERVERS, environment
+
+HOST = "127.0.0.1"
+START_LIMIT = 120.0  # [s] until a server must answer; a cold first start with two busy cores takes about 30
+STOP_LIMIT = 10.0  # [s] until a server that was asked to end is killed
+
+
+@dataclass(frozen=True)
+class Addresses:
+    """Where the two servers answer."""
+
+    prefect: str
+    """Of Prefect's pages; its interface is below `/api`."""
+    mlflow: str
+    """Of MLflow's pages and interface."""
+    pid: int
+    """The process that keeps them."""
+
+
+def free_port(wanted: int = 0) -> int:
+    """A port that nobody listens on; `wanted` itself when given.
+
+    Raises:
+        BadInput: when the wanted port is taken.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, wanted))
+        except OSError as error:
+            remedy = "Give another port, or none for a free one."
+            raise BadInput(f"port {wanted} of {HOST}", "a free port", str(error.strerror), remedy) from None
+        return int(probe.getsockname()[1])
+
+
+def running(workspace: Path) -> Addresses | None:
+    """The servers that another process keeps for this workspace, if they answer."""
+    try:
+        found = Addresses(**json.loads((workspace / SERVERS / "addresses.json").read_text()))
+    except (OSError, ValueError, TypeError):
+        return None
+    return found if answers(f"{found.prefect}/api/health") and answers(f"{found.mlflow}/health") else None
+
+
+def answers(url: str) -> bool:
+    """Whether the address answers with success."""
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    try:
+        with opener.open(url, timeout=5) as reply:
+            return bool(reply.status == 200)
+    except (urllib.error.URLError, OSError):
+        return False
+
+
+@contextmanager
+def servers(workspace: Path, prefect_port: int = 0, mlflow_port: int = 0) -> Iterator[Addresses]:
+    """Both servers for the length of a block; those already running for the workspace are used and left running.
+
+    Raises:
+        BadInput: when a wanted port is taken or a server ends at once.
+    """
+    workspace = workspace.resolve()
+    found = running(workspace)
+    if found is not None:
+        yield found
+        return
+    ports = {"prefect": free_port(prefect_port), "mlflow": free_port(mlflow_port)}
+    folder = workspace / SERVERS
+    (folder / "artifacts").mkdir(parents=True, exist_ok=True)
+    _create_database(workspace)
+    started: dict[str, subprocess.Popen[bytes]] = {}
+    try:
+        for name, command in commands(workspace, ports).items():
+            started[name] = _start(name, command, workspace)
+        addresses = Addresses(**{name: f"http://{HOST}:{port}" for name, port in ports.items()}, pid=os.getpid())
+        _wait(started["prefect"], f"{addresses.prefect}/api/health", folder / "prefect.log")
+        _wait(started["mlflow"], f"{addresses.mlflow}/health", folder / "mlflow.log")
+        (folder / "addresses.json").write_text(json.dumps(vars(addresses)))
+        yield addresses
+    finally:
+        (folder / "addresses.json").unlink(missing_ok=True)
+        stop(list(started.values()))
+
+
+def commands(workspace: Path, ports: dict[str, int]) -> dict[str, list[str]]:
+    """The command line of each server."""
+    folder = workspace / SERVERS
+    prefect = [sys.executable, "-m", "prefect", "server", "start", "--host", HOST, "--port", str(ports["prefect"])]
+    mlflow = [sys.executable, "-m", "mlflow", "server", "--host", HOST, "--port", str(ports["mlflow"])]
+    mlflow += ["--backend-store-uri", f"sqlite:///{folder / 'mlflow.db'}", "--workers", "1"]
+    mlflow += ["--serve-artifacts", "--artifacts-destination", str(folder / "artifacts")]
+    return {"prefect": prefect, "mlflow": mlflow}
+
+
+def _create_database(workspace: Path) -> None:
+    """MLflow's database, made by one process before several write: they race on a new one."""
+    code = "from tasks import registry; registry.prepare()"
+    made = subprocess.run(
+        [sys.executable, "-c", code], cwd=workspace, env=environment(workspace), capture_output=True, text=True
+    )
+    if made.returncode:
+        last = (made.stderr.strip().splitlines() or ["no message"])[-1]
+        raise BadInput(workspace / SERVERS / "mlflow.db", "a database that MLflow can open", last)
+
+
+def _start(name: str, command: list[str], workspace: Path) -> subprocess.Popen[bytes]:
+    with (workspace / SERVERS / f"{name}.log").open("ab") as log:
+        # A session of its own: Ctrl-C reaches the flow first, which then ends the servers in order.
+        return subprocess.Popen(
+            command, cwd=workspace, env=environment(workspace), stdout=log, stderr=log, start_new_session=True
+        )
+
+
+def _wait(process: subprocess.Popen[bytes], url: str, log: Path) -> None:
+    end = time.monotonic() + START_LIMIT
+    while not answers(url):
+        if process.poll() is not None or time.monotonic() > end:
+            lines = [line for line in log.read_text(errors="replace").splitlines() if line.strip()] or ["no message"]
+            raise BadInput(url, "a server that answers", lines[-1], f"See {log}.")
+        time.sleep(0.2)
+
+
+def stop(processes: list[subprocess.Popen[bytes]]) -> None:
+    """End the processes and everything that they started, first politely."""
+    for process in processes:
+        _signal(process, signal.SIGTERM)
+    end = time.monotonic() + STOP_LIMIT
+    for process in processes:
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(max(end - time.monotonic(), 0.1))
+        _signal(process, signal.SIGKILL)  # what is left of its group
+        process.wait()
+
+
+def _signal(process: subprocess.Popen[bytes], number: int) -> None:
+    try:
+        os.killpg(process.pid, number)
+    except ProcessLookupError:
+        return

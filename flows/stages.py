@@ -1,0 +1,90 @@
+"""The stages of dvc.yaml as a graph: who needs whom, and who has something to do."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+from bumblebee.errors import BadInput
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of the loop, after its matrix is spelled out."""
+
+    name: str
+    """As DVC calls it, such as `experts@c0`."""
+    command: str
+    """What it runs."""
+    needs: frozenset[str]
+    """Names of the stages whose files it reads."""
+    lacks: frozenset[str]
+    """Files it reads that no stage makes and that are not there (an answer not yet given)."""
+
+    @property
+    def kind(self) -> str:
+        """The stage's name without cluster and round."""
+        return self.name.partition("@")[0]
+
+    def option(self, name: str) -> str | None:
+        """The value of `--name` in the command, or None."""
+        words = self.command.split()
+        return words[words.index(f"--{name}") + 1] if f"--{name}" in words else None
+
+    @property
+    def title(self) -> str:
+        """For people: `refine round 1 c0`."""
+        number, cluster = self.option("round"), self.option("cluster")
+        parts = [self.kind, f"round {number}" if number else "", cluster or ""]
+        return " ".join(part for part in parts if part)
+
+
+def read_stages(workspace: Path) -> list[Stage]:
+    """All stages, each after those that it needs; among equals in the order of dvc.yaml."""
+    from dvc.exceptions import DvcException
+    from dvc.repo import Repo
+
+    try:
+        with Repo(str(workspace)) as repo:
+            graph = repo.index.graph
+            found = {}
+            for node in repo.index.stages:
+                needs = frozenset(other.addressing for other in graph.successors(node))
+                made = {str(out.fs_path) for out in repo.index.outs}
+                lacks = frozenset(
+                    str(dep.def_path)
+                    for dep in node.deps
+                    if dep.def_path and not dep.exists and not any(_inside(str(dep.fs_path), out) for out in made)
+                )
+                found[node.addressing] = Stage(node.addressing, str(node.cmd), needs, lacks)
+    except DvcException as error:
+        raise BadInput(workspace / "dvc.yaml", "stages that DVC can read", str(error)) from None
+    return in_order(found.values())
+
+
+def _inside(path: str, out: str) -> bool:
+    return path == out or path.startswith(out + "/") or out.startswith(path + "/")
+
+
+def in_order(stages: Iterable[Stage]) -> list[Stage]:
+    """Each stage after those that it needs."""
+    known = {stage.name: stage for stage in stages}
+    sorter = TopologicalSorter({name: sorted(stage.needs) for name, stage in known.items()})
+    return [known[name] for name in sorter.static_order()]
+
+
+def to_run(stages: list[Stage], changed: set[str]) -> set[str]:
+    """The stages that may have work: the changed ones and everything that reads what they make."""
+    busy: set[str] = set()
+    for stage in in_order(stages):
+        if stage.name in changed or stage.needs & busy:
+            busy.add(stage.name)
+    return busy
+
+
+def changed_stages(workspace: Path) -> set[str]:
+    """Names of the stages whose inputs, outputs, command or parameters differ from dvc.lock."""
+    from dvc.repo import Repo
+
+    with Repo(str(workspace)) as repo:
+        return {name.removeprefix("dvc.yaml:") for name in repo.status()}

@@ -1,0 +1,88 @@
+"""A workspace: a folder with its own dvc.yaml, params.yaml, data, models and servers, using this checkout's code."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import bumblebee
+from bumblebee.errors import BadInput
+from flows.environment import environment
+from tasks import params
+
+HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
+CODE = ("bumblebee", "tasks", "flows")
+COPIED = ("dvc.yaml", ".dvcignore")
+
+
+def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    """`base` with the values of `over`; sections merge, everything else is replaced."""
+    merged = dict(base)
+    for key, value in over.items():
+        old = merged.get(key)
+        merged[key] = merge(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return merged
+
+
+def create(folder: Path, profile: str | None = None, motions: Path | None = None, **over: Any) -> Path:
+    """Make `folder` a workspace, or bring an existing one up to date; its data, models and history stay.
+
+    Args:
+        folder: where; made if it is not there.
+        profile: the name of a file in profiles/ whose values replace those of params.yaml.
+        motions: a folder of motion files to use in place of the embedded ones.
+        over: further sections of params.yaml to replace.
+
+    Raises:
+        BadInput: for an unknown profile or a missing folder of motions.
+    """
+    content = params.read(HOME / "params.yaml")
+    if profile:
+        content = merge(content, params.read(profile_path(profile)))
+    if motions is not None:
+        source = motions.expanduser().resolve()
+        if not source.is_dir():
+            raise BadInput(source, "a folder of motion files", "no such folder", "Check MOTIONS.")
+        content = merge(content, {"motions": {"source": str(source)}})
+    content = merge(content, over)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in CODE:
+        _link(folder / name, HOME / name)
+    for name in COPIED:
+        _write(folder / name, (HOME / name).read_text())
+    _write(folder / "params.yaml", yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
+    if not (folder / ".dvc" / "config").exists():
+        init = [sys.executable, "-m", "dvc", "init", "--no-scm", "-q"]
+        subprocess.run(init, cwd=folder, env=environment(folder), check=True)
+        settings = (HOME / ".dvc" / "config").read_text()
+        _write(folder / ".dvc" / "config", settings.replace("[core]\n", "[core]\n    no_scm = True\n"))
+    return folder
+
+
+def profile_path(profile: str) -> Path:
+    """The file of a profile."""
+    path = HOME / "profiles" / f"{profile}.yaml"
+    if not path.exists():
+        known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml")))
+        raise BadInput(path, f"one of the profiles {known}", profile)
+    return path
+
+
+def _link(link: Path, target: Path) -> None:
+    wanted = os.path.relpath(target, link.parent.resolve())
+    if link.is_symlink() and os.readlink(link) == wanted:
+        return
+    if link.is_symlink():
+        link.unlink()
+    if link.exists():
+        raise BadInput(link, "a link to the code", "something else", "Choose another folder.")
+    link.symlink_to(wanted)
+
+
+def _write(path: Path, text: str) -> None:
+    """Write only what differs, so that an unchanged workspace keeps its time stamps."""
+    if not path.exists() or path.read_text() != text:
+        path.write_text(text)
