@@ -1,0 +1,1 @@
+"""Text-motion clustering (paper, section "AE Clustering"): features, autoencoder, K-means, audit."""

