@@ -1,0 +1,69 @@
+"""Statistics against known motions, names, keywords, agreement, stability and the random control."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bumblebee.clustering.audit import cluster_table, family_agreement, random_control, separation, stability
+from bumblebee.clustering.statistics import COLUMNS, LOWER, UPPER, clip_statistics, keywords, names
+from bumblebee.motion.kinematics import make_clip
+from bumblebee.robot.facts import joint_names, stand_pose
+from tests.clustering.conftest import TEXTS
+from tests.clustering.test_kmeans import blobs
+
+
+def test_statistics_of_a_ramp() -> None:
+    """2 s at 0.5 m/s forward and 0.1 m/s up, one knee at 1 rad/s."""
+    time = np.arange(101) / 50.0
+    root = np.stack([0.5 * time, 0 * time, 1.5 + 0.1 * time], 1)
+    joint_pos = np.tile(stand_pose(), (101, 1))
+    joint_pos[:, joint_names().index("left_knee_joint")] += time
+    numbers = clip_statistics(make_clip("ramp", 50.0, root, np.tile([1.0, 0, 0, 0], (101, 1)), joint_pos))
+    expected = (1.0, 1000 * 0.1 / 30, 0.5, 1 / 23, 1 / 12, 0.0, 1.0)
+    assert numbers == pytest.approx(dict(zip(COLUMNS, expected, strict=True)), abs=1e-4)
+    assert len(LOWER) == 12 and len(UPPER) == 11
+
+
+def test_keywords_are_what_sets_a_cluster_apart() -> None:
+    captions = [(TEXTS["stand"],), (TEXTS["walk"], "the person quickly walks"), (TEXTS["stand"],), ()]
+    words = keywords(captions, np.array([0, 1, 0, 2]), 3)
+    assert words[0][:2] == ["stands", "waves"] and "walks" in words[1] and "person" not in sum(words, []) and words[2] == []
+    assert keywords([(), ()], np.array([0, 1]), 2) == [[], []]
+
+
+def test_names_follow_the_papers_table() -> None:
+    """Jump, two walks by speed, three stands by the legs' share."""
+    rows = [(0.1, 0.33, 0.35, 0.4), (0, 0.35, 0.36, 0.2), (0, 0.43, 0.47, 0.4), (0, 0.06, 0.14, 0.31), (0, 0.12, 0.17, 0.22)]
+    rows.append((0, 0.15, 0.28, 0.27))
+    table = pd.DataFrame(rows, columns=["airborne", "speed", "lower_joint", "upper_joint"]).assign(z_move=1.0)
+    assert names(table) == ["jump", "walk-slow", "walk-fast", "stand-up", "stand-mid", "stand-low"]
+    many = pd.concat([table.iloc[[3]].assign(lower_joint=0.1 * i) for i in range(1, 6)])
+    assert len(set(names(many))) == 5
+
+
+def test_cluster_table_has_a_row_for_each_cluster() -> None:
+    statistics = pd.DataFrame({name: [1.0, 3.0, 5.0] for name in COLUMNS})
+    table = cluster_table(statistics, [("walks",)] * 3, np.array([1, 1, 0]), 2)
+    assert table["clips"].tolist() == [1, 2] and table["speed"].tolist() == [5.0, 2.0]
+
+
+def test_agreement_counts_known_families_only() -> None:
+    assert family_agreement(["a", "a", "b", "b", ""], np.array([1, 1, 0, 0, 0])) == 1.0
+    assert family_agreement(["", "", "a"], np.array([0, 1, 1])) is None
+
+
+def test_clear_clusters_are_stable_and_noise_is_not() -> None:
+    clear, _ = blobs((10, 10, 10))
+    noise = np.random.default_rng(0).normal(size=(30, 5))
+    assert stability(clear, 3, 4)["subsamples"] == pytest.approx(1.0)
+    assert stability(noise, 3, 4)["subsamples"] < 0.8
+
+
+def test_random_split_explains_less() -> None:
+    truth = np.repeat([0, 1], 20)
+    values = truth + 0.1 * np.random.default_rng(0).normal(size=40)
+    statistics = pd.DataFrame(dict.fromkeys(COLUMNS, values)).assign(airborne=0.0)
+    ours, chance = separation(statistics, truth), random_control(statistics, truth, 20)
+    assert ours["speed"] > 0.9 and chance["speed"] < 0.2 and ours["airborne"] == 0.0
+    by_hand = 1 - np.mean([values[truth == c].var() for c in (0, 1)]) / values.var()
+    assert ours["speed"] == pytest.approx(by_hand)

@@ -1,0 +1,47 @@
+"""From clips to labels: motions that differ end up apart."""
+
+from dataclasses import replace
+
+import pytest
+from sklearn.metrics import adjusted_rand_score
+
+from bumblebee.clustering.config import ClusterConfig
+from bumblebee.clustering.pipeline import Clustering, cluster_clips
+from bumblebee.clustering.text import TokenTable
+from bumblebee.errors import BadInput
+from bumblebee.motion.clip import Clip
+
+
+@pytest.fixture(scope="module")
+def result(library: list[Clip], table: TokenTable, tiny: ClusterConfig) -> Clustering:
+    return cluster_clips(library, ["c0", "c1"], tiny, table=table)
+
+
+def test_stands_and_walks_are_told_apart(result: Clustering) -> None:
+    labels = result.labels
+    assert adjusted_rand_score(labels["family"], labels["cluster"]) == 1.0
+    assert result.summary["audit"]["family_ari"] == 1.0
+    assert set(labels.loc[labels["family"] == "stand", "cluster"]) == {"c0"}  # slowest first, held-out ones too
+
+
+def test_summary_counts_every_clip(result: Clustering, library: list[Clip]) -> None:
+    rows = result.summary["clusters"]
+    assert sum(row["clips"] + row["held_out_clips"] for row in rows.values()) == len(library) == len(result.labels)
+    assert [row["label"] for row in rows.values()] == ["stand", "walk"]
+    assert result.summary["clips"] == {"train": 14, "held_out": 2, "with_captions": 16}
+    assert result.elbow["k"].tolist() == list(range(1, 7)) and len(result.curve) == 25
+
+
+def test_held_out_clips_change_nothing(library: list[Clip], table: TokenTable, tiny: ClusterConfig) -> None:
+    """Labels of the training clips are the same whether the held-out ones are there or not."""
+    short = replace(tiny, epochs=3)
+    training = [clip for clip in library if clip.split == "train"]
+    both, alone = (cluster_clips(clips, ["a", "b"], short, table=table).labels for clips in (library, training))
+    kept = both[both["split"] == "train"].reset_index(drop=True)
+    assert kept["cluster"].tolist() == alone["cluster"].tolist()
+    assert kept["x"].to_numpy() == pytest.approx(alone["x"].to_numpy(), abs=1e-5)
+
+
+def test_too_few_clips_are_refused_before_any_work(library: list[Clip], tiny: ClusterConfig) -> None:
+    with pytest.raises(BadInput, match="at least 3 x 2 training clips for 3 clusters, came 5 training clips"):
+        cluster_clips(library[:5], ["a", "b", "c"], tiny)

