@@ -1,0 +1,71 @@
+"""Rewards of the delta-action policy, one function a row of the paper's table "Reward design for delta action model".
+
+The table prints its regularisation rows with dots on quantities that have none; the reading here: the action rate is
+the difference of two successive delta actions, the action norm is the norm of the delta action itself.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from bumblebee.sim.rotations import angle_between
+
+
+@dataclass(frozen=True)
+class DeltaRewardConfig:
+    """Weights of the table's rows."""
+
+    torque_limits: float = -10.0
+    """Row "Torque limits": share of motors at their limit."""
+    dof_pos_limits: float = -10.0
+    """Row "DoF position limits": share of joints beyond their range."""
+    dof_vel_limits: float = -10.0
+    """Row "DoF velocity limits": share of joints beyond their speed."""
+    termination: float = -200.0
+    """Row "Termination"; multiplied by the control period like every row."""
+    dof_acc: float = -3e-8
+    """Row "DoF acceleration"."""
+    action_rate: float = -2.0
+    """Row "Action rate"."""
+    action_norm: float = -2.0
+    """Row "Action norm"."""
+    torque: float = -1e-4
+    """Row "Torque"."""
+    root_pos: float = 1.0
+    """Row "Root position"."""
+    root_rot: float = 0.5
+    """Row "Root rotation"."""
+    root_ang_vel: float = 0.5
+    """Row "Root angular velocity"."""
+    root_vel: float = 0.5
+    """Row "Root velocity"."""
+    dof_pos: float = 0.5
+    """Row "DoF position"."""
+    dof_vel: float = 0.5
+    """Row "DoF velocity"."""
+
+
+def beyond(values: Tensor, low: Tensor, high: Tensor) -> Tensor:
+    """Rows "... limits": share of the J values (B, J) outside [low, high], (B,)."""
+    return ((values < low) | (values > high)).float().mean(dim=-1)
+
+
+def squared_norm(values: Tensor) -> Tensor:
+    """Rows "DoF acceleration" and "Action rate": ||x||^2 of (B, N), (B,)."""
+    return values.square().sum(dim=-1)
+
+
+def norm(values: Tensor) -> Tensor:
+    """Rows "Action norm" and "Torque": ||x|| of (B, N), (B,)."""
+    return values.norm(dim=-1)
+
+
+def closeness(values: Tensor, reference: Tensor) -> Tensor:
+    """Task rows: exp(-4 ||x - x_ref||^2) of (B, N), (B,)."""
+    return torch.exp(-4.0 * (values - reference).square().sum(dim=-1))
+
+
+def rotation_closeness(quat: Tensor, reference: Tensor) -> Tensor:
+    """Row "Root rotation": exp(-4 angle^2), the angle [rad] between (B, 4) and (B, 4)."""
+    return torch.exp(-4.0 * angle_between(reference, quat).square())

@@ -1,0 +1,89 @@
+"""Measured rollouts as tensors to replay: where the robot was, what it was told, tick by tick.
+
+The state of a recording is what the engine needs to start from (paper, section 3.3.2: base velocity, orientation,
+angular velocity, joint positions and velocities). Velocities are the measured ones, not differences.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import torch
+from scipy.spatial.transform import Rotation
+from torch import Tensor
+
+from bumblebee.errors import BadInput
+from bumblebee.measured.rollout import Rollout
+from bumblebee.robot.facts import FEET, joint_names
+
+_NEEDED = ("joint_target", "base_quat", "base_ang_vel", "base_lin_vel")
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """R rollouts laid end to end in N rows.
+
+    `qpos` (N, 7 + J) and `qvel` (N, 6 + J) in MuJoCo's convention, joints as the encoders read them; `targets`
+    (N, J) [rad]; `start` and `length` (R,) rows of each rollout; `ids` their names.
+    """
+
+    qpos: Tensor
+    qvel: Tensor
+    targets: Tensor
+    start: Tensor
+    length: Tensor
+    ids: tuple[str, ...]
+
+    def windows(self, frames: int, stride: int) -> Tensor:
+        """First rows of all windows of `frames` steps, every `stride` rows of each rollout, (W,)."""
+        rows = [
+            torch.arange(int(first), int(first + length) - frames, stride)
+            for first, length in zip(self.start, self.length, strict=True)
+        ]
+        return torch.cat(rows) if rows else torch.zeros(0, dtype=torch.long)
+
+    def owner(self, rows: Tensor) -> Tensor:
+        """Index of the rollout that each row belongs to."""
+        return torch.bucketize(rows, self.start, right=True) - 1
+
+
+def stack(rollouts: Sequence[Rollout], model: mujoco.MjModel) -> Recordings:
+    """Lay rollouts of the G1 end to end, columns in `joint_names()` order.
+
+    Raises:
+        BadInput: if a column that the replay needs was not logged.
+    """
+    if not rollouts:
+        raise BadInput("delta", "at least one measured rollout", "none")
+    parts = [_states(rollout, model) for rollout in rollouts]
+    lengths = torch.tensor([len(qpos) for qpos, _, _ in parts])
+    qpos, qvel, targets = (torch.as_tensor(np.concatenate(c), dtype=torch.float32) for c in zip(*parts, strict=True))
+    return Recordings(qpos, qvel, targets, lengths.cumsum(0) - lengths, lengths, tuple(r.rollout_id for r in rollouts))
+
+
+def _states(rollout: Rollout, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    for column in _NEEDED:
+        if getattr(rollout, column) is None:
+            do = "Log it, or leave the rollout out of the delta stage."
+            raise BadInput(f"{rollout.rollout_id}: column {column}", "a logged column", "none", do)
+    order = [rollout.joints.index(name) for name in joint_names()]
+    joints = rollout.joint_pos[:, order]
+    turn = Rotation.from_quat(rollout.base_quat, scalar_first=True)
+    velocity_w = turn.apply(rollout.base_lin_vel)
+    position = rollout.base_pos if rollout.base_pos is not None else _odometry(rollout, joints, velocity_w, model)
+    qpos = np.concatenate([position, rollout.base_quat, joints], axis=1)
+    qvel = np.concatenate([velocity_w, rollout.base_ang_vel, rollout.joint_vel[:, order]], axis=1)
+    return qpos, qvel, rollout.joint_target[:, order]
+
+
+def _odometry(rollout: Rollout, joints: np.ndarray, velocity_w: np.ndarray, model: mujoco.MjModel) -> np.ndarray:
+    """Root positions (T, 3) without motion capture: velocity integrated, height such that the lowest sole is at 0."""
+    steps = np.diff(rollout.time)[:, None] * 0.5 * (velocity_w[1:] + velocity_w[:-1])
+    position = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    data = mujoco.MjData(model)
+    soles = [g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name in FEET]
+    data.qpos[2], data.qpos[3:7], data.qpos[7:] = 0.0, rollout.base_quat[0], joints[0]
+    mujoco.mj_kinematics(model, data)
+    lowest = min(data.geom_xpos[g, 2] - model.geom_size[g, 0] for g in soles)
+    return position - [0.0, 0.0, lowest]

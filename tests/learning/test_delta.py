@@ -1,0 +1,165 @@
+"""The delta action: its rewards by hand, what an untrained one does, when one is kept."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from bumblebee.errors import BadInput
+from bumblebee.learning import delta_rewards as rewards
+from bumblebee.learning.delta import DeltaAction, DeltaConfig, action_adapter, layout, load_delta, make_network, save_delta
+from bumblebee.learning.delta_env import DeltaEnv
+from bumblebee.learning.delta_gain import compare, replay_error
+from bumblebee.learning.recordings import Recordings, stack
+from bumblebee.measured.rollout import Rollout
+from bumblebee.robot.facts import ANKLE_JOINTS, joint_names, stand_pose
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.mujoco_cpu import MujocoCpu
+from bumblebee.sim.sensors import load_model
+from bumblebee.tracking.observations import layout as tracking_layout
+
+NO_OFFSET = torch.zeros(23)
+
+
+def record(worlds: int = 3, ticks: int = 70, weak: float = 1.0) -> list[Rollout]:
+    """Rollouts of a G1 that moves its arms while it stands (and slowly falls), `weak` scaling every gain."""
+    model = load_model()
+    model.actuator_gainprm[:, 0] *= weak
+    model.actuator_biasprm[:, 1:3] *= weak
+    engine = MujocoCpu(model, worlds, threads=1)
+    qpos = torch.as_tensor(model.key_qpos[:1], dtype=torch.float32).repeat(worlds, 1)
+    pose = torch.as_tensor(stand_pose(), dtype=torch.float32).repeat(worlds, 1)
+    engine.reset(torch.arange(worlds), qpos, torch.zeros(worlds, 29), pose)
+    rng = np.random.default_rng(0)
+    phase = torch.as_tensor(rng.uniform(0, 6, (worlds, 1)), dtype=torch.float32)
+    rows: list[list[torch.Tensor]] = []
+    for k in range(ticks):
+        target = pose + 0.15 * torch.sin(0.1 * k + phase) * (torch.arange(23) > 14)
+        state = engine.state()
+        rows.append([state.root_pos_w, state.root_quat_w, state.root_lin_vel_b, state.root_ang_vel_b,
+                     state.joint_pos, state.joint_vel, target])  # fmt: skip
+        engine.step(target)
+    columns = [torch.stack(c, dim=1).numpy() for c in zip(*rows, strict=True)]
+    names = ("base_pos", "base_quat", "base_lin_vel", "base_ang_vel", "joint_pos", "joint_vel", "joint_target")
+    time = np.arange(ticks) / 50
+    return [
+        Rollout(f"r{i}", joint_names(), 50, time, **{n: c[i] for n, c in zip(names, columns, strict=True)})
+        for i in range(worlds)
+    ]
+
+
+@pytest.fixture(scope="module")
+def recordings() -> Recordings:
+    return stack(record(), load_model())
+
+
+def test_rewards_by_hand() -> None:
+    x, ref = torch.tensor([[0.3, 0.4]]), torch.zeros(1, 2)
+    assert rewards.closeness(x, ref).item() == pytest.approx(np.exp(-4 * 0.25), rel=1e-6)
+    assert rewards.norm(x).item() == pytest.approx(0.5)
+    assert rewards.squared_norm(x).item() == pytest.approx(0.25)
+    assert rewards.beyond(x, torch.tensor([0.0, 0.0]), torch.tensor([0.35, 0.35])).item() == 0.5
+    turn = torch.tensor([[np.cos(0.1), np.sin(0.1), 0.0, 0.0]], dtype=torch.float32)
+    still = torch.tensor([[1.0, 0.0, 0.0, 0.0]])
+    assert rewards.rotation_closeness(turn, still).item() == pytest.approx(np.exp(-4 * 0.2**2), rel=1e-4)
+
+
+def test_windows_stay_inside_their_rollout(recordings: Recordings) -> None:
+    rows = recordings.windows(50, 5)
+    assert len(rows) == 3 * 4
+    assert torch.equal(recordings.owner(rows), recordings.owner(rows + 50))
+
+
+def test_a_missing_column_is_named() -> None:
+    rollout = record(worlds=1, ticks=5)[0]
+    object.__setattr__(rollout, "base_lin_vel", None)
+    with pytest.raises(BadInput, match="r0: column base_lin_vel: expected a logged column"):
+        stack([rollout], load_model())
+
+
+def test_odometry_stands_in_for_a_missing_position(recordings: Recordings) -> None:
+    """Integrated velocity follows the true path, and the start height comes from the soles."""
+    rollout = record(worlds=1, ticks=30)[0]
+    truth = rollout.base_pos.copy()
+    object.__setattr__(rollout, "base_pos", None)
+    path = stack([rollout], load_model()).qpos[:, :3].numpy()
+    np.testing.assert_allclose(path[0, 2], truth[0, 2], atol=2e-3)
+    np.testing.assert_allclose(path - path[0], truth - truth[0], atol=5e-3)
+
+
+def test_replay_of_its_own_simulator_is_exact_and_of_another_is_not(recordings: Recordings) -> None:
+    same = replay_error(MujocoCpu(load_model(), 8, threads=1), recordings, NO_OFFSET, None, stride=10)
+    model = load_model()
+    model.actuator_gainprm[:, 0] *= 0.8
+    other = replay_error(MujocoCpu(model, 8, threads=1), recordings, NO_OFFSET, None, stride=10)
+    assert np.nanmax(same["0.2"]) < 2e-3  # float32 states and a cold solver are all that differs
+    assert np.nanmin(other["0.2"]) > 5 * np.nanmax(same["0.2"])
+
+
+def test_an_untrained_delta_corrects_nothing_and_a_trained_one_only_its_joints(recordings: Recordings) -> None:
+    network = make_network((16,), 4)
+    delta = DeltaAction(network, ANKLE_JOINTS, limit=0.1)
+    state = RobotState(*(torch.randn(5, *shape) for shape in ((3,), (4,), (3,), (3,), (23,), (23,), (14, 3))))
+    targets = torch.randn(5, 23)
+    assert torch.equal(delta(state, targets), targets)
+    torch.nn.init.normal_(network[-1].weight, std=50.0)
+    change = delta(state, targets) - targets
+    ankles = [joint_names().index(name) for name in ANKLE_JOINTS]
+    others = [i for i in range(23) if i not in ankles]
+    assert change[:, others].abs().max() == 0
+    assert 0 < change[:, ankles].abs().max() <= 0.1 + 1e-6
+
+
+def test_the_adapter_changes_actions_by_the_same_targets() -> None:
+    network = make_network((16,), 4)
+    torch.nn.init.normal_(network[-1].weight)
+    delta, scale = DeltaAction(network, ANKLE_JOINTS, 0.1), torch.linspace(0.1, 0.3, 23)
+    state = RobotState(*(torch.randn(2, *shape) for shape in ((3,), (4,), (3,), (3,), (23,), (23,), (14, 3))))
+    sizes = dict(tracking_layout())
+    observation, action = torch.randn(2, sum(sizes.values())), torch.randn(2, 23)
+    first = sum(size for name, size in tracking_layout()[: list(sizes).index("ref_joint_pos")])
+    reference = observation[:, first : first + 23]
+    adapted = reference + scale * action_adapter(delta, scale)(state, observation, action)
+    torch.testing.assert_close(adapted, delta(state, reference + scale * action))
+
+
+def test_saved_and_loaded_alike_and_withheld_unless_promoted(tmp_path: Path) -> None:
+    network = make_network((16, 8), 4)
+    torch.nn.init.normal_(network[-1].weight)
+    delta = DeltaAction(network, ANKLE_JOINTS, 0.1)
+    save_delta(tmp_path, delta, (16, 8), {"promoted": False})
+    assert load_delta(tmp_path) is None
+    loaded = load_delta(tmp_path, promoted_only=False)
+    seen = torch.randn(3, sum(n for _, n in layout()))
+    torch.testing.assert_close(loaded.network(seen), network(seen))
+
+
+def test_perfect_tracking_earns_the_task_rewards(recordings: Recordings) -> None:
+    """In its own simulator a zero correction earns nearly all of the task rows (3.5 a second) and loses nobody."""
+    config = DeltaConfig(num_envs=4, episode_seconds=0.4)
+    env = DeltaEnv(MujocoCpu(load_model(), 4, threads=1), recordings, config, NO_OFFSET)
+    for _ in range(10):
+        _, reward, done, extras = env.step(torch.zeros(4, 4))
+        assert not done.any() and extras["log"]["lost"] == 0
+        assert (reward > 0.9 * 3.5 * 0.02).all()
+    for _ in range(10):
+        _, _, done, extras = env.step(torch.zeros(4, 4))
+    assert done.all() and extras["time_outs"].all()
+
+
+def test_promotion_needs_an_interval_below_zero() -> None:
+    rng = np.random.default_rng(0)
+    before = rng.uniform(0.05, 0.1, 12)
+    base = {"0.2": before, "1.0": 2 * before}
+
+    def scaled(factor: np.ndarray) -> dict[str, np.ndarray]:
+        return {h: v * factor for h, v in base.items()}
+
+    assert compare(base, scaled(0.8 + 0.02 * rng.normal(size=12))).promoted
+    assert not compare(base, scaled(1.0 + 0.05 * rng.normal(size=12))).promoted
+    assert not compare(base, scaled(1.3 + 0.02 * rng.normal(size=12))).promoted
+    worse_soon = {"0.2": before * 1.2, "1.0": before * 1.5}
+    assert not compare(base, worse_soon).promoted
+    few = {h: v[:3] for h, v in base.items()}
+    assert not compare(few, {h: 0.5 * v for h, v in few.items()}).promoted
