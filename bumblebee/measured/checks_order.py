@@ -92,7 +92,7 @@ def check_order(view: View) -> None:
     for joint in np.flatnonzero(best != np.arange(len(best))):
         other = int(best[joint])
         if own[joint] > limits.order_error and error[joint, other] < limits.order_gain * own[joint]:
-            came = f"{error[joint, other]:.3g} rad from the target of {rollout.joints[other]}, {own[joint]:.3g} from its own"
+            came = f"{error[joint, other]:.3g} rad from {rollout.joints[other]}'s target, {own[joint]:.3g} from its own"
             expected = "positions that follow their own target"
             fatal = own[other] > limits.order_error and own[joint] > 2 * error[joint, other]
             view.add(view.label("joint_pos", joint), None, "joint-order", expected, came, fatal=fatal)

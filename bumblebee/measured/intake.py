@@ -1,0 +1,201 @@
+"""The intake of a batch: good files into `accepted`, others copied to `quarantine` with their findings beside them.
+
+Originals are never touched and nothing is ever overwritten. Running it again changes nothing: a file whose content lies
+there already is skipped, a file of the same name with other content is a finding.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import pandas as pd
+
+from bumblebee.errors import BadInput
+from bumblebee.measured.checks import check_rollout
+from bumblebee.measured.finding import Finding
+from bumblebee.measured.rollout import BadRollout, Rollout, read_rollout
+
+FINDING_COLUMNS = ("file", "column", "row", "rule", "expected", "came", "fatal", "message")
+
+
+@dataclass(frozen=True)
+class Item:
+    """One incoming file and what became of it."""
+
+    file: str
+    sha256: str
+    accepted: bool
+    motion: str
+    cluster: str
+    seconds: float
+    joints: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class IntakeSummary:
+    """What came of a batch."""
+
+    items: tuple[Item, ...]
+    findings: pd.DataFrame
+    """One row a finding: file, column, row, rule, expected, came, fatal, message."""
+
+    @property
+    def accepted(self) -> list[str]:
+        """Names of the files that are accepted."""
+        return [item.file for item in self.items if item.accepted]
+
+    @property
+    def quarantined(self) -> list[str]:
+        """Names of the files that were set aside."""
+        return [item.file for item in self.items if not item.accepted]
+
+
+def intake(
+    incoming: Path,
+    accepted: Path,
+    quarantine: Path,
+    model: mujoco.MjModel,
+    contracts: Mapping[str, dict[str, Any]] | None = None,
+    tick: Callable[[str], None] = lambda file: None,
+) -> IntakeSummary:
+    """Check every rollout of a folder and sort it.
+
+    Args:
+        incoming: a dataset folder (rollouts/*.parquet) or a folder of *.parquet; only read.
+        accepted: folder for copies of the files that can be used.
+        quarantine: folder for copies of the others, each with `<file>.findings.json`.
+        model: the declared model.
+        contracts: cluster -> contract.json of the policy that was deployed for it; "" holds for every cluster.
+        tick: called with each file's name when it is done.
+    """
+    items, findings = [], []
+    for source in incoming_files(incoming):
+        item, found = _take(source, accepted, quarantine, model, contracts or {})
+        items.append(item)
+        findings += found
+        tick(source.name)
+    return IntakeSummary(tuple(items), findings_table(findings))
+
+
+def incoming_files(folder: Path) -> list[Path]:
+    """The Parquet files of a dataset folder or a plain folder, by name."""
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise BadInput(folder, "a folder of measured rollouts", "no such folder")
+    inner = folder / "rollouts"
+    files = (inner if inner.is_dir() else folder).glob("*.parquet")
+    return sorted(file for file in files if not file.name.startswith("."))
+
+
+def findings_table(findings: Iterable[Finding]) -> pd.DataFrame:
+    """Findings as a table, in the order in which they were made."""
+    table = pd.DataFrame([finding.as_dict() for finding in findings], columns=list(FINDING_COLUMNS))
+    return table.astype({"row": "Int64", "fatal": bool})
+
+
+def merge(summaries: Iterable[IntakeSummary]) -> IntakeSummary:
+    """Several folders' summaries as one."""
+    summaries = list(summaries)
+    tables = [summary.findings for summary in summaries if len(summary.findings)]
+    items = tuple(item for summary in summaries for item in summary.items)
+    return IntakeSummary(items, pd.concat(tables, ignore_index=True) if tables else findings_table([]))
+
+
+def file_hash(path: Path) -> str:
+    """sha256 of a file's bytes."""
+    with Path(path).open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _take(
+    source: Path, accepted: Path, quarantine: Path, model: mujoco.MjModel, contracts: Mapping[str, dict[str, Any]]
+) -> tuple[Item, list[Finding]]:
+    digest = file_hash(source)
+    rollout, findings = _check(source, model, contracts)
+    fatal = any(finding.fatal for finding in findings)
+    place = accepted / source.name
+    if place.exists():
+        same = file_hash(place) == digest
+        if not same or fatal:
+            came = "a file of that name that was accepted before" + ("" if same else ", with other content")
+            findings.append(Finding(source.name, "", None, "name-taken", "a name that is free", came, fatal=True))
+            fatal = True
+    elif not fatal:
+        copy_new(source, place)
+    if fatal:
+        _set_aside(source, digest, quarantine, findings)
+    meta = rollout.meta if rollout else {}
+    usable = rollout is not None and rollout.frames > 1
+    return Item(
+        source.name,
+        digest,
+        not fatal,
+        str(meta.get("motion", "")),
+        str(meta.get("cluster", "")),
+        round(rollout.duration, 6) if usable and rollout.duration == rollout.duration else 0.0,
+        rollout.joints if rollout else (),
+    ), findings
+
+
+def _check(
+    source: Path, model: mujoco.MjModel, contracts: Mapping[str, dict[str, Any]]
+) -> tuple[Rollout | None, list[Finding]]:
+    try:
+        rollout = read_rollout(source)
+    except BadRollout as bad:
+        return None, [Finding(source.name, bad.column, None, bad.rule, bad.expected, bad.came, fatal=True)]
+    contract = contracts.get(str(rollout.meta.get("cluster", "")), contracts.get(""))
+    return rollout, check_rollout(rollout, model, contract, source.name)
+
+
+def _set_aside(source: Path, digest: str, quarantine: Path, findings: list[Finding]) -> None:
+    place = quarantine / source.name
+    if place.exists() and file_hash(place) != digest:
+        place = quarantine / f"{source.stem}.{digest[:12]}{source.suffix}"
+    if not place.exists():
+        copy_new(source, place)
+    notes = place.with_name(f"{place.name}.findings.json")
+    table = {"file": source.name, "sha256": digest, "findings": [finding.as_dict() for finding in findings]}
+    if not notes.exists():
+        write_new(notes, json.dumps(table, indent=1, ensure_ascii=False, default=str).encode())
+
+
+def copy_new(source: Path, target: Path) -> None:
+    """Copy a file; the copy appears whole, and an existing one is never replaced."""
+    with _appearing(target) as temporary:
+        shutil.copyfile(source, temporary)
+
+
+def write_new(target: Path, content: bytes) -> None:
+    """Write a new file; it appears whole, and an existing one is never replaced."""
+    with _appearing(target) as temporary:
+        temporary.write_bytes(content)
+
+
+@contextlib.contextmanager
+def _appearing(target: Path) -> Any:  # noqa: ANN401 (context manager of a path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=".part")
+    os.close(handle)
+    try:
+        yield Path(name)
+        os.chmod(name, 0o644)
+        try:
+            os.link(name, target)  # fails where the target exists; os.replace would not
+        except FileExistsError:
+            raise BadInput(target, "a name that is free", "a file that exists") from None
+        except OSError:  # a file system without hard links
+            if target.exists():
+                raise BadInput(target, "a name that is free", "a file that exists") from None
+            os.replace(name, target)
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(name)

@@ -1,0 +1,128 @@
+"""Check a round's measured rollouts, set bad files aside, and ask for an answer at the gate."""
+
+import json
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from bumblebee.errors import BadInput
+from bumblebee.measured import gate
+from bumblebee.measured.intake import IntakeSummary, file_hash, incoming_files, intake, merge
+from bumblebee.measured.overview import write_overview
+from bumblebee.measured.rollout import read_rollout
+from bumblebee.measured.summary import summary_table
+from bumblebee.progress import progress
+from bumblebee.robot.model import write_xml
+from tasks.stage import load, log_run, output_folder, run_stage
+
+
+@dataclass(frozen=True)
+class IngestConfig:
+    """Where measured rollouts come from."""
+
+    incoming: str = "data/rollouts/r{round}"
+    """Folder of a round: datasets in folders of their own, one a cluster, or one dataset. `{round}` is its number."""
+    model: str = ""
+    """The declared MJCF; empty: the model.xml beside the rollouts, or else this project's G1."""
+
+
+def main(round: int) -> None:
+    """Sort the rollouts of one round."""
+    config = load("ingest", IngestConfig)
+    folders = dataset_folders(Path(config.incoming.format(round=round)))
+    with output_folder(f"data/measured/r{round}") as out:
+        write_model(folders, config.model, out / "model.xml")
+        batch = sort_rollouts(folders, out, policy_contracts(folders, round))
+        if not batch.accepted:
+            raise BadInput(folders[0].parent, "at least one rollout that can be used", _came(batch))
+        table = write_results(batch, round, out)
+    ask(round)
+    counts = {key: float(table[key]) for key in ("accepted", "quarantined", "seconds")}
+    log_run("ingest", round=round, params=config, metrics=counts)
+
+
+def dataset_folders(incoming: Path) -> list[Path]:
+    """The dataset folders of a round: the folder itself, or each folder in it that holds rollouts."""
+    if not incoming.is_dir():
+        raise BadInput(incoming, "a folder of measured rollouts", "no such folder")
+    inside = [folder for folder in sorted(incoming.iterdir()) if folder.is_dir() and folder.name != "rollouts"]
+    folders = [folder for folder in (incoming, *inside) if not folder.name.startswith(".") and incoming_files(folder)]
+    if not folders:
+        raise BadInput(incoming, "rollouts/*.parquet, or folders that hold them", "none")
+    return folders
+
+
+def write_model(folders: list[Path], given: str, out: Path) -> None:
+    """The declared model: the one that was named, the one beside the rollouts, or the G1."""
+    beside = [folder / "model.xml" for folder in folders if (folder / "model.xml").is_file()]
+    if not given and len({file_hash(path) for path in beside}) > 1:
+        raise BadInput(beside[1], f"the same model as {beside[0]}", "another one", "Name one in ingest.model.")
+    source = Path(given) if given else beside[0] if beside else None
+    if source is None:
+        write_xml(out)
+        return
+    try:
+        mujoco.MjModel.from_xml_path(str(source))
+    except ValueError as error:
+        raise BadInput(source, "an MJCF model that loads", str(error)) from None
+    shutil.copyfile(source, out)
+
+
+def policy_contracts(folders: list[Path], round: int) -> dict[str, dict[str, Any]]:
+    """Cluster -> contract of the policy that was deployed: beside the rollouts, or the expert of the round before."""
+    contracts = {}
+    for folder in folders:
+        for path in (folder / "contract.json", Path(f"models/experts/r{round - 1}/{folder.name}/contract.json")):
+            if folder.name not in contracts and path.is_file():
+                contracts[folder.name] = json.loads(path.read_text(encoding="utf-8"))
+    return contracts
+
+
+def sort_rollouts(folders: list[Path], out: Path, contracts: dict[str, dict[str, Any]]) -> IntakeSummary:
+    """Every folder through the intake, with progress."""
+    model = mujoco.MjModel.from_xml_path(str(out / "model.xml"))
+    total = sum(len(incoming_files(folder)) for folder in folders)
+    with progress(total, "checking rollouts", "files") as bar:
+        return merge(
+            intake(folder, out / "rollouts", out / "quarantine", model, contracts, lambda file: bar.update(1, file))
+            for folder in folders
+        )
+
+
+def write_results(batch: IntakeSummary, round: int, out: Path) -> dict[str, Any]:
+    """findings.csv, summary.json and overview.html."""
+    batch.findings.to_csv(out / "findings.csv", index=False)
+    table = summary_table(batch, round) | {"findings_sha256": file_hash(out / "findings.csv")}
+    (out / "summary.json").write_text(json.dumps(table, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_overview(out / "overview.html", table, batch.findings, _accepted(batch, out))
+    return table
+
+
+def ask(round: int) -> None:
+    """Leave the request at the gate; in the automatic mode answer it at once."""
+    path = Path(f"data/approvals/round-{round}.json")
+    request = gate.request(path, round, Path(f"data/measured/r{round}/summary.json"))
+    if request["status"] == "pending" and load("gate", gate.GateConfig).mode == "auto":
+        gate.answer(path, True, gate.AUTOMATIC)
+        print(f"round {round}: approved, {gate.AUTOMATIC}", flush=True)
+    elif request["status"] == "pending":
+        print(gate.how_to_answer(round), flush=True)
+
+
+def _accepted(batch: IntakeSummary, out: Path) -> Iterator[Any]:
+    return (read_rollout(out / "rollouts" / name) for name in batch.accepted)
+
+
+def _came(batch: IntakeSummary) -> str:
+    if not batch.items:
+        return "no file"
+    first = batch.findings[batch.findings["fatal"]].iloc[0]["message"]
+    return f"{len(batch.items)} files that all fail; the first: {first}"
+
+
+if __name__ == "__main__":
+    run_stage(main)
