@@ -1,0 +1,195 @@
+"""DAgger from all experts into one generalist (paper, section 3.4 and the table "Hyperparameters for DAgger").
+
+The generalist acts, the expert of each motion's cluster says what it would have done there, and the generalist learns
+from everything gathered so far by KL(general || expert). Clusters are drawn with equal shares (appendix D).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import pandas as pd
+import torch
+from rsl_rl.models import MLPModel
+from torch import Tensor
+
+from bumblebee.learning.policy import Policy, Shape, new_actor
+from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.env import TrackingEnv
+
+
+@dataclass(frozen=True)
+class DistillConfig:
+    """Distillation of the experts into the generalist."""
+
+    iterations: int = 300
+    """Rounds of collecting and learning."""
+    steps: int = 8
+    """Control steps of each world a round; with 512 worlds that is the paper's batch of 4096."""
+    epochs: int = 2
+    """Passes over a round's number of samples, drawn from all that was gathered."""
+    mini_batches: int = 4
+    """Gradient steps a pass."""
+    learning_rate: float = 5e-4
+    """Adam's rate; the paper's is 1e-4 with many more samples."""
+    grad_norm: float = 1.0
+    """Gradients are scaled down to this norm."""
+    capacity: int = 400_000
+    """Samples that are kept; the oldest go first."""
+    expert_share: float = 0.5
+    """Share of the worlds in which the expert acts at first; falls to 0 over the first half."""
+    init: Literal["base", "scratch"] = "base"
+    """Start from the base policy or from nothing."""
+    hidden: tuple[int, ...] = (256, 256, 128)
+    """Layers of a generalist from scratch; from base they are base's."""
+    seed: int = 0
+    """Seed of the draws and of the network."""
+    env: EnvConfig = field(default_factory=EnvConfig)
+    """The environment it learns in."""
+
+
+def gaussian_kl(mean: Tensor, std: Tensor, other_mean: Tensor, other_std: Tensor) -> Tensor:
+    """KL( N(mean, std^2) || N(other_mean, other_std^2) ), diagonal, summed over the last dimension.
+
+    Args:
+        mean: (B, J) of the first distribution, `std` (B, J) or (J,).
+        std: see `mean`.
+        other_mean: (B, J) of the second one, `other_std` likewise.
+        other_std: see `other_mean`.
+    """
+    ratio = (std / other_std).square()
+    shift = ((mean - other_mean) / other_std).square()
+    return 0.5 * (ratio + shift - 1.0 - ratio.log()).sum(dim=-1)
+
+
+def gaussian(actor: MLPModel, observation: Tensor) -> tuple[Tensor, Tensor]:
+    """Mean (B, J) and standard deviation (B, J) of an actor's action."""
+    actor.distribution.update(actor.mlp(actor.get_latent({"policy": observation})))
+    return actor.output_mean, actor.output_std
+
+
+class Aggregate:
+    """The data set that DAgger aggregates: a ring of observations with the experts' answers."""
+
+    def __init__(self, capacity: int, observation: int, actions: int) -> None:
+        self.observation = torch.zeros(capacity, observation)
+        self.mean, self.std = torch.zeros(capacity, actions), torch.zeros(capacity, actions)
+        self.capacity, self.size, self._next = capacity, 0, 0
+
+    def add(self, observation: Tensor, mean: Tensor, std: Tensor) -> None:
+        """Append B samples; beyond the capacity the oldest are overwritten."""
+        rows = (self._next + torch.arange(len(observation))) % self.capacity
+        self.observation[rows], self.mean[rows], self.std[rows] = observation, mean, std
+        self._next = int((self._next + len(observation)) % self.capacity)
+        self.size = min(self.size + len(observation), self.capacity)
+
+    def draw(self, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
+        """Draw `count` samples, with replacement."""
+        rows = torch.randint(self.size, (count,), generator=generator)
+        return self.observation[rows], self.mean[rows], self.std[rows]
+
+
+def equal_shares(lengths: Tensor, cluster: Sequence[int]) -> Tensor:
+    """(N,) factors on the clips' frames that give every cluster the same share of the draws (appendix D)."""
+    index = torch.as_tensor(cluster)
+    total = torch.zeros(int(index.max()) + 1).index_add(0, index, lengths.float())
+    return lengths.float().mean() / total[index]
+
+
+def distill(
+    env: TrackingEnv,
+    experts: Mapping[int, Policy],
+    cluster: Sequence[int],
+    config: DistillConfig,
+    base: Policy,
+    report: Callable[[int, str], None] = lambda frames, note: None,
+) -> tuple[Policy, pd.DataFrame]:
+    """Distil.
+
+    Args:
+        env: follows the training clips of all clusters.
+        experts: cluster index -> its expert.
+        cluster: (N,) cluster index of each clip of `env.library`.
+        config: see `DistillConfig`.
+        base: gives the start (`init: base`) and the sizes.
+        report: called after each round with its frames and a short note.
+
+    Returns:
+        The generalist, and the curve: iteration, frames, kl, success, key_error.
+    """
+    torch.manual_seed(config.seed)
+    generator = torch.Generator().manual_seed(config.seed)
+    student = _student(base, config)
+    optimiser = torch.optim.Adam(student.parameters(), lr=config.learning_rate)
+    data = Aggregate(config.capacity, base.shape.observation, base.shape.actions)
+    of_clip, rows = torch.as_tensor(cluster), []
+    frames_each = config.steps * env.num_envs
+    for iteration in range(config.iterations):
+        env.progress = 1.0  # the success threshold at its final value
+        share = config.expert_share * max(0.0, 1.0 - 2.0 * iteration / config.iterations)
+        _collect(env, student, experts, of_clip, data, config, share, generator)
+        kl = _learn(student, optimiser, data, frames_each, config, generator)
+        scalars = env.statistics.take()
+        kept = {name: scalars[name] for name in ("success", "key_error")}
+        rows.append({"iteration": iteration + 1, "frames": (iteration + 1) * frames_each, "kl": kl, **kept})
+        report(frames_each, f"KL {kl:.3f}, success {kept['success']:.2f}")
+    student.eval()
+    shape = Shape(**{**vars(base.shape), "hidden": tuple(config.hidden if config.init == "scratch" else base.shape.hidden)})
+    return Policy(student, base.critic_state, shape), pd.DataFrame(rows)
+
+
+def _student(base: Policy, config: DistillConfig) -> MLPModel:
+    if config.init == "base":
+        student = new_actor(base.shape)
+        student.load_state_dict(base.actor.state_dict())
+    else:
+        student = new_actor(Shape(**{**vars(base.shape), "hidden": tuple(config.hidden)}))
+        student.obs_normalizer.load_state_dict(base.actor.obs_normalizer.state_dict())
+    student.obs_normalizer.eval()  # the statistics stay those of base's training
+    return student
+
+
+@torch.no_grad()
+def _collect(
+    env: TrackingEnv,
+    student: MLPModel,
+    experts: Mapping[int, Policy],
+    of_clip: Tensor,
+    data: Aggregate,
+    config: DistillConfig,
+    expert_share: float,
+    generator: torch.Generator,
+) -> None:
+    for _ in range(config.steps):
+        seen = env.get_observations()["policy"]
+        wanted = torch.zeros(env.num_envs, env.num_actions)
+        spread = torch.ones_like(wanted)
+        now = of_clip[env.clip]
+        for index, expert in experts.items():
+            own = (now == index).nonzero()[:, 0]
+            if len(own):
+                wanted[own], spread[own] = gaussian(expert.actor, seen[own])
+        data.add(seen, wanted, spread)
+        leads = torch.rand(env.num_envs, 1, generator=generator) < expert_share
+        env.step(torch.where(leads, wanted, student({"policy": seen})))
+
+
+def _learn(
+    student: MLPModel,
+    optimiser: torch.optim.Optimizer,
+    data: Aggregate,
+    samples: int,
+    config: DistillConfig,
+    generator: torch.Generator,
+) -> float:
+    batch, total = max(samples // config.mini_batches, 1), 0.0
+    steps = config.epochs * config.mini_batches
+    for _ in range(steps):
+        seen, mean, std = data.draw(batch, generator)
+        loss = gaussian_kl(*gaussian(student, seen), mean, std).mean()
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(student.parameters(), config.grad_norm)
+        optimiser.step()
+        total += float(loss.detach())
+    return total / steps

@@ -1,0 +1,61 @@
+"""Distillation: the KL against torch's, equal shares, the ring, and a student that comes to agree with its experts."""
+
+import pytest
+import torch
+from torch.distributions import Independent, Normal, kl_divergence
+
+from bumblebee.learning.distill import Aggregate, equal_shares, gaussian, gaussian_kl
+from bumblebee.learning.policy import Shape, new_actor
+
+
+def test_kl_is_torchs() -> None:
+    torch.manual_seed(0)
+    mean, other = torch.randn(5, 3), torch.randn(5, 3)
+    std, other_std = torch.rand(5, 3) + 0.1, torch.rand(5, 3) + 0.1
+    expected = kl_divergence(Independent(Normal(mean, std), 1), Independent(Normal(other, other_std), 1))
+    torch.testing.assert_close(gaussian_kl(mean, std, other, other_std), expected)
+
+
+def test_kl_is_zero_only_between_equals() -> None:
+    mean, std = torch.randn(4, 3), torch.full((3,), 0.3)
+    assert gaussian_kl(mean, std, mean, std).abs().max() < 1e-6
+    assert (gaussian_kl(mean, std, mean + 0.1, std) > 0.1).all()
+    assert (gaussian_kl(mean, std, mean, 2 * std) > 0.1).all()
+
+
+def test_every_cluster_gets_the_same_share_of_frames() -> None:
+    lengths, cluster = torch.tensor([100, 300, 50, 50]), [0, 0, 1, 2]
+    weight = lengths * equal_shares(lengths, cluster)
+    shares = [float(weight[torch.tensor(cluster) == c].sum()) for c in range(3)]
+    assert shares == pytest.approx([shares[0]] * 3)
+
+
+def test_the_ring_keeps_the_newest() -> None:
+    data = Aggregate(capacity=5, observation=1, actions=1)
+    for value in range(8):
+        data.add(torch.full((1, 1), float(value)), torch.zeros(1, 1), torch.ones(1, 1))
+    assert data.size == 5
+    assert sorted(data.observation[:, 0].tolist()) == [3, 4, 5, 6, 7]
+    seen, _, _ = data.draw(50, torch.Generator().manual_seed(0))
+    assert set(seen[:, 0].tolist()) <= {3.0, 4.0, 5.0, 6.0, 7.0}
+
+
+def test_learning_by_kl_recovers_the_experts_mean_and_spread() -> None:
+    torch.manual_seed(0)
+    shape = Shape(observation=6, critic_observation=6, actions=2, hidden=(32,), ahead=())
+    expert, student = new_actor(shape, initial_std=0.2), new_actor(shape, initial_std=1.0)
+    torch.nn.init.normal_(expert.mlp[-1].weight, std=0.3)
+    optimiser = torch.optim.Adam(student.parameters(), lr=3e-3)
+    losses = []
+    for _ in range(400):
+        seen = torch.randn(256, 6)
+        with torch.no_grad():
+            wanted = gaussian(expert, seen)
+        loss = gaussian_kl(*gaussian(student, seen), *wanted).mean()
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        losses.append(float(loss.detach()))
+    assert losses[-1] < 0.1 * losses[0]
+    _, spread = gaussian(student, torch.randn(1, 6))
+    torch.testing.assert_close(spread, torch.full((1, 2), 0.2), atol=0.06, rtol=0)
