@@ -11,17 +11,19 @@ from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import CONTROL_HZ, Robots
 from bumblebee.deploy.runner import PolicyRunner
 from bumblebee.deploy.sensors import SensorNoise, Sensors, add_noise, draws
+from bumblebee.evaluation.contract import StartNoise
 from bumblebee.measured.rollout import Rollout
 from bumblebee.motion import quaternions
 from bumblebee.motion.clip import Clip, velocities
 from bumblebee.motion.kinematics import sole_points
 from bumblebee.robot.facts import joint_names
-from bumblebee.robot.model import gains
 from bumblebee.robot.facts import joints as robot_joints
+from bumblebee.robot.model import gains
 
-FALL_TILT = np.radians(60)  # of the pelvis' up axis against the reference's
+FALL_TILT = np.radians(60.0)  # of the pelvis' up axis against the reference's
 FALL_DROP = 0.35  # m: of the pelvis below the reference's
 MAX_LIFT = 0.10  # m: a start is lifted or lowered by no more than this to stand on the floor
+FALL_RULE = {"tilt_deg": 60.0, "drop_m": FALL_DROP, "max_start_lift_m": MAX_LIFT}
 
 
 @dataclass(frozen=True)
@@ -38,16 +40,6 @@ class Episode:
     """Of the start state and the sensor noise; the same seed and motion give the same draws whatever runs beside."""
     meta: dict[str, Any] = field(default_factory=dict)
     """Further fields of the rollout's metadata (cluster, operator, ...)."""
-
-
-@dataclass(frozen=True)
-class StartNoise:
-    """Standard deviation of the start state around the clip's first frame."""
-
-    joint_pos: float = 0.01
-    """[rad]"""
-    joint_vel: float = 0.05
-    """[rad/s]"""
 
 
 def run_episodes(
@@ -92,10 +84,14 @@ def run_episodes(
         log.add(alive, sensors, action, target)
         robots.step(alive, target)
         on_tick(len(alive))
-    return [log.rollout(i, episode, policies[episode.policy], clips[episode.motion]) for i, episode in enumerate(episodes)]
+    return [
+        log.rollout(i, episode, policies[episode.policy], clips[episode.motion]) for i, episode in enumerate(episodes)
+    ]
 
 
-def start_states(clips: Sequence[Clip], rngs: Sequence[np.random.Generator], noise: StartNoise) -> tuple[np.ndarray, np.ndarray]:
+def start_states(
+    clips: Sequence[Clip], rngs: Sequence[np.random.Generator], noise: StartNoise
+) -> tuple[np.ndarray, np.ndarray]:
     """Start states at the clips' first frames with noise on the joints, soles on the floor: qpos (B, 7+J), qvel (B, 6+J).
 
     A clip whose first frame is further than 10 cm from the floor (it starts in the air) is left where it is.
@@ -122,7 +118,10 @@ class _Log:
         self._rows: list[list[dict[str, np.ndarray]]] = [[] for _ in range(count)]
 
     def add(self, robots: np.ndarray, sensors: Sensors, action: np.ndarray, target: np.ndarray) -> None:
-        columns = {f.name: getattr(sensors, f.name) for f in fields(sensors)} | {"action": action, "joint_target": target}
+        columns = {f.name: getattr(sensors, f.name) for f in fields(sensors)} | {
+            "action": action,
+            "joint_target": target,
+        }
         for row, robot in enumerate(robots):
             self._rows[robot].append({name: values[row] for name, values in columns.items()})
 
@@ -142,7 +141,9 @@ class _Log:
         return Rollout(episode.rollout_id, joint_names(), CONTROL_HZ, time, meta=meta, **stacked)
 
 
-def _groups(episodes: Sequence[Episode], policies: dict[str, ExportedPolicy], clips: list[Clip]) -> list[tuple[np.ndarray, PolicyRunner]]:
+def _groups(
+    episodes: Sequence[Episode], policies: dict[str, ExportedPolicy], clips: list[Clip]
+) -> list[tuple[np.ndarray, PolicyRunner]]:
     """Episodes by policy: their indices and a runner over them."""
     members: dict[str, list[int]] = {}
     for index, episode in enumerate(episodes):

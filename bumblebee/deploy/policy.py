@@ -97,16 +97,26 @@ def read_policy_contract(path: Path) -> dict[str, Any]:
 
 def ahead_frames(contract: dict[str, Any]) -> int:
     """Number of further reference frames that the contract's observation holds."""
-    return sum(str(part["name"]).startswith("ahead") and str(part["name"]).endswith("_root_pos_b") for part in contract["observation"])
+    return sum(
+        str(part["name"]).startswith("ahead") and str(part["name"]).endswith("_root_pos_b")
+        for part in contract["observation"]
+    )
 
 
 def _check_joints(path: Path, contract: dict[str, Any]) -> None:
     expected, came = list(joint_names()), list(contract["joints"])
     if came != expected:
-        index = next((i for i, pair in enumerate(zip(expected, came, strict=False)) if pair[0] != pair[1]), min(len(expected), len(came)))
+        index = next(
+            (i for i, pair in enumerate(zip(expected, came, strict=False)) if pair[0] != pair[1]),
+            min(len(expected), len(came)),
+        )
         one, other = (names[index] if index < len(names) else "nothing" for names in (expected, came))
         raise BadInput(f"{path}: joints[{index}]", one, other, "The policy was made for another robot or joint order.")
-    for field, values in (("kp", contract["kp"]), ("kd", contract["kd"]), ("action.scale", contract["action"]["scale"])):
+    for field, values in (
+        ("kp", contract["kp"]),
+        ("kd", contract["kd"]),
+        ("action.scale", contract["action"]["scale"]),
+    ):
         if len(values) != len(expected):
             raise BadInput(f"{path}: {field}", f"{len(expected)} numbers", str(len(values)))
 

@@ -5,7 +5,8 @@
     python -m bumblebee.deploy.stand_in --sealed data/sealed/robot.json --clips LIBRARY --plan plan.json --out DIR
 
 It takes the robot's place: its effects are sealed in a file that nothing else reads before the loop's report.
-A plan is {"policies": {key: folder}, "episodes": [{"rollout_id", "policy", "motion", "seed", "meta"}]}.
+A plan is {"policies": {key: folder}, "episodes": [{"rollout_id", "policy", "motion", "seed", "meta"}],
+"start_noise": {...}}; meta and start_noise may be absent.
 """
 
 import argparse
@@ -18,10 +19,12 @@ import mujoco
 
 from bumblebee.deploy.episodes import Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.deploy.robots import SideBySide
 from bumblebee.deploy.sensors import SensorNoise
 from bumblebee.deploy.stand_in_effects import read_sealed
 from bumblebee.deploy.stand_in_robots import StandInRobots
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.evaluation.contract import StartNoise
 from bumblebee.measured.rollout import write_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
@@ -43,7 +46,7 @@ def main(argv: list[str] | None = None) -> int:
 def run(options: argparse.Namespace) -> None:
     """Run all episodes and write one file each."""
     effects = read_sealed(options.sealed) if options.sealed else []
-    folders, episodes = _plan(options) if options.plan else _named(options)
+    folders, episodes, start = _plan(options) if options.plan else _named(options)
     if not episodes:
         raise BadInput(options.plan or "--names", "at least one episode", "none")
     policies = {key: ExportedPolicy.load(Path(folder)) for key, folder in folders.items()}
@@ -54,8 +57,8 @@ def run(options: argparse.Namespace) -> None:
     total = sum(clips[e.motion].frames for e in episodes)
     recorded = {"recorded_at": datetime.now(UTC).isoformat(timespec="seconds"), "operator": options.operator}
     with progress(total, f"stand-in robot, {len(episodes)} rollouts", "ticks") as bar:
-        make = lambda count: StandInRobots(count, effects, options.threads)  # noqa: E731
-        rollouts = run_episodes(make, episodes, policies, clips, SensorNoise(), on_tick=bar.update)
+        make = lambda count: SideBySide(lambda part: StandInRobots(part, effects), count, options.threads)  # noqa: E731
+        rollouts = run_episodes(make, episodes, policies, clips, SensorNoise(), start, bar.update)
     for rollout in rollouts:
         rollout.meta.update({key: value for key, value in recorded.items() if key not in rollout.meta})
         rollout.meta["notes"] = _ending(rollout.frames, clips[rollout.meta["motion"]])
@@ -63,10 +66,12 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _ending(frames: int, clip: Clip) -> str:
-    return "ran to the end" if frames == clip.frames else f"fell after {frames / clip.fps:.2f} s of {clip.duration:.2f} s"
+    return (
+        "ran to the end" if frames == clip.frames else f"fell after {frames / clip.fps:.2f} s of {clip.duration:.2f} s"
+    )
 
 
-def _named(options: argparse.Namespace) -> tuple[dict[str, Path], list[Episode]]:
+def _named(options: argparse.Namespace) -> tuple[dict[str, Path], list[Episode], StartNoise]:
     """Every named clip, `--rollouts` times, by one policy."""
     if not options.policy or not options.names:
         raise BadInput("command line", "--policy and --names, or --plan", "neither")
@@ -77,19 +82,22 @@ def _named(options: argparse.Namespace) -> tuple[dict[str, Path], list[Episode]]
         for name in options.names
         for run in range(options.rollouts)
     ]
-    return {key: options.policy}, episodes
+    return {key: options.policy}, episodes, StartNoise()
 
 
-def _plan(options: argparse.Namespace) -> tuple[dict[str, str], list[Episode]]:
+def _plan(options: argparse.Namespace) -> tuple[dict[str, str], list[Episode], StartNoise]:
     try:
         plan = json.loads(options.plan.read_text())
-        return dict(plan["policies"]), [Episode(**episode) for episode in plan["episodes"]]
+        episodes = [Episode(**episode) for episode in plan["episodes"]]
+        return dict(plan["policies"]), episodes, StartNoise(**plan.get("start_noise", {}))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInput(options.plan, "a plan with policies and episodes", f"{type(error).__name__}: {error}") from None
 
 
 def _options(argv: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m bumblebee.deploy.stand_in", description=(__doc__ or "").splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m bumblebee.deploy.stand_in", description=(__doc__ or "").splitlines()[0]
+    )
     parser.add_argument("--sealed", type=Path, help="file of undeclared effects; without it there are none")
     parser.add_argument("--clips", type=Path, required=True, help="motion library")
     parser.add_argument("--out", type=Path, required=True, help="folder for the rollouts")

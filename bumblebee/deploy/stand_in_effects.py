@@ -51,7 +51,9 @@ def read_sealed(path: Path) -> list[dict[str, Any]]:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInput(path, "a sealed robot with effects and sha256", f"{type(error).__name__}: {error}") from None
     if seal(effects) != claimed:
-        raise BadInput(f"{path}: field sha256", seal(effects)[:12], str(claimed)[:12], "The seal is broken: seal it anew.")
+        raise BadInput(
+            f"{path}: field sha256", seal(effects)[:12], str(claimed)[:12], "The seal is broken: seal it anew."
+        )
     return effects
 
 

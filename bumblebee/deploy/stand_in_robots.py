@@ -24,14 +24,13 @@ class StandInRobots:
     Args:
         count: number of robots.
         effects: entries of the sealed file, empty for none.
-        threads: of the simulation.
     """
 
-    def __init__(self, count: int, effects: list[dict], threads: int = 2) -> None:
+    def __init__(self, count: int, effects: list[dict]) -> None:
         self.model = _motor_model()
         self.effects = to_arrays(effects, self.model)
         _apply_to_model(self.model, self.effects)
-        self.batch = Batch(self.model, count, threads)
+        self.batch = Batch(self.model, count, 1)
         self._view = BatchView(self.batch)
         self._push = self.batch.bind("qfrc_applied")
         pairs = np.array([gains(joint) for joint in robot_joints()])

@@ -63,6 +63,8 @@ class Contract:
     """Start state noise."""
     engines: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Engine name -> its settings (time step, integrator, sensor noise); the sealed effects are not part of it."""
+    fall: dict[str, float] = field(default_factory=dict)
+    """When a robot counts as fallen, and how far a start may be lifted to stand on the floor."""
     alignment: str = ALIGNMENT
     """How frames are matched."""
     errors: str = ERRORS
@@ -101,6 +103,7 @@ def freeze(
     thresholds: Thresholds | None = None,
     start_noise: StartNoise | None = None,
     engines: dict[str, dict[str, Any]] | None = None,
+    fall: dict[str, float] | None = None,
 ) -> Contract:
     """The contract of evaluating on these clips with these seeds; motions are sorted by name."""
     limits = thresholds or Thresholds()
@@ -115,7 +118,7 @@ def freeze(
         }
         for clip in sorted(clips, key=lambda clip: clip.name)
     )
-    return Contract(motions, tuple(seeds), limits, start_noise or StartNoise(), engines or {})
+    return Contract(motions, tuple(seeds), limits, start_noise or StartNoise(), engines or {}, fall or {})
 
 
 def write_contract(path: Path, contract: Contract) -> None:
@@ -133,7 +136,12 @@ def read_contract(path: Path) -> dict[str, Any]:
     content = {key: value for key, value in stored.items() if key != "sha256"}
     actual = hashlib.sha256(canonical(content).encode()).hexdigest()
     if actual != claimed:
-        raise BadInput(f"{path}: field sha256", f"the hash of the content, {actual[:12]}", str(claimed)[:12], "It was edited: freeze it anew.")
+        raise BadInput(
+            f"{path}: field sha256",
+            f"the hash of the content, {actual[:12]}",
+            str(claimed)[:12],
+            "It was edited: freeze it anew.",
+        )
     return stored
 
 

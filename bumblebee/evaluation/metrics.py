@@ -36,7 +36,9 @@ class EpisodeMetrics:
     """"end", "keypoint" (threshold exceeded) or "fall"."""
 
 
-def success_threshold(family: str, walking: float = 0.8, other: float = 0.4, families: Collection[str] = WALKING_FAMILIES) -> float:
+def success_threshold(
+    family: str, walking: float = 0.8, other: float = 0.4, families: Collection[str] = WALKING_FAMILIES
+) -> float:
     """The keypoint threshold [m] of a motion's family: `walking` where the root travels, else `other`."""
     return walking if family in families else other
 

@@ -1,0 +1,151 @@
+"""From episodes to a summary: rates and errors with intervals by group, and paired comparisons by motion."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from bumblebee.evaluation.intervals import (
+    bootstrap_mean,
+    mcnemar_test,
+    mean_by_motion,
+    motion_means,
+    sign_flip_test,
+    success_rate,
+)
+
+COLUMNS = (
+    "policy", "kind", "round", "cluster", "motion", "family", "split", "engine", "seed",
+    "success", "mpjpe_rad", "mpkpe_mm", "frames", "end_reason",
+)  # fmt: skip
+ALL = "all"
+
+
+def results(episodes: pd.DataFrame) -> list[dict[str, Any]]:
+    """One entry for each policy, engine, split and group.
+
+    `policy` is also "experts-r<N>": every motion by its own cluster's expert of round N. `group_by` is "all", "family" or
+    "cluster" (of the motion). Errors are means over motions, over all episodes up to termination and, apart, over
+    successful ones (`*_successful`), since errors of failures stop at the failure and so flatter it.
+    """
+    return [
+        {
+            "policy": policy,
+            "kind": str(rows["kind"].iloc[0]),
+            "round": _int(rows["round"].iloc[0]),
+            "engine": engine,
+            "split": split,
+            "group_by": by,
+            "group": group,
+            **numbers(rows),
+        }
+        for policy, own in policies(episodes)
+        for engine, some in own.groupby("engine", sort=True)
+        for split, part in _with_all(some, "split")
+        for by, group, rows in _groups(part)
+    ]
+
+
+def numbers(rows: pd.DataFrame) -> dict[str, Any]:
+    """n, success, mpjpe_rad, mpkpe_mm (and `*_successful`), each value with its 95 % interval, and the endings."""
+    motions, good = rows["motion"].to_numpy(), rows["success"].to_numpy(dtype=bool)
+    entry: dict[str, Any] = {"n": len(rows), "success": success_rate(good, motions).as_dict()}
+    for metric in ("mpjpe_rad", "mpkpe_mm"):
+        values = rows[metric].to_numpy(dtype=float)
+        entry[metric] = mean_by_motion(values, motions).as_dict()
+        entry[f"{metric}_successful"] = mean_by_motion(np.where(good, values, np.nan), motions).as_dict()
+    entry["end_reasons"] = {
+        str(key): int(value) for key, value in rows["end_reason"].value_counts().sort_index().items()
+    }
+    return entry
+
+
+def policies(episodes: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
+    """Each policy's episodes, then those of all experts of a round together as "experts-r<N>"."""
+    for name in episodes["policy"].drop_duplicates():
+        yield str(name), episodes[episodes["policy"] == name]
+    experts = episodes[episodes["kind"] == "expert"]
+    for number, rows in experts.groupby("round", sort=True):
+        yield f"experts-r{int(number)}", rows
+
+
+def compare(episodes: pd.DataFrame, first: str, second: str, engine: str, split: str) -> dict[str, Any] | None:
+    """Second policy against first on the episodes (motion, seed) that both have; None where they share none.
+
+    `success` is the difference of rates over motions with a bootstrap interval and the sign-flip p-value over motions;
+    `mcnemar_p` pairs single episodes and is given only where there is one seed. Errors are compared over episodes in
+    which both succeeded.
+    """
+    table = dict(policies(episodes))
+    if first not in table or second not in table:
+        return None
+    both = _paired(table[first], table[second], engine, split)
+    if both.empty:
+        return None
+    gain = both["success_2"].astype(float) - both["success_1"].astype(float)
+    means = motion_means(gain.to_numpy(), both["motion"].to_numpy())
+    entry: dict[str, Any] = {
+        "from": first,
+        "to": second,
+        "engine": engine,
+        "split": split,
+        "episodes": len(both),
+        "motions": len(means),
+        "success": _difference(means),
+        "mcnemar_p": mcnemar_test(both["success_1"], both["success_2"]) if both["seed"].nunique() == 1 else None,
+    }
+    good = both[both["success_1"] & both["success_2"]]
+    for metric in ("mpjpe_rad", "mpkpe_mm"):
+        change = (good[f"{metric}_2"] - good[f"{metric}_1"]).to_numpy(dtype=float)
+        entry[metric] = _difference(motion_means(change, good["motion"].to_numpy()))
+    return entry
+
+
+def comparisons(episodes: pd.DataFrame, pairs: list[tuple[str, str]]) -> list[dict[str, Any]]:
+    """`compare` for each pair of policies, engine, and split ("all" among them)."""
+    engines = sorted(episodes["engine"].unique())
+    splits = [ALL, *sorted(episodes["split"].unique())]
+    found = [compare(episodes, a, b, engine, split) for a, b in pairs for engine in engines for split in splits]
+    return [entry for entry in found if entry is not None]
+
+
+def _paired(first: pd.DataFrame, second: pd.DataFrame, engine: str, split: str) -> pd.DataFrame:
+    keys, values = ["motion", "seed"], ["success", "mpjpe_rad", "mpkpe_mm"]
+    halves = []
+    for rows in (first, second):
+        some = rows[rows["engine"] == engine]
+        halves.append((some if split == ALL else some[some["split"] == split])[keys + values])
+    return halves[0].merge(halves[1], on=keys, suffixes=("_1", "_2"), validate="one_to_one")
+
+
+def _difference(means: np.ndarray) -> dict[str, Any]:
+    """Mean of paired differences by motion with interval and p-value; null where there are too few."""
+    if len(means) == 0:
+        return {"motions": 0, "value": None, "ci95": [None, None], "p": None, "test": "sign-flip over motions"}
+    low, high = bootstrap_mean(means)
+    ci95 = [low if np.isfinite(low) else None, high if np.isfinite(high) else None]
+    return {
+        "motions": len(means),
+        "value": float(means.mean()),
+        "ci95": ci95,
+        "p": sign_flip_test(means),
+        "test": "sign-flip over motions",
+    }
+
+
+def _with_all(rows: pd.DataFrame, column: str) -> Iterator[tuple[str, pd.DataFrame]]:
+    yield ALL, rows
+    for value, part in rows.groupby(column, sort=True):
+        yield str(value), part
+
+
+def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    yield ALL, ALL, rows
+    for by in ("family", "cluster"):
+        for value, part in rows.groupby(by, sort=True):
+            yield by, str(value), part
+
+
+def _int(value: object) -> int | None:
+    return None if pd.isna(value) else int(value)  # type: ignore[arg-type, call-overload]

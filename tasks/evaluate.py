@@ -1,0 +1,299 @@
+"""Stage evaluate: every policy on the nominal model and on the stand-in robot, under one frozen contract.
+
+Writes data/evaluation/contract.json, episodes.parquet (one row an episode) and summary.json (results and comparisons).
+"""
+
+import json
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from bumblebee.deploy.episodes import FALL_RULE, Episode, run_episodes
+from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.deploy.robots import NominalRobots
+from bumblebee.deploy.sensors import NO_NOISE, SensorNoise
+from bumblebee.errors import BadInput
+from bumblebee.evaluation.contract import (
+    Contract,
+    StartNoise,
+    Thresholds,
+    freeze,
+    read_contract,
+    require_same,
+    write_contract,
+)
+from bumblebee.evaluation.episodes import rollout_metrics
+from bumblebee.evaluation.summary import COLUMNS, comparisons, results
+from bumblebee.measured.rollout import Rollout, read_rollout
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.store import read_index, read_library, write_library
+from bumblebee.progress import progress
+from tasks.params import FILE, read
+from tasks.rollouts import library_folder, start_stand_in
+from tasks.stage import load, log_run, output_folder, run_stage
+
+OUT = Path("data/evaluation")
+ENGINES = {
+    "nominal": {
+        "timestep": 0.005,
+        "integrator": "implicitfast",
+        "servo": "position, in the integrator",
+        "sensor_noise": None,
+    },
+    "stand_in": {
+        "timestep": 0.001,
+        "integrator": "euler",
+        "servo": "torque, 1 kHz",
+        "sensor_noise": asdict(SensorNoise()),
+    },
+}
+
+
+@dataclass(frozen=True)
+class EvaluateConfig:
+    """What is evaluated."""
+
+    seeds: tuple[int, ...] = (0,)
+    """One episode for each seed, motion and policy."""
+    engines: tuple[str, ...] = ("nominal", "stand_in")
+    """Which robots: the declared model, the stand-in."""
+    max_seconds: float = 10.0
+    """Longer motions are cut to their beginning [s]."""
+    max_motions: int = 60
+    """A larger library is thinned evenly within each split."""
+    untrained: bool = True
+    """Also a policy with fresh weights: what there is before training."""
+    contract: str = ""
+    """sha256 of the contract that must be met, or nothing; a different one is refused."""
+    threads: int = 2
+    """CPU threads of the simulation."""
+    thresholds: Thresholds = field(default_factory=Thresholds)
+    """Keypoint thresholds of success."""
+    start_noise: StartNoise = field(default_factory=StartNoise)
+    """Noise of the start states."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A policy that is evaluated."""
+
+    policy: str
+    """Name in the tables: untrained, base, expert-<cluster>-r<N>, generalist."""
+    kind: str
+    """untrained, base, expert or generalist."""
+    folder: Path
+    """The exported policy."""
+    round: int | None = None
+    """An expert's round."""
+    cluster: str | None = None
+    """An expert's cluster: it is run on that cluster's motions only."""
+
+
+def main() -> None:
+    """Evaluate every policy there is."""
+    config = load("evaluate", EvaluateConfig)
+    clips, cluster_of = motions(config)
+    contract = frozen(clips, config)
+    print(f"evaluation contract {contract.sha256}: {len(clips)} motions, seeds {list(config.seeds)}", flush=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        found, missing = candidates(Path(scratch) if config.untrained else None)
+        for name in missing:
+            print(f"not evaluated, not there: {name}", flush=True)
+        planned = plan(found, clips, cluster_of, config.seeds)
+        tables = [
+            run(engine, found, planned, clips, contract, cluster_of, config, Path(scratch)) for engine in config.engines
+        ]
+    episodes = pd.concat(tables, ignore_index=True)
+    pairs = chain(found)
+    summary = {
+        "schema": 1,
+        "contract_sha256": contract.sha256,
+        "policies": [{**asdict(c), "folder": str(c.folder) if c.kind != "untrained" else ""} for c in found],
+        "missing": missing,
+        "results": results(episodes),
+        "comparisons": comparisons(episodes, pairs),
+    }
+    with output_folder(OUT) as folder:
+        write_contract(folder / "contract.json", contract)
+        episodes.to_parquet(folder / "episodes.parquet", index=False)
+        (folder / "summary.json").write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n")
+    tell(summary)
+    log_run(
+        "evaluate",
+        params=config,
+        metrics=headline(summary),
+        artifacts=[OUT],
+        tags={"evaluation_contract": contract.sha256},
+    )
+
+
+def motions(config: EvaluateConfig) -> tuple[list[Clip], dict[str, str]]:
+    """The kept clips, thinned and cut, and the cluster of each."""
+    index = read_index(Path("data/filtered"))
+    names: list[str] = []
+    for _, part in index.groupby("split", sort=True):
+        share = max(1, round(config.max_motions * len(part) / len(index)))
+        ordered = part.sort_values(["family", "name"])["name"].to_numpy()
+        names += list(
+            ordered[np.unique(np.linspace(0, len(ordered) - 1, min(share, len(ordered))).round().astype(int))]
+        )
+    labels = pd.read_parquet("data/clusters/labels.parquet")
+    clips = [cut(clip, config.max_seconds) for clip in read_library(library_folder(), names)]
+    return clips, dict(zip(labels["name"], labels["cluster"], strict=True))
+
+
+def cut(clip: Clip, seconds: float) -> Clip:
+    """The beginning of a clip, at most `seconds` long."""
+    frames = min(clip.frames, int(seconds * clip.fps) + 1)
+    arrays = {name: getattr(clip, name)[:frames] for name in ("root_pos", "root_quat", "joint_pos", "key_pos")}
+    return replace(clip, **arrays)
+
+
+def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
+    """The contract; one that is not the wanted one is refused, with what differs if the old one is still there."""
+    unknown = [name for name in config.engines if name not in ENGINES]
+    if unknown or not config.engines or not config.seeds:
+        raise BadInput(
+            f"{FILE}: evaluate", f"seeds, and engines among {', '.join(ENGINES)}", ", ".join(unknown) or "none"
+        )
+    engines = {name: ENGINES[name] for name in config.engines}
+    contract = freeze(clips, config.seeds, config.thresholds, config.start_noise, engines, FALL_RULE)
+    if config.contract and config.contract != contract.sha256:
+        if (OUT / "contract.json").exists():
+            require_same(read_contract(OUT / "contract.json"), contract.as_dict(), f"{FILE}: evaluate.contract")
+        raise BadInput(
+            f"{FILE}: evaluate.contract",
+            config.contract[:12],
+            contract.sha256[:12],
+            "Motions or settings have changed.",
+        )
+    return contract
+
+
+def candidates(scratch: Path | None) -> tuple[list[Candidate], list[str]]:
+    """The policies that are there, and the names of those that are not; `scratch` takes an untrained one."""
+    params = read()
+    rounds = [0, *(int(entry["n"]) for entry in params.get("rounds", []))]
+    wanted = [Candidate("base", "base", Path("models/base"))]
+    wanted += [
+        Candidate(f"expert-{cluster}-r{number}", "expert", Path(f"models/experts/r{number}/{cluster}"), number, cluster)
+        for number in rounds
+        for cluster in params.get("clusters", [])
+    ]
+    wanted.append(Candidate("generalist", "generalist", Path("models/generalist")))
+    found = [c for c in wanted if (c.folder / "contract.json").exists()]
+    missing = [c.policy for c in wanted if c not in found]
+    if not found:
+        raise BadInput("models", "at least one exported policy", "none", "Train first.")
+    if scratch is not None:
+        found.insert(0, Candidate("untrained", "untrained", untrained(scratch / "untrained", found[0].folder)))
+    return found, missing
+
+
+def plan(
+    found: list[Candidate], clips: list[Clip], cluster_of: dict[str, str], seeds: tuple[int, ...]
+) -> list[Episode]:
+    """Each policy on each of its clips with each seed."""
+    return [
+        Episode(f"{c.policy}-{clip.name}-{seed}", c.policy, clip.name, seed)
+        for c in found
+        for clip in clips
+        if c.cluster is None or cluster_of.get(clip.name) == c.cluster
+        for seed in seeds
+    ]
+
+
+def run(
+    engine: str,
+    found: list[Candidate],
+    planned: list[Episode],
+    clips: list[Clip],
+    contract: Contract,
+    cluster_of: dict[str, str],
+    config: EvaluateConfig,
+    scratch: Path,
+) -> pd.DataFrame:
+    """All episodes on one engine, one row each."""
+    by_name = {clip.name: clip for clip in clips}
+    rollouts = (nominal if engine == "nominal" else stand_in)(found, planned, by_name, config, scratch)
+    thresholds = {motion["name"]: motion["threshold_m"] for motion in contract.motions}
+    about = {c.policy: c for c in found}
+    rows = []
+    for episode, rollout in zip(planned, rollouts, strict=True):
+        clip, policy = by_name[episode.motion], about[episode.policy]
+        values = asdict(rollout_metrics(rollout, clip, thresholds[clip.name]))
+        rows.append(
+            {
+                **{"policy": policy.policy, "kind": policy.kind, "round": policy.round, "motion": clip.name},
+                **{"cluster": cluster_of.get(clip.name, ""), "family": clip.family, "split": clip.split},
+                **{"engine": engine, "seed": episode.seed, **values},
+            }
+        )
+    return pd.DataFrame(rows)[list(COLUMNS)].astype({"round": "Int64"})
+
+
+def nominal(
+    found: list[Candidate], planned: list[Episode], clips: dict[str, Clip], config: EvaluateConfig, scratch: Path
+) -> list[Rollout]:
+    """On the declared model, in this process, without sensor noise."""
+    loaded = {c.policy: ExportedPolicy.load(c.folder) for c in found}
+    total = sum(clips[e.motion].frames for e in planned)
+    with progress(total, f"nominal model, {len(planned)} episodes", "ticks") as bar:
+        return run_episodes(
+            lambda n: NominalRobots(n, config.threads), planned, loaded, clips, NO_NOISE, config.start_noise, bar.update
+        )
+
+
+def stand_in(
+    found: list[Candidate], planned: list[Episode], clips: dict[str, Clip], config: EvaluateConfig, scratch: Path
+) -> Iterator[Rollout]:
+    """On the stand-in robot, a process of its own, through measured rollouts."""
+    write_library(scratch / "clips", list(clips.values()))
+    episodes = [{"rollout_id": e.rollout_id, "policy": e.policy, "motion": e.motion, "seed": e.seed} for e in planned]
+    noise = asdict(config.start_noise)
+    work = {"policies": {c.policy: str(c.folder.resolve()) for c in found}, "episodes": episodes, "start_noise": noise}
+    start_stand_in(work, scratch / "clips", scratch / "rollouts", scratch, config.threads)
+    return (read_rollout(scratch / "rollouts" / f"{e.rollout_id}.parquet") for e in planned)
+
+
+def untrained(folder: Path, like: Path) -> Path:
+    """A policy of the same shape as `like` with fresh weights, exported."""
+    from bumblebee.evaluation.untrained import export_untrained
+
+    export_untrained(like, folder)
+    return folder
+
+
+def chain(found: list[Candidate]) -> list[tuple[str, str]]:
+    """What is compared with what: each step of the loop, and the generalist with all before it."""
+    rounds = sorted({c.round for c in found if c.round is not None})
+    steps = ["untrained", "base", *(f"experts-r{number}" for number in rounds), "generalist"]
+    pairs = list(zip(steps, steps[1:], strict=False))
+    extra = [("base", steps[-2]), ("base", "generalist")]
+    return list(dict.fromkeys(pairs + [pair for pair in extra if pair[0] != pair[1]]))
+
+
+def headline(summary: dict) -> dict[str, float]:
+    """Success rates over all motions, by policy and engine, for MLflow."""
+    whole = [r for r in summary["results"] if r["split"] == r["group"] == "all"]
+    return {f"{r['engine']}/{r['policy']}/success": r["success"]["value"] for r in whole}
+
+
+def tell(summary: dict) -> None:
+    """The same as a table on the terminal."""
+    print(f"{'policy':<18}{'engine':<10}{'success [95 %]':<24}{'MPJPE rad':>10}{'MPKPE mm':>10}")
+    for r in summary["results"]:
+        if r["split"] == r["group"] == "all":
+            low, high = r["success"]["ci95"]
+            rate = f"{r['success']['value']:.0%} [{low:.0%}, {high:.0%}] of {r['n']}"
+            print(
+                f"{r['policy']:<18}{r['engine']:<10}{rate:<24}{r['mpjpe_rad']['value']:>10.3f}{r['mpkpe_mm']['value']:>10.0f}"
+            )
+
+
+if __name__ == "__main__":
+    run_stage(main)

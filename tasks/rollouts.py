@@ -1,0 +1,201 @@
+"""Stage rollouts: one cluster's expert runs on the robot for one round and measured rollouts come back.
+
+The robot is the stand-in, a process of its own, or, where `rollouts.source` names a folder, the user's: its files
+`<source>/r<N>/<cluster>/[rollouts/]*.parquet` are copied, the originals stay as they are.
+"""
+
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from bumblebee.errors import BadInput
+from bumblebee.evaluation.episodes import rollout_metrics
+from bumblebee.evaluation.metrics import success_threshold
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.store import read_index, read_library
+from bumblebee.robot.model import write_xml
+from tasks.params import FILE, read
+from tasks.stage import load, log_run, output_folder, run_stage
+
+SEALED = Path("data/sealed/robot.json")
+
+
+@dataclass(frozen=True)
+class RolloutsConfig:
+    """What is run on the robot in a round."""
+
+    motions: int = 6
+    """Motions of the cluster (paper: 20)."""
+    repeats: int = 2
+    """Rollouts of each motion (paper: 8)."""
+    seed: int = 11
+    """Of the choice of motions, the start states and the sensor noise."""
+    source: Path | None = None
+    """Folder of the user's own measured rollouts; nothing: the stand-in robot runs."""
+    threads: int = 2
+    """CPU threads of the stand-in."""
+    max_seconds: float = 10.0
+    """Longer clips are not run."""
+
+
+def main(round: int, cluster: str) -> None:
+    """Fill data/rollouts/r<round>/<cluster>."""
+    config = load("rollouts", RolloutsConfig)
+    target = Path(f"data/rollouts/r{round}/{cluster}")
+    with output_folder(target) as folder:
+        if config.source is not None:
+            count = copy_users(config.source / f"r{round}" / cluster, folder)
+            chosen = pd.DataFrame()
+        else:
+            policy = Path(f"models/experts/r{parent_round(round)}/{cluster}")
+            chosen = choose(policy, cluster, config, round)
+            chosen.to_csv(folder / "chosen.csv", index=False)
+            run_stand_in(policy, cluster, list(chosen["motion"][chosen["run"]]), folder, config, round)
+            count = len(list((folder / "rollouts").glob("*.parquet")))
+        if not (folder / "model.xml").exists():
+            write_xml(folder / "model.xml")
+    print(f"round {round}, {cluster}: {count} measured rollouts in {target}")
+    log_run("rollouts", cluster=cluster, round=round, params=config, metrics={"rollouts": count})
+
+
+def parent_round(round: int, rounds: list[dict[str, Any]] | None = None) -> int:
+    """The round whose experts are run in this one, from `rounds` in params.yaml."""
+    listed = read().get("rounds", []) if rounds is None else rounds
+    for entry in listed:
+        if isinstance(entry, dict) and entry.get("n") == round and "parent" in entry:
+            return int(entry["parent"])
+    raise BadInput(f"{FILE}: rounds", f"an entry with n: {round} and its parent", str(listed))
+
+
+def choose(policy: Path, cluster: str, config: RolloutsConfig, round: int) -> pd.DataFrame:
+    """Which motions are run: a seeded draw among those that the policy follows in the nominal simulation.
+
+    Where it follows fewer than wanted, those that it followed longest fill up: they give data until the fall. Columns:
+    motion, family, success, frames (before termination), mpkpe_mm, run.
+    """
+    clips = candidates(cluster, config.max_seconds)
+    if not clips:
+        raise BadInput(
+            "data/clusters/labels.parquet",
+            f"motions of {cluster} in the train split, at most {config.max_seconds:g} s",
+            "none",
+        )
+    table = followed(policy, clips, config.threads)
+    rng = np.random.default_rng([config.seed, round, *cluster.encode()])
+    table = table.iloc[rng.permutation(len(table))]
+    # Stable: the draw decides among those that succeed, the share that was followed among those that do not.
+    table = table.sort_values("share", ascending=False, kind="stable").reset_index(drop=True)
+    table["run"] = np.arange(len(table)) < config.motions
+    return table
+
+
+def followed(policy: Path, clips: list[Clip], threads: int) -> pd.DataFrame:
+    """How far the policy follows each clip in the declared model, without noise."""
+    from bumblebee.deploy.episodes import Episode, run_episodes
+    from bumblebee.deploy.policy import ExportedPolicy
+    from bumblebee.deploy.robots import NominalRobots
+    from bumblebee.deploy.sensors import NO_NOISE
+
+    episodes = [Episode(clip.name, "expert", clip.name, 0) for clip in clips]
+    by_name = {clip.name: clip for clip in clips}
+    rollouts = run_episodes(
+        lambda n: NominalRobots(n, threads), episodes, {"expert": ExportedPolicy.load(policy)}, by_name, NO_NOISE
+    )
+    rows = []
+    for clip, rollout in zip(clips, rollouts, strict=True):
+        result = rollout_metrics(rollout, clip, success_threshold(clip.family))
+        share = 1.0 if result.success else result.frames / clip.frames
+        rows.append((clip.name, clip.family, result.success, result.frames, round_to(share), result.mpkpe_mm))
+    return pd.DataFrame(rows, columns=["motion", "family", "success", "frames", "share", "mpkpe_mm"])
+
+
+def round_to(share: float) -> float:
+    """Shares in steps of a tenth, so that the draw still matters among equals."""
+    return float(np.floor(share * 10) / 10)
+
+
+def candidates(cluster: str, max_seconds: float) -> list[Clip]:
+    """Kept clips of the cluster that were trained on and are short enough."""
+    labels = pd.read_parquet("data/clusters/labels.parquet")
+    index = read_index(Path("data/filtered"))
+    usable = set(index["name"][(index["split"] == "train") & (index["duration"] <= max_seconds)])
+    names = [name for name in labels["name"][labels["cluster"] == cluster] if name in usable]
+    return read_library(library_folder(), names)
+
+
+def library_folder() -> Path:
+    """Where the kept clips' arrays lie: in data/filtered if it holds them, else in data/motions."""
+    filtered = Path("data/filtered")
+    return filtered if (filtered / "clips").is_dir() else Path("data/motions")
+
+
+def run_stand_in(
+    policy: Path, cluster: str, names: list[str], folder: Path, config: RolloutsConfig, round: int
+) -> None:
+    """Start the stand-in as its own process and wait; its one line of complaint becomes ours."""
+    parent = parent_round(round)
+    meta = {
+        "cluster": cluster,
+        "policy": {"name": f"expert-{cluster}", "version": f"r{parent}", "sha256": _sha256(policy)},
+    }
+    episodes = [
+        {
+            "rollout_id": f"r{round}-{cluster}-{name}-{run}",
+            "policy": f"expert-{cluster}",
+            "motion": name,
+            "seed": config.seed + 1000 * round + run,
+            "meta": meta,
+        }
+        for name in names
+        for run in range(config.repeats)
+    ]
+    plan = {"policies": {f"expert-{cluster}": str(policy)}, "episodes": episodes}
+    start_stand_in(plan, library_folder(), folder / "rollouts", folder, config.threads)
+
+
+def start_stand_in(plan: dict[str, Any], clips: Path, out: Path, work: Path, threads: int) -> None:
+    """Run a plan on the stand-in robot, in another process, which alone reads the sealed effects."""
+    file = work / ".plan.json"
+    file.write_text(json.dumps(plan))
+    command = [sys.executable, "-m", "bumblebee.deploy.stand_in", "--sealed", str(SEALED), "--clips", str(clips)]
+    command += ["--plan", str(file), "--out", str(out), "--threads", str(threads)]
+    ended = subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False)
+    file.unlink()
+    if ended.returncode:
+        lines = ended.stderr.strip().splitlines()
+        raise BadInput(
+            "stand-in robot", "its process to end with status 0", f"{ended.returncode}: {lines[-1] if lines else ''}"
+        )
+
+
+def copy_users(source: Path, folder: Path) -> int:
+    """Copy the user's rollouts and model; the originals are not touched."""
+    inner = source / "rollouts" if (source / "rollouts").is_dir() else source
+    files = sorted(inner.glob("*.parquet")) if inner.is_dir() else []
+    if not files:
+        raise BadInput(
+            f"params.yaml: rollouts.source: {source}", "a folder with *.parquet of this round and cluster", "none"
+        )
+    (folder / "rollouts").mkdir()
+    for file in files:
+        shutil.copy2(file, folder / "rollouts" / file.name)
+    if (source / "model.xml").is_file():
+        shutil.copy2(source / "model.xml", folder / "model.xml")
+    return len(files)
+
+
+def _sha256(policy: Path) -> str:
+    from bumblebee.deploy.policy import read_policy_contract
+
+    return str(read_policy_contract(policy / "contract.json")["onnx_sha256"])
+
+
+if __name__ == "__main__":
+    run_stage(main)
