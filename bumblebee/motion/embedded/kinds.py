@@ -172,11 +172,11 @@ def _sidestep() -> tuple[Kind, ...]:
 def _jump() -> tuple[Kind, ...]:
     j = jumps
     return (
-        Kind("jump", "jump", lambda v: j.jump(v, 0.2),
+        Kind("jump", "jump", lambda v: j.jump(v, 0.18),
              ("a person jumps", "a person jumps straight up in place")),
         Kind("jump_small", "jump", lambda v: j.jump(v, 0.14, crouch=0.065),
              ("a person makes a small jump", "a person hops slightly in place")),
-        Kind("jump_forward", "jump", lambda v: j.jump(v, 0.18, ahead=0.14),
+        Kind("jump_forward", "jump", lambda v: j.jump(v, 0.18, ahead=0.14, crouch=0.065),
              ("a person jumps forward", "a person makes a small jump ahead")),
         Kind("jump_twice", "jump", lambda v: j.jump(v, 0.16, crouch=0.07, hops=2),
              ("a person jumps two times", "a person makes two small jumps in place")),
