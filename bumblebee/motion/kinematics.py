@@ -42,21 +42,21 @@ def forward_key_positions(root_pos: np.ndarray, root_quat: np.ndarray, joint_pos
     return np.stack([poses[body][0] for body in KEY_BODIES], axis=1)
 
 
-def collision_points(root_pos: np.ndarray, root_quat: np.ndarray, joint_pos: np.ndarray) -> dict[str, np.ndarray]:
-    """The lowest points of the collision primitives of each body: name -> (T, N, 3) [m, world].
+def lowest_heights(root_pos: np.ndarray, root_quat: np.ndarray, joint_pos: np.ndarray) -> dict[str, np.ndarray]:
+    """Height of the lowest point of each body that has collision primitives: name -> (T,) [m, world]."""
+    heights = {}
+    for name, (pos, quat) in forward_bodies(root_pos, root_quat, joint_pos).items():
+        if primitives := g1_bodies()[name].get("collision"):
+            centres, radii = _centres(primitives)  # (N, 3), (N,): a capsule has one at either end
+            w, x, y, z = quat.T
+            up = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1)
+            heights[name] = pos[:, 2] + (up @ centres.T - radii).min(axis=1)
+    return heights
 
-    A sphere has one such point, a capsule one below the centre of either end.
-    """
-    poses = forward_bodies(root_pos, root_quat, joint_pos)
-    points = {}
-    for name, facts in g1_bodies().items():
-        if "collision" in facts:
-            centres, radii = _centres(facts["collision"])
-            pos, quat = poses[name]
-            world = pos[:, None] + quaternions.rotate(quat[:, None], centres[None])
-            world[..., 2] -= radii
-            points[name] = world
-    return points
+
+def lowest(root_pos: np.ndarray, root_quat: np.ndarray, joint_pos: np.ndarray) -> np.ndarray:
+    """Height of the robot's lowest point in each frame, (T,) [m, world]."""
+    return np.min(list(lowest_heights(root_pos, root_quat, joint_pos).values()), axis=0)
 
 
 def sole_points(root_pos: np.ndarray, root_quat: np.ndarray, joint_pos: np.ndarray) -> np.ndarray:

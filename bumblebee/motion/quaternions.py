@@ -28,10 +28,12 @@ def conjugate(quat: ArrayLike) -> FloatArray:
 
 def rotate(quat: ArrayLike, vector: ArrayLike) -> FloatArray:
     """Rotate vectors (..., 3) by quaternions (..., 4); leading axes broadcast."""
-    quat, vector = np.asarray(quat), np.asarray(vector)
-    axis = quat[..., 1:]
-    twice = 2.0 * np.cross(axis, vector)
-    return vector + quat[..., :1] * twice + np.cross(axis, twice)
+    w, x, y, z = np.moveaxis(np.asarray(quat), -1, 0)
+    a, b, c = np.moveaxis(np.asarray(vector), -1, 0)
+    # v + w t + r x t with t = 2 r x v, written out: numpy's cross is several times slower.
+    ta, tb, tc = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    rotated = [a + w * ta + y * tc - z * tb, b + w * tb + z * ta - x * tc, c + w * tc + x * tb - y * ta]
+    return np.stack(np.broadcast_arrays(*rotated), axis=-1)
 
 
 def normalised(quat: ArrayLike) -> FloatArray:

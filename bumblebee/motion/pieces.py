@@ -1,0 +1,61 @@
+"""Long motions cut into pieces, and the split into training and held-out motions."""
+
+import hashlib
+import re
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from bumblebee.motion.captions import within
+from bumblebee.motion.clip import Clip
+
+FAMILY_MINIMUM = 4  # motions: a family of so many has at least one held out
+
+
+def split_long(clip: Clip, max_seconds: float) -> list[Clip]:
+    """The clip itself, or equal pieces `<name>_p0`, `_p1` ... none longer than `max_seconds` (0: never cut)."""
+    if max_seconds <= 0 or clip.duration <= max_seconds:
+        return [clip]
+    count = int(np.ceil(clip.frames / (max_seconds * clip.fps + 1)))
+    edges = np.linspace(0, clip.frames, count + 1).round().astype(int)
+    pieces = []
+    for number, (start, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        arrays = {name: getattr(clip, name)[start:end] for name in ("root_pos", "root_quat", "joint_pos", "key_pos")}
+        captions = within(clip.captions, start / clip.fps, (end - 1) / clip.fps)
+        source = clip.caption_source if captions else ""
+        pieces.append(
+            replace(clip, name=f"{clip.name}_p{number}", captions=captions, caption_source=source, **arrays)
+        )
+    return pieces
+
+
+def motion_of(name: str) -> str:
+    """The motion that a piece was cut from; a whole clip's own name."""
+    return re.sub(r"_p\d+$", "", name)
+
+
+def hold_out(clips: Iterable[Clip], share: float) -> list[Clip]:
+    """The clips with `split` set: about `share` of the motions are "test", by a hash of their names.
+
+    All pieces of one motion go to the same side. A family of at least four motions has at least one held out, and at
+    least one left; none is held out where `share` is 0.
+    """
+    clips = list(clips)
+    families: dict[str, set[str]] = defaultdict(set)
+    for clip in clips:
+        families[clip.family].add(motion_of(clip.name))
+    held: set[str] = set()
+    for motions in families.values():
+        ranked = sorted(motions, key=_position)
+        chosen = [motion for motion in ranked if _position(motion) < share]
+        if share > 0 and not chosen and len(ranked) >= FAMILY_MINIMUM:
+            chosen = ranked[:1]
+        held |= set(chosen[: max(len(ranked) - 1, 0)] if share < 1 else chosen)
+    return [replace(clip, split="test" if motion_of(clip.name) in held else "train") for clip in clips]
+
+
+def _position(name: str) -> float:
+    """A number from 0 to 1 that depends on the name alone."""
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big") / 2**64

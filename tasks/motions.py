@@ -1,0 +1,85 @@
+"""Read or make the motions, resample them to 50 Hz, hold some out: the user's files -> data/motions."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bumblebee.errors import BadInput
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.folder import Reading, ReadConfig, motion_files, read_folder
+from bumblebee.motion.pieces import hold_out
+from bumblebee.motion.store import write_library
+from bumblebee.progress import progress
+from tasks.stage import load, log_run, run_stage
+
+MOTIONS = Path("data/motions")
+EMBEDDED = "embedded"
+
+
+@dataclass(frozen=True)
+class MotionsConfig:
+    """Where the motions come from."""
+
+    source: str = EMBEDDED
+    """"embedded" for the library that comes with BumbleBee, or a folder (or one file) of motions."""
+    holdout_share: float = 0.15
+    """Share of the motions that no policy trains on, by a hash of their names; each family of 4 or more has one."""
+    read: ReadConfig = field(default_factory=ReadConfig)
+    """How the files of a folder are read."""
+
+    def __post_init__(self) -> None:
+        """Refuse a share that leaves nothing to train on."""
+        if not 0 <= self.holdout_share < 1:
+            raise ValueError(f"holdout_share is a share from 0 to below 1, came {self.holdout_share}")
+
+
+def main() -> None:
+    """Read the source, split it, write the library, say what came."""
+    config = load("motions", MotionsConfig)
+    reading = gather(config)
+    clips = hold_out(reading.clips, config.holdout_share)
+    write_library(MOTIONS, clips, reading.skipped)
+    tell(clips, reading)
+    log_run("motions", params=config, metrics=metrics(clips, reading), artifacts=[MOTIONS / "skipped.csv"])
+
+
+def gather(config: MotionsConfig) -> Reading:
+    """The clips of the configured source, and the files that gave none."""
+    if config.source == EMBEDDED:
+        return embedded()
+    source = Path(config.source).expanduser()
+    if not source.exists():
+        raise BadInput(f"params.yaml: motions.source {source}", f"a folder of motions, or {EMBEDDED!r}", "nothing there")
+    with progress(len(motion_files(source)), "reading motions", "files") as bar:
+        return read_folder(source, config.read, bar.update)
+
+
+def embedded() -> Reading:
+    """The library that comes with BumbleBee."""
+    import pandas as pd
+
+    from bumblebee.motion.embedded import make_library
+
+    return Reading(make_library(), pd.DataFrame(columns=["file", "reason"]))
+
+
+def metrics(clips: list[Clip], reading: Reading) -> dict[str, float]:
+    """Counts for MLflow."""
+    return {
+        "clips": len(clips),
+        "held_out": sum(clip.split == "test" for clip in clips),
+        "minutes": sum(clip.duration for clip in clips) / 60,
+        "files_skipped": len(reading.skipped),
+    }
+
+
+def tell(clips: list[Clip], reading: Reading) -> None:
+    """One line of counts, and one for each reason why files were skipped."""
+    counts = metrics(clips, reading)
+    print(f"{counts['clips']} clips, {counts['minutes']:.1f} minutes, {counts['held_out']} held out -> {MOTIONS}")
+    for reason, group in reading.skipped.groupby("reason"):
+        which = group["file"].iloc[0] + (f" and {len(group) - 1} more" if len(group) > 1 else "")
+        print(f"skipped {which}: {reason}")
+
+
+if __name__ == "__main__":
+    run_stage(main)
