@@ -1,0 +1,112 @@
+"""Stage delta: one cluster's delta action on what the corrected model still misses, kept only if it beats none.
+
+It is trained on the rollouts that the diagnosis fitted and judged on those that it held out: the delta never sees them.
+"""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import pandas as pd
+import torch
+
+from bumblebee.errors import BadInput
+from bumblebee.learning.delta import DeltaConfig, magnitudes, save_delta
+from bumblebee.learning.delta_env import DeltaEnv
+from bumblebee.learning.delta_gain import Gain, compare, replay_error
+from bumblebee.learning.delta_train import train_delta
+from bumblebee.learning.recordings import Recordings, stack
+from bumblebee.measured.rollout import read_dataset
+from bumblebee.progress import progress
+from bumblebee.sim.effects import read_effects, runtime_hooks
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.mujoco_cpu import MujocoCpu
+from bumblebee.sim.rotations import rotate_inverse
+from bumblebee.sim.sensors import load_model
+from tasks.diagnosed import split
+from tasks.stage import load, log_run, output_folder, run_stage
+
+_WORLDS_TO_JUDGE = 64
+
+
+def main(round: int, cluster: str) -> None:
+    """Fill models/delta/r<round>/<cluster>."""
+    config = load("delta", DeltaConfig)
+    found = Path(f"data/diagnosis/r{round}")
+    model = load_model(found / "model.xml")
+    hooks = runtime_hooks(read_effects(found / "effects.yaml"), model)
+    offset = torch.as_tensor(hooks.encoder_offset, dtype=torch.float32)
+    train, held_out = recordings(round, cluster)
+    engine = MujocoCpu(model, config.num_envs, threads=config.threads, hooks=hooks)
+    env = DeltaEnv(engine, train, config, offset)
+    total = config.iterations * config.steps_per_iteration * config.num_envs
+    with progress(total, f"delta action, round {round}, {cluster}", "frames") as bar:
+        delta, curve = train_delta(env, config, bar.update)
+    judge = MujocoCpu(model, _WORLDS_TO_JUDGE, threads=config.threads, hooks=hooks)
+    gain = judged(judge, held_out, offset, delta) if held_out is not None else Gain(0, {}, False)
+    card = {
+        "round": round,
+        "cluster": cluster,
+        "promoted": gain.promoted,
+        "held_out": asdict(gain),
+        "train_rollouts": list(train.ids),
+        "magnitude_rad": magnitudes(delta, recorded_state(train), train.targets),
+        "config": asdict(config),
+    }
+    target = Path(f"models/delta/r{round}/{cluster}")
+    with output_folder(target) as folder:
+        save_delta(folder, delta, config.hidden, card)
+        curve.to_csv(folder / "curve.csv", index=False)
+    print(verdict(round, cluster, gain))
+    numbers = {f"held_out/{h}/{k}": v for h, values in gain.change.items() for k, v in values.items()}
+    tags = {"promoted": str(gain.promoted).lower()}
+    log_run(
+        "delta", cluster=cluster, round=round, params=config, metrics=numbers, curve=target / "curve.csv",
+        artifacts=[target], tags=tags,
+    )  # fmt: skip
+
+
+def recordings(round: int, cluster: str) -> tuple[Recordings, Recordings | None]:
+    """The cluster's rollouts of this round, as the diagnosis split them."""
+    folder = Path(f"data/measured/r{round}")
+    declared = load_model(folder / "model.xml")
+    train_ids, held_out_ids = split(round)
+    own = [r for r in read_dataset(folder).rollouts if r.meta.get("cluster", cluster) == cluster]
+    train = [r for r in own if r.rollout_id in train_ids]
+    held_out = [r for r in own if r.rollout_id in held_out_ids]
+    if not train:
+        raise BadInput(folder, f"rollouts of cluster {cluster} outside the held-out set", "none", "Collect more rollouts.")
+    return stack(train, declared), stack(held_out, declared) if held_out else None
+
+
+def judged(engine: MujocoCpu, held_out: Recordings, offset: torch.Tensor, delta) -> Gain:  # noqa: ANN001 (DeltaAction)
+    """The held-out comparison with and without the delta."""
+    without = replay_error(engine, held_out, offset, None)
+    return compare(without, replay_error(engine, held_out, offset, delta))
+
+
+def recorded_state(recordings: Recordings) -> RobotState:
+    """Every recorded row as a state; the key bodies, which a delta does not see, are left at zero."""
+    qpos, qvel = recordings.qpos, recordings.qvel
+    return RobotState(
+        root_pos_w=qpos[:, :3],
+        root_quat_w=qpos[:, 3:7],
+        root_lin_vel_b=rotate_inverse(qpos[:, 3:7], qvel[:, :3]),
+        root_ang_vel_b=qvel[:, 3:6],
+        joint_pos=qpos[:, 7:],
+        joint_vel=qvel[:, 6:],
+        key_pos_w=torch.zeros(len(qpos), 14, 3),
+    )
+
+
+def verdict(round: int, cluster: str, gain: Gain) -> str:
+    """One line for the terminal."""
+    if not gain.change:
+        return f"round {round}, {cluster}: no held-out rollouts, so no delta action is kept"
+    longest = pd.DataFrame(gain.change).T.iloc[-1]
+    outcome = "kept" if gain.promoted else "not kept: it does not beat no delta beyond its interval"
+    change = f"{longest['relative']:+.1%} [{longest['low']:+.1%}, {longest['high']:+.1%}]"
+    return f"round {round}, {cluster}: error after 1 s {change} on {gain.rollouts} held-out rollouts; delta action {outcome}"
+
+
+if __name__ == "__main__":
+    run_stage(main)

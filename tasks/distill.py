@@ -1,0 +1,121 @@
+"""Stage distill: the experts of the final round become one generalist, in the simulator that the last round corrected."""
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import mujoco
+import pandas as pd
+import torch
+from torch import Tensor
+
+from bumblebee.errors import BadInput
+from bumblebee.learning.delta import action_adapter, load_delta
+from bumblebee.learning.distill import DistillConfig, distill, equal_shares
+from bumblebee.learning.export import export_policy
+from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.trial import World, success_by_family, try_policy
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.store import read_library
+from bumblebee.progress import progress
+from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.mujoco_cpu import MujocoCpu
+from bumblebee.sim.sensors import load_model
+from bumblebee.tracking.env import TrackingEnv, action_scale
+from bumblebee.tracking.library import MotionLibrary
+from tasks.sections import loop
+from tasks.stage import load, log_run, output_folder, run_stage
+
+OUT = Path("models/generalist")
+
+
+def main() -> None:
+    """Fill models/generalist."""
+    config, shape = load("distill", DistillConfig), loop()
+    clips, cluster = training_clips(shape.clusters)
+    base = load_policy(Path("models/base"))
+    experts = {
+        i: load_policy(Path(f"models/experts/r{shape.final_round}/{name}")) for i, name in enumerate(shape.clusters)
+    }
+    model, hooks = simulator(shape.final_round, config.env.physics_hz)
+    env = environment(clips, cluster, model, hooks, config)
+    env.action_adapter = deltas(env, cluster, shape.clusters, shape.final_round)
+    total = config.iterations * config.steps * config.env.num_worlds
+    with progress(total, "distil the generalist", "frames") as bar:
+        generalist, curve = distill(env, experts, cluster, config, base, bar.update)
+    card = {
+        "from": [f"expert-{name}-r{shape.final_round}" for name in shape.clusters],
+        "agreement": agreement(generalist, clips, model, hooks, config),
+        "config": asdict(config),
+    }
+    with output_folder(OUT) as folder:
+        generalist.save(folder)
+        export_policy(folder, generalist, config.env.physics_hz)
+        curve.to_csv(folder / "curve.csv", index=False)
+        (folder / "card.json").write_text(json.dumps(card, indent=2) + "\n")
+    final = {"kl": float(curve["kl"].iloc[-1]), **{f"success/{k}": v for k, v in card["agreement"].items()}}
+    print(f"generalist: KL to the experts {final['kl']:.3f}, success in the corrected simulator {card['agreement']['all']:.0%}")
+    log_run("distill", params=config, metrics=final, curve=OUT / "curve.csv", artifacts=[OUT])
+
+
+def training_clips(clusters: tuple[str, ...]) -> tuple[list[Clip], list[int]]:
+    """The training clips and the index of each one's cluster."""
+    labels = pd.read_parquet("data/clusters/labels.parquet").set_index("name")["cluster"]
+    clips = [clip for clip in read_library(Path("data/filtered")) if clip.split == "train"]
+    if not clips:
+        raise BadInput("data/filtered", "training clips", "none")
+    return clips, [clusters.index(labels[clip.name]) for clip in clips]
+
+
+def simulator(final_round: int, physics_hz: float) -> tuple[mujoco.MjModel, RuntimeHooks | None]:
+    """The model that the last round corrected; the declared one if there was no round."""
+    if final_round == 0:
+        return load_model(physics_hz=physics_hz), None
+    folder = Path(f"data/diagnosis/r{final_round}")
+    model = load_model(folder / "model.xml", physics_hz)
+    return model, runtime_hooks(read_effects(folder / "effects.yaml"), model)
+
+
+def environment(
+    clips: list[Clip], cluster: list[int], model: mujoco.MjModel, hooks: RuntimeHooks | None, config: DistillConfig
+) -> TrackingEnv:
+    """The tracking task over all clusters, each with the same share of the frames."""
+    library = MotionLibrary(clips, config.env.ahead)
+    engine = MujocoCpu(model, config.env.num_worlds, threads=config.env.threads, hooks=hooks)
+    return TrackingEnv(library, engine, config.env, config.seed, clip_share=equal_shares(library.length, cluster))
+
+
+def deltas(
+    env: TrackingEnv, cluster: list[int], clusters: tuple[str, ...], final_round: int
+) -> Callable[[RobotState, Tensor, Tensor], Tensor] | None:
+    """Each world's motion is run with the delta action that its cluster's expert was refined with, if any was kept."""
+    if final_round == 0:
+        return None
+    kept = {i: load_delta(Path(f"models/delta/r{final_round}/{name}")) for i, name in enumerate(clusters)}
+    adapters = {i: action_adapter(delta, action_scale()) for i, delta in kept.items() if delta is not None}
+    if not adapters:
+        return None
+    of_clip = torch.as_tensor(cluster)
+
+    def adapt(state: RobotState, observation: Tensor, action: Tensor) -> Tensor:
+        now, changed = of_clip[env.clip], action.clone()
+        for index, adapter in adapters.items():
+            own = (now == index).nonzero()[:, 0]
+            changed[own] = adapter(state[own], observation[own], action[own])
+        return changed
+
+    return adapt
+
+
+def agreement(
+    generalist: Policy, clips: list[Clip], model: mujoco.MjModel, hooks: RuntimeHooks | None, config: DistillConfig
+) -> dict[str, float]:
+    """Success rate by family on the training clips, in the simulator it learned in, without any delta action."""
+    world = World(model, hooks, threads=config.env.threads)
+    return success_by_family(try_policy(generalist, clips, world, config.env.ahead))
+
+
+if __name__ == "__main__":
+    run_stage(main)
