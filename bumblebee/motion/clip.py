@@ -10,9 +10,9 @@ _CONTACT_HEIGHT = 0.03  # m: a sole lower than this may touch the floor
 _CONTACT_SPEED = 0.5  # m/s: and does, if it moves slower than this
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Clip:
-    """One motion of the G1, sampled evenly; arrays are float32.
+    """One motion of the G1, sampled evenly; arrays are float32; two clips are equal only if they are one object.
 
     `root_pos` (T, 3) [m, world], `root_quat` (T, 4) [wxyz, body to world], `joint_pos` (T, 23) [rad] in the order of
     `joint_names()`, `key_pos` (T, 14, 3) [m, world] of `KEY_BODIES` by forward kinematics.

@@ -6,12 +6,13 @@ written down with the value, the frame and a sentence.
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.kinematics import lowest, lowest_heights
+from bumblebee.motion.kinematics import lowest_heights
 from bumblebee.robot.facts import KEY_BODIES, joint_names, joints
 
 DROP_COLUMNS = ("motion", "rule", "value", "limit", "unit", "frame", "time", "explanation")
@@ -52,7 +53,7 @@ class Worst:
 
 def floor_penetration(clip: Clip, config: FilterConfig) -> Worst:
     """Depth of the robot's lowest point under the floor."""
-    heights = lowest_heights(clip.root_pos, clip.root_quat, clip.joint_pos)
+    heights = _heights(clip)
     body = min(heights, key=lambda name: heights[name].min())
     frame = int(np.argmin(heights[body]))
     depth = max(0.0, -float(heights[body][frame]))
@@ -61,7 +62,7 @@ def floor_penetration(clip: Clip, config: FilterConfig) -> Worst:
 
 def floating(clip: Clip, config: FilterConfig) -> Worst:
     """The smallest distance from the floor in the whole motion: one that never comes down is wrong in height."""
-    low = lowest(clip.root_pos, clip.root_quat, clip.joint_pos)
+    low = np.min(list(_heights(clip).values()), axis=0)
     frame = int(np.argmin(low))
     height = max(0.0, float(low[frame]))
     return Worst(height, config.floating, "m", frame, f"never nearer to the floor than {height:.3f} m")
@@ -69,7 +70,7 @@ def floating(clip: Clip, config: FilterConfig) -> Worst:
 
 def airborne(clip: Clip, config: FilterConfig) -> Worst:
     """The longest time without any contact possible."""
-    high = lowest(clip.root_pos, clip.root_quat, clip.joint_pos) > config.airborne_height
+    high = np.min(list(_heights(clip).values()), axis=0) > config.airborne_height
     start, length = _longest_run(high)
     seconds = length / clip.fps
     said = f"{seconds:.2f} s more than {config.airborne_height} m above the floor"
@@ -144,6 +145,12 @@ def filter_clips(clips: Iterable[Clip], config: FilterConfig | None = None) -> t
         if not broken:
             kept.append(clip)
     return kept, pd.DataFrame(drops, columns=list(DROP_COLUMNS))
+
+
+@lru_cache(maxsize=1)
+def _heights(clip: Clip) -> dict[str, np.ndarray]:
+    """Height of each body's lowest point, (T,) [m]; three rules ask for it in turn."""
+    return lowest_heights(clip.root_pos, clip.root_quat, clip.joint_pos)
 
 
 def _steps(values: np.ndarray, fps: float) -> np.ndarray:

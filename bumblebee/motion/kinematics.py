@@ -1,5 +1,7 @@
 """Forward kinematics of the G1 over all frames of a motion at once."""
 
+from functools import cache
+
 import numpy as np
 
 from bumblebee.motion import quaternions
@@ -17,21 +19,19 @@ def forward_bodies(
         root_quat: the pelvis, (T, 4) [wxyz].
         joint_pos: (T, 23) [rad] in the order of `joint_names()`; the wrists are locked at 0.
     """
-    angles = {name: np.asarray(joint_pos, np.float64)[:, i] for i, name in enumerate(joint_names())}
+    joint_pos = np.asarray(joint_pos, np.float64)
+    root = np.asarray(root_pos, np.float64), quaternions.normalised(np.asarray(root_quat, np.float64))
     poses: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    for name, facts in g1_bodies().items():
-        if facts["parent"] == "world":
-            poses[name] = np.asarray(root_pos, np.float64), quaternions.normalised(np.asarray(root_quat, np.float64))
+    for name, parent, offset, fixed, axis, column in _tree():
+        if parent not in poses:
+            poses[name] = root
             continue
-        parent_pos, parent_quat = poses[facts["parent"]]
-        pos = parent_pos + quaternions.rotate(parent_quat, facts["pos"])
-        quat = parent_quat
-        if facts["quat"] != [1.0, 0.0, 0.0, 0.0]:
-            quat = quaternions.multiply(quat, quaternions.normalised(facts["quat"]))
-        joint = facts.get("joint")
-        if joint and joint["name"] in angles:
-            turn = quaternions.from_axis_angle(joint["axis"], angles[joint["name"]])
-            quat = quaternions.multiply(quat, turn)
+        pos, quat = poses[parent]
+        pos = pos + quaternions.rotate(quat, offset)
+        if fixed is not None:
+            quat = quaternions.multiply(quat, fixed)
+        if column is not None:
+            quat = quaternions.multiply(quat, quaternions.from_axis_angle(axis, joint_pos[:, column]))
         poses[name] = pos, quat
     return poses
 
@@ -46,8 +46,8 @@ def lowest_heights(root_pos: np.ndarray, root_quat: np.ndarray, joint_pos: np.nd
     """Height of the lowest point of each body that has collision primitives: name -> (T,) [m, world]."""
     heights = {}
     for name, (pos, quat) in forward_bodies(root_pos, root_quat, joint_pos).items():
-        if primitives := g1_bodies()[name].get("collision"):
-            centres, radii = _centres(primitives)  # (N, 3), (N,): a capsule has one at either end
+        if "collision" in g1_bodies()[name]:
+            centres, radii = _centres(name)  # (N, 3), (N,): a capsule has one at either end
             w, x, y, z = quat.T
             up = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1)
             heights[name] = pos[:, 2] + (up @ centres.T - radii).min(axis=1)
@@ -82,11 +82,26 @@ def make_clip(
     return Clip(name, float(fps), *arrays, **about)  # type: ignore[arg-type]
 
 
-def _centres(primitives: list[dict]) -> tuple[np.ndarray, np.ndarray]:
+@cache
+def _tree() -> list[tuple[str, str, np.ndarray, np.ndarray | None, np.ndarray, int | None]]:
+    """For each body: name, parent, offset (3,) [m], fixed rotation (4,) if there is one, joint axis (3,), its column."""
+    rows = []
+    for name, facts in g1_bodies().items():
+        fixed = None if facts["quat"] == [1.0, 0.0, 0.0, 0.0] else quaternions.normalised(facts["quat"])
+        joint = facts.get("joint", {"name": "", "axis": (0.0, 0.0, 0.0)})
+        column = joint_names().index(joint["name"]) if joint["name"] in joint_names() else None
+        rows.append((name, facts["parent"], np.array(facts["pos"]), fixed, np.array(joint["axis"]), column))
+    return rows
+
+
+@cache
+def _centres(body: str) -> tuple[np.ndarray, np.ndarray]:
+    """Centres (N, 3) [m, body] and radii (N,) [m] of a body's spheres and of the ends of its capsules."""
     centres, radii = [], []
-    for geom in primitives:
-        reach = quaternions.rotate(geom["quat"], [0.0, 0.0, geom["size"][1]]) if geom["type"] == "capsule" else np.zeros(3)
-        ends = (1.0, -1.0) if geom["type"] == "capsule" else (0.0,)
+    for geom in g1_bodies()[body]["collision"]:
+        capsule = geom["type"] == "capsule"
+        reach = quaternions.rotate(geom["quat"], [0.0, 0.0, geom["size"][1]]) if capsule else np.zeros(3)
+        ends = (1.0, -1.0) if capsule else (0.0,)
         centres += [np.asarray(geom["pos"]) + end * reach for end in ends]
         radii += [geom["size"][0]] * len(ends)
     return np.array(centres), np.array(radii)

@@ -8,16 +8,12 @@ FloatArray = np.ndarray
 
 def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
     """Product `left * right` (..., 4): the rotation `right` followed by `left`."""
-    w1, x1, y1, z1 = np.moveaxis(np.asarray(left), -1, 0)
-    w2, x2, y2, z2 = np.moveaxis(np.asarray(right), -1, 0)
-    return np.stack(
-        [
-            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
-            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
-            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
-            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
-        ],
-        axis=-1,
+    (w1, x1, y1, z1), (w2, x2, y2, z2) = _parts(left), _parts(right)
+    return _joined(
+        w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
+        w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
+        w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
+        w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
     )
 
 
@@ -28,12 +24,10 @@ def conjugate(quat: ArrayLike) -> FloatArray:
 
 def rotate(quat: ArrayLike, vector: ArrayLike) -> FloatArray:
     """Rotate vectors (..., 3) by quaternions (..., 4); leading axes broadcast."""
-    w, x, y, z = np.moveaxis(np.asarray(quat), -1, 0)
-    a, b, c = np.moveaxis(np.asarray(vector), -1, 0)
+    (w, x, y, z), (a, b, c) = _parts(quat), _parts(vector)
     # v + w t + r x t with t = 2 r x v, written out: numpy's cross is several times slower.
     ta, tb, tc = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    rotated = [a + w * ta + y * tc - z * tb, b + w * tb + z * ta - x * tc, c + w * tc + x * tb - y * ta]
-    return np.stack(np.broadcast_arrays(*rotated), axis=-1)
+    return _joined(a + w * ta + y * tc - z * tb, b + w * tb + z * ta - x * tc, c + w * tc + x * tb - y * ta)
 
 
 def normalised(quat: ArrayLike) -> FloatArray:
@@ -72,3 +66,15 @@ def slerp(start: ArrayLike, end: ArrayLike, share: ArrayLike) -> FloatArray:
     angle = np.linalg.norm(vector, axis=-1)
     axis = vector / np.maximum(angle, 1e-12)[..., None]
     return normalised(multiply(start, np.concatenate([np.cos(angle / 2)[..., None], np.sin(angle / 2)[..., None] * axis], -1)))
+
+
+def _parts(array: ArrayLike) -> tuple[FloatArray, ...]:
+    array = np.asarray(array)
+    return tuple(array[..., i] for i in range(array.shape[-1]))
+
+
+def _joined(*parts: FloatArray) -> FloatArray:
+    joined = np.empty((*np.shape(parts[0]), len(parts)), dtype=np.result_type(*parts))
+    for i, part in enumerate(parts):
+        joined[..., i] = part
+    return joined
