@@ -18,7 +18,7 @@ from prefect.task_runners import ThreadPoolTaskRunner
 
 from flows import gates
 from flows.environment import environment
-from flows.stages import Stage, changed_stages, read_stages, to_run
+from flows.stages import Stage, changed_stages, downstream, read_stages, to_run
 
 KEPT = 5  # last lines of a failed stage that its error repeats
 
@@ -79,7 +79,7 @@ def loop(workspace: str = "") -> list[str]:
     for stage in gates_last(stages):
         if stage.name not in busy:
             continue
-        if waiting is not None and depends_on(stage, waiting, stages):
+        if waiting is not None and stage.name in downstream(stages, waiting):
             continue
         before = [running[name] for name in sorted(stage.needs) if name in running]
         if stage.kind == "gate" and not any(failed(future) for future in before):
@@ -112,12 +112,6 @@ def report(running: dict[str, PrefectFuture[Any]], stages: list[Stage], waiting:
         raise StageFailed(text + " | ".join(first))
     if waiting is not None:
         raise WaitingForAnswer(f"{titles[waiting]} waits for an answer; what came before it is kept")
-
-
-def depends_on(stage: Stage, other: str, stages: list[Stage]) -> bool:
-    """Whether `stage` reads, directly or not, what `other` makes."""
-    known = {each.name: each for each in stages}
-    return any(name == other or depends_on(known[name], other, stages) for name in stage.needs)
 
 
 def gates_last(stages: list[Stage]) -> list[Stage]:

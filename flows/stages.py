@@ -88,3 +88,8 @@ def changed_stages(workspace: Path) -> set[str]:
 
     with Repo(str(workspace)) as repo:
         return {name.removeprefix("dvc.yaml:") for name in repo.status()}
+
+
+def downstream(stages: list[Stage], name: str) -> set[str]:
+    """Names of all stages that read, directly or not, what the stage `name` makes."""
+    return to_run(stages, {name}) - {name}

@@ -15,7 +15,6 @@ from tasks import params
 
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")
-COPIED = ("dvc.yaml", ".dvcignore")
 
 
 def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
@@ -51,8 +50,8 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
     folder.mkdir(parents=True, exist_ok=True)
     for name in CODE:
         _link(folder / name, HOME / name)
-    for name in COPIED:
-        _write(folder / name, (HOME / name).read_text())
+    _write(folder / ".dvcignore", (HOME / ".dvcignore").read_text())
+    _write(folder / "dvc.yaml", stages_with(motions))
     _write(folder / "params.yaml", yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
     if not (folder / ".dvc" / "config").exists():
         init = [sys.executable, "-m", "dvc", "init", "--no-scm", "-q"]
@@ -60,6 +59,16 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
         settings = (HOME / ".dvc" / "config").read_text()
         _write(folder / ".dvc" / "config", settings.replace("[core]\n", "[core]\n    no_scm = True\n"))
     return folder
+
+
+def stages_with(motions: Path | None) -> str:
+    """dvc.yaml, in which the stage motions also depends on the user's folder, so that new files make it stale."""
+    text = (HOME / "dvc.yaml").read_text()
+    if motions is None:
+        return text
+    pipeline = yaml.safe_load(text)
+    pipeline["stages"]["motions"]["deps"].append(str(motions.expanduser().resolve()))
+    return yaml.safe_dump(pipeline, sort_keys=False, width=120)
 
 
 def profile_path(profile: str) -> Path:
@@ -86,3 +95,19 @@ def _write(path: Path, text: str) -> None:
     """Write only what differs, so that an unchanged workspace keeps its time stamps."""
     if not path.exists() or path.read_text() != text:
         path.write_text(text)
+
+
+def named(name: str) -> Path:
+    """The workspace called `name` under runs/; without a name this folder if it is one, else the checkout.
+
+    Raises:
+        BadInput: when there is none of that name.
+    """
+    if not name:
+        here = Path.cwd()
+        return here if (here / "dvc.yaml").exists() and (here / "params.yaml").exists() else HOME
+    folder = HOME / "runs" / name
+    if not (folder / "dvc.yaml").exists():
+        known = ", ".join(sorted(path.parent.name for path in folder.parent.glob("*/dvc.yaml"))) or "none yet"
+        raise BadInput(folder, "a workspace", "no such folder", f"Workspaces: {known}.")
+    return folder

@@ -45,7 +45,7 @@ def load(section: str, kind: type[Config], path: Path = FILE) -> Config:
     """
     content = read(path)
     if section not in content:
-        raise BadInput(f"{path}: {section}", "this section", "none", _nearest(section, content))
+        raise BadInput(f"{path}: {section}", "this section", "none", nearest(section, content))
     return build(kind, content[section], path, section)
 
 
@@ -55,16 +55,17 @@ def build(kind: type[Config], values: Any, path: Path | str, place: str) -> Conf
         raise BadInput(f"{path}: {place}", "keys and values", _said(values))
     hints = typing.get_type_hints(kind)
     known = {field.name: field for field in fields(kind) if field.init}  # type: ignore[arg-type]
+    inside = f"{place}." if place else ""
     for key in values:
         if key not in known:
             expected = f"one of {', '.join(known)}" if len(known) <= 6 else "a known key"
-            raise BadInput(f"{path}: {place}.{key}", expected, "an unknown key", _nearest(str(key), known))
+            raise BadInput(f"{path}: {inside}{key}", expected, "an unknown key", nearest(str(key), known))
     made = {}
     for name, field in known.items():
         if name in values:
-            made[name] = convert(hints[name], values[name], path, f"{place}.{name}")
+            made[name] = convert(hints[name], values[name], path, f"{inside}{name}")
         elif field.default is MISSING and field.default_factory is MISSING:
-            raise BadInput(f"{path}: {place}.{name}", _type_name(hints[name]), "nothing", "Add the key.")
+            raise BadInput(f"{path}: {inside}{name}", _type_name(hints[name]), "nothing", "Add the key.")
     try:
         return kind(**made)
     except (ValueError, TypeError) as error:
@@ -124,7 +125,8 @@ def _element_types(origin: Any, args: tuple[Any, ...], length: int) -> list[Any]
     return list(args) if len(args) == length else None
 
 
-def _nearest(key: str, known: typing.Iterable[str]) -> str:
+def nearest(key: str, known: typing.Iterable[str]) -> str:
+    """A question that names the known key most like `key`; empty where none is."""
     near = difflib.get_close_matches(key, list(known), n=1, cutoff=0.5)
     return f"Did you mean {near[0]}?" if near else ""
 

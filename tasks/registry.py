@@ -148,3 +148,80 @@ def read_curve(path: Path) -> list[tuple[str, int, float]]:
                 except (TypeError, ValueError):
                     continue
     return [point for point in points if point[2] == point[2]]
+
+
+def register(name: str, folder: Path, tags: dict[str, str], metrics: dict[str, float | None]) -> str:
+    """A new version of the model `name` from a policy folder, with its contract; returns the version's number.
+
+    The version is a plain ONNX model (MLflow's onnx flavour) with contract.json and card.json beside it. A version of
+    the same file under the same evaluation is not made twice.
+    """
+    import mlflow
+
+    client = prepare()
+    same = ("onnx_sha256", "evaluation_contract", "dvc_policy")
+    for version in _versions(client, name):
+        if all(version.tags.get(key) == tags.get(key) for key in same):
+            return str(version.version)
+    with mlflow.start_run(run_name=f"publish {tags.get('policy', name)}", tags={"stage": "publish", **_short(tags)}):
+        logged = _log_onnx(folder, name)
+        mlflow.set_tags(_short(run_tags()))
+        mlflow.log_metrics({key: value for key, value in metrics.items() if value is not None})
+        for extra in ("contract.json", "card.json", "curve.csv"):
+            if (folder / extra).exists():
+                mlflow.log_artifact(str(folder / extra), "policy")
+    version = str(logged.registered_model_version)
+    for key, value in _short({**run_tags(), **tags}).items():
+        client.set_model_version_tag(name, version, key, value)
+    return version
+
+
+def _log_onnx(folder: Path, name: str) -> Any:
+    import mlflow
+    import numpy as np
+    import onnx
+
+    model = onnx.load(str(folder / "policy.onnx"))
+    size = model.graph.input[0].type.tensor_type.shape.dim[1].dim_value
+    return mlflow.onnx.log_model(
+        onnx_model=model,
+        name=name,
+        registered_model_name=name,
+        input_example=np.zeros((1, size), np.float32),
+        pip_requirements=["onnxruntime", "numpy"],  # named: to find them out takes MLflow many seconds
+        metadata={"contract": json.loads((folder / "contract.json").read_text())},
+    )
+
+
+def set_alias(name: str, alias: str, version: str) -> None:
+    """Let `models:/name@alias` mean this version."""
+    prepare().set_registered_model_alias(name, alias, version)
+
+
+def champion_version(name: str) -> str | None:
+    """The version that `models:/name@champion` means, or None."""
+    found = _champion(name)
+    return None if found is None else str(found.version)
+
+
+def champion_tags(name: str) -> dict[str, str] | None:
+    """The tags of the champion's version, or None where there is no champion."""
+    found = _champion(name)
+    return None if found is None else dict(found.tags)
+
+
+def _champion(name: str) -> Any:
+    from mlflow.exceptions import MlflowException
+
+    try:
+        return prepare().get_model_version_by_alias(name, "champion")
+    except MlflowException:
+        return None
+
+
+def _versions(client: "MlflowClient", name: str) -> list[Any]:
+    return list(client.search_model_versions(f"name = '{name}'"))
+
+
+def _short(tags: Mapping[str, str]) -> dict[str, str]:
+    return {key: str(value)[:LONGEST] for key, value in tags.items()}

@@ -1,0 +1,137 @@
+"""`make demo` and `make smoke`: the whole loop with both servers, in this checkout or in a workspace under runs/."""
+
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from flows import workspace as workspaces
+from flows.environment import environment
+from flows.servers import Addresses, servers
+from flows.stages import changed_stages, read_stages, to_run
+
+EXIT_FAILED, EXIT_WAITING = 1, 3
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run; 0 done, 1 a stage failed, 2 bad input, 3 a gate waits for an answer."""
+    options = parser().parse_args(argv)
+    try:
+        folder = choose(options.name, options.profile, options.motions)
+        return run(folder, options.prefect_port, options.mlflow_port)
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except KeyboardInterrupt:
+        print("stopped; the same command continues after the last finished stage", file=sys.stderr)
+        return 130
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    made = argparse.ArgumentParser(prog="python -m flows.demo", description=__doc__)
+    made.add_argument("--motions", type=Path, help="folder of motion files instead of the embedded ones")
+    made.add_argument("--name", default="", help="workspace under runs/; by default after the motions' folder")
+    made.add_argument("--profile", default="", help="file of profiles/ whose values replace those of params.yaml")
+    add_ports(made)
+    return made
+
+
+def add_ports(made: argparse.ArgumentParser) -> None:
+    """The options of both servers' ports."""
+    made.add_argument("--prefect-port", type=int, default=0, help="port of Prefect's server (default: a free one)")
+    made.add_argument("--mlflow-port", type=int, default=0, help="port of MLflow's server (default: a free one)")
+
+
+def choose(name: str, profile: str, motions: Path | None) -> Path:
+    """The checkout itself, or the workspace that the options ask for, made or brought up to date."""
+    if not (name or profile or motions):
+        return workspaces.HOME
+    if motions is not None and not name:
+        name = motions.expanduser().resolve().name
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", name or profile)
+    return workspaces.create(workspaces.HOME / "runs" / name, profile or None, motions)
+
+
+def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
+    """Bring the workspace up to date through the flow."""
+    os.environ.update(environment(folder))
+    check_parameters(folder)
+    if not to_run(read_stages(folder), changed_stages(folder)):
+        print(f"everything in {shown(folder)} is up to date")
+        summarise(folder)
+        return 0
+    with servers(folder, prefect_port, mlflow_port) as addresses:
+        announce(folder, addresses)
+        status = walk(folder, addresses)
+        if status == 0:
+            summarise(folder)
+    return status
+
+
+def walk(folder: Path, addresses: Addresses) -> int:
+    """Run the flow in this process; only now is Prefect imported, since it reads its settings once."""
+    os.environ["PREFECT_API_URL"] = f"{addresses.prefect}/api"
+    from flows.loop import StageFailed, WaitingForAnswer, loop, runner
+
+    os.chdir(folder)
+    try:
+        loop.with_options(task_runner=runner(os.cpu_count() or 1))(str(folder))
+    except StageFailed as error:
+        print(f"{error}\nwhat completed is kept: the same command goes on from there", file=sys.stderr)
+        return EXIT_FAILED
+    except WaitingForAnswer as error:
+        print(error, file=sys.stderr)
+        return EXIT_WAITING
+    return 0
+
+
+def check_parameters(folder: Path) -> None:
+    """Every section of params.yaml, before the first stage: a slip in the last one must not cost the others' time."""
+    command = [sys.executable, "-m", "tasks.sections"]
+    checked = subprocess.run(command, cwd=folder, env=environment(folder), capture_output=True, text=True)
+    if checked.returncode == EXIT_BAD_INPUT:
+        print(checked.stderr.strip(), file=sys.stderr)
+        raise SystemExit(EXIT_BAD_INPUT)
+    if checked.returncode:
+        raise RuntimeError(checked.stderr)
+
+
+def announce(folder: Path, addresses: Addresses) -> None:
+    """Where to look while it runs."""
+    print(f"workspace  {shown(folder)}")
+    print(f"Prefect    {addresses.prefect}   the stages as they run, and the gates")
+    print(f"MLflow     {addresses.mlflow}   every run's numbers, and the registered policies")
+    print(f"open them again with: {serve_command(folder)}", flush=True)
+
+
+def serve_command(folder: Path) -> str:
+    """How to open this workspace's servers again."""
+    return "make serve" if folder.resolve() == workspaces.HOME else f"make serve NAME={folder.name}"
+
+
+def shown(folder: Path) -> str:
+    """The folder as a person would name it from here."""
+    path = os.path.relpath(folder)
+    return str(folder) if path.startswith("..") else path
+
+
+def summarise(folder: Path) -> None:
+    """What there is now: registered models and the report."""
+    published = folder / "data" / "published.json"
+    if published.exists():
+        models = json.loads(published.read_text())["models"]
+        for name, facts in models.items():
+            print(f"  models:/{name}@champion  version {facts['champion']}")
+    report = folder / "reports" / "report.html"
+    if report.exists():
+        print(f"report: {shown(report)}")
+    print(f"history: {serve_command(folder)}")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,115 @@
+"""Stage publish: every policy becomes a version in the registry; the alias champion moves where promotion holds."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import pandas as pd
+
+from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.errors import BadInput
+from bumblebee.evaluation.summary import compare
+from tasks import registry
+from tasks.lineage import path_hash
+from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both
+from tasks.sections import Loop, loop
+from tasks.stage import load, output_file, run_stage
+
+EVALUATION, OUT = Path("data/evaluation"), Path("data/published.json")
+
+
+@dataclass(frozen=True)
+class PublishConfig:
+    """By which numbers policies are promoted."""
+
+    engine: Literal["stand_in", "nominal"] = "stand_in"
+    """The robot of the evaluation whose success decides."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A policy on its way into the registry."""
+
+    model: str
+    """Registered name: base, expert-<cluster>, generalist."""
+    policy: str
+    """Name in the evaluation."""
+    folder: Path
+    """The exported policy."""
+    parent: str | None
+    """Name in the evaluation of the policy it was trained from, where both do the same task."""
+
+
+def main() -> None:
+    """Register, promote, and write down what is published."""
+    config, shape = load("publish", PublishConfig), loop()
+    summary = json.loads((EVALUATION / "summary.json").read_text())
+    episodes = pd.read_parquet(EVALUATION / "episodes.parquet")
+    contract = str(summary["contract_sha256"])
+    models: dict[str, Any] = {}
+    for candidate in candidates(shape):
+        result = result_of(summary, candidate.policy, config.engine)
+        related = (
+            compare(episodes, candidate.parent, candidate.policy, config.engine, "all") if candidate.parent else None
+        )
+        facts = publish(candidate, result, contract, against_parent(related))
+        facts["earlier"] = models.get(candidate.model, {}).get("earlier", []) + [facts["version"]]
+        models[candidate.model] = facts
+    for name in models:
+        models[name]["champion"] = registry.champion_version(name)
+        print(
+            f"{name}: version {models[name]['version']}, champion is {models[name]['champion']} ({models[name]['reason']})"
+        )
+    content = {"schema": 1, "evaluation_contract": contract, "engine": config.engine, "models": models}
+    with output_file(OUT) as file:
+        file.write_text(json.dumps(content, indent=1) + "\n")
+
+
+def candidates(shape: Loop) -> Iterator[Candidate]:
+    """Every policy of the loop in the order in which it was trained, so that a later round meets its parent's version."""
+    yield Candidate("base", "base", Path("models/base"), None)
+    for cluster in shape.clusters:
+        for number in range(shape.final_round + 1):
+            folder = Path(f"models/experts/r{number}/{cluster}")
+            parent = f"expert-{cluster}-r{number - 1}" if number else "base"
+            yield Candidate(f"expert-{cluster}", f"expert-{cluster}-r{number}", folder, parent)
+    yield Candidate("generalist", "generalist", Path("models/generalist"), None)
+
+
+def result_of(summary: dict[str, Any], policy: str, engine: str) -> dict[str, Any]:
+    """The policy's numbers over all its motions.
+
+    Raises:
+        BadInput: when the evaluation does not hold them.
+    """
+    for entry in summary["results"]:
+        if (entry["policy"], entry["engine"], entry["split"], entry["group_by"]) == (policy, engine, "all", "all"):
+            return dict(entry)
+    where = EVALUATION / "summary.json"
+    raise BadInput(where, f"results of {policy} on {engine}", "none", "Add the engine to evaluate.engines.")
+
+
+def publish(candidate: Candidate, result: dict[str, Any], contract: str, related: Verdict) -> dict[str, Any]:
+    """One version of one model, with its alias if it earns it; its facts for published.json."""
+    policy = ExportedPolicy.load(candidate.folder)
+    champion = registry.champion_tags(candidate.model)
+    verdict = both(related, against_champion(result["success"], champion, contract))
+    metrics = {
+        "success": result["success"]["value"],
+        "mpjpe_rad": result["mpjpe_rad"]["value"],
+        "mpkpe_mm": result["mpkpe_mm"]["value"],
+    }
+    tags = {"policy": candidate.policy, "onnx_sha256": policy.sha256, "evaluation_contract": contract}
+    tags |= {"dvc_policy": path_hash(candidate.folder), "promotion": verdict.reason}
+    tags |= {name: f"{value:.6g}" for name, value in metrics.items() if value is not None}
+    version = registry.register(candidate.model, candidate.folder, tags, metrics)
+    if verdict.promoted:
+        registry.set_alias(candidate.model, CHAMPION, version)
+    facts = {"version": version, "policy": candidate.policy, "folder": str(candidate.folder)}
+    return {**facts, "promoted": verdict.promoted, "reason": verdict.reason, **metrics, "onnx_sha256": policy.sha256}
+
+
+if __name__ == "__main__":
+    run_stage(main)
