@@ -43,12 +43,18 @@ def check_frozen(view: View) -> None:
         speed = float(np.abs(rollout.joint_vel[rows, joint]).mean()) if length else 0.0
         moved = np.ptp(rollout.joint_target[rows, joint]) if rollout.joint_target is not None and length else 0.0
         if length >= need and (moved > limits.freeze_command or speed > limits.freeze_speed):
-            came = (
-                f"{length + 1} equal rows while the command moved {moved:.3g} rad and joint_vel said {speed:.3g} rad/s"
-            )
-            view.add(view.label("joint_pos", joint), start, "frozen", "a reading that follows", came, fatal=True)
+            came = f"{length + 1} equal rows; the command moved {moved:.3g} rad, joint_vel said {speed:.3g} rad/s"
+            fatal = speed > limits.freeze_speed or not _may_stall(place, start, length, limits.freeze_share)
+            view.add(view.label("joint_pos", joint), start, "frozen", "a reading that follows", came, fatal=fatal)
         _check_frozen_rate(view, joint, need)
     _check_frozen_base(view, need)
+
+
+def _may_stall(place: np.ndarray, start: int, length: int, share: float) -> bool:
+    """Whether equal readings may be a stalled joint: a coarse encoder that repeats itself elsewhere, and moves again."""
+    outside = np.delete(np.diff(place), np.s_[start : start + length])
+    moves_again = start + length < len(place) - 1
+    return bool(len(outside) and (outside == 0).mean() > 0.05 and moves_again and length < share * len(place))
 
 
 def _check_frozen_rate(view: View, joint: int, need: int) -> None:

@@ -24,7 +24,8 @@ h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}table{border-collapse:c
 td,th{padding:.25rem .7rem;border-bottom:1px solid #e3e7ee;text-align:left;vertical-align:top}
 td.n{text-align:right;font-variant-numeric:tabular-nums}.fatal{color:#b3261e}.bar{fill:#d99a00}
 .big{display:flex;gap:2.5rem;flex-wrap:wrap}.big b{display:block;font-size:1.9rem;line-height:1.2}
-text{font:11px system-ui,sans-serif;fill:#4a5568}.cmd{stroke:#8a94a6}.got{stroke:#d97706}path{fill:none;stroke-width:1.3}
+text{font:11px system-ui,sans-serif;fill:#4a5568}
+.cmd{stroke:#8a94a6}.got{stroke:#d97706}path{fill:none;stroke-width:1.3}
 """
 
 

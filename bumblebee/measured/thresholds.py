@@ -27,6 +27,9 @@ class Thresholds:
     """Motion of the target [rad] that no servo answers with an unchanged encoder reading."""
     freeze_speed: float = 0.3
     """Mean reported speed [rad/s] during which a position cannot stay the same."""
+    freeze_share: float = 0.25
+    """Share of the file: a shorter standstill of a coarse encoder that moves again may be a stalled joint (a real
+    gripper stood still for 6 s against its torque limit), a longer one is a dead channel."""
     step_speed: float = 8.0
     """Speed [rad/s] that may hide between two rows without showing in joint_vel (impacts in falls)."""
     step_floor: float = 0.08

@@ -1,0 +1,75 @@
+"""`import_dataset`: any known layout of logs as a dataset of the contract, with the declared model beside it."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+
+from bumblebee.errors import BadInput
+from bumblebee.measured.asap_npz import import_asap
+from bumblebee.measured.csv_map import DOUBLE_PENDULUM, import_csv, read_map
+from bumblebee.measured.rollout import Rollout, write_rollout
+from bumblebee.measured.so101 import import_so101
+from bumblebee.measured.sysid_npz import import_sysid
+
+KINDS = ("so101", "csv", "double_pendulum", "asap", "sysid")
+
+
+def read_rollouts(
+    source: Path, kind: str, model: mujoco.MjModel | None = None, column_map: Path | None = None
+) -> list[Rollout]:
+    """The rollouts of a source in one of the layouts `KINDS`.
+
+    Args:
+        source: folder, zip archive or file.
+        kind: so101, csv (needs `column_map`), double_pendulum, asap or sysid (both need `model`).
+        model: the declared model.
+        column_map: YAML file with the fields of `ColumnMap`.
+    """
+    if kind in ("asap", "sysid") and model is None:
+        raise BadInput(kind, "the declared model, by whose joints the file is read", "none", "Give a model.xml.")
+    if kind == "csv" and column_map is None:
+        raise BadInput(kind, "a column map", "none", "Give a YAML file with joints and columns.")
+    readers: dict[str, Callable[[], list[Rollout]]] = {
+        "so101": lambda: import_so101(source),
+        "csv": lambda: import_csv(source, [read_map(column_map or Path())]),
+        "double_pendulum": lambda: import_csv(source, DOUBLE_PENDULUM),
+        "asap": lambda: import_asap(source, model),
+        "sysid": lambda: import_sysid(source, model),
+    }
+    if kind not in readers:
+        raise BadInput(kind, f"one of {', '.join(KINDS)}", repr(kind))
+    return readers[kind]()
+
+
+def import_dataset(
+    source: Path, kind: str, out: Path, model_path: Path | None = None, column_map: Path | None = None
+) -> list[str]:
+    """Write `out`/rollouts/*.parquet and `out`/model.xml; `out` appears whole and must not exist. Returns the ids."""
+    out = Path(out)
+    if out.exists():
+        raise BadInput(out, "a new folder", "one that exists", "Choose another name.")
+    model = _load(model_path) if model_path else None
+    rollouts = read_rollouts(Path(source), kind, model, column_map)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+    try:
+        for rollout in rollouts:
+            write_rollout(temporary / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)
+        if model_path:
+            shutil.copyfile(model_path, temporary / "model.xml")
+        temporary.chmod(0o755)
+        os.rename(temporary, out)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return [rollout.rollout_id for rollout in rollouts]
+
+
+def _load(path: Path) -> mujoco.MjModel:
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise BadInput(path, "an MJCF model that loads", str(error)) from None

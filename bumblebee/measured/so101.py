@@ -1,0 +1,92 @@
+"""Importer of SO-101 recordings (SAGE layout): a folder a motion with control.csv, state_motor.csv, joint_list.txt.
+
+Traps of the layout: time stamps are microseconds; the Jaw is a share of its travel, not radians; torques are unsigned
+current estimates and are left out.
+"""
+
+import io
+import json
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+import pandas as pd
+
+from bumblebee.errors import BadInput
+from bumblebee.measured.rollout import Rollout
+from bumblebee.measured.source import Source, measured_rate, open_source
+
+JAW_ZERO, JAW_TRAVEL = -0.174533, 2.336  # rad at share 0, rad from share 0 to 1
+NOTES = (
+    "SO-101, SAGE layout. Jaw scaled from its share of travel to rad (-0.174533 + 2.336 share). joint_torque left out: "
+    "the logged torques are unsigned current estimates. Joints are read one after another, some milliseconds after the "
+    "row's time; joint_vel has steps of 0.0767 rad/s."
+)
+
+
+def import_so101(place: Path) -> list[Rollout]:
+    """Every motion of a folder or zip archive of SO-101 recordings."""
+    source = open_source(place)
+    folders = [PurePosixPath(name).parent for name in source.ending("control.csv")]
+    if not folders:
+        raise BadInput(place, "motion folders with control.csv and state_motor.csv", "none")
+    return [_read_motion(source, folder) for folder in folders]
+
+
+def _read_motion(source: Source, folder: PurePosixPath) -> Rollout:
+    for name in ("state_motor.csv", "joint_list.txt"):
+        if str(folder / name) not in source.names:
+            raise BadInput(f"{source.place}/{folder}", f"{name} beside control.csv", "no such file")
+    joints = tuple(source.read(str(folder / "joint_list.txt")).decode("utf-8", "replace").split())
+    stamps, commands = _read_table(source, str(folder / "control.csv"), ("positions",), len(joints))
+    times, states = _read_table(source, str(folder / "state_motor.csv"), ("positions", "velocities"), len(joints))
+    if len(stamps) != len(times) or not np.array_equal(stamps, times):
+        came = f"{len(stamps)} and {len(times)} rows with other time stamps"
+        raise BadInput(f"{source.place}/{folder}", "control.csv and state_motor.csv row by row", came)
+    for table in (commands, states):
+        if "Jaw" in joints:
+            jaw = joints.index("Jaw")
+            table["positions"][:, jaw] = JAW_ZERO + JAW_TRAVEL * table["positions"][:, jaw]
+    time = times * 1e-6
+    meta = {"robot": "so101", "motion": folder.name, "notes": NOTES}
+    return Rollout(
+        folder.name or source.place.stem,
+        joints,
+        measured_rate(time),
+        time,
+        states["positions"],
+        states["velocities"],
+        joint_target=commands["positions"],
+        meta=meta,
+    )
+
+
+def _read_table(
+    source: Source, name: str, columns: tuple[str, ...], width: int
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Time stamps [us] and vector columns of one CSV whose vectors are JSON lists in quotes."""
+    where = source.where(name)
+    try:
+        table = pd.read_csv(io.BytesIO(source.read(name)))
+    except (ValueError, UnicodeDecodeError) as error:
+        raise BadInput(where, "a CSV file", str(error)) from None
+    for column in ("timestamp", *columns):
+        if column not in table.columns:
+            raise BadInput(f"{where}: column {column}", "this column", f"only {', '.join(map(str, table.columns))}")
+    vectors = {}
+    for column in columns:
+        rows = [_vector(f"{where}: column {column}, row {row}", text, width) for row, text in enumerate(table[column])]
+        vectors[column] = np.array(rows, dtype=np.float64).reshape(-1, width)
+    try:
+        return table["timestamp"].to_numpy(dtype=np.float64), vectors
+    except ValueError as error:
+        raise BadInput(f"{where}: column timestamp", "microseconds", str(error)) from None
+
+
+def _vector(where: str, text: object, width: int) -> list[float]:
+    try:
+        values = [float(value) for value in json.loads(str(text))]
+    except (ValueError, TypeError):
+        raise BadInput(where, f"a JSON list of {width} numbers", repr(text)[:60]) from None
+    if len(values) != width:
+        raise BadInput(where, f"{width} values", str(len(values)))
+    return values

@@ -1,0 +1,122 @@
+"""Importer of `mujoco.sysid` files (.npz): a SystemTrajectory, or one TimeSeries that holds controls and states.
+
+Signals are found by the JSON mapping name -> [type, columns] that mujoco.sysid writes (types: 0 sensor, 2 qpos, 3 qvel,
+5 control). States come from qpos and qvel signals, or from jointpos and jointvel sensors of the model.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from bumblebee.errors import BadInput
+from bumblebee.measured.checks_units import servo_gains
+from bumblebee.measured.rollout import Rollout
+from bumblebee.measured.source import Source, measured_rate, open_source, read_arrays, rollout_names
+
+SENSOR, QPOS, QVEL, CTRL = 0, 2, 3, 5
+NOTES = "mujoco.sysid; controls held, states interpolated to the controls' times. Sensor data of mujoco.sysid may lag."
+
+
+@dataclass(frozen=True)
+class _Signal:
+    """One named column with its time stamps."""
+
+    time: np.ndarray
+    values: np.ndarray
+
+
+def import_sysid(place: Path, model: mujoco.MjModel) -> list[Rollout]:
+    """Every .npz of a folder or zip archive, or one file, for the actuated hinges and slides of the model."""
+    source = open_source(place)
+    names = source.ending(".npz")
+    if not names:
+        raise BadInput(place, ".npz files", "none")
+    ids = rollout_names(names, ".npz")
+    return [_read(source, name, ids[name], model) for name in names]
+
+
+def _read(source: Source, name: str, rollout_id: str, model: mujoco.MjModel) -> Rollout:
+    where, table = source.where(name), read_arrays(source, name)
+    signals = _signals(where, table, model)
+    controls = {key[1]: signal for key, signal in signals.items() if key[0] == "ctrl"}
+    if not controls:
+        raise BadInput(where, "control signals with their mapping", f"only {', '.join(table)}")
+    joints, commands = [], []
+    for actuator, signal in controls.items():
+        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
+        if number < 0:
+            raise BadInput(f"{where}: {actuator}_ctrl", "an actuator of the model", actuator)
+        joints.append(model.joint(int(model.actuator_trnid[number, 0])).name)
+        commands.append(signal)
+    time = commands[0].time
+    state = {}
+    for kind, column in (("pos", "joint_pos"), ("vel", "joint_vel")):
+        missing = [joint for joint in joints if (kind, joint) not in signals]
+        if missing:
+            raise BadInput(
+                f"{where}: {column}", f"a signal for joint {missing[0]}", f"only {', '.join(_said(signals))}"
+            )
+        state[column] = np.stack([_at(signals[kind, joint], time) for joint in joints], axis=1)
+    given = np.stack([signal.values for signal in commands], axis=1)
+    gains = servo_gains(model)
+    column = "joint_target" if all(joint in gains for joint in joints) else "joint_torque_cmd"
+    meta = {"motion": rollout_id, "notes": NOTES}
+    return Rollout(rollout_id, tuple(joints), measured_rate(time), time, **state, **{column: given}, meta=meta)
+
+
+def _signals(where: str, table: dict[str, np.ndarray], model: mujoco.MjModel) -> dict[tuple[str, str], _Signal]:
+    """("ctrl", actuator), ("pos", joint) and ("vel", joint) -> signal, from all series of the file."""
+    found: dict[tuple[str, str], _Signal] = {}
+    for prefix in ("", "control_", "sensordata_", "state_"):  # states replace sensors of the same joint
+        if f"{prefix}times" not in table or f"{prefix}data" not in table:
+            continue
+        time, data = table[f"{prefix}times"].astype(np.float64), np.atleast_2d(table[f"{prefix}data"])
+        mapping = _mapping(where, table, prefix, model)
+        if time.ndim != 1 or len(time) != len(data):
+            raise BadInput(f"{where}: {prefix}data", f"{time.size} rows like {prefix}times", str(data.shape))
+        for name, (kind, columns) in mapping.items():
+            place = _place(name, kind, model)
+            if place is None or not columns:
+                continue
+            if max(columns) >= data.shape[1]:
+                raise BadInput(f"{where}: {name}", f"a column below {data.shape[1]}", str(max(columns)))
+            found[place] = _Signal(time, data[:, columns[0]].astype(np.float64))
+    return found
+
+
+def _mapping(
+    where: str, table: dict[str, np.ndarray], prefix: str, model: mujoco.MjModel
+) -> dict[str, tuple[int, list[int]]]:
+    if f"{prefix}signal_mapping" not in table:
+        if prefix == "control_":  # without a mapping the columns are the model's controls
+            return {f"{model.actuator(i).name}_ctrl": (CTRL, [i]) for i in range(model.nu)}
+        return {}
+    try:
+        raw = json.loads(str(table[f"{prefix}signal_mapping"]))
+        return {str(name): (int(kind), [int(column) for column in columns]) for name, (kind, columns) in raw.items()}
+    except (ValueError, TypeError, AttributeError) as error:
+        raise BadInput(f"{where}: {prefix}signal_mapping", "JSON: name -> [type, columns]", str(error)) from None
+
+
+def _place(name: str, kind: int, model: mujoco.MjModel) -> tuple[str, str] | None:
+    if kind == CTRL:
+        return "ctrl", name.removesuffix("_ctrl")
+    if kind == QPOS:
+        return "pos", name.removesuffix("_qpos")
+    if kind == QVEL:
+        return "vel", name.removesuffix("_qvel")
+    sensor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name) if kind == SENSOR else -1
+    kinds = {mujoco.mjtSensor.mjSENS_JOINTPOS: "pos", mujoco.mjtSensor.mjSENS_JOINTVEL: "vel"}
+    what = kinds.get(mujoco.mjtSensor(int(model.sensor_type[sensor]))) if sensor >= 0 else None
+    return (what, model.joint(int(model.sensor_objid[sensor])).name) if what else None
+
+
+def _at(signal: _Signal, time: np.ndarray) -> np.ndarray:
+    return signal.values if np.array_equal(signal.time, time) else np.interp(time, signal.time, signal.values)
+
+
+def _said(signals: dict[tuple[str, str], _Signal]) -> list[str]:
+    return sorted(f"{kind} {name}" for kind, name in signals)
