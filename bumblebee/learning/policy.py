@@ -1,0 +1,87 @@
+"""A trained policy in torch: building, saving and loading the network, apart from how it was trained."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from rsl_rl.models import MLPModel
+from tensordict import TensorDict
+from torch import Tensor
+
+from bumblebee.errors import BadInput
+
+FILE = "policy.pt"
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What fixes an actor and its critic: entries of their observations, actions, layers, look-ahead [s]."""
+
+    observation: int
+    critic_observation: int
+    actions: int
+    hidden: tuple[int, ...]
+    ahead: tuple[float, ...]
+
+
+def model_config(hidden: tuple[int, ...], initial_std: float | None) -> dict[str, Any]:
+    """rsl_rl's settings of an actor, or of a critic where `initial_std` is None; normalisation is inside."""
+    config: dict[str, Any] = {"hidden_dims": list(hidden), "activation": "elu", "obs_normalization": True}
+    if initial_std is not None:
+        config["distribution_cfg"] = {
+            "class_name": "GaussianDistribution",
+            "init_std": initial_std,
+            "std_range": (0.05, 1.5),
+        }
+    return config
+
+
+class Policy:
+    """The deterministic policy, observation (N, D) to mean action (N, J), with its critic's weights beside it.
+
+    Args:
+        actor: rsl_rl's network with group "policy".
+        critic_state: weights of the critic, for whoever trains on.
+        shape: sizes of both.
+    """
+
+    def __init__(self, actor: MLPModel, critic_state: dict[str, Tensor], shape: Shape) -> None:
+        self.actor, self.critic_state, self.shape = actor, critic_state, shape
+        self.actor.eval()
+
+    @torch.inference_mode()
+    def __call__(self, observation: Tensor) -> Tensor:
+        """Mean actions (N, J) of observations (N, D)."""
+        return self.actor({"policy": observation})
+
+    def save(self, folder: Path) -> None:
+        """Write `policy.pt` into an existing folder."""
+        content = {"shape": asdict(self.shape), "actor": self.actor.state_dict(), "critic": self.critic_state}
+        torch.save(content, Path(folder) / FILE)
+
+
+def new_actor(shape: Shape, initial_std: float = 1.0) -> MLPModel:
+    """An untrained actor."""
+    example = TensorDict({"policy": torch.zeros(1, shape.observation)}, batch_size=[1])
+    config = model_config(shape.hidden, initial_std)
+    return MLPModel(example, {"actor": ["policy"]}, "actor", shape.actions, **config)
+
+
+def load_policy(folder: Path) -> Policy:
+    """Read `policy.pt`; only tensors and plain values are unpickled.
+
+    Raises:
+        BadInput: if there is none, or it is no checkpoint of a policy.
+    """
+    path = Path(folder) / FILE
+    try:
+        content = torch.load(path, weights_only=True, map_location="cpu")
+        shape = Shape(**{k: tuple(v) if isinstance(v, list) else v for k, v in content["shape"].items()})
+        actor = new_actor(shape)
+        actor.load_state_dict(content["actor"])
+    except FileNotFoundError:
+        raise BadInput(path, "a trained policy", "no file", "Train it first.") from None
+    except Exception as error:
+        raise BadInput(path, "a checkpoint of a policy", str(error).splitlines()[0]) from None
+    return Policy(actor, content["critic"], shape)

@@ -1,0 +1,188 @@
+"""PPO of rsl_rl around the tracking environment: our loop, curve, curriculum and checkpoints (paper, section 3.2).
+
+rsl_rl's own `learn` prints a screen an iteration and forgets the environment in its checkpoints; the steps between are
+its, unchanged.
+"""
+
+import contextlib
+import io
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from rsl_rl.algorithms import PPO
+from rsl_rl.runners import OnPolicyRunner
+
+from bumblebee.learning.config import PpoConfig
+from bumblebee.learning.curve import CurveWriter
+from bumblebee.learning.policy import Policy, Shape, load_policy, model_config, new_actor
+from bumblebee.progress import progress
+from bumblebee.tracking.env import TrackingEnv
+
+CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
+
+
+class BoundedPpo(PPO):
+    """rsl_rl's PPO with bounds on the adaptive learning rate, which are constants there (1e-5 and 1e-2)."""
+
+    def __init__(self, *args: Any, learning_rate_range: tuple[float, float], **kwargs: Any) -> None:  # noqa: ANN401
+        self._bounds = learning_rate_range
+        super().__init__(*args, **kwargs)
+
+    @property
+    def learning_rate(self) -> float:
+        """The rate of the next gradient step."""
+        return self._learning_rate
+
+    @learning_rate.setter
+    def learning_rate(self, value: float) -> None:
+        self._learning_rate = min(max(value, self._bounds[0]), self._bounds[1])
+
+
+def runner_config(config: PpoConfig) -> dict[str, Any]:
+    """rsl_rl's configuration; it ignores keys that it does not know, so a test compares them with its signatures."""
+    fixed = config.schedule == "fixed"
+    algorithm = {
+        "class_name": BoundedPpo,
+        "learning_rate_range": (config.learning_rate,) * 2 if fixed else config.learning_rate_range,
+        "num_learning_epochs": config.epochs,
+        "num_mini_batches": config.mini_batches,
+        "clip_param": config.clip,
+        "gamma": config.gamma,
+        "lam": config.lam,
+        "value_loss_coef": config.value,
+        "entropy_coef": config.entropy,
+        "learning_rate": config.learning_rate,
+        "max_grad_norm": config.grad_norm,
+        "schedule": config.schedule,
+        "desired_kl": config.desired_kl,
+        "rnd_cfg": None,
+        "symmetry_cfg": None,
+    }
+    return {
+        "num_steps_per_env": config.steps,
+        "obs_groups": {"actor": ["policy"], "critic": ["critic"]},
+        "algorithm": algorithm,
+        "actor": {"class_name": "MLPModel", **model_config(config.hidden, config.initial_std)},
+        "critic": {"class_name": "MLPModel", **model_config(config.hidden, None)},
+    }
+
+
+class Trainer:
+    """Trains one policy in `env`, and can be killed at any time.
+
+    Args:
+        env: the task.
+        config: the algorithm.
+        folder: for the checkpoint and the curve; a checkpoint found there is continued.
+        seed: of the network and of the actions' noise.
+        parent: folder of a policy to start from, if any.
+    """
+
+    def __init__(
+        self, env: TrackingEnv, config: PpoConfig, folder: Path, seed: int = 0, parent: Path | None = None
+    ) -> None:
+        self.env, self.config, self.folder = env, config, Path(folder)
+        torch.manual_seed(seed)
+        with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
+            self._runner = OnPolicyRunner(env, runner_config(config), log_dir=None, device="cpu")
+        self.algorithm: BoundedPpo = self._runner.alg  # type: ignore[assignment]
+        self.iteration, self._seconds = 0, 0.0
+        if parent is not None:
+            self._start_from(load_policy(parent))
+        self._resume()
+
+    @property
+    def frames(self) -> int:
+        """Control steps seen so far, of all worlds."""
+        return self.iteration * self.config.steps * self.env.num_envs
+
+    def train(self, what: str = "policy") -> None:
+        """Train up to the configured iterations; a line of `curve.csv` each."""
+        config, per_iteration = self.config, self.config.steps * self.env.num_envs
+        curve = CurveWriter(self.folder / CURVE, self.iteration)
+        self.algorithm.train_mode()
+        total = config.iterations * per_iteration
+        with progress(total, f"train {what}", "frames", start=self.frames) as bar:
+            while self.iteration < config.iterations:
+                began = time.monotonic()
+                scalars = self._iterate()
+                self._seconds += time.monotonic() - began
+                self.iteration += 1
+                row = {"frames": self.frames, "seconds": self._seconds, **scalars}
+                for name, value in row.items():
+                    curve.add_scalar(name, value, self.iteration)
+                curve.flush()
+                bar.update(per_iteration, f"success {scalars['success']:.2f}, key error {scalars['key_error']:.3f} m")
+                if self.iteration % config.checkpoint_every == 0:
+                    self.save_checkpoint()
+        curve.stop()
+
+    def policy(self) -> Policy:
+        """The policy as it is now; a copy."""
+        observation = self.env.get_observations()
+        shape = Shape(
+            observation=observation["policy"].shape[1],
+            critic_observation=observation["critic"].shape[1],
+            actions=self.env.num_actions,
+            hidden=tuple(self.config.hidden),
+            ahead=tuple(self.env.library.ahead),
+        )
+        actor = new_actor(shape)
+        actor.load_state_dict(self.algorithm.actor.state_dict())
+        critic = {name: tensor.clone() for name, tensor in self.algorithm.critic.state_dict().items()}
+        return Policy(actor, critic, shape)
+
+    def save_checkpoint(self) -> None:
+        """Write all that the next iteration depends on, whole or not at all."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        content = {
+            "algorithm": self.algorithm.save(),
+            "learning_rate": self.algorithm.learning_rate,
+            "iteration": self.iteration,
+            "seconds": self._seconds,
+            "env": self.env.state_dict(),
+            "random": torch.get_rng_state(),
+        }
+        fresh = self.folder / f".{CHECKPOINT}"
+        torch.save(content, fresh)
+        os.replace(fresh, self.folder / CHECKPOINT)
+
+    def _resume(self) -> None:
+        path = self.folder / CHECKPOINT
+        if not path.exists():
+            return
+        # Our own file of this run, with NumPy arrays in it.
+        content = torch.load(path, weights_only=False, map_location="cpu")
+        self.algorithm.load(content["algorithm"], None, True)
+        self.algorithm.learning_rate = content["learning_rate"]
+        self.iteration, self._seconds = content["iteration"], content["seconds"]
+        self.env.load_state_dict(content["env"])
+        torch.set_rng_state(content["random"])
+
+    def _start_from(self, parent: Policy) -> None:
+        self.algorithm.actor.load_state_dict(parent.actor.state_dict())
+        self.algorithm.critic.load_state_dict(parent.critic_state)
+
+    def _iterate(self) -> dict[str, float]:
+        config, algorithm, env = self.config, self.algorithm, self.env
+        done = self.iteration / max(config.iterations, 1)
+        env.progress = done
+        algorithm.desired_kl = config.desired_kl + done * (config.desired_kl_end - config.desired_kl)
+        with torch.inference_mode():
+            observations = env.get_observations()
+            for _ in range(config.steps):
+                actions = algorithm.act(observations)
+                observations, rewards, dones, extras = env.step(actions)
+                algorithm.process_env_step(observations, rewards, dones, extras)
+            algorithm.compute_returns(observations)
+            std = float(algorithm.actor.output_std.mean())
+        losses = algorithm.update()
+        scalars = env.statistics.take() | {f"loss_{name}": float(value) for name, value in losses.items()}
+        scalars |= {"learning_rate": algorithm.learning_rate, "action_std": std, "threshold": env.threshold}
+        if not np.isfinite(scalars["loss_value"]):
+            raise FloatingPointError(f"the critic's loss is no number at iteration {self.iteration}")
+        return scalars

@@ -1,0 +1,93 @@
+"""How well a policy follows clips: from the first frame to the last, deterministic, without noise."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import pandas as pd
+import torch
+from torch import Tensor
+
+from bumblebee.motion.clip import Clip
+from bumblebee.sim.mujoco_cpu import Hooks, MujocoCpu
+from bumblebee.tracking.env import ActionAdapter, action_scale, start_state
+from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.observations import joint_targets, observe
+from bumblebee.tracking.terminations import fallen, key_distance, success_threshold
+
+_WORLDS = 128  # at once
+
+
+@dataclass(frozen=True)
+class World:
+    """What the policy is tried on: a model with foot sensors, and what is no part of the model."""
+
+    model: mujoco.MjModel
+    hooks: Hooks | None = None
+    action_adapter: ActionAdapter | None = None
+    threads: int = 2
+
+
+def try_policy(
+    policy: Callable[[Tensor], Tensor], clips: Sequence[Clip], world: World, ahead: Sequence[float]
+) -> pd.DataFrame:
+    """One rollout of each clip.
+
+    Returns:
+        a row a clip: name, family, split, success, share (of the clip until it failed), key_error [m] and joint_error
+        [rad] (means until then).
+    """
+    tables = [_try_some(policy, clips[i : i + _WORLDS], world, ahead) for i in range(0, len(clips), _WORLDS)]
+    return pd.concat(tables, ignore_index=True)
+
+
+def success_by_family(trials: pd.DataFrame) -> dict[str, float]:
+    """Success rate of each family and of `all`, rounded to three digits."""
+    rates = {str(k): round(float(v), 3) for k, v in trials.groupby("family")["success"].mean().items()}
+    return rates | {"all": round(float(trials["success"].mean()), 3)}
+
+
+@torch.inference_mode()
+def _try_some(
+    policy: Callable[[Tensor], Tensor], clips: Sequence[Clip], world: World, ahead: Sequence[float]
+) -> pd.DataFrame:
+    n = len(clips)
+    library = MotionLibrary(clips, ahead)
+    engine = MujocoCpu(world.model, n, threads=min(world.threads, n), hooks=world.hooks)
+    ids, scale, dt = torch.arange(n), action_scale(), engine.control_dt
+    limit = torch.tensor([success_threshold(clip.family) for clip in clips])
+    first = library.frames(ids, torch.zeros(n))
+    qpos, qvel = start_state(first, 0.0, torch.Generator())
+    engine.reset(ids, qpos, qvel, first.joint_pos)
+    action = torch.zeros(n, library.num_joints)
+    alive = torch.ones(n, dtype=torch.bool)
+    survived, key_sum, joint_sum = torch.zeros(n), torch.zeros(n), torch.zeros(n)
+    for frame in range(int(library.length.max()) - 1):
+        ref = library.frames(ids, torch.full((n,), (frame + 1) * dt))
+        state = engine.state()
+        seen = observe(state, ref, action)
+        action = policy(seen)
+        motor = action if world.action_adapter is None else world.action_adapter(state, seen, action)
+        engine.step(joint_targets(ref, motor, scale))
+        state = engine.state()
+        running = frame + 1 < library.length
+        good = (key_distance(state, ref) <= limit) & ~fallen(state, ref) & ~engine.unstable()
+        alive &= good | ~running
+        counted = (alive & running).float()
+        survived += counted
+        key_sum += counted * torch.nan_to_num((state.key_pos_w - ref.key_pos_w).norm(dim=-1).mean(-1))
+        joint_sum += counted * torch.nan_to_num((state.joint_pos - ref.joint_pos).abs().mean(-1))
+        if not bool((alive & running).any()):
+            break
+    steps = survived.clamp(min=1)
+    return pd.DataFrame(
+        {
+            "name": [clip.name for clip in clips],
+            "family": [clip.family for clip in clips],
+            "split": [clip.split for clip in clips],
+            "success": alive.numpy(),
+            "share": (survived / (library.length - 1).clamp(min=1)).numpy(),
+            "key_error": (key_sum / steps).numpy(),
+            "joint_error": (joint_sum / steps).numpy(),
+        }
+    )

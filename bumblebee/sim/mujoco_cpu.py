@@ -1,0 +1,170 @@
+"""The CPU engine: MuJoCo's `batch.Batch`, many worlds on a few threads, seen through `sim.engine.Engine`.
+
+One `MjData` a world (`persistent`), so that the position and velocity stages computed after a step, which make key
+bodies current, are not computed again by the next one.
+"""
+
+from typing import Protocol
+
+import mujoco
+import numpy as np
+import torch
+from mujoco.batch import Batch
+from torch import Tensor
+
+from bumblebee.errors import BadInput
+from bumblebee.robot.facts import FEET, KEY_BODIES
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.rotations import rotate_inverse
+from bumblebee.sim.sensors import sensor_name
+
+_VEL = int(mujoco.mjtStage.mjSTAGE_VEL)
+# MuJoCo resets a world by itself when its state blows up, and counts it in these warnings.
+_BAD = [int(w) for w in (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL)]
+_BAD.append(int(mujoco.mjtWarning.mjWARN_BADQACC))
+
+
+class Hooks(Protocol):
+    """Effects that are no part of the model: so far, what the encoders add to the joint angles, (J,) [rad]."""
+
+    encoder_offset: np.ndarray
+
+
+class MujocoCpu:
+    """An `Engine` of `num_worlds` copies of `model` on `threads` threads.
+
+    Args:
+        model: free base first, then hinges with one position servo each, and the foot sensors of `sim.sensors`.
+        num_worlds: how many robots.
+        control_hz: rate of the policy; a whole number of physics steps must fit.
+        threads: CPU threads, the caller's included.
+        hooks: effects outside the model, see `bumblebee.sim.effects.runtime_hooks`.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        num_worlds: int,
+        control_hz: float = 50.0,
+        threads: int = 2,
+        hooks: Hooks | None = None,
+    ) -> None:
+        self.model, self.num_worlds, self.control_dt = model, num_worlds, 1.0 / control_hz
+        steps = self.control_dt / model.opt.timestep
+        if abs(steps - round(steps)) > 1e-6:
+            came = f"{1 / model.opt.timestep:g} Hz"
+            raise BadInput("physics rate", f"a multiple of the control rate {control_hz:g} Hz", came)
+        self.substeps = round(steps)
+        self.batch = Batch(model, num_worlds, threads, persistent=True)
+        self._offset = None
+        if hooks is not None and np.any(hooks.encoder_offset):
+            self._offset = torch.as_tensor(hooks.encoder_offset, dtype=torch.float32)
+        self._keys = [model.body(name).id for name in KEY_BODIES]
+        self._feet = [model.body(name).id for name in FEET]
+        self._force = _foot_sensor_columns(model)
+        self._xpos, self._xquat = self.batch.bind("xpos"), self.batch.bind("xquat")
+        self._actuator_force, self._sensordata = self.batch.bind("actuator_force"), self.batch.bind("sensordata")
+        self._history, self._held = _history_template(model)
+        self._warnings = np.zeros(num_worlds, dtype=np.int64)
+        self._unstable = torch.zeros(num_worlds, dtype=torch.bool)
+        self.batch.reset(keyframe=0 if model.nkey else -1, stage=_VEL)
+
+    def reset(self, ids: Tensor, qpos: Tensor, qvel: Tensor, targets: Tensor) -> None:
+        """See `Engine.reset`; `ids` ascending."""
+        if len(ids) == 0:
+            return
+        i, held = ids.numpy(), targets.numpy()
+        batch = self.batch
+        batch.time[i] = 0.0
+        batch.qpos[i] = qpos.numpy()
+        batch.qvel[i] = qvel.numpy()
+        batch.ctrl[i] = held
+        batch.qacc_warmstart[i] = 0.0
+        if self.model.na:
+            batch.act[i] = 0.0
+        if len(self._history):
+            filled = np.repeat(self._history[None], len(i), axis=0)
+            for column, actuator in self._held:
+                filled[:, column] = held[:, actuator]
+            batch.history[i] = filled
+        batch.forward(ids=i, stage=_VEL)
+        self._unstable[ids] = False
+
+    def step(self, targets: Tensor) -> None:
+        """See `Engine.step`."""
+        self.batch.ctrl[:] = targets.numpy()
+        self.batch.step(nstep=self.substeps, stage=_VEL)
+        counted = self.batch.warning[:, _BAD, 1].sum(axis=1)  # [last index, number]
+        finite = np.isfinite(self.batch.qpos).all(axis=1) & np.isfinite(self.batch.qvel).all(axis=1)
+        self._unstable = torch.from_numpy((counted > self._warnings) | ~finite)
+        self._warnings = counted
+
+    def state(self) -> RobotState:
+        """See `Engine.state`."""
+        qpos = _float(self.batch.qpos)
+        qvel = _float(self.batch.qvel)
+        quat = qpos[:, 3:7]
+        joint_pos = qpos[:, 7:]
+        return RobotState(
+            root_pos_w=qpos[:, :3],
+            root_quat_w=quat,
+            root_lin_vel_b=rotate_inverse(quat, qvel[:, :3]),
+            root_ang_vel_b=qvel[:, 3:6],
+            joint_pos=joint_pos if self._offset is None else joint_pos + self._offset,
+            joint_vel=qvel[:, 6:],
+            key_pos_w=_float(self._xpos[:, self._keys]),
+        )
+
+    def torque(self) -> Tensor:
+        """See `Engine.torque`."""
+        return _float(self._actuator_force)
+
+    def foot_force_w(self) -> Tensor:
+        """See `Engine.foot_force_w`."""
+        # The sensor gives the force of the first body on the second: of the foot on the floor.
+        return -_float(self._sensordata[:, self._force]).unflatten(1, (2, 3))
+
+    def foot_quat_w(self) -> Tensor:
+        """See `Engine.foot_quat_w`."""
+        return _float(self._xquat[:, self._feet])
+
+    def push(self, velocity_w: Tensor) -> None:
+        """See `Engine.push`."""
+        self.batch.qvel[:, :3] += velocity_w.numpy()
+
+    def unstable(self) -> Tensor:
+        """See `Engine.unstable`."""
+        return self._unstable
+
+    def state_dict(self) -> dict[str, np.ndarray]:
+        """All that the next step depends on, to go on later from here."""
+        return {"state": self.batch.state.copy()}
+
+    def load_state_dict(self, saved: dict[str, np.ndarray]) -> None:
+        """Go on from what `state_dict` gave."""
+        self.batch.state[:] = saved["state"]
+        self.batch.forward(stage=_VEL)
+
+
+def _float(values: np.ndarray) -> Tensor:
+    return torch.from_numpy(values.astype(np.float32))
+
+
+def _foot_sensor_columns(model: mujoco.MjModel) -> list[int]:
+    names = {model.sensor(i).name for i in range(model.nsensor)}
+    if missing := [sensor_name(foot) for foot in FEET if sensor_name(foot) not in names]:
+        raise BadInput("model", "contact sensors under the feet", f"no {missing[0]}", "Load it with sim.load_model.")
+    first = [int(model.sensor(sensor_name(foot)).adr[0]) for foot in FEET]
+    return [a + k for a in first for k in range(3)]
+
+
+def _history_template(model: mujoco.MjModel) -> tuple[np.ndarray, list[tuple[slice, list[int]]]]:
+    """The delay buffers of a fresh world, and for each delayed actuator the columns that hold its past commands."""
+    template = mujoco.MjData(model).history.copy()
+    held = []
+    for actuator in range(model.nu):
+        samples = int(model.actuator_history[actuator, 0])
+        if samples:
+            first = int(model.actuator_historyadr[actuator]) + 2 + samples  # user value, cursor, times; then values
+            held.append((slice(first, first + samples), [actuator]))
+    return template, held

@@ -1,0 +1,76 @@
+"""Settings of the tracking task, a section of params.yaml each."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from bumblebee.tracking.library import AHEAD
+
+
+@dataclass(frozen=True)
+class RewardConfig:
+    """Which weights and kernels the reward has; docs/decisions/rewards.md says why there are two sets."""
+
+    preset: Literal["demo", "paper"] = "demo"
+    """`paper`: the table's weights and sharpness; `demo`: the same terms, tuned for minutes on a CPU."""
+    weights: dict[str, float] = field(default_factory=dict)
+    """Weights that replace the preset's, by term."""
+    sharpness: dict[str, float] = field(default_factory=dict)
+    """Factors in exp(-factor * error) that replace the preset's, by term."""
+    soft_limit: float = 0.95
+    """Share of a torque, position or velocity limit beyond which it counts as exceeded."""
+
+
+@dataclass(frozen=True)
+class Randomisation:
+    """How much the worlds differ from the declared model (paper, table of domain randomisation); zeros: not at all."""
+
+    friction: tuple[float, float] = (0.6, 1.25)
+    """Range of the factor on ground friction."""
+    gains: float = 0.1
+    """Largest relative change of each servo's P and D gain."""
+    strength: float = 0.0
+    """Largest relative loss of torque limit and gain of a motor."""
+    mass: float = 0.05
+    """Largest relative change of each link's mass."""
+    frictionloss: float = 0.0
+    """Largest dry friction added to a joint [N m]; not zero costs about 15 % of the speed."""
+    push: float = 0.3
+    """Largest change of the root's horizontal velocity by a push [m/s]."""
+    push_interval: float = 5.0
+    """Mean time between pushes [s]."""
+
+
+@dataclass(frozen=True)
+class EnvConfig:
+    """The environment that policies learn in."""
+
+    num_worlds: int = 512
+    """Copies of the robot."""
+    threads: int = 2
+    """CPU threads of the physics."""
+    physics_hz: float = 200.0
+    """Rate of the physics; the policy acts at 50 Hz."""
+    episode_seconds: float = 10.0
+    """Longest episode [s]; its end is no failure."""
+    start_share: float = 0.2
+    """Share of the episodes that start at the clip's first frame; the others start anywhere."""
+    ahead: tuple[float, ...] = AHEAD
+    """Look-ahead times of the observation [s]."""
+    reset_noise: float = 1.0
+    """Factor on the noise of the initial state: 0.03 rad, 0.3 rad/s, 0.1 m/s, 0.02 m in the plane."""
+    observation_noise: float = 1.0
+    """Factor on the sensor noise of the policy's observation."""
+    threshold_start: float = 0.8
+    """Distance of a key body from the reference that ends an episode, at first [m]."""
+    threshold_end: float = 0.3
+    """The same at the end of the curriculum [m]."""
+    threshold_share: float = 0.5
+    """Share of the training over which the threshold shrinks."""
+    sampler_floor: float = 0.3
+    """A clip is drawn by its length times (this + its failure rate): no clip is ever forgotten."""
+    sampler_memory: float = 0.9
+    """How much of a clip's failure rate one more episode leaves."""
+    reward: RewardConfig = field(default_factory=RewardConfig)
+    """The reward."""
+    randomisation: Randomisation = field(default_factory=Randomisation)
+    """Differences between the worlds."""

@@ -1,0 +1,234 @@
+"""The reward: one small function for each row of the paper's table (appendix B, "Reward design for WBC").
+
+Every term maps a `Step` to (B,) and knows nothing of its weight. Norms over joints are Euclidean; the body position is
+the mean distance of the 14 key bodies. What the table leaves open is decided in docs/decisions/rewards.md.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from bumblebee.robot.facts import joints
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.rotations import angle_between, rotate, rotate_inverse
+from bumblebee.tracking.config import RewardConfig
+from bumblebee.tracking.library import ReferenceFrame
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of the joints, (J,) each: torque [N m], lowest and highest angle [rad], speed [rad/s]."""
+
+    torque: Tensor
+    low: Tensor
+    high: Tensor
+    speed: Tensor
+
+    @classmethod
+    def of_robot(cls, soft: float = 1.0) -> "Limits":
+        """The G1's, with torque, speed and half range times `soft`."""
+        table = joints()
+        low, high = (torch.tensor([j.range[i] for j in table]) for i in (0, 1))
+        middle, half = (low + high) / 2, (high - low) / 2 * soft
+        torque = torch.tensor([float(j.effort_limit) for j in table]) * soft
+        speed = torch.tensor([float(j.velocity_limit) for j in table]) * soft
+        return cls(torque, middle - half, middle + half, speed)
+
+
+@dataclass(frozen=True)
+class Step:
+    """What the reward of one control step depends on; actions (B, J) are the policy's outputs, newest first."""
+
+    state: RobotState
+    ref: ReferenceFrame
+    torque: Tensor
+    joint_acc: Tensor
+    actions: tuple[Tensor, Tensor, Tensor]
+    foot_force_w: Tensor
+    foot_quat_w: Tensor
+    limits: Limits
+
+
+def torque_limits(step: Step) -> Tensor:
+    """Torque limits: 1(tau not in [tau_min, tau_max]), any joint."""
+    return (step.torque.abs() > step.limits.torque).any(-1).float()
+
+
+def dof_position_limits(step: Step) -> Tensor:
+    """DoF position limits: 1(d not in [q_min, q_max]), any joint."""
+    outside = (step.state.joint_pos < step.limits.low) | (step.state.joint_pos > step.limits.high)
+    return outside.any(-1).float()
+
+
+def dof_velocity_limits(step: Step) -> Tensor:
+    """DoF velocity limits: 1(d' not in [q'_min, q'_max]), any joint."""
+    return (step.state.joint_vel.abs() > step.limits.speed).any(-1).float()
+
+
+def dof_acceleration(step: Step) -> Tensor:
+    """DoF acceleration: |d''|^2 [rad^2/s^4]."""
+    return step.joint_acc.square().sum(-1)
+
+
+def action_rate(step: Step) -> Tensor:
+    """Action rate: |a_t - a_(t-1)|^2."""
+    return (step.actions[0] - step.actions[1]).square().sum(-1)
+
+
+def action_smoothness(step: Step) -> Tensor:
+    """Action smoothness: |a'_t - a'_(t-1)|^2, the second difference of the action."""
+    now, before, earlier = step.actions
+    return (now - 2 * before + earlier).square().sum(-1)
+
+
+def torque(step: Step) -> Tensor:
+    """Torque: |tau| [N m]."""
+    return step.torque.norm(dim=-1)
+
+
+def stumble(step: Step) -> Tensor:
+    """Stumble: 1(F_xy > 5 F_z), either foot."""
+    force = step.foot_force_w
+    return (force[..., :2].norm(dim=-1) > 5 * force[..., 2].abs()).any(-1).float()
+
+
+def feet_orientation(step: Step) -> Tensor:
+    """Feet orientation: sum over the feet of |gravity_xy| in the foot's frame; 0 when both soles are level."""
+    down = torch.zeros_like(step.foot_force_w)
+    down[..., 2] = -1.0
+    return rotate_inverse(step.foot_quat_w, down)[..., :2].norm(dim=-1).sum(-1)
+
+
+def body_position(step: Step) -> Tensor:
+    """Body position, the error: |p_body - p_ref|, mean over the key bodies [m]."""
+    return (step.state.key_pos_w - step.ref.key_pos_w).norm(dim=-1).mean(-1)
+
+
+def root_rotation(step: Step) -> Tensor:
+    """Root rotation, the error: angle between the roots [rad]."""
+    return angle_between(step.state.root_quat_w, step.ref.root_quat_w)
+
+
+def root_angular_velocity(step: Step) -> Tensor:
+    """Root angular velocity, the error: |omega - omega_ref| [rad/s], each in its own base frame."""
+    return (step.state.root_ang_vel_b - step.ref.root_ang_vel_b).norm(dim=-1)
+
+
+def root_velocity(step: Step) -> Tensor:
+    """Root velocity, the error: |v - v_ref| in the world [m/s]."""
+    velocity_w = rotate(step.state.root_quat_w, step.state.root_lin_vel_b)
+    return (velocity_w - step.ref.root_lin_vel_w).norm(dim=-1)
+
+
+def dof_position(step: Step) -> Tensor:
+    """DoF position, the error: |d - d_ref| [rad]."""
+    return (step.state.joint_pos - step.ref.joint_pos).norm(dim=-1)
+
+
+def dof_velocity(step: Step) -> Tensor:
+    """DoF velocity, the error: |d' - d'_ref| [rad/s]."""
+    return (step.state.joint_vel - step.ref.joint_vel).norm(dim=-1)
+
+
+def alive(step: Step) -> Tensor:
+    """Not in the table: 1 for each step that does not end the episode."""
+    return torch.ones(len(step.torque))
+
+
+PENALTIES: dict[str, Callable[[Step], Tensor]] = {
+    f.__name__: f
+    for f in (
+        torque_limits,
+        dof_position_limits,
+        dof_velocity_limits,
+        dof_acceleration,
+        action_rate,
+        action_smoothness,
+        torque,
+        stumble,
+        feet_orientation,
+        alive,
+    )
+}
+"""Terms that enter as they are."""
+
+ERRORS: dict[str, Callable[[Step], Tensor]] = {
+    f.__name__: f
+    for f in (body_position, root_rotation, root_angular_velocity, root_velocity, dof_position, dof_velocity)
+}
+"""Terms that enter as exp(-sharpness * error)."""
+
+PAPER_WEIGHTS = {
+    "torque_limits": -10.0,
+    "dof_position_limits": -10.0,
+    "dof_velocity_limits": -10.0,
+    "dof_acceleration": -3e-8,
+    "action_rate": -2.0,
+    "action_smoothness": -2.0,
+    "torque": -1e-4,
+    "stumble": -0.00125,
+    "feet_orientation": -2.0,
+    "body_position": 1.0,
+    "root_rotation": 0.5,
+    "root_angular_velocity": 0.5,
+    "root_velocity": 0.5,
+    "dof_position": 0.5,
+    "dof_velocity": 0.5,
+}
+PAPER_SHARPNESS = dict.fromkeys(ERRORS, 4.0)
+
+DEMO_WEIGHTS = PAPER_WEIGHTS | {
+    "torque_limits": -0.1,
+    "dof_position_limits": -0.2,
+    "dof_velocity_limits": -0.1,
+    "action_rate": -0.01,
+    "action_smoothness": -0.002,
+    "feet_orientation": -0.1,
+    "body_position": 2.0,
+    "alive": 0.5,
+}
+DEMO_SHARPNESS = {
+    "body_position": 6.0,
+    "root_rotation": 3.0,
+    "root_angular_velocity": 0.5,
+    "root_velocity": 2.0,
+    "dof_position": 1.0,
+    "dof_velocity": 0.1,
+}
+
+
+class Reward:
+    """The weighted sum of the terms, times the control period (so that a second in perfect tracking gives ~ 1).
+
+    Args:
+        config: preset and what replaces its values; an unknown term is an error.
+        dt: control period [s].
+    """
+
+    def __init__(self, config: RewardConfig, dt: float) -> None:
+        paper = config.preset == "paper"
+        self.weights = (PAPER_WEIGHTS if paper else DEMO_WEIGHTS) | config.weights
+        self.sharpness = (PAPER_SHARPNESS if paper else DEMO_SHARPNESS) | config.sharpness
+        unknown = (set(self.weights) - set(PENALTIES) - set(ERRORS)) | (set(self.sharpness) - set(ERRORS))
+        if unknown:
+            known = ", ".join([*PENALTIES, *ERRORS])
+            raise ValueError(f"unknown reward terms {sorted(unknown)}; the terms are {known}")
+        self.dt = dt
+
+    def terms(self, step: Step) -> dict[str, Tensor]:
+        """Each term with its weight, (B,)."""
+        out = {}
+        for name, weight in self.weights.items():
+            if weight == 0:
+                continue
+            if name in ERRORS:
+                out[name] = weight * torch.exp(-self.sharpness[name] * ERRORS[name](step))
+            else:
+                out[name] = weight * PENALTIES[name](step)
+        return out
+
+    def __call__(self, step: Step) -> Tensor:
+        """The reward of the step, (B,)."""
+        return self.dt * torch.stack(list(self.terms(step).values())).sum(0)

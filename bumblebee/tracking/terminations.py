@@ -1,0 +1,35 @@
+"""When an episode is lost: the robot has fallen, or a key body is too far from its reference (paper, section 3.2)."""
+
+from torch import Tensor
+
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.rotations import angle_between
+from bumblebee.tracking.library import ReferenceFrame
+
+FALL_HEIGHT = 0.35  # m: the pelvis is this much lower than its reference
+FALL_ANGLE = 1.2  # rad: or tilted this far away from it
+
+LOOSE_FAMILIES = frozenset({"walk", "step", "turn", "sidestep", "run", "march"})
+"""Families that travel: their key bodies may be 0.8 m off, those of the others 0.4 m (paper, metrics)."""
+
+
+def success_threshold(family: str) -> float:
+    """Distance of a key body [m] at which a clip of this family counts as failed."""
+    return 0.8 if family in LOOSE_FAMILIES else 0.4
+
+
+def fallen(state: RobotState, ref: ReferenceFrame) -> Tensor:
+    """Robots (B,) bool that lie or topple where the reference does not."""
+    low = state.root_pos_w[:, 2] < ref.root_pos_w[:, 2] - FALL_HEIGHT
+    return low | (angle_between(state.root_quat_w, ref.root_quat_w) > FALL_ANGLE)
+
+
+def key_distance(state: RobotState, ref: ReferenceFrame) -> Tensor:
+    """Distance (B,) [m] of the farthest key body from its reference."""
+    return (state.key_pos_w - ref.key_pos_w).norm(dim=-1).amax(-1)
+
+
+def threshold_at(progress: float, start: float, end: float, share: float) -> float:
+    """The curriculum: from `start` to `end` [m] over the first `share` of the training, never back."""
+    part = 1.0 if share <= 0 else min(max(progress / share, 0.0), 1.0)
+    return start + (end - start) * part
