@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.robot.facts import joint_names
+from bumblebee.robot.facts import joint_names, joints
+from bumblebee.robot.model import gains
 from bumblebee.tracking.observations import layout
 
 if TYPE_CHECKING:
@@ -119,6 +120,15 @@ def _check_joints(path: Path, contract: dict[str, Any]) -> None:
     ):
         if len(values) != len(expected):
             raise BadInput(f"{path}: {field}", f"{len(expected)} numbers", str(len(values)))
+    servo = [gains(joint) for joint in joints()]
+    for field, index in (("kp", 0), ("kd", 1)):
+        declared = [pair[index] for pair in servo]
+        if not np.allclose(contract[field], declared, rtol=1e-3):
+            worst = int(np.argmax(np.abs(np.asarray(contract[field]) / declared - 1)))
+            came = f"{contract[field][worst]:g}"
+            raise BadInput(
+                f"{path}: {field}[{worst}]", f"{declared[worst]:g}, the servo's gain", came, "Train with it."
+            )
 
 
 def _check_sizes(policy: ExportedPolicy) -> None:

@@ -11,8 +11,7 @@ from mujoco.batch import Batch
 
 from bumblebee.deploy.sensors import Sensors
 from bumblebee.motion import quaternions
-from bumblebee.robot.facts import FEET
-from bumblebee.robot.model import RobotConfig, build_spec
+from bumblebee.sim.sensors import load_model
 
 CONTROL_HZ = 50.0
 
@@ -41,7 +40,7 @@ class NominalRobots:
     """
 
     def __init__(self, count: int, threads: int = 2) -> None:
-        self.model = spec_with_foot_sensors(RobotConfig()).compile()
+        self.model = load_model()
         self.batch = Batch(self.model, count, threads)
         self._steps = round(1.0 / CONTROL_HZ / self.model.opt.timestep)
         self._view = BatchView(self.batch)
@@ -88,7 +87,9 @@ class SideBySide:
         """See `Robots.read`."""
         readings = [part.read() for part in self._parts]
         order = np.argsort(np.concatenate(self._members))
-        return Sensors(**{f.name: np.concatenate([getattr(r, f.name) for r in readings])[order] for f in fields(Sensors)})
+        return Sensors(
+            **{f.name: np.concatenate([getattr(r, f.name) for r in readings])[order] for f in fields(Sensors)}
+        )
 
     def step(self, robots: np.ndarray, targets: np.ndarray) -> None:
         """See `Robots.step`."""
@@ -129,23 +130,3 @@ class BatchView:
             # The sensor gives the force of the foot on the floor: the contract wants that of the floor on the foot.
             foot_force=-self._sensor[:, :6].reshape(-1, 2, 3),
         )
-
-
-def spec_with_foot_sensors(config: RobotConfig) -> mujoco.MjSpec:
-    """The declared model with one net contact force sensor for each foot, left first, in the world frame."""
-    spec = build_spec(config)
-    for foot in FEET:
-        sensor = spec.add_sensor(
-            name=f"{foot}_force",
-            type=mujoco.mjtSensor.mjSENS_CONTACT,
-            objtype=mujoco.mjtObj.mjOBJ_BODY,
-            objname=foot,
-            reftype=mujoco.mjtObj.mjOBJ_GEOM,
-            refname="floor",
-        )
-        sensor.intprm[:3] = (
-            1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE),
-            3,
-            1,
-        )  # force, reduced to the net force, once
-    return spec

@@ -8,14 +8,17 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from bumblebee.deploy.robots import CONTROL_HZ, BatchView, spec_with_foot_sensors
+from bumblebee.deploy.robots import CONTROL_HZ, BatchView
 from bumblebee.deploy.sensors import Sensors
 from bumblebee.deploy.stand_in_effects import STEP_MS, SealedEffects, to_arrays
 from bumblebee.robot.facts import joints as robot_joints
-from bumblebee.robot.model import RobotConfig, gains
+from bumblebee.robot.model import RobotConfig, build_spec, gains
+from bumblebee.sim.sensors import add_foot_sensors
 
 SERVO_STEPS = round(1000 / CONTROL_HZ / STEP_MS)
-INTEGRATOR = "euler"
+# MuJoCo's default dry friction creeps (0.02 rad/s a N m at the knee) where a real joint sticks: made stiff here.
+STICTION_SOLREF = (0.004, 1.0)
+STICTION_SOLIMP = 0.999
 
 
 class StandInRobots:
@@ -55,10 +58,10 @@ class StandInRobots:
         true = self._view.sensors(self._reported)
         return Sensors(**{**vars(true), "joint_pos": true.joint_pos + self.effects.offset})
 
-    def step(self, robots: np.ndarray, targets: np.ndarray) -> None:
+    def step(self, robots: np.ndarray, targets: np.ndarray, cycles: int = SERVO_STEPS) -> None:
         """Hold targets (n, J) [rad] for 20 ms on `robots` (n,): 20 servo cycles of 1 ms."""
         rows = np.arange(len(self.kp))
-        for _ in range(SERVO_STEPS):
+        for _ in range(cycles):
             self._clock += 1
             self._sent[self._clock % self._depth, robots] = targets
             late = (self._clock - self.effects.delay_ms.astype(int)) % self._depth  # (J,)
@@ -78,7 +81,8 @@ class StandInRobots:
 
 def _motor_model() -> mujoco.MjModel:
     """The declared geometry and masses with torque motors, 1 ms steps and the semi-implicit Euler integrator."""
-    spec = spec_with_foot_sensors(RobotConfig(timestep=STEP_MS / 1000))
+    spec = build_spec(RobotConfig(timestep=STEP_MS / 1000))
+    add_foot_sensors(spec)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     for actuator in spec.actuators:
         actuator.set_to_motor()
@@ -87,6 +91,7 @@ def _motor_model() -> mujoco.MjModel:
 
 def _apply_to_model(model: mujoco.MjModel, effects: SealedEffects) -> None:
     model.dof_frictionloss[6:] += effects.coulomb
+    model.dof_solref[6:], model.dof_solimp[6:, :2] = STICTION_SOLREF, STICTION_SOLIMP
     for dof, armature in effects.armature.items():
         model.dof_armature[dof] = armature
     for body, mass in effects.mass.items():

@@ -16,7 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-WALKING_FAMILIES = ("walk", "turn", "sidestep", "run")
+from bumblebee.tracking.terminations import LOOSE_FAMILIES
+
+WALKING_FAMILIES = tuple(sorted(LOOSE_FAMILIES))
 END_REASONS = ("end", "keypoint", "fall")
 
 

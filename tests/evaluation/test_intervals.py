@@ -3,12 +3,25 @@
 import numpy as np
 import pytest
 
-from bumblebee.evaluation.intervals import bootstrap_mean, mcnemar_test, mean_by_motion, sign_flip_test, success_rate, wilson
+from bumblebee.evaluation.intervals import (
+    bootstrap_mean,
+    mcnemar_test,
+    mean_by_motion,
+    sign_flip_test,
+    success_rate,
+    wilson,
+)
 
 
 @pytest.mark.parametrize(
     ("successes", "trials", "low", "high"),
-    [(0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (1, 29, 0.0061, 0.1718)],
+    [
+        (0, 10, 0.0, 0.2775),
+        (10, 10, 0.7225, 1.0),
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (1, 29, 0.0061, 0.1718),
+    ],
 )
 def test_wilson_agrees_with_newcombe_1998(successes: int, trials: int, low: float, high: float) -> None:
     assert wilson(successes, trials) == pytest.approx((low, high), abs=5e-5)
@@ -45,7 +58,12 @@ def test_motions_weigh_the_same_whatever_their_number_of_episodes() -> None:
 
 
 def test_nothing_gives_null_and_not_a_number_in_json() -> None:
-    assert mean_by_motion(np.array([np.nan]), np.array(["a"])).as_dict() == {"n": 0, "motions": 0, "value": None, "ci95": [None, None]}
+    assert mean_by_motion(np.array([np.nan]), np.array(["a"])).as_dict() == {
+        "n": 0,
+        "motions": 0,
+        "value": None,
+        "ci95": [None, None],
+    }
 
 
 def test_sign_flips_are_exact_for_few_motions() -> None:
