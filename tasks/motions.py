@@ -5,7 +5,8 @@ from pathlib import Path
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.folder import Reading, ReadConfig, motion_files, read_folder
+from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.motion.folder import ReadConfig, Reading, motion_files, read_folder, skipped_table
 from bumblebee.motion.pieces import hold_out
 from bumblebee.motion.store import write_library
 from bumblebee.progress import progress
@@ -23,6 +24,8 @@ class MotionsConfig:
     """"embedded" for the library that comes with BumbleBee, or a folder (or one file) of motions."""
     holdout_share: float = 0.15
     """Share of the motions that no policy trains on, by a hash of their names; each family of 4 or more has one."""
+    embedded: EmbeddedConfig = field(default_factory=EmbeddedConfig)
+    """Which clips the embedded library has."""
     read: ReadConfig = field(default_factory=ReadConfig)
     """How the files of a folder are read."""
 
@@ -45,21 +48,14 @@ def main() -> None:
 def gather(config: MotionsConfig) -> Reading:
     """The clips of the configured source, and the files that gave none."""
     if config.source == EMBEDDED:
-        return embedded()
+        return Reading(make_library(config.embedded), skipped_table([]))
     source = Path(config.source).expanduser()
     if not source.exists():
-        raise BadInput(f"params.yaml: motions.source {source}", f"a folder of motions, or {EMBEDDED!r}", "nothing there")
+        raise BadInput(
+            "params.yaml: motions.source", f"a folder of motions or {EMBEDDED!r}", f"{source}: nothing there"
+        )
     with progress(len(motion_files(source)), "reading motions", "files") as bar:
         return read_folder(source, config.read, bar.update)
-
-
-def embedded() -> Reading:
-    """The library that comes with BumbleBee."""
-    import pandas as pd
-
-    from bumblebee.motion.embedded import make_library
-
-    return Reading(make_library(), pd.DataFrame(columns=["file", "reason"]))
 
 
 def metrics(clips: list[Clip], reading: Reading) -> dict[str, float]:

@@ -30,7 +30,7 @@ def read_asap_pickle(path: Path) -> list[RawMotion]:
     return [_motion(path, f"{path.stem}_{name}", str(name), motion) for name, motion in content.items()]
 
 
-def _motion(path: Path, name: str, part: str, motion: Any) -> RawMotion:  # noqa: ANN401
+def _motion(path: Path, name: str, part: str, motion: Any) -> RawMotion:
     where = f"{path}, motion {part!r}" if part else str(path)
     if not isinstance(motion, dict):
         raise BadInput(where, "a dict with root_trans_offset, root_rot, dof and fps", f"a {type(motion).__name__}")
@@ -57,7 +57,7 @@ def actuated(joint_pos: np.ndarray) -> np.ndarray:
     return joint_pos[:, [joint_names(29).index(name) for name in joint_names()]]
 
 
-def _field(motion: dict, field: str) -> Any:  # noqa: ANN401
+def _field(motion: dict, field: str) -> Any:
     return next((motion[name] for name in _FIELDS[field] if name in motion), None)
 
 

@@ -52,7 +52,10 @@ class Clip:
 
 @dataclass(frozen=True)
 class ClipVelocities:
-    """Velocities by central differences, float32: `root_lin_vel_w` (T, 3) [m/s], `root_ang_vel_b` (T, 3) [rad/s], `joint_vel` (T, 23) [rad/s]."""
+    """Velocities by central differences, float32.
+
+    `root_lin_vel_w` (T, 3) [m/s], `root_ang_vel_b` (T, 3) [rad/s], `joint_vel` (T, 23) [rad/s].
+    """
 
     root_lin_vel_w: np.ndarray
     root_ang_vel_b: np.ndarray

@@ -1,7 +1,7 @@
 """Kinematic rules that a motion must satisfy to be worth learning (paper, section 4.1; limits as in ProtoMotions).
 
-Each rule is a function from a clip to its worst frame; a motion that exceeds the rule's limit is dropped, and the drop is
-written down with the value, the frame and a sentence.
+Each rule is a function from a clip to its worst frame; a motion that exceeds the rule's limit is dropped, and the
+drop is written down with the value, the frame and a sentence.
 """
 
 from collections.abc import Callable, Iterable

@@ -3,6 +3,8 @@
 import hashlib
 import os
 import re
+import zipfile
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,7 +25,7 @@ from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
 from bumblebee.motion.store import read_library
 
-# Formats that come in such folders and are not read; anything that is no motion at all (notes, licences) is passed over.
+# Formats that come in such folders and are not read; what is no motion at all (notes, licences) is passed over.
 _NOT_YET = {
     ".npz": "SMPL motions cannot be read yet",
     ".npy": "NumPy arrays cannot be read yet",
@@ -35,6 +37,7 @@ _NOT_YET = {
     ".gz": "archives cannot be read yet: unpack it",
     ".7z": "archives cannot be read yet: unpack it",
 }
+_UNKNOWN = "a format that is not known"
 _NO_MOTION = {"", ".txt", ".md", ".pdf", ".png", ".jpg", ".gif", ".mp4", ".html", ".json", ".yaml", ".yml", ".py"}
 
 
@@ -64,9 +67,7 @@ class Reading:
     skipped: pd.DataFrame
 
 
-def read_folder(
-    path: Path, config: ReadConfig | None = None, tell: Callable[[], None] | None = None
-) -> Reading:
+def read_folder(path: Path, config: ReadConfig | None = None, tell: Callable[[], None] | None = None) -> Reading:
     """All motions below `path`; a file that cannot be used is listed and does not stop the others.
 
     Args:
@@ -79,7 +80,7 @@ def read_folder(
     """
     path, config = Path(path), config or ReadConfig()
     if path.is_file():
-        return Reading(read_file(path, config), _skipped([]))
+        return Reading(read_file(path, config), skipped_table([]))
     if not path.is_dir():
         raise BadInput(path, "a folder with motion files", "no such folder")
     files = motion_files(path)
@@ -99,7 +100,7 @@ def read_folder(
         first = f"; the first: {skipped[0][0]}: {skipped[0][1]}" if skipped else ""
         came = f"{len(files)} files, none of them usable{first}"
         raise BadInput(path, "G1 CSV files, ASAP pickles or a motion library", came)
-    return Reading(clips, _skipped(skipped))
+    return Reading(clips, skipped_table(skipped))
 
 
 def read_file(path: Path, config: ReadConfig | None = None) -> list[Clip]:
@@ -143,8 +144,23 @@ def _raw(path: Path, config: ReadConfig) -> list[RawMotion]:
         return read_asap_pickle(path)
     if suffix == ".csv":
         return [read_g1_csv(path, _csv_fps(path, config))]
-    reason = _NOT_YET.get(suffix, "a format that is not known")
+    reason = _inside_zip(path) if suffix == ".zip" else _NOT_YET.get(suffix, _UNKNOWN)
     raise BadInput(path, "a G1 CSV file, an ASAP pickle or a motion library", reason)
+
+
+def _inside_zip(path: Path) -> str:
+    """Why an archive is skipped, with what it holds."""
+    reason = _NOT_YET[".zip"]
+    try:
+        with zipfile.ZipFile(path) as archive:
+            kinds = Counter(Path(name).suffix.lower() for name in archive.namelist())
+    except (zipfile.BadZipFile, OSError, ValueError):
+        return reason
+    kinds.pop("", None)
+    if not kinds:
+        return reason
+    kind, count = kinds.most_common(1)[0]
+    return f"{reason} ({count} {kind} files in it" + (f"; {_NOT_YET[kind]})" if kind in _NOT_YET else ")")
 
 
 def _csv_fps(path: Path, config: ReadConfig) -> float:
@@ -174,12 +190,13 @@ def _walk(folder: Path) -> Iterator[Path]:
 
 def _reason(error: BadInput, file: Path) -> str:
     """The error's line without the file's name, which stands in a column of its own."""
-    if error.came in _NOT_YET.values() or error.came == "a format that is not known":
+    if error.came.startswith(tuple(_NOT_YET.values())) or error.came == _UNKNOWN:
         return error.came
     return str(error).removeprefix(str(file)).lstrip(":, ")
 
 
-def _skipped(rows: list[tuple[str, str]]) -> pd.DataFrame:
+def skipped_table(rows: list[tuple[str, str]]) -> pd.DataFrame:
+    """Files without clips, columns `file` and `reason`."""
     return pd.DataFrame(rows, columns=["file", "reason"])
 
 
@@ -191,13 +208,19 @@ def _distinct(found: list[tuple[Path, list[Clip]]]) -> list[Clip]:
         names = [clip.name for clip in group]
         if taken & set(names):
             names = [f"{_file_name(file.parent.name)}_{name}" for name in names]
-        stems, number = [motion_of(name) for name in names], 2
+        first, number = names, 2
         while taken & set(names):
-            names = [f"{stem}_{number}{clip.name[len(motion_of(clip.name)) :]}" for stem, clip in zip(stems, group, strict=True)]
+            names = [_numbered(name, number) for name in first]
             number += 1
         taken |= set(names)
         clips += [replace(clip, name=name) for clip, name in zip(group, names, strict=True)]
     return clips
+
+
+def _numbered(name: str, number: int) -> str:
+    """`walk_p3` -> `walk_2_p3`: the piece stays at the end."""
+    motion = motion_of(name)
+    return f"{motion}_{number}{name[len(motion) :]}"
 
 
 def _file_name(name: str) -> str:

@@ -26,9 +26,7 @@ def read_g1_csv(path: Path, fps: float) -> RawMotion:
         raise _width(path, 1, len(lines[0].split(",")))
     values = _numbers(path, lines[first_row - 1 :], first_row, _ROOT + len(joints))
     order = [_ROOT + joints.index(name) for name in joint_names()]
-    return RawMotion(
-        path.stem, float(fps), values[:, :3], values[:, [6, 3, 4, 5]], values[:, order], path, first_row
-    )
+    return RawMotion(path.stem, float(fps), values[:, :3], values[:, [6, 3, 4, 5]], values[:, order], path, first_row)
 
 
 def _lines(path: Path) -> list[str]:

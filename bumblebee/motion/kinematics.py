@@ -84,7 +84,7 @@ def make_clip(
 
 @cache
 def _tree() -> list[tuple[str, str, np.ndarray, np.ndarray | None, np.ndarray, int | None]]:
-    """For each body: name, parent, offset (3,) [m], fixed rotation (4,) if there is one, joint axis (3,), its column."""
+    """For each body: name, parent, offset (3,) [m], fixed rotation (4,) or None, joint axis (3,), its column."""
     rows = []
     for name, facts in g1_bodies().items():
         fixed = None if facts["quat"] == [1.0, 0.0, 0.0, 0.0] else quaternions.normalised(facts["quat"])

@@ -5,6 +5,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,13 +22,11 @@ def split_long(clip: Clip, max_seconds: float) -> list[Clip]:
     count = int(np.ceil(clip.frames / (max_seconds * clip.fps + 1)))
     edges = np.linspace(0, clip.frames, count + 1).round().astype(int)
     pieces = []
-    for number, (start, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for number, (start, end) in enumerate(pairwise(edges)):
         arrays = {name: getattr(clip, name)[start:end] for name in ("root_pos", "root_quat", "joint_pos", "key_pos")}
         captions = within(clip.captions, start / clip.fps, (end - 1) / clip.fps)
         source = clip.caption_source if captions else ""
-        pieces.append(
-            replace(clip, name=f"{clip.name}_p{number}", captions=captions, caption_source=source, **arrays)
-        )
+        pieces.append(replace(clip, name=f"{clip.name}_p{number}", captions=captions, caption_source=source, **arrays))
     return pieces
 
 

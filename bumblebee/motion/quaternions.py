@@ -65,7 +65,8 @@ def slerp(start: ArrayLike, end: ArrayLike, share: ArrayLike) -> FloatArray:
     vector = rotation_vector(multiply(conjugate(start), end)) * share[..., None]
     angle = np.linalg.norm(vector, axis=-1)
     axis = vector / np.maximum(angle, 1e-12)[..., None]
-    return normalised(multiply(start, np.concatenate([np.cos(angle / 2)[..., None], np.sin(angle / 2)[..., None] * axis], -1)))
+    turn = np.concatenate([np.cos(angle / 2)[..., None], np.sin(angle / 2)[..., None] * axis], axis=-1)
+    return normalised(multiply(start, turn))
 
 
 def _parts(array: ArrayLike) -> tuple[FloatArray, ...]:

@@ -26,11 +26,11 @@ _MAX_DIMENSIONS = 8
 _NUMERIC = re.compile(r"[<>=|]?[biuf][1248]|bool")
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """The pickle holds something that is neither a plain value nor a numeric array."""
 
 
-def load(path: Path) -> Any:  # noqa: ANN401 (a pickle may hold any plain value)
+def load(path: Path) -> Any:
     """The pickle's content: dicts, lists, tuples, strings, numbers, and numpy arrays.
 
     Raises:
@@ -39,7 +39,7 @@ def load(path: Path) -> Any:  # noqa: ANN401 (a pickle may hold any plain value)
     try:
         data = _unpacked(path)
         return _plain(_SafeUnpickler(data).load())
-    except Refused as refusal:
+    except RefusedError as refusal:
         raise BadInput(
             path, "a pickle of plain values and numeric arrays", str(refusal), "Nothing of it was executed."
         ) from None
@@ -57,7 +57,7 @@ def load(path: Path) -> Any:  # noqa: ANN401 (a pickle may hold any plain value)
 def _unpacked(path: Path) -> bytes:
     """The file's bytes, decompressed as joblib compresses, within `MAX_BYTES`."""
     if path.stat().st_size > MAX_BYTES:
-        raise Refused(f"a file of more than {MAX_BYTES >> 20} MiB")
+        raise RefusedError(f"a file of more than {MAX_BYTES >> 20} MiB")
     raw = path.read_bytes()
     if not raw:
         raise BadInput(path, "a pickle", "an empty file", "Copy the file again.")
@@ -65,15 +65,15 @@ def _unpacked(path: Path) -> bytes:
         if raw.startswith(magic):
             return _decompress(raw, maker())
     if raw.startswith((b"\x04\x22\x4d\x18", b"ZF")):
-        raise Refused("a compression (lz4 or joblib before 0.10) that is not read: save it with compress=0")
+        raise RefusedError("a compression (lz4 or joblib before 0.10) that is not read: save it with compress=0")
     return raw
 
 
-def _decompress(raw: bytes, decompressor: Any) -> bytes:  # noqa: ANN401 (zlib's has no public type)
+def _decompress(raw: bytes, decompressor: Any) -> bytes:
     data = decompressor.decompress(raw, MAX_BYTES)
     if not decompressor.eof:
         if len(data) >= MAX_BYTES:
-            raise Refused(f"a pickle that unpacks to more than {MAX_BYTES >> 20} MiB")
+            raise RefusedError(f"a pickle that unpacks to more than {MAX_BYTES >> 20} MiB")
         raise EOFError("the compressed stream is truncated")
     return data
 
@@ -103,7 +103,7 @@ class _DType:
 
     def numpy(self) -> np.dtype:
         if not isinstance(self.text, str) or not _NUMERIC.fullmatch(self.text):
-            raise Refused(f"an array of dtype {self.text!r}, which is not numeric")
+            raise RefusedError(f"an array of dtype {self.text!r}, which is not numeric")
         return np.dtype(self.text)
 
 
@@ -126,7 +126,7 @@ class _JoblibWrapper:
 
     def set_state(self, state: Any) -> None:
         if not isinstance(state, dict):
-            raise Refused("an array wrapper without its facts")
+            raise RefusedError("an array wrapper without its facts")
         self.facts = state
 
     def read(self, file: io.BytesIO) -> np.ndarray:
@@ -140,27 +140,27 @@ class _JoblibWrapper:
         return _array(raw, self.facts["dtype"], self.facts["shape"], self.facts["order"])
 
 
-def _dtype(description: Any) -> np.dtype:  # noqa: ANN401
+def _dtype(description: Any) -> np.dtype:
     return (description if isinstance(description, _DType) else _DType(description)).numpy()
 
 
-def _count(shape: Any) -> int:  # noqa: ANN401
+def _count(shape: Any) -> int:
     whole = isinstance(shape, tuple) and all(type(n) is int and n >= 0 for n in shape)
     if not whole or len(shape) > _MAX_DIMENSIONS:
-        raise Refused(f"an array of shape {str(shape)[:60]}")
+        raise RefusedError(f"an array of shape {str(shape)[:60]}")
     return math.prod(shape)
 
 
 def _checked_size(count: int, dtype: np.dtype) -> int:
     if count * dtype.itemsize > MAX_BYTES:
-        raise Refused(f"an array of more than {MAX_BYTES >> 20} MiB")
+        raise RefusedError(f"an array of more than {MAX_BYTES >> 20} MiB")
     return count * dtype.itemsize
 
 
-def _array(raw: Any, dtype: Any, shape: Any, order: Any) -> np.ndarray:  # noqa: ANN401
+def _array(raw: Any, dtype: Any, shape: Any, order: Any) -> np.ndarray:
     kind, count = _dtype(dtype), _count(shape)
     if not isinstance(raw, bytes | bytearray):
-        raise Refused(f"an array made of {type(raw).__name__}, not of bytes")
+        raise RefusedError(f"an array made of {type(raw).__name__}, not of bytes")
     if len(raw) != _checked_size(count, kind):
         raise EOFError(f"an array has {len(raw)} of {count * kind.itemsize} bytes")
     values = np.frombuffer(bytes(raw), kind).reshape(shape, order="F" if order == "F" else "C")
@@ -171,13 +171,13 @@ def _reconstruct(*_: object) -> _Array:
     return _Array()
 
 
-def _scalar(dtype: Any, raw: Any) -> float | int | bool:  # noqa: ANN401
+def _scalar(dtype: Any, raw: Any) -> float | int | bool:
     return _array(raw, dtype, (), "C").item()
 
 
-def _encode(text: Any, encoding: Any = "latin1") -> bytes:  # noqa: ANN401
+def _encode(text: Any, encoding: Any = "latin1") -> bytes:
     if not isinstance(text, str) or encoding != "latin1":
-        raise Refused(f"text in encoding {encoding!r}")
+        raise RefusedError(f"text in encoding {encoding!r}")
     return text.encode("latin1")
 
 
@@ -193,44 +193,47 @@ _NAMES: dict[tuple[str, str], Any] = {
 _CALLABLE = (_DType, _reconstruct, _scalar, _array, _encode)
 
 
-class _SafeUnpickler(pickle._Unpickler):  # type: ignore[name-defined,misc]  # the Python one: joblib's arrays need its stream
-    dispatch: ClassVar[dict[int, Any]] = dict(pickle._Unpickler.dispatch)  # type: ignore[attr-defined]
+class _SafeUnpickler(pickle._Unpickler):  # the one in Python: it reads no further than joblib's arrays begin
+    dispatch: ClassVar[dict[int, Any]] = dict(pickle._Unpickler.dispatch)
+    stack: list[Any]
+    append: Callable[[Any], None]
+    read: Callable[[int], bytes]
 
     def __init__(self, data: bytes) -> None:
         self._stream = io.BytesIO(data)
         self._size = len(data)
         super().__init__(self._stream)
 
-    def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401
+    def find_class(self, module: str, name: str) -> Any:
         if (module, name) not in _NAMES:
-            raise Refused(f"the name {module}.{name}"[:120])
+            raise RefusedError(f"the name {module}.{name}"[:120])
         return _NAMES[module, name]
 
-    def persistent_load(self, pid: Any) -> Any:  # noqa: ANN401
-        raise Refused("a persistent id")
+    def persistent_load(self, pid: Any) -> Any:
+        raise RefusedError("a persistent id")
 
     def get_extension(self, code: int) -> None:
-        raise Refused("an extension code")
+        raise RefusedError("an extension code")
 
     def load_reduce(self) -> None:
         args, function = self.stack.pop(), self.stack[-1]
         if function not in _CALLABLE or not isinstance(args, tuple):
-            raise Refused(f"a call of {_called(function)}")
+            raise RefusedError(f"a call of {_called(function)}")
         self.stack[-1] = function(*args)
 
     def load_newobj(self) -> None:
         args, kind = self.stack.pop(), self.stack.pop()
         if kind is not _JoblibWrapper or args != ():
-            raise Refused(f"an object of {_called(kind)}")
+            raise RefusedError(f"an object of {_called(kind)}")
         self.append(_JoblibWrapper())
 
     def load_refused(self) -> None:
-        raise Refused("an instruction that makes objects in a way arrays do not need")
+        raise RefusedError("an instruction that makes objects in a way arrays do not need")
 
     def load_build(self) -> None:
         state, made = self.stack.pop(), self.stack[-1]
         if not isinstance(made, _DType | _Array | _JoblibWrapper):
-            raise Refused(f"a state for a {type(made).__name__}")
+            raise RefusedError(f"a state for a {type(made).__name__}")
         made.set_state(state)
         if isinstance(made, _JoblibWrapper):
             self.stack[-1] = made.read(self._stream)
@@ -249,15 +252,15 @@ class _SafeUnpickler(pickle._Unpickler):  # type: ignore[name-defined,misc]  # t
         dispatch[_opcode[0]] = load_refused
 
 
-def _called(function: Any) -> str:  # noqa: ANN401
+def _called(function: Any) -> str:
     return str(getattr(function, "__name__", type(function).__name__)).lstrip("_")
 
 
-def _plain(value: Any, depth: int = 0) -> Any:  # noqa: ANN401
+def _plain(value: Any, depth: int = 0) -> Any:
     """Stand-ins replaced by what they stand for, in dicts and sequences a few levels deep."""
     if isinstance(value, _Array):
         if value.value is None:
-            raise Refused("an array without its values")
+            raise RefusedError("an array without its values")
         return value.value
     if isinstance(value, dict) and depth < 3:
         return {key: _plain(item, depth + 1) for key, item in value.items() if isinstance(key, str | int)}

@@ -1,8 +1,8 @@
 """A library of clips on disk: a folder of Parquet files with an index.
 
-    <folder>/index.parquet          one row a clip
-    <folder>/clips/<name>.parquet   the arrays; facts about the clip in the schema's metadata
-    <folder>/skipped.csv            source files that are not in the library, and why
+- `index.parquet`: one row a clip
+- `clips/<name>.parquet`: the arrays, with the facts about the clip in the schema's metadata
+- `skipped.csv`: source files that are not in the library, and why
 """
 
 import json
@@ -104,8 +104,8 @@ def read_clip(path: Path) -> Clip:
     values = np.stack([column.to_numpy() for column in table.columns], axis=1)
     root_pos, root_quat, joint_pos, key_pos = np.split(values, [3, 7, 7 + len(joint_names())], axis=1)
     key_pos = key_pos.reshape(-1, len(KEY_BODIES), 3)
-    arrays = [np.ascontiguousarray(a) for a in (root_pos, root_quat, joint_pos, key_pos)]
-    return Clip(facts.pop("name"), facts.pop("fps"), *arrays, **facts)
+    arrays = {"root_pos": root_pos, "root_quat": root_quat, "joint_pos": joint_pos, "key_pos": key_pos}
+    return Clip(**facts, **{name: np.ascontiguousarray(values) for name, values in arrays.items()})
 
 
 def index_of(clips: Iterable[Clip]) -> pd.DataFrame:
