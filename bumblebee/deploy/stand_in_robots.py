@@ -91,7 +91,10 @@ def _motor_model() -> mujoco.MjModel:
 
 def _apply_to_model(model: mujoco.MjModel, effects: SealedEffects) -> None:
     model.dof_frictionloss[6:] += effects.coulomb
-    model.dof_solref[6:], model.dof_solimp[6:, :2] = STICTION_SOLREF, STICTION_SOLIMP
+    if effects.coulomb.any():
+        model.dof_solref[6:], model.dof_solimp[6:, :2] = STICTION_SOLREF, STICTION_SOLIMP
+        # The declared model's 5 Newton iterations of 6 line-search steps do not converge on dry friction.
+        model.opt.iterations = model.opt.ls_iterations = 50
     for dof, armature in effects.armature.items():
         model.dof_armature[dof] = armature
     for body, mass in effects.mass.items():
