@@ -43,7 +43,10 @@ def load(section: str, kind: type[Config], path: Path = FILE) -> Config:
         BadInput: for an unknown or missing key or a value of the wrong type; the line names file, key, what was
             expected, what came, and the nearest known key.
     """
+    from tasks.sections import check_names
+
     content = read(path)
+    check_names(content, path)
     if section not in content:
         raise BadInput(f"{path}: {section}", "this section", "none", nearest(section, content))
     return build(kind, content[section], path, section)

@@ -55,20 +55,19 @@ def main() -> None:
             compare(episodes, candidate.parent, candidate.policy, config.engine, "all") if candidate.parent else None
         )
         facts = publish(candidate, result, contract, against_parent(related))
-        facts["earlier"] = models.get(candidate.model, {}).get("earlier", []) + [facts["version"]]
+        facts["versions"] = [*models.get(candidate.model, {}).get("versions", []), facts["version"]]
         models[candidate.model] = facts
     for name in models:
         models[name]["champion"] = registry.champion_version(name)
-        print(
-            f"{name}: version {models[name]['version']}, champion is {models[name]['champion']} ({models[name]['reason']})"
-        )
+        made, champion, reason = (models[name][key] for key in ("version", "champion", "reason"))
+        print(f"{name}: version {made}, champion is {champion} ({reason})")
     content = {"schema": 1, "evaluation_contract": contract, "engine": config.engine, "models": models}
     with output_file(OUT) as file:
         file.write_text(json.dumps(content, indent=1) + "\n")
 
 
 def candidates(shape: Loop) -> Iterator[Candidate]:
-    """Every policy of the loop in the order in which it was trained, so that a later round meets its parent's version."""
+    """Every policy in the order in which it was trained, so that a later round meets its parent's version."""
     yield Candidate("base", "base", Path("models/base"), None)
     for cluster in shape.clusters:
         for number in range(shape.final_round + 1):

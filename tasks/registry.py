@@ -6,11 +6,13 @@ and the flow leave the same history; the server only shows it. Why: docs/decisio
 
 import csv
 import fcntl
+import json
 import logging
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +28,11 @@ LONGEST = 480  # characters of a parameter or a tag that are kept
 
 def prepare() -> "MlflowClient":
     """A client on the workspace's own database, which is made first if need be, by one process at a time."""
+    return _prepared(Path.cwd())
+
+
+@cache
+def _prepared(workspace: Path) -> "MlflowClient":
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT", "1")
     logging.getLogger("mlflow").setLevel(logging.WARNING)

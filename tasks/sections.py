@@ -1,5 +1,6 @@
 """Which dataclass each section of params.yaml is: `python -m tasks.sections` checks the whole file at once."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -10,7 +11,21 @@ from tasks import params
 
 SECTIONS = {
     "seal": "tasks.seal:SealConfig",
+    "motions": "tasks.motions:MotionsConfig",
+    "filter": "bumblebee.motion.filter:FilterConfig",
     "cluster": "bumblebee.clustering.config:ClusterConfig",
+    "base": "tasks.base:BaseConfig",
+    "experts": "tasks.experts:ExpertsConfig",
+    "rollouts": "tasks.rollouts:RolloutsConfig",
+    "ingest": "tasks.ingest:IngestConfig",
+    "gate": "bumblebee.measured.gate:GateConfig",
+    "diagnose": "tasks.diagnose:DiagnoseConfig",
+    "delta": "bumblebee.learning.delta:DeltaConfig",
+    "refine": "tasks.refine:RefineConfig",
+    "distill": "bumblebee.learning.distill:DistillConfig",
+    "evaluate": "tasks.evaluate:EvaluateConfig",
+    "publish": "tasks.publish:PublishConfig",
+    "report": "tasks.report:ReportConfig",
 }
 LOOP = ("clusters", "rounds", "final_round")
 
@@ -60,17 +75,26 @@ def loop(path: Path = params.FILE) -> Loop:
     return shape
 
 
+def check_names(content: Iterable[str], path: Path) -> None:
+    """Refuse a key at the top of the file that nothing reads.
+
+    Raises:
+        BadInput: naming it and the known key most like it.
+    """
+    known = [*LOOP, *SECTIONS]
+    for section in content:
+        if section not in known:
+            nearest = params.nearest(str(section), known)
+            raise BadInput(f"{path}: {section}", "a known section", "an unknown one", nearest)
+
+
 def check(path: Path = params.FILE) -> dict[str, Any]:
     """Every section as its dataclass, and the loop's shape under "".
 
     Raises:
         BadInput: for the first thing in the file that is wrong.
     """
-    content = params.read(path)
-    known = [*LOOP, *SECTIONS]
-    for section in content:
-        if section not in known:
-            raise BadInput(f"{path}: {section}", "a known section", "an unknown one", params.nearest(section, known))
+    check_names(params.read(path), path)
     found: dict[str, Any] = {"": loop(path)}
     for section, place in SECTIONS.items():
         module, _, name = place.partition(":")

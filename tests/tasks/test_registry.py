@@ -1,0 +1,105 @@
+"""MLflow's one module: what a stage leaves in the history, and models that can be loaded by their alias."""
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tasks import lineage, registry
+
+
+@dataclass(frozen=True)
+class Inner:
+    clip: float = 0.2
+
+
+@dataclass(frozen=True)
+class Config:
+    steps: int = 4
+    ppo: Inner = field(default_factory=Inner)
+
+
+def policy_folder(folder: Path, gain: float) -> Path:
+    """A policy of one multiplication, with the files that the registry reads."""
+    from onnx import TensorProto, helper, numpy_helper
+
+    weights = [numpy_helper.from_array(np.full((5, 2), gain, np.float32), "w")]
+    nodes = [helper.make_node("MatMul", ["obs", "w"], ["actions"])]
+    ends = [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["N", k]) for n, k in (("obs", 5), ("actions", 2))]
+    graph = helper.make_graph(nodes, "policy", ends[:1], ends[1:], weights)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
+    model.ir_version = 8
+    folder.mkdir()
+    (folder / "policy.onnx").write_bytes(model.SerializeToString())
+    (folder / "contract.json").write_text(json.dumps({"schema": 1, "joints": ["a", "b"]}))
+    return folder
+
+
+@pytest.fixture
+def workspace(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path_factory.mktemp("registry") / "lab"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def test_settings_are_flattened_with_dots():
+    assert registry.flatten(Config()) == {"steps": "4", "ppo.clip": "0.2"}
+    assert registry.flatten(None) == {}
+
+
+def test_a_curve_is_read_column_by_column_without_its_gaps(tmp_path: Path):
+    file = tmp_path / "curve.csv"
+    file.write_text("step,loss,kl\n0,2.0,\n10,1.0,0.5\n20,nan,x\n")
+    assert registry.read_curve(file) == [("loss", 0, 2.0), ("loss", 10, 1.0), ("kl", 10, 0.5)]
+
+
+def test_dvc_hash_of_a_folder_is_dvcs_own(tmp_path: Path):
+    """The listing that DVC hashes: sorted relative paths with their MD5."""
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b" / "x").write_text("1")
+    (tmp_path / "a").write_text("2")
+    md5 = {text: hashlib.md5(text.encode()).hexdigest() for text in ("1", "2")}
+    listing = [{"md5": md5["2"], "relpath": "a"}, {"md5": md5["1"], "relpath": "b/x"}]
+    assert lineage.path_hash(tmp_path) == hashlib.md5(json.dumps(listing).encode()).hexdigest() + ".dir"
+    assert lineage.path_hash(tmp_path / "nothing") == "missing"
+
+
+def test_runs_and_models_can_be_found_again_even_when_the_workspace_has_moved(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """One run of a stage and two versions of a model; then the folder gets another name and all is still there."""
+    curve = workspace / "curve.csv"
+    curve.write_text("step,loss\n0,2.0\n1,1.0\n")
+    run_id = registry.log_run("base", None, 0, Config(), {"success": 0.5}, curve, [curve], {"note": "x"})
+    first = registry.register(
+        "generalist", policy_folder(workspace / "p1", 2.0), {"onnx_sha256": "1"}, {"success": 0.5}
+    )
+    second = registry.register(
+        "generalist", policy_folder(workspace / "p2", 3.0), {"onnx_sha256": "2"}, {"success": None}
+    )
+    again = registry.register("generalist", workspace / "p1", {"onnx_sha256": "1"}, {"success": 0.5})
+    assert (first, second, again) == ("1", "2", "1")
+    assert registry.champion_version("generalist") is None
+    registry.set_alias("generalist", "champion", second)
+    registry.set_alias("generalist", "champion", first)
+
+    moved = workspace.with_name("moved")
+    workspace.rename(moved)
+    monkeypatch.chdir(moved)
+    client = registry.prepare()
+    run = client.get_run(run_id)
+    assert run.data.params["ppo.clip"] == "0.2"
+    assert [point.value for point in client.get_metric_history(run_id, "loss")] == [2.0, 1.0]
+    assert {"stage", "round", "note", "git_sha"} <= set(run.data.tags)
+    assert run.info.artifact_uri.startswith("mlflow-artifacts:/")
+    tags = registry.champion_tags("generalist")
+    assert tags is not None and tags["onnx_sha256"] == "1" and "git_sha" in tags
+
+    import mlflow
+
+    loaded = mlflow.pyfunc.load_model("models:/generalist@champion")
+    assert np.allclose(loaded.predict(np.ones((1, 5), np.float32))["actions"], 10.0)

@@ -1,0 +1,121 @@
+"""What stages share: whole outputs or none, one line and status 2 for bad input, scratch that follows its inputs."""
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from bumblebee.errors import BadInput
+from tasks import stage
+from tasks.stage import output_file, output_folder, run_stage, scratch
+
+
+@pytest.fixture(autouse=True)
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("DVC_STAGE", raising=False)
+    monkeypatch.setattr(stage, "_used_scratch", set())
+    return tmp_path
+
+
+def test_a_folder_appears_whole(workspace: Path):
+    with output_folder("data/x") as folder:
+        (folder / "a").write_text("1")
+        assert not Path("data/x").exists()
+    assert Path("data/x/a").read_text() == "1"
+    assert [path.name for path in Path("data").iterdir()] == ["x"]
+
+
+def test_a_failure_leaves_the_old_folder_and_nothing_else(workspace: Path):
+    with output_folder("data/x") as folder:
+        (folder / "a").write_text("old")
+    with pytest.raises(RuntimeError), output_folder("data/x") as folder:
+        (folder / "a").write_text("new")
+        raise RuntimeError
+    assert Path("data/x/a").read_text() == "old"
+    assert [path.name for path in Path("data").iterdir()] == ["x"]
+
+
+def test_a_new_folder_replaces_the_old_one_entirely(workspace: Path):
+    for name in ("a", "b"):
+        with output_folder("x") as folder:
+            (folder / name).touch()
+    assert [path.name for path in Path("x").iterdir()] == ["b"]
+
+
+def test_what_a_killed_run_left_behind_is_cleared(workspace: Path):
+    Path(".x.writing").mkdir()
+    Path(".x.writing/half").touch()
+    with output_folder("x") as folder:
+        assert list(folder.iterdir()) == []
+
+
+def test_a_file_appears_whole_or_not_at_all(workspace: Path):
+    with pytest.raises(RuntimeError), output_file("data/x.json") as file:
+        file.write_text("half")
+        raise RuntimeError
+    assert list(Path("data").iterdir()) == []
+    with output_file("data/x.json") as file:
+        file.write_text("whole")
+    assert Path("data/x.json").read_text() == "whole"
+
+
+def test_parameters_of_main_are_its_options():
+    seen = []
+
+    def main(cluster: str, round: int) -> None:
+        seen.append((cluster, round))
+
+    run_stage(main, ["--cluster", "c0", "--round", "2"])
+    assert seen == [("c0", 2)]
+
+
+def test_bad_input_is_one_line_and_status_2(capsys: pytest.CaptureFixture[str]):
+    def main() -> None:
+        raise BadInput("a.csv, row 3", "36 columns", "35")
+
+    with pytest.raises(SystemExit) as ended:
+        run_stage(main, [])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == "a.csv, row 3: expected 36 columns, came 35\n"
+
+
+def test_a_full_disk_is_one_line_and_status_2_and_nothing_is_half_written(capsys: pytest.CaptureFixture[str]):
+    def main() -> None:
+        with output_folder("data/x") as folder:
+            (folder / "a").touch()
+            raise OSError(errno.ENOSPC, "No space left on device", str(folder / "a"))
+
+    with pytest.raises(SystemExit) as ended:
+        run_stage(main, [])
+    assert ended.value.code == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "no space left" in error and "data/.x.writing/a" in error
+    assert list(Path("data").iterdir()) == []
+
+
+def test_other_errors_keep_their_traceback():
+    def main() -> None:
+        raise OSError(errno.ENOENT, "no such file", "x")
+
+    with pytest.raises(FileNotFoundError):
+        run_stage(main, [])
+
+
+def test_scratch_survives_a_run_that_did_not_complete_and_goes_with_one_that_did(workspace: Path):
+    (scratch("base") / "checkpoint.pt").touch()
+    assert (scratch("base") / "checkpoint.pt").exists()
+    run_stage(lambda: scratch("base"), [])
+    assert not Path(".scratch/base").exists()
+
+
+def test_scratch_is_emptied_when_what_it_was_made_from_changed(workspace: Path):
+    source = Path("clips")
+    source.mkdir()
+    (source / "a").write_text("1")
+    (scratch("base", source, "lr=1") / "checkpoint.pt").touch()
+    assert (scratch("base", source, "lr=1") / "checkpoint.pt").exists()
+    assert not (scratch("base", source, "lr=2") / "checkpoint.pt").exists()
+    (scratch("base", source, "lr=2") / "checkpoint.pt").touch()
+    (source / "a").write_text("2")
+    assert not (scratch("base", source, "lr=2") / "checkpoint.pt").exists()

@@ -1,0 +1,107 @@
+"""The import rule: flows -> tasks -> bumblebee, and inside bumblebee from the upper floors to the lower ones."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+HOME = Path(__file__).parent.parent
+ORCHESTRATION = {"prefect", "dvc", "mlflow", "pydantic"}
+# What a room may import beside itself; a floor is a set of rooms that do not know each other.
+FLOORS = [
+    {"robot"},
+    {"motion", "sim", "measured"},
+    {"clustering", "tracking", "diagnosis"},
+    {"learning", "evaluation"},
+    {"deploy"},
+    {"report"},
+]
+ONLY = {"clustering": {"motion"}, "tracking": {"motion", "sim"}, "diagnosis": {"sim", "measured"}}
+FREE = {"errors", "progress", "__init__"}  # below the ground floor: known to everybody
+
+
+def imports(path: Path) -> Iterator[tuple[int, str]]:
+    """(line, full module name) of every import in a file, those inside functions too."""
+    package = path.relative_to(HOME).with_suffix("").parts[:-1]
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            yield from ((node.lineno, f"{module}.{alias.name}") for alias in node.names)
+
+
+def files(package: str) -> list[Path]:
+    return sorted((HOME / package).rglob("*.py"))
+
+
+def offences(package: str, forbidden: set[str]) -> list[str]:
+    found = []
+    for path in files(package):
+        for line, name in imports(path):
+            if name.split(".")[0] in forbidden:
+                found.append(f"{path.relative_to(HOME)}:{line} imports {name}")
+    return found
+
+
+def allowed_rooms(room: str) -> set[str]:
+    level = next(index for index, floor in enumerate(FLOORS) if room in floor)
+    below = set().union(*FLOORS[:level])
+    if room in ONLY:
+        below = ONLY[room] | FLOORS[0]
+    return below | {room} | FREE
+
+
+def test_the_library_knows_nothing_of_the_orchestration():
+    assert offences("bumblebee", ORCHESTRATION | {"tasks", "flows"}) == []
+
+
+def test_typer_appears_in_the_command_line_only():
+    found = offences("bumblebee", {"typer"})
+    assert [line for line in found if not line.startswith("bumblebee/cli.py")] == []
+
+
+def test_tasks_know_neither_prefect_nor_flows():
+    assert offences("tasks", {"prefect", "flows"}) == []
+
+
+def test_mlflow_is_named_in_one_module_and_imported_inside_functions_only():
+    found = offences("tasks", {"mlflow"})
+    assert found != []
+    assert {line.split(":")[0] for line in found} == {"tasks/registry.py"}
+    tree = ast.parse((HOME / "tasks" / "registry.py").read_text())
+    top = [name for node in tree.body if isinstance(node, ast.Import) for name in [a.name for a in node.names]]
+    assert "mlflow" not in top
+
+
+def test_flows_leave_torch_and_mlflow_to_the_stages():
+    assert offences("flows", {"torch", "mlflow", "mujoco"}) == []
+
+
+def test_every_room_stands_on_a_floor():
+    rooms = {path.name for path in (HOME / "bumblebee").iterdir() if path.is_dir() and list(path.glob("*.py"))}
+    assert rooms <= set().union(*FLOORS)
+
+
+def rooms_with_code() -> list[str]:
+    return sorted(room for room in set().union(*FLOORS) if list((HOME / "bumblebee" / room).glob("*.py")))
+
+
+@pytest.mark.parametrize("room", rooms_with_code())
+def test_a_room_imports_its_own_floor_or_lower_ones(room: str):
+    found = []
+    for path in files(f"bumblebee/{room}"):
+        for line, name in imports(path):
+            parts = name.split(".")
+            if parts[0] == "bumblebee" and len(parts) > 1 and parts[1] not in allowed_rooms(room):
+                found.append(f"{path.relative_to(HOME)}:{line} imports {name}")
+    assert found == []
+
+
+def test_the_rule_would_see_an_import_inside_a_function(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "bumblebee").mkdir()
+    (tmp_path / "bumblebee" / "a.py").write_text("def f():\n    from prefect import flow\n")
+    monkeypatch.setattr("tests.test_imports.HOME", tmp_path)
+    assert offences("bumblebee", {"prefect"}) == ["bumblebee/a.py:2 imports prefect.flow"]
