@@ -74,7 +74,9 @@ def recordings(round: int, cluster: str) -> tuple[Recordings, Recordings | None]
     train = [r for r in own if r.rollout_id in train_ids]
     held_out = [r for r in own if r.rollout_id in held_out_ids]
     if not train:
-        raise BadInput(folder, f"rollouts of cluster {cluster} outside the held-out set", "none", "Collect more rollouts.")
+        raise BadInput(
+            folder, f"rollouts of cluster {cluster} outside the held-out set", "none", "Collect more rollouts."
+        )
     return stack(train, declared), stack(held_out, declared) if held_out else None
 
 
@@ -105,7 +107,8 @@ def verdict(round: int, cluster: str, gain: Gain) -> str:
     longest = pd.DataFrame(gain.change).T.iloc[-1]
     outcome = "kept" if gain.promoted else "not kept: it does not beat no delta beyond its interval"
     change = f"{longest['relative']:+.1%} [{longest['low']:+.1%}, {longest['high']:+.1%}]"
-    return f"round {round}, {cluster}: error after 1 s {change} on {gain.rollouts} held-out rollouts; delta action {outcome}"
+    where = f"round {round}, {cluster}"
+    return f"{where}: error after 1 s {change} on {gain.rollouts} held-out rollouts; delta action {outcome}"
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Stage distill: the experts of the final round become one generalist, in the simulator that the last round corrected."""
+"""Stage distill: the experts of the final round become one generalist, in the simulator of the last round."""
 
 import json
 from collections.abc import Callable
@@ -56,7 +56,8 @@ def main() -> None:
         curve.to_csv(folder / "curve.csv", index=False)
         (folder / "card.json").write_text(json.dumps(card, indent=2) + "\n")
     final = {"kl": float(curve["kl"].iloc[-1]), **{f"success/{k}": v for k, v in card["agreement"].items()}}
-    print(f"generalist: KL to the experts {final['kl']:.3f}, success in the corrected simulator {card['agreement']['all']:.0%}")
+    rate = card["agreement"]["all"]
+    print(f"generalist: KL to the experts {final['kl']:.3f}, success in the corrected simulator {rate:.0%}")
     log_run("distill", params=config, metrics=final, curve=OUT / "curve.csv", artifacts=[OUT])
 
 

@@ -7,7 +7,7 @@ world are hidden from it. The correction is in radians of target, so no action s
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +56,7 @@ class DeltaConfig:
     """Factor on the table's two action rows: 1 is the paper's, which with corrections this small allows none."""
     divergence: float = 0.5
     """An episode ends where the root is this far from the recording [m]."""
-    rewards: DeltaRewardConfig = DeltaRewardConfig()
+    rewards: DeltaRewardConfig = field(default_factory=DeltaRewardConfig)
     """The table's weights."""
 
 
@@ -144,6 +144,7 @@ class Normaliser(torch.nn.Module):
         self.std.copy_(values.std(0).clamp(min=0.05))
 
     def forward(self, values: Tensor) -> Tensor:
+        """Normalised values (N, D)."""
         return (values - self.mean) / self.std
 
 

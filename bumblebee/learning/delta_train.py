@@ -76,7 +76,7 @@ def _collect(env: DeltaEnv, algorithm: BoundedPpo, steps: int) -> tuple[float, f
     return total / steps, lost / steps
 
 
-def _extract(actor: Any, config: DeltaConfig) -> DeltaAction:  # noqa: ANN401 (rsl_rl's MLPModel)
+def _extract(actor: Any, config: DeltaConfig) -> DeltaAction:
     network = make_network(config.hidden, len(config.joints))
     network[0].mean.copy_(actor.obs_normalizer._mean[0])
     network[0].std.copy_(actor.obs_normalizer._std[0] + actor.obs_normalizer.eps)

@@ -134,7 +134,9 @@ def distill(
         rows.append({"iteration": iteration + 1, "frames": (iteration + 1) * frames_each, "kl": kl, **kept})
         report(frames_each, f"KL {kl:.3f}, success {kept['success']:.2f}")
     student.eval()
-    shape = Shape(**{**vars(base.shape), "hidden": tuple(config.hidden if config.init == "scratch" else base.shape.hidden)})
+    shape = Shape(
+        **{**vars(base.shape), "hidden": tuple(config.hidden if config.init == "scratch" else base.shape.hidden)}
+    )
     return Policy(student, base.critic_state, shape), pd.DataFrame(rows)
 
 

@@ -46,7 +46,9 @@ def film(rollout: Rollout, model_xml: str, panels: int = 8, fps: int = 12, secon
         return Film(_stick_strip(qpos, model_xml, panels), "", f"This machine cannot render off-screen ({note}).")
     chosen = np.linspace(0, len(rows) - 1, panels).round().astype(int)
     strip = np.concatenate(list(frames[chosen][:, :, 50:-50]), axis=1)
-    return Film(image_uri(_webp([strip]), "webp"), image_uri(_webp(list(frames), 1000 // fps), "webp"), f"rendered by {note}")
+    return Film(
+        image_uri(_webp([strip]), "webp"), image_uri(_webp(list(frames), 1000 // fps), "webp"), f"rendered by {note}"
+    )
 
 
 def _webp(frames: list[np.ndarray], milliseconds: int = 100) -> bytes:

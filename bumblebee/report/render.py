@@ -16,7 +16,9 @@ BACKENDS = ("egl", "osmesa")
 _SOLE_CENTRE, _SOLE_HALF = (0.04, 0.0, -0.024), (0.095, 0.031, 0.011)
 
 
-def render_frames(model_xml: str, qpos: np.ndarray, width: int = 320, height: int = 300) -> tuple[np.ndarray | None, str]:
+def render_frames(
+    model_xml: str, qpos: np.ndarray, width: int = 320, height: int = 300
+) -> tuple[np.ndarray | None, str]:
     """Render robot states.
 
     Args:

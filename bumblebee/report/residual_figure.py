@@ -11,7 +11,7 @@ _SHADES = {"before": "#b9c0c9", "after": colour(0), "floor": QUIET}
 _NAMES = {"before": "declared model", "after": "corrected model", "floor": "sensor noise alone"}
 
 
-def value_and_interval(entry: Any) -> tuple[float, float, float]:  # noqa: ANN401 (JSON)
+def value_and_interval(entry: Any) -> tuple[float, float, float]:
     """A number of an error block with its interval: {"value", "ci95"}, a bare number, or nothing."""
     if isinstance(entry, dict):
         low, high = entry.get("ci95") or (None, None)

@@ -90,7 +90,7 @@ def _add_world(spec: mujoco.MjSpec) -> None:
     )
 
 
-def _add_body(parent: Any, name: str, facts: dict[str, Any], config: RobotConfig) -> None:  # noqa: ANN401 (MjsBody)
+def _add_body(parent: Any, name: str, facts: dict[str, Any], config: RobotConfig) -> None:
     body = parent.add_body(
         name=name,
         pos=facts["pos"],
@@ -124,12 +124,18 @@ def _add_body(parent: Any, name: str, facts: dict[str, Any], config: RobotConfig
 def _sphere_sole(body: str) -> list[dict[str, Any]]:
     side = body.split("_")[0]
     return [
-        {"name": f"{side}_foot{i}_collision", "type": "sphere", "size": [_SOLE_RADIUS], "pos": pos, "quat": [1, 0, 0, 0]}
+        {
+            "name": f"{side}_foot{i}_collision",
+            "type": "sphere",
+            "size": [_SOLE_RADIUS],
+            "pos": pos,
+            "quat": [1, 0, 0, 0],
+        }
         for i, pos in enumerate(_SOLE_CORNERS, 1)
     ]
 
 
-def _add_geom(body: Any, geom: dict[str, Any], config: RobotConfig) -> None:  # noqa: ANN401 (MjsBody)
+def _add_geom(body: Any, geom: dict[str, Any], config: RobotConfig) -> None:
     kind = mujoco.mjtGeom.mjGEOM_SPHERE if geom["type"] == "sphere" else mujoco.mjtGeom.mjGEOM_CAPSULE
     foot = "_foot" in geom["name"]
     body.add_geom(

@@ -8,7 +8,15 @@ import torch
 
 from bumblebee.errors import BadInput
 from bumblebee.learning import delta_rewards as rewards
-from bumblebee.learning.delta import DeltaAction, DeltaConfig, action_adapter, layout, load_delta, make_network, save_delta
+from bumblebee.learning.delta import (
+    DeltaAction,
+    DeltaConfig,
+    action_adapter,
+    layout,
+    load_delta,
+    make_network,
+    save_delta,
+)
 from bumblebee.learning.delta_env import DeltaEnv
 from bumblebee.learning.delta_gain import compare, replay_error
 from bumblebee.learning.recordings import Recordings, stack

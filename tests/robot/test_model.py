@@ -24,7 +24,7 @@ def test_mass_is_the_tables() -> None:
 
 
 def test_servo_law() -> None:
-    """torque = kp (target - q) - kd qd, clipped to the motor's limit."""
+    """Torque = kp (target - q) - kd qd, clipped to the motor's limit."""
     model = build_model()
     data = mujoco.MjData(model)
     rng = np.random.default_rng(0)

@@ -1,0 +1,100 @@
+"""Sections about the policies: how they learned and follow, which step of the loop helped, what is published."""
+
+from typing import Any
+
+from bumblebee.report.curves_figure import curves_figure
+from bumblebee.report.page import Block, Section, heading, image, note, table, text
+from bumblebee.report.results import LoopResults
+from bumblebee.report.success_figure import pick, success_figure
+from bumblebee.report.wording import change, number, percent
+
+ENGINES = {"stand_in": "on the stand-in robot", "nominal": "on the declared model"}
+
+
+def ladder(results: LoopResults) -> list[str]:
+    """Policies in the order of the loop: untrained, base, all experts by round, generalist."""
+    names = list(dict.fromkeys(entry["policy"] for entry in results.evaluation["results"]))
+    experts = sorted(name for name in names if name.startswith("experts-r"))
+    return [n for n in ("untrained", "base", *experts, "generalist") if n in names]
+
+
+def engines(results: LoopResults) -> list[str]:
+    """Engines that were evaluated, the robot first."""
+    there = {entry["engine"] for entry in results.evaluation["results"]}
+    return [engine for engine in ENGINES if engine in there]
+
+
+def training_section(results: LoopResults) -> Section:
+    """Learning curves."""
+    base = {n: c for n, c in results.curves.items() if n == "base"}
+    experts = {n: c for n, c in results.curves.items() if n.startswith("expert")}
+    rest = {n: c for n, c in results.curves.items() if n == "generalist"}
+    blocks: list[Block] = []
+    captions = (
+        "Base policy, from scratch; episodes start anywhere in a clip, with noise and a shrinking threshold.",
+        "Experts (r0: fine-tuned from base; r1 ...: refined in the corrected simulator).",
+        "Generalist, by DAgger from the final experts.",
+    )
+    for curves, caption in zip((base, experts, rest), captions, strict=True):
+        picture = curves_figure(curves)
+        if picture:
+            blocks.append(image(picture, caption))
+    seconds = {n: c["seconds"].iloc[-1] for n, c in results.curves.items() if "seconds" in c and len(c)}
+    if seconds:
+        blocks.append(note("Training time: " + ", ".join(f"{n} {s / 60:.1f} min" for n, s in seconds.items()) + "."))
+    return Section("training", "Learning", tuple(blocks))
+
+
+def success_section(results: LoopResults) -> Section:
+    """Success, MPJPE and MPKPE by policy, engine and split; by family and cluster; paired comparisons."""
+    entries, policies = results.evaluation["results"], ladder(results)
+    contract = results.contract
+    blocks: list[Block] = [
+        text(
+            f"Frozen evaluation {results.evaluation['contract_sha256'][:12]}: {len(contract['motions'])} motions, "
+            f"seeds {', '.join(map(str, contract['seeds']))}. Success: no fall, and every key body within the "
+            "threshold of its reference from the first frame to the last. Intervals are 95 %, motions being the unit of evidence."
+        )
+    ]
+    for engine in engines(results):
+        blocks += [heading(f"{ENGINES[engine]}".capitalize()), _rates(entries, policies, engine)]
+        for group in ("family", "cluster"):
+            picture = success_figure(entries, policies, engine, group)
+            if picture:
+                blocks.append(
+                    image(picture, f"Success by {group} {ENGINES[engine]}, all motions; lines are 95 % intervals.")
+                )
+    rows = [
+        (f"{c['from']} → {c['to']}", ENGINES[c["engine"]], c["split"], str(c["motions"]), change(c))
+        for c in results.evaluation["comparisons"]
+        if c["split"] in ("all", "test")
+    ]
+    header = ("step", "where", "motions", "n", "success")
+    blocks += [heading("Which step helped"), table(header, rows, "Paired by motion. 'test' are the held-out motions.")]
+    return Section("success", "Success", tuple(blocks))
+
+
+def _rates(entries: list[dict[str, Any]], policies: list[str], engine: str) -> Block:
+    rows = []
+    for policy in policies:
+        for split, name in (("train", "training"), ("test", "held out")):
+            found = pick(entries, policy=policy, engine=engine, split=split, group="all")
+            for e in found:
+                errors = (number(e["mpjpe_rad"]), number(e["mpkpe_mm"], 0))
+                rows.append((policy, name, str(e["n"]), percent(e["success"]), *errors))
+    header = ("policy", "motions", "episodes", "success", "MPJPE [rad]", "MPKPE [mm]")
+    return table(header, rows, "Errors over all episodes up to their end.")
+
+
+def registry_section(results: LoopResults) -> Section:
+    """Names, versions and aliases in the MLflow registry."""
+    rows = []
+    for name, model in results.published.get("models", {}).items():
+        earlier = ", ".join(str(v) for v in model.get("earlier", [])) or "–"
+        champion = "–" if model.get("champion") is None else f"version {model['champion']}"
+        rows.append((name, str(model["version"]), earlier, champion, model["reason"], str(model["onnx_sha256"])[:12]))
+    blocks: tuple[Block, ...] = (
+        table(("model", "newest", "in this run", "@champion", "why", "ONNX sha256"), rows),
+        note("Look one up: mlflow.pyfunc.load_model('models:/generalist@champion'), with the server of `make serve`."),
+    )
+    return Section("registry", "Registry", blocks)

@@ -1,0 +1,56 @@
+"""What a finished loop left, as plain values: everything that the report's sections read."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import pandas as pd
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class RoundResults:
+    """One turn with the robot."""
+
+    n: int
+    """Its number."""
+    intake: Json
+    """data/measured/rN/summary.json."""
+    gate: Json
+    """data/gates/round-N.json."""
+    diagnosis: Json
+    """data/diagnosis/rN/diagnosis.json."""
+    deltas: dict[str, Json]
+    """Cluster -> card of its delta action."""
+
+
+@dataclass(frozen=True)
+class LoopResults:
+    """All of it."""
+
+    library: pd.DataFrame
+    """Index of the motions read: name, family, split, source, licence, duration ..."""
+    skipped: pd.DataFrame
+    """Files that could not be read: file, reason."""
+    drops: pd.DataFrame
+    """Motions that the filter dropped: motion, rule, value, limit, explanation."""
+    labels: pd.DataFrame
+    """Motion -> cluster, with its place in the latent plane."""
+    elbow: pd.DataFrame
+    """K -> within-cluster sum of squares."""
+    clusters: Json
+    """data/clusters/summary.json."""
+    curves: dict[str, pd.DataFrame]
+    """Policy -> learning curve."""
+    evaluation: Json
+    """data/evaluation/summary.json."""
+    contract: Json
+    """data/evaluation/contract.json."""
+    published: Json
+    """data/published.json."""
+    sealed: Json | None
+    """data/sealed/robot.json, opened at the very end; None where a real robot ran."""
+    cards: dict[str, Json] = field(default_factory=dict)
+    """Policy -> card.json."""
+    rounds: tuple[RoundResults, ...] = ()
+    """The turns with the robot."""

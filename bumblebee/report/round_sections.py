@@ -1,0 +1,134 @@
+"""Sections about each round with the robot: what came, effects found beside the truth, error before and after."""
+
+from typing import Any
+
+from bumblebee.report.page import Block, Cell, Section, bullets, heading, image, note, table, text
+from bumblebee.report.residual_figure import residual_figure, value_and_interval
+from bumblebee.report.results import LoopResults, RoundResults
+from bumblebee.report.truth import Match, match
+from bumblebee.report.wording import effect_line
+
+Json = dict[str, Any]
+_MEASURES = (
+    ("joint_pos_rmse", "joint positions", 1e3, "mrad"),
+    ("joint_vel_rmse", "joint velocities", 1.0, "rad/s"),
+    ("base_pos_rmse", "base position", 1e3, "mm"),
+    ("base_rot_rmse", "base rotation", 1e3, "mrad"),
+    ("chi2", "chi2 (1 = sensor noise)", 1.0, ""),
+)
+
+
+def round_section(results: LoopResults, turn: RoundResults) -> Section:
+    """One round."""
+    diagnosis = turn.diagnosis
+    blocks: list[Block] = [text(_arrived(turn))]
+    blocks += [heading("Effects that the simulator lacked"), *_effects(results.sealed, diagnosis)]
+    blocks.append(heading("Error of the simulator before and after"))
+    picture = residual_figure(diagnosis["error"])
+    if picture:
+        blocks.append(
+            image(picture, f"Round {turn.n}: {len(diagnosis['holdout'])} rollouts that took no part in fitting.")
+        )
+    blocks.append(_error_table(diagnosis["error"]))
+    blocks.append(text(_remains(diagnosis)))
+    blocks += [heading("Delta actions"), *_deltas(turn.deltas)]
+    return Section(f"round-{turn.n}", f"Round {turn.n} with the robot", tuple(blocks))
+
+
+def _arrived(turn: RoundResults) -> str:
+    seen, gate = turn.intake, turn.gate
+    words = f"{seen['accepted']} rollouts accepted ({seen['seconds']:.0f} s), {seen['quarantined']} set aside. "
+    return (
+        words + f"The gate was {gate['status']} by {gate.get('by', 'nobody')} at {gate.get('at', 'an unknown time')}."
+    )
+
+
+def _effects(sealed: Json | None, diagnosis: Json) -> list[Block]:
+    found = diagnosis["effects"]
+    if sealed is None:
+        rows = [(*effect_line(effect), _share(effect)) for effect in found]
+        nothing = [] if rows else [text("No effect passed the tests: the declared model stands.")]
+        return [*nothing, table(("effect", "estimate [95 %]", "declared", "explains"), rows)]
+    rows = [_truth_row(pair) for pair in match(sealed["effects"], found)]
+    if not rows:
+        return [text("Nothing was sealed and nothing was found: no false alarm.")]
+    header = ("sealed in the stand-in", "sealed value", "found", "estimate [95 %]", "explains")
+    caption = (
+        "Explains: share of the held-out excess error that the effect removes. The diagnosis cannot read the seal."
+    )
+    return [table(header, rows, caption)]
+
+
+def _truth_row(pair: Match) -> tuple[str | Cell, ...]:
+    truth, value = ("–", "–")
+    if pair.sealed is not None:
+        truth = f"{pair.sealed['effect'].replace('_', ' ')} on {', '.join(pair.sealed['where'])}"
+        value = ", ".join(
+            f"{k} {v:.4g} {pair.sealed.get('unit', '')}".strip() for k, v in pair.sealed["parameters"].items()
+        )
+    if pair.found is None:
+        return truth, value, Cell("not found", "missed"), "–", "–"
+    name, estimate, _ = effect_line(pair.found)
+    if pair.relative_error is not None:
+        inside = {True: ", interval holds it", False: ", outside the interval", None: ""}[pair.covered]
+        estimate += f" ({100 * pair.relative_error:+.1f} %{inside})"
+    if pair.sealed is None:
+        return truth, value, Cell(f"{name} (not sealed)", "missed"), estimate, _share(pair.found)
+    mark = Cell("found" if pair.through == "exact" else f"its class: {name}", "found")
+    return truth, value, mark, estimate, _share(pair.found)
+
+
+def _share(effect: Json) -> str:
+    share = effect.get("explains")
+    return "–" if share is None else f"{100 * share:.0f} %"
+
+
+def _error_table(error: Json) -> Block:
+    rows = []
+    for horizon in error["before"]:
+        for key, name, factor, unit in _MEASURES:
+            cells = [
+                _cell(error.get(block, {}).get(horizon, {}).get(key), factor) for block in ("before", "after", "floor")
+            ]
+            if cells[0] != "–":
+                rows.append((f"{horizon} s", f"{name} [{unit}]" if unit else name, *cells))
+    return table(("after", "error", "declared model", "corrected model", "noise alone"), rows)
+
+
+def _cell(entry: Any, factor: float) -> str:
+    if entry is None:
+        return "–"
+    value, low, high = value_and_interval(entry)
+    if value != value:
+        return "–"
+    text_ = f"{factor * value:.3g}"
+    return text_ if low != low else f"{text_} [{factor * low:.3g}, {factor * high:.3g}]"
+
+
+def _remains(diagnosis: Json) -> str:
+    left = diagnosis["unexplained"]
+    p = left.get("p")
+    size = "" if p is None else f" (p = {p:.2g})"
+    if not left["significant"]:
+        return f"What remains shows no structure that these data could prove{size}."
+    where = ", ".join(left["where"]) or "no single joint"
+    depends = ", ".join(left["depends_on"]) or "nothing simple"
+    return f"What remains has structure{size}, in {where}, depending on {depends}. {left.get('description', '')}"
+
+
+def _deltas(cards: dict[str, Json]) -> list[Block]:
+    rows, lines = [], []
+    for cluster, card in cards.items():
+        held = card["held_out"]
+        for horizon, c in held["change"].items():
+            interval = "–" if c["low"] != c["low"] else f"[{100 * c['low']:+.1f}, {100 * c['high']:+.1f}]"
+            change = f"{100 * c['relative']:+.1f} % {interval}"
+            verdict = Cell("kept", "found") if card["promoted"] else "not kept"
+            rows.append((cluster, f"{horizon} s", f"{c['without']:.4f}", f"{c['with']:.4f}", change, verdict))
+        if not held["change"]:
+            lines.append(f"{cluster}: no held-out rollouts, so nothing was kept.")
+    header = ("cluster", "after", "without delta [rad]", "with delta [rad]", "change [95 %]", "")
+    explained = note(
+        "State error on held-out rollouts; a delta is kept only if the interval after 1 s lies below zero."
+    )
+    return [table(header, rows), explained, *([bullets(lines)] if lines else [])]

@@ -1,0 +1,114 @@
+"""The report says what the numbers allow, holds everything in itself, and runs nothing that came with the data."""
+
+import base64
+import re
+
+import numpy as np
+import pytest
+
+from bumblebee.measured.rollout import Rollout
+from bumblebee.report import filmstrip
+from bumblebee.report.data_sections import clusters_section, motions_section
+from bumblebee.report.loop_picture import Box, loop_picture
+from bumblebee.report.page import image, render
+from bumblebee.report.policy_sections import registry_section, success_section, training_section
+from bumblebee.report.round_sections import round_section
+from bumblebee.report.truth import match
+from bumblebee.report.verdict import verdict
+from bumblebee.report.wording import percent, shown
+from bumblebee.robot.facts import joint_names, stand_pose
+from bumblebee.robot.model import build_spec
+from tests.report.made import TRUTH, estimate, found, loop_results
+
+
+def page(effects: list, sealed: list | None) -> str:
+    results = loop_results(effects, sealed)
+    sections = [motions_section(results), clusters_section(results), training_section(results)]
+    sections += [round_section(results, turn) for turn in results.rounds]
+    sections += [success_section(results), registry_section(results)]
+    return render("Title", "sub", verdict(results), loop_picture([Box("a", "1")], [Box("b", "2")], "back"), sections)
+
+
+def test_a_page_loads_nothing_and_runs_nothing() -> None:
+    html = page([found()], [TRUTH])
+    assert "<script" not in html and "&lt;script&gt;" in html  # the gate's answer was signed by "Ada <script>"
+    assert not re.search(r'(src|href)="(?!data:|#)', html)
+    assert "default-src 'none'" in html
+
+
+def test_images_must_be_inside() -> None:
+    with pytest.raises(ValueError, match="in itself"):
+        image("https://example.org/a.png", "")
+
+
+def test_a_found_effect_stands_beside_the_truth_with_its_error() -> None:
+    html = page([found()], [TRUTH])
+    assert '<td class="found">found</td>' in html
+    assert "(-4.2 %, interval holds it)" in html
+    assert "1 of 1 sealed effects found; 0 reported" in html
+
+
+def test_a_missed_and_a_false_effect_are_said() -> None:
+    html = page([found("viscous_friction", "right_knee_joint")], [TRUTH])
+    assert '<td class="missed">not found</td>' in html
+    assert "(not sealed)" in html
+    assert "0 of 1 sealed effects found; 1 reported that were not sealed" in html
+
+
+def test_an_effect_of_the_same_class_counts_as_found_but_not_as_exact() -> None:
+    other = found("kd", equivalent=[{"effect": "coulomb_friction", "where": ["left_knee_joint"]}])
+    (pair,) = match([TRUTH], [other])
+    assert pair.through == "class" and pair.relative_error is None
+
+
+def test_an_exact_match_is_preferred_to_a_class() -> None:
+    close = found("kd", equivalent=[{"effect": "coulomb_friction", "where": ["left_knee_joint"]}])
+    pairs = match([TRUTH], [close, found()])
+    assert [pair.through for pair in pairs] == ["exact", ""]
+
+
+def test_nothing_sealed_and_nothing_found_is_said() -> None:
+    assert "no false alarm" in page([], [])
+
+
+def test_a_real_robot_has_no_truth_to_show() -> None:
+    html = page([found()], None)
+    assert "sealed in the stand-in" not in html and "1 effects found" in html
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "said"), [(0.1, 0.2, "improved"), (-0.2, -0.1, "worse"), (-0.1, 0.1, "no difference shown")]
+)
+def test_claims_follow_the_interval(low: float, high: float, said: str) -> None:
+    assert shown(low, high) == said
+
+
+def test_an_interval_across_zero_is_no_gain_in_the_verdict() -> None:
+    lines = verdict(loop_results([found()], [TRUTH]))
+    assert any("base → experts-r0" in line and "no difference shown" in line for line in lines)
+    assert "untrained: 0 %" in lines[0]
+
+
+def test_percent() -> None:
+    assert percent(estimate(0.91, 0.05)) == "91 % [86, 96]"
+    assert percent({"value": None, "ci95": [None, None]}) == "–"
+
+
+def test_titles_in_the_picture_are_escaped() -> None:
+    assert "<b>" not in loop_picture([Box("<b>", "&")], [], "")
+
+
+def test_a_stick_figure_stands_in_where_nothing_renders(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(filmstrip, "render_frames", lambda *_: (None, "egl: no device"))
+    spec = build_spec()
+    spec.compile()
+    rows = 20
+    rollout = Rollout(
+        "r", joint_names(), 50, np.arange(rows) / 50, np.tile(stand_pose(), (rows, 1)), np.zeros((rows, 23)),
+        joint_target=np.zeros((rows, 23)), base_quat=np.tile([1.0, 0, 0, 0], (rows, 1)),
+        base_pos=np.tile([0, 0, 0.784], (rows, 1)),
+    )  # fmt: skip
+    shown_film = filmstrip.film(rollout, spec.to_xml(), panels=3)
+    assert shown_film.animation == "" and "no device" in shown_film.note
+    kind, data = shown_film.strip.split(",", 1)
+    assert kind.startswith("data:image/svg+xml") and b"<path" in base64.b64decode(data)
