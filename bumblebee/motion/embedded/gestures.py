@@ -13,13 +13,13 @@ from bumblebee.motion.embedded.plan import PELVIS_HEIGHT, SIDES, WAIST, Plan, po
 from bumblebee.motion.embedded.vary import Vary
 
 RELAXED = (0.2, 0.2, 0.0, 0.6)
-WAVING = (-1.45, 0.75, 0.0, -0.45)
-UP = (-2.75, 0.25, 0.0, 1.2)
+WAVING = (-1.45, 0.9, 0.0, 0.05)
+UP = (-2.8, 0.7, 0.0, 1.35)
 ASIDE = (0.1, 1.45, 0.0, 1.35)
-AHEAD = (-1.4, 0.08, 0.0, 1.35)
-CLAPPING = (-0.75, 0.12, -0.3, 0.25)
+AHEAD = (-1.4, 0.2, 0.0, 1.35)
+CLAPPING = (-0.75, 0.12, 0.05, 0.25)
 GUARD = (0.15, 0.2, -0.15, -0.65)
-HAND_ON_HIP = (0.55, 0.75, -0.95, 0.25)
+HAND_ON_HIP = (0.6, 1.1, -1.0, 0.15)
 START = 0.5  # s of standing still before and after
 
 Keys = Sequence[tuple[float, Sequence[float]]]
@@ -84,7 +84,7 @@ def clap(vary: Vary) -> Plan:
     """Hands together in front of the chest, a few times; they stop a hand's width short of each other."""
     move, seconds = vary(0.9), vary(2.4)
     plan = _held(SIDES, CLAPPING, seconds, move)
-    apart = vary(0.16) * swing(plan.time, START + move, START + move + seconds, 5, rise=0.3)
+    apart = vary(0.15) * swing(plan.time, START + move, START + move + seconds, 5, rise=0.3)
     for side in SIDES:
         _oscillate(plan, side, 2, apart)
     return plan

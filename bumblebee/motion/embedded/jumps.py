@@ -13,13 +13,16 @@ from bumblebee.motion.embedded.solver import GRAVITY
 from bumblebee.motion.embedded.vary import Vary
 
 BEGIN, CROUCH, PUSH, LAND, RISE, END = 0.6, 0.8, 0.36, 0.4, 0.9, 0.6  # s
-TAKE_OFF = COM_HEIGHT - 0.025
+TAKE_OFF = COM_HEIGHT - 0.05
 """Height of the centre of mass as the feet leave and land [m]: the knees are still bent."""
+LEAN = 0.45  # rad: of the torso
+LIFT = 0.028
+"""How far the feet come up under the body and off the floor [m]."""
 Knot = tuple[float, tuple[float, float, float]]
 """Time, and height, speed, acceleration there."""
 
 
-def jump(vary: Vary, airborne: float, ahead: float = 0.0, crouch: float = 0.085, hops: int = 1) -> Plan:
+def jump(vary: Vary, airborne: float, ahead: float = 0.0, crouch: float = 0.075, hops: int = 1) -> Plan:
     """Jump for `airborne` [s], the feet landing `ahead` [m]; a crouch as deep in between where there are `hops`."""
     crouch = vary(crouch)
     airborne = round(vary(airborne) * FPS) / FPS  # leaves and lands on a frame
@@ -40,7 +43,7 @@ def jump(vary: Vary, airborne: float, ahead: float = 0.0, crouch: float = 0.085,
         inside = (plan.time >= start[0] - 1e-9) & (plan.time <= end[0] + 1e-9)
         height[inside] = quintic(plan.time[inside], start, end)
     plan = _fly(replace(plan, height=height, ballistic=True), flights, airborne, vary(ahead))
-    return _lean(plan, height)
+    return _lean(plan, knots)
 
 
 def quintic(time: np.ndarray, start: Knot, end: Knot) -> np.ndarray:
@@ -63,23 +66,17 @@ def _fly(plan: Plan, flights: list[float], airborne: float, ahead: float) -> Pla
     pos, contact, zmp = plan.foot_pos.copy(), plan.contact.copy(), plan.zmp.copy()
     for leave in flights:
         phase = (plan.time - leave) / airborne
-        pos[:, :, 2] += LIFT_PER_SECOND * airborne * bump(phase)[:, None]
+        pos[:, :, 2] += LIFT * bump(phase)[:, None]
         pos[:, :, 0] += ahead * ease((phase - 0.1) / 0.8)[:, None]
         zmp[:, 0] += ahead * (phase > 0.5)
         contact[(phase > 1e-6) & (phase < 1 - 1e-6)] = False
     return replace(plan, foot_pos=pos, contact=contact, zmp=zmp)
 
 
-LIFT_PER_SECOND = 0.26
-"""How far the feet come up for each second in the air [m/s]."""
-
-
-def _lean(plan: Plan, height: np.ndarray) -> Plan:
-    """Lean ahead as far as the crouch is deep."""
-    depth = np.maximum(TAKE_OFF - height, 0.0)
-    smooth = depth**3 / (depth**2 + 0.03**2)
+def _lean(plan: Plan, knots: list[Knot]) -> Plan:
+    """Torso ahead and arms back from the crouch to the last landing; neither turns while the body is fast."""
+    share = track(plan.time, list(zip([knots[i][0] for i in (0, 1, -2, -1)], (0.0, 1.0, 1.0, 0.0), strict=True)))
     upper = plan.upper.copy()
     for side in SIDES:
-        arm = np.array(RELAXED) + np.multiply.outer(smooth, [4.0, 0.5, 0.0, 1.0])
-        pose_arm(upper, side, arm)
-    return add(replace(plan, upper=upper), pelvis_pitch=2.2 * smooth)
+        pose_arm(upper, side, np.array(RELAXED) + np.multiply.outer(share, [0.35, 0.1, 0.0, -0.2]))
+    return add(replace(plan, upper=upper), pelvis_pitch=LEAN * share)

@@ -158,11 +158,11 @@ def _sidestep() -> tuple[Kind, ...]:
         )
 
     return (
-        side_steps("sidestep_left", (0.1, 0.1, 0.1), 0.6,
+        side_steps("sidestep_left", (0.09, 0.09, 0.09), 0.6,
                    ("a person steps to the left", "a person takes three steps sideways to the left")),
-        side_steps("sidestep_right", (-0.1, -0.1, -0.1), 0.6,
+        side_steps("sidestep_right", (-0.09, -0.09, -0.09), 0.6,
                    ("a person steps to the right", "a person takes three steps sideways to the right")),
-        side_steps("sidestep_left_right", (0.09, -0.09, 0.09, -0.09), 0.6,
+        side_steps("sidestep_left_right", (0.08, -0.08, 0.08, -0.08), 0.6,
                    ("a person steps left and right", "a person steps sideways from side to side")),
         side_steps("sidestep_left_slow", (0.06, 0.06), 0.75,
                    ("a person slowly steps to the left", "a person takes small slow steps sideways to the left")),
@@ -174,11 +174,11 @@ def _jump() -> tuple[Kind, ...]:
     return (
         Kind("jump", "jump", lambda v: j.jump(v, 0.18),
              ("a person jumps", "a person jumps straight up in place")),
-        Kind("jump_small", "jump", lambda v: j.jump(v, 0.14, crouch=0.065),
+        Kind("jump_small", "jump", lambda v: j.jump(v, 0.14, crouch=0.06),
              ("a person makes a small jump", "a person hops slightly in place")),
-        Kind("jump_forward", "jump", lambda v: j.jump(v, 0.18, ahead=0.14, crouch=0.065),
+        Kind("jump_forward", "jump", lambda v: j.jump(v, 0.18, ahead=0.12, crouch=0.045),
              ("a person jumps forward", "a person makes a small jump ahead")),
-        Kind("jump_twice", "jump", lambda v: j.jump(v, 0.16, crouch=0.07, hops=2),
+        Kind("jump_twice", "jump", lambda v: j.jump(v, 0.16, crouch=0.06, hops=2),
              ("a person jumps two times", "a person makes two small jumps in place")),
     )  # fmt: skip
 

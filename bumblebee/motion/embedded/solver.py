@@ -26,7 +26,7 @@ NEWTON_STEPS = 30
 TOLERANCE = 1e-7
 END_EASE = 0.4  # s
 LEG_DOFS = np.arange(6, 18)
-AIRBORNE = 0.15
+AIRBORNE = 0.4
 """Below this share of the weight on the floor there is no ZMP to speak of."""
 
 
