@@ -53,7 +53,8 @@ def success_section(results: LoopResults) -> Section:
         text(
             f"Frozen evaluation {results.evaluation['contract_sha256'][:12]}: {len(contract['motions'])} motions, "
             f"seeds {', '.join(map(str, contract['seeds']))}. Success: no fall, and every key body within the "
-            "threshold of its reference from the first frame to the last. Intervals are 95 %, motions being the unit of evidence."
+            "threshold of its reference from the first frame to the last. Intervals are 95 %, and motions are "
+            "the unit of evidence."
         )
     ]
     for engine in engines(results):

@@ -1,5 +1,6 @@
 """A small made-up loop, as the report's sections take it."""
 
+from itertools import pairwise
 from typing import Any
 
 import pandas as pd
@@ -77,7 +78,7 @@ def loop_results(effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | N
     gain = {"value": 0.1, "ci95": [-0.05, 0.25], "p": 0.2, "motions": 9}
     step = {"engine": "stand_in", "split": "all", "motions": 9, "success": gain}
     steps = [{"from": a, "to": b, **step}
-             for a, b in (("base", "experts-r0"), ("experts-r0", "experts-r1"), ("experts-r1", "generalist"))]  # fmt: skip
+             for a, b in pairwise(list(RATES)[1:])]  # fmt: skip
     held = {
         "rollouts": 6,
         "change": {"1.0": {"without": 0.1, "with": 0.09, "relative": -0.1, "low": -0.2, "high": 0.1}},
