@@ -4,7 +4,7 @@ import numpy as np
 
 from bumblebee.measured.view import View, integral
 
-TURN_SECONDS = 0.2  # long enough for a turn to stand out of quaternion noise
+TURN_SECONDS = (0.2, 0.5, 1.0)  # the slower the base turns, the longer until it stands out of the noise
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -63,9 +63,13 @@ def turns(quat: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
 def _check_turning(view: View, quat: np.ndarray) -> None:
     """The gyro's integral against the quaternion's change, under each reading of the two."""
     limits, rollout = view.limits, view.rollout
-    window = view.window(min(TURN_SECONDS, 0.1 * rollout.duration))
-    gyro = integral(rollout.time, rollout.base_ang_vel, window)
-    body, world = turns(quat, window)
+    for seconds in TURN_SECONDS:
+        window = view.window(min(seconds, 0.25 * rollout.duration))
+        gyro = integral(rollout.time, rollout.base_ang_vel, window)
+        body, world = turns(quat, window)
+        size = max(_robust(body), min(_robust(gyro), np.pi))
+        if size > limits.turn_wanted:
+            break
     swapped, _ = turns(np.roll(quat, 1, axis=1), window)
     errors = {
         "good": _robust(body - gyro),
@@ -74,15 +78,16 @@ def _check_turning(view: View, quat: np.ndarray) -> None:
         "degrees": _robust(body - gyro * np.pi / 180),
         "sign": _robust(body + gyro),
     }
-    size = max(_robust(body), min(_robust(gyro), np.pi))
     if size < limits.turn_floor:
         _check_still_order(view, quat)
         return
     best = min(errors, key=lambda name: errors[name])
+    if best != "good" and errors["xyzw"] < 1.3 * errors[best] + 0.5 * limits.turn_floor:
+        best = "xyzw"  # a base that only pitches gives a reversed gyro as well; the order is the usual mistake
     if best == "good" or errors[best] > limits.frame_gain**0.5 * errors["good"] or errors["good"] < limits.turn_floor:
-        _check_loose(view, errors["good"], size)
+        _check_loose(view, errors["good"], size, seconds)
         return
-    came = f"mismatch with the gyro {errors['good']:.3g} rad in {TURN_SECONDS} s, {errors[best]:.3g} if it were so"
+    came = f"mismatch with the gyro {errors['good']:.3g} rad in {seconds:g} s, {errors[best]:.3g} if it were so"
     rule, column, expected, what = {
         "xyzw": ("quaternion-order", "base_quat", "wxyz", "xyzw"),
         "world": ("velocity-frame", "base_ang_vel", "the base frame", "the world frame"),
@@ -92,9 +97,9 @@ def _check_turning(view: View, quat: np.ndarray) -> None:
     view.add(column, None, rule, expected, f"{what}: {came}", fatal=True)
 
 
-def _check_loose(view: View, error: float, size: float) -> None:
+def _check_loose(view: View, error: float, size: float, seconds: float) -> None:
     if size > 5 * view.limits.turn_floor and error > 0.7 * size:
-        came = f"mismatch {error:.3g} rad of {size:.3g} rad in {TURN_SECONDS} s"
+        came = f"mismatch {error:.3g} rad of {size:.3g} rad in {seconds:g} s"
         view.add("base_ang_vel", None, "gyro-derivative", "the quaternion's rate of change", came, fatal=False)
 
 

@@ -52,17 +52,32 @@ def check_velocity(view: View) -> None:
     said = integral(rollout.time, rollout.joint_vel, window) / span
     if view.found("degrees", "joint_pos"):
         speed = speed * np.pi / 180
-    ratios = np.full(len(rollout.joints), np.nan)
     for joint in range(len(rollout.joints)):
         if view.found("frozen", view.label("joint_pos", joint)):
             continue
         moved, told = float(speed[:, joint].std()), float(said[:, joint].std())
         if max(moved, told) < limits.moving_speed:
             continue
-        ratios[joint] = told / max(moved, 1e-9)
-        correlation = float(np.corrcoef(speed[:, joint], said[:, joint])[0, 1]) if min(moved, told) > 0 else 0.0
+        correlation = _correlation(speed[:, joint], said[:, joint])
         row = int(np.argmax(np.abs(speed[:, joint] - said[:, joint])))
-        _judge_velocity(view, joint, row, correlation, ratios[joint])
+        if correlation < limits.velocity_correlation_warn and _another(view, speed, said[:, joint], joint, row):
+            continue
+        _judge_velocity(view, joint, row, correlation, told / max(moved, 1e-9))
+
+
+def _another(view: View, speed: np.ndarray, said: np.ndarray, joint: int, row: int) -> bool:
+    """Whether a velocity is the derivative of another joint's position; noted if so."""
+    fits = np.array([_correlation(speed[:, other], said) for other in range(speed.shape[1])])
+    best = int(np.argmax(fits))
+    if best == joint or fits[best] < 0.95:
+        return False
+    came = f"that of {view.rollout.joints[best]} (correlation {fits[best]:.2f}, with its own {fits[joint]:.2f})"
+    view.add(view.label("joint_vel", joint), row, "velocity-derivative", "its own velocity", came, fatal=True)
+    return True
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.corrcoef(a, b)[0, 1]) if min(a.std(), b.std()) > 1e-9 else 0.0
 
 
 def _judge_velocity(view: View, joint: int, row: int, correlation: float, ratio: float) -> None:
@@ -117,7 +132,7 @@ def check_response(view: View) -> None:
         moves = np.diff(command[:, joint]), np.diff(rollout.joint_pos[:, joint])
         window = view.window(0.1)
         sums = [np.convolve(move, np.ones(window), "valid") for move in moves]
-        together = float(np.corrcoef(*sums)[0, 1]) if min(np.std(sums[0]), np.std(sums[1])) > 1e-9 else 0.0
+        together = _correlation(*sums)
         if z < -limits.response_z and (not by_target or together < limits.response_correlation):
             name = "joint_target" if by_target else "joint_torque_cmd"
             came = f"motion against it ({-z:.0f} standard errors, correlation {together:.2f})"
@@ -141,8 +156,9 @@ def _response_z(view: View, command: np.ndarray, joint: int) -> float:
     change = change[::window]
     if len(change) < 3 * table.shape[1]:
         return 0.0
-    scale = table.std(axis=0) + (table.std(axis=0) == 0)
-    inverse = np.linalg.pinv(table / scale)
-    weights = inverse @ change
-    noise = np.sqrt(((change - (table / scale) @ weights) ** 2).sum() / (len(change) - table.shape[1]))
-    return float(weights[0] / (noise * np.linalg.norm(inverse[0]) + 1e-12))
+    table = table / (np.linalg.norm(table, axis=0) + 1e-12)
+    # The ridge keeps collinear columns apart: a joint that rests makes its position one with the constant.
+    inverse = np.linalg.inv(table.T @ table + 1e-9 * np.eye(table.shape[1]))
+    weights = inverse @ (table.T @ change)
+    noise = np.sqrt(((change - table @ weights) ** 2).sum() / (len(change) - table.shape[1]))
+    return float(weights[0] / (noise * np.sqrt(max(inverse[0, 0], 0.0)) + 1e-12))

@@ -48,6 +48,9 @@ def _fits_only_as_degrees(values: np.ndarray, ranges: np.ndarray) -> bool:
         return False
     values, ranges = values[:, limited], ranges[limited]
     outside = (_excess(values, ranges) > 1.0).any(axis=1).mean() > 0.2
+    jumps = np.abs(np.diff(values, axis=0)).max()
+    if abs(jumps - 2 * np.pi) < 0.3 and np.abs(values).max() < 4 * np.pi:
+        return False  # radians that were wrapped
     return bool(outside and (_excess(values * DEGREE, ranges) < 0.1).all())
 
 

@@ -51,7 +51,7 @@ def check_frozen(view: View) -> None:
 
 
 def _may_stall(place: np.ndarray, start: int, length: int, share: float) -> bool:
-    """Whether equal readings may be a stalled joint: a coarse encoder that repeats itself elsewhere, and moves again."""
+    """Whether equal readings may be a stalled joint: a coarse encoder, equal elsewhere too, that moves again."""
     outside = np.delete(np.diff(place), np.s_[start : start + length])
     moves_again = start + length < len(place) - 1
     return bool(len(outside) and (outside == 0).mean() > 0.05 and moves_again and length < share * len(place))

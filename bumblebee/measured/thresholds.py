@@ -52,7 +52,7 @@ class Thresholds:
     """Factor between displacement and integrated velocity, either way: filters and coarse steps stay within."""
     velocity_scale_fatal: float = 2.5
     """Factor from which the unit is wrong."""
-    response_z: float = 8.0
+    response_z: float = 6.0
     """Standard errors by which a joint's response must oppose its command to be called reversed."""
     response_correlation: float = -0.3
     """Correlation of command and position changes below which a response may be called reversed."""
@@ -66,8 +66,10 @@ class Thresholds:
     """Norm error of a vector that is no unit quaternion."""
     frame_gain: float = 0.4
     """Share of the squared mismatch that must remain under another reading (frame, order) for it to be called so."""
-    turn_floor: float = 0.01
-    """Rotation over 0.2 s [rad, rms] that quaternion noise alone cannot make."""
+    turn_wanted: float = 0.1
+    """Rotation [rad, rms] to compare gyro and quaternion over: the shortest time that has it, 0.2 to 1 s."""
+    turn_floor: float = 0.03
+    """Rotation [rad, rms] below which quaternion noise (0.01 rad in a difference) hides frames and order."""
     drift_floor: float = 0.05
     """Mismatch of velocities [m/s, rms] below which frames are not told apart."""
     gains_relative: float = 0.02

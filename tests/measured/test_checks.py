@@ -1,0 +1,247 @@
+"""Every corruption of a good rollout is found, by its rule and in its column; good rollouts raise nothing."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.measured.checks import check_rollout
+from bumblebee.measured.finding import Finding
+from bumblebee.measured.rollout import Rollout
+from tests.measured.simulated import arm_model, arm_rollout, g1_model, g1_rollout
+
+Change = Callable[[Rollout], Rollout]
+
+
+def model_of(rollout: Rollout) -> mujoco.MjModel:
+    if len(rollout.joints) == 23:
+        return g1_model()
+    return arm_model("position" if rollout.joint_target is not None else "motor")
+
+
+def findings(rollout: Rollout, contract: dict | None = None) -> list[Finding]:
+    return check_rollout(rollout, model_of(rollout), contract)
+
+
+def fatal_rules(rollout: Rollout) -> set[tuple[str, str]]:
+    return {(finding.rule, finding.column) for finding in findings(rollout) if finding.fatal}
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("size", [0.0, 0.05, 0.15, 0.5, 1.5])
+def test_a_good_floating_robot_raises_nothing_still_swaying_falling_or_thrashing(seed: int, size: float) -> None:
+    assert findings(g1_rollout(seed, size, seconds=3.0)) == []
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("kind", "hz"), [("position", 50.0), ("motor", 50.0), ("position", 500.0), ("motor", 250.0)])
+def test_a_good_arm_raises_nothing_at_any_rate(seed: int, kind: str, hz: float) -> None:
+    assert findings(arm_rollout(seed, kind, size=(0.3, 0.8, 1.5)[seed % 3], hz=hz)) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_good_arm_at_rest_raises_nothing(seed: int) -> None:
+    assert findings(arm_rollout(seed, size=0.0)) == []
+
+
+def test_a_good_robot_without_noise_raises_nothing() -> None:
+    rollout = g1_rollout(1, 0.3)
+    assert findings(replace(rollout, joint_pos=np.round(rollout.joint_pos, 3))) == []  # a coarse encoder
+
+
+def edit(column: str, change: Callable[[np.ndarray], None]) -> Change:
+    """A change made in place on a copy of one column."""
+
+    def apply(rollout: Rollout) -> Rollout:
+        values = getattr(rollout, column).copy()
+        change(values)
+        return replace(rollout, **{column: values})
+
+    return apply
+
+
+def put(where: object, value: object) -> Callable[[np.ndarray], None]:
+    def change(values: np.ndarray) -> None:
+        values[where] = value
+
+    return change
+
+
+def scale(column: str, factor: float, joint: int | slice = slice(None)) -> Change:
+    def change(values: np.ndarray) -> None:
+        values[:, joint] *= factor
+
+    return edit(column, change)
+
+
+def swap(*columns: str) -> Change:
+    def apply(rollout: Rollout) -> Rollout:
+        return replace(rollout, **{column: getattr(rollout, column)[:, [1, 0, 2]] for column in columns})
+
+    return apply
+
+
+def freeze(column: str, joint: int) -> Change:
+    def change(values: np.ndarray) -> None:
+        values[60:, joint] = values[60, joint]
+
+    return edit(column, change)
+
+
+def flip_joint(rollout: Rollout) -> Rollout:
+    return scale("joint_pos", -1, 1)(scale("joint_vel", -1, 1)(rollout))
+
+
+def drop(rows: slice) -> Change:
+    def apply(rollout: Rollout) -> Rollout:
+        keep = np.delete(np.arange(rollout.frames), rows)
+        return replace(rollout, time=rollout.time[keep], **{c: getattr(rollout, c)[keep] for c in rollout.columns})
+
+    return apply
+
+
+def shake(rollout: Rollout) -> Rollout:
+    rng = np.random.default_rng(0)
+    return replace(rollout, time=np.sort(rng.uniform(rollout.time[0], rollout.time[-1], rollout.frames)))
+
+
+ARM_CHANGES: dict[str, tuple[Change, str, str]] = {
+    "gap": (drop(slice(100, 130)), "time-gap", "time"),
+    "duplicate": (edit("time", lambda t: t.__setitem__(50, t[49])), "time-duplicate", "time"),
+    "backwards": (edit("time", lambda t: t.__setitem__(50, t[40])), "time-order", "time"),
+    "milliseconds": (lambda r: replace(r, time=r.time * 1e3), "rate", "time"),
+    "other rate": (lambda r: replace(r, control_hz=100.0), "rate", "time"),
+    "jitter": (shake, "time-", "time"),
+    "time nan": (edit("time", put(7, np.nan)), "finite", "time"),
+    "nan": (edit("joint_pos", put((9, 1), np.nan)), "finite", "joint_pos[elbow]"),
+    "inf": (edit("joint_target", put((9, 1), np.inf)), "finite", "joint_target[elbow]"),
+    "frozen position": (freeze("joint_pos", 1), "frozen", "joint_pos[elbow]"),
+    "frozen velocity": (freeze("joint_vel", 1), "frozen", "joint_vel[elbow]"),
+    "spike": (edit("joint_pos", lambda q: q.__setitem__((80, 1), q[80, 1] + 0.5)), "step", "joint_pos[elbow]"),
+    "wrapped": (
+        edit("joint_pos", lambda q: q.__setitem__((slice(80, None), 2), q[80:, 2] + 6.283)),
+        "step",
+        "joint_pos",
+    ),
+    "out of range": (edit("joint_pos", lambda q: q.__setitem__((..., 1), q[:, 1] + 2.4)), "range", "joint_pos[elbow]"),
+    "degrees": (scale("joint_pos", 180 / np.pi), "degrees", "joint_pos"),
+    "all in degrees": (
+        lambda r: scale("joint_pos", 57.3)(scale("joint_vel", 57.3)(scale("joint_target", 57.3)(r))),
+        "degrees",
+        "joint_pos",
+    ),
+    "target in degrees": (scale("joint_target", 180 / np.pi), "degrees", "joint_target"),
+    "velocity in degrees": (scale("joint_vel", 180 / np.pi), "degrees", "joint_vel"),
+    "velocity reversed": (scale("joint_vel", -1, 1), "velocity-sign", "joint_vel[elbow]"),
+    "velocity of another joint": (swap("joint_vel"), "velocity-", "joint_vel"),
+    "velocity too large": (scale("joint_vel", 10, 1), "velocity-derivative", "joint_vel[elbow]"),
+    "targets exchanged": (swap("joint_target"), "joint-order", "joint_pos"),
+    "joint reversed": (flip_joint, "response-sign", "joint_target[elbow]"),
+    "target reversed": (scale("joint_target", -1, 1), "response-sign", "joint_target[elbow]"),
+    "unknown joint": (lambda r: replace(r, joints=("shoulder", "elbov", "wrist")), "joint-names", "joints"),
+    "other gains": (lambda r: replace(r, meta=r.meta | {"kp": [40.0, 60.0, 40.0]}), "gains", "kp[elbow]"),
+}
+
+
+@pytest.mark.parametrize("seed", [0, 1, 4])
+@pytest.mark.parametrize("name", ARM_CHANGES)
+def test_each_corruption_of_an_arm_is_found_in_its_column(name: str, seed: int) -> None:
+    change, rule, column = ARM_CHANGES[name]
+    found = fatal_rules(change(arm_rollout(seed)))
+    assert any(broken.startswith(rule) and place.startswith(column) for broken, place in found), found
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_reversed_torque_or_joint_is_found(seed: int, joint: int) -> None:
+    rollout = arm_rollout(seed, "motor", seconds=10.0)
+    for broken in (
+        scale("joint_torque_cmd", -1, joint)(rollout),
+        scale("joint_pos", -1, joint)(scale("joint_vel", -1, joint)(rollout)),
+    ):
+        assert any(rule == "response-sign" for rule, _ in fatal_rules(broken))
+
+
+def test_a_target_that_balances_against_the_motion_is_no_reversed_sign() -> None:
+    """Feedback makes command and position anticorrelated; the response itself is still the right way round."""
+    assert not any(f.rule == "response-sign" for seed in range(4) for f in findings(g1_rollout(seed, 0.5)))
+
+
+def turned(rollout: Rollout) -> np.ndarray:
+    """base_lin_vel in the world frame, by MuJoCo's own rotation."""
+    out = np.zeros((rollout.frames, 3))
+    for row in range(rollout.frames):
+        mujoco.mju_rotVecQuat(out[row], rollout.base_lin_vel[row], rollout.base_quat[row])
+    return out
+
+
+def gyro_in_world(rollout: Rollout) -> np.ndarray:
+    out = np.zeros((rollout.frames, 3))
+    for row in range(rollout.frames):
+        mujoco.mju_rotVecQuat(out[row], rollout.base_ang_vel[row], rollout.base_quat[row])
+    return out
+
+
+G1_CHANGES: dict[str, tuple[Change, str, str]] = {
+    "xyzw": (lambda r: replace(r, base_quat=np.roll(r.base_quat, -1, axis=1)), "quaternion-order", "base_quat"),
+    "not unit": (lambda r: replace(r, base_quat=2 * r.base_quat), "quaternion-norm", "base_quat"),
+    "world velocity": (lambda r: replace(r, base_lin_vel=turned(r)), "velocity-frame", "base_lin_vel"),
+    "world gyro": (lambda r: replace(r, base_ang_vel=gyro_in_world(r)), "velocity-frame", "base_ang_vel"),
+    "gyro in degrees": (lambda r: replace(r, base_ang_vel=57.3 * r.base_ang_vel), "degrees", "base_ang_vel"),
+    "gyro reversed": (lambda r: replace(r, base_ang_vel=-r.base_ang_vel), "gyro-sign", "base_ang_vel"),
+    "no gyro": (lambda r: replace(r, base_ang_vel=None), "base-columns", "base_ang_vel"),
+    "frozen gyro": (
+        edit("base_ang_vel", lambda w: w.__setitem__(slice(20, None), w[20])),
+        "frozen",
+        "base_ang_vel",
+    ),
+    "degrees": (scale("joint_pos", 180 / np.pi), "degrees", "joint_pos"),
+}
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", G1_CHANGES)
+def test_each_corruption_of_a_floating_base_is_found(name: str, seed: int) -> None:
+    change, rule, column = G1_CHANGES[name]
+    found = fatal_rules(change(g1_rollout(seed, 0.5, heading=1.0 + 2 * seed)))
+    assert any(broken == rule and place.startswith(column) for broken, place in found), found
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_still_base_in_xyzw_is_pointed_out_though_nothing_decides_it(seed: int) -> None:
+    rollout = g1_rollout(seed, 0.0, heading=0.0)
+    found = findings(replace(rollout, base_quat=np.roll(rollout.base_quat, -1, axis=1)))
+    assert {(finding.rule, finding.column) for finding in found} == {("quaternion-order", "base_quat")}
+
+
+def test_a_slightly_wrong_clock_and_a_lost_tick_are_warnings() -> None:
+    rollout = arm_rollout(0)
+    for change, rule in ((drop(slice(100, 102)), "time-gap"), (lambda r: replace(r, control_hz=52.0), "rate")):
+        found = findings(change(rollout))
+        assert [(finding.rule, finding.fatal) for finding in found] == [(rule, False)]
+
+
+def test_joints_are_held_against_the_deployed_policy() -> None:
+    rollout = arm_rollout(0)
+    assert findings(rollout, {"joints": list(rollout.joints)}) == []
+    for joints in (["elbow", "shoulder", "wrist"], ["shoulder", "elbow"]):
+        assert [finding.rule for finding in findings(rollout, {"joints": joints})] == ["policy-joints"]
+    gains = {"joints": list(rollout.joints), "kp": [40.0, 40.0, 41.0], "kd": [2.0] * 3}
+    assert [finding.column for finding in findings(rollout, gains)] == ["kp[wrist]"]
+
+
+def test_a_finding_is_one_line_that_names_file_column_row_and_rule() -> None:
+    bad = edit("joint_pos", put((9, 1), np.nan))(arm_rollout(0))
+    (finding,) = check_rollout(bad, arm_model(), file="x.parquet")
+    for part in ("x.parquet", "joint_pos[elbow]", "row 9", "rule finite", "expected", "nan"):
+        assert part in finding.message
+    assert "\n" not in finding.message and finding.row == 9
+
+
+def test_a_joint_that_is_missing_from_the_log_is_a_warning() -> None:
+    rollout = arm_rollout(0)
+    part = {column: getattr(rollout, column)[:, :2] for column in rollout.columns}
+    found = findings(replace(rollout, joints=rollout.joints[:2], meta={}, **part))
+    assert [(finding.rule, finding.fatal) for finding in found] == [("joint-missing", False)]
