@@ -15,7 +15,7 @@ from bumblebee.tracking.observations import layout
 
 
 def linear_onnx(gain: float, ahead: int = len(AHEAD)) -> bytes:
-    """actions = obs @ W, W random with deviation `gain`; 0 gives a policy that follows the reference blindly."""
+    """Actions = obs @ W, W random with deviation `gain`; 0 gives a policy that follows the reference blindly."""
     from onnx import TensorProto, helper, numpy_helper
 
     size = sum(part for _, part in layout(23, ahead))

@@ -1,0 +1,107 @@
+"""The stand-in's process: sealed file in, measured rollouts by the contract out, one line for what is wrong."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bumblebee.deploy.stand_in import main
+from bumblebee.deploy.stand_in_effects import read_sealed, seal, to_arrays
+from bumblebee.errors import BadInput
+from bumblebee.measured.rollout import read_rollout
+from bumblebee.motion.store import write_library
+from bumblebee.robot.facts import joint_names, joints
+from bumblebee.robot.model import build_model, gains
+from tests.deploy.conftest import nod
+
+OFFSET = {"effect": "encoder_offset", "where": ["right_elbow_joint"], "parameters": {"offset": 0.05}}
+
+
+def sealed(path: Path, effects: list[dict]) -> Path:
+    path.write_text(json.dumps({"schema": 1, "effects": effects, "sha256": seal(effects)}))
+    return path
+
+
+@pytest.fixture
+def arguments(tmp_path: Path, policy_folder: Callable[..., Path]) -> Callable[..., list[str]]:
+    write_library(tmp_path / "clips", [nod("a", 12), nod("b", 15)])
+    policy = policy_folder()
+
+    def make(effects: list[dict], out: str, *more: str) -> list[str]:
+        common = ["--clips", str(tmp_path / "clips"), "--out", str(tmp_path / out), "--threads", "1"]
+        return ["--sealed", str(sealed(tmp_path / "robot.json", effects)), *common, "--policy", str(policy), *more]
+
+    return make
+
+
+def test_rollouts_keep_the_contract_and_the_seed_decides_them(arguments: Callable, tmp_path: Path) -> None:
+    for out in ("first", "again"):
+        assert main(arguments([], out, "--names", "a", "b", "--rollouts", "2", "--seed", "5", "--cluster", "c1")) == 0
+    files = sorted((tmp_path / "first").glob("*.parquet"))
+    assert [file.stem for file in files] == ["a-0", "a-1", "b-0", "b-1"]
+    rollout = read_rollout(files[0])
+    assert rollout.joints == joint_names() and rollout.control_hz == 50 and rollout.frames == 12
+    assert np.allclose(np.diff(rollout.time), 0.02)
+    assert {"joint_target", "action", "joint_torque", "base_pos", "foot_force"} <= set(rollout.columns)
+    assert rollout.meta["kp"] == pytest.approx([gains(joint)[0] for joint in joints()])
+    assert rollout.meta["cluster"] == "c1" and rollout.meta["motion"] == "a" and rollout.meta["operator"] == "stand-in"
+    assert len(rollout.meta["policy"]["sha256"]) == 64 and rollout.meta["notes"] == "ran to the end"
+    assert np.array_equal(rollout.joint_pos, read_rollout(tmp_path / "again" / "a-0.parquet").joint_pos)
+    assert not np.array_equal(rollout.joint_pos, read_rollout(files[1]).joint_pos)
+
+
+def test_a_command_issued_in_a_row_acts_before_the_next(arguments: Callable, tmp_path: Path) -> None:
+    """Row k's target moves the joint between row k and k+1: the measured speed follows the reference's swing."""
+    assert main(arguments([], "out", "--names", "b")) == 0
+    rollout = read_rollout(tmp_path / "out" / "b-0.parquet")
+    shoulder = joint_names().index("left_shoulder_roll_joint")
+    assert nod("b", 15).joint_pos[1:, shoulder] == pytest.approx(rollout.joint_target[:-1, shoulder], abs=1e-6)
+
+
+def test_sealed_effects_reach_the_robot(arguments: Callable, tmp_path: Path) -> None:
+    """The offset is in the readings from the first row on; everything else there is as without it."""
+    assert main(arguments([OFFSET], "with", "--names", "a")) == 0
+    assert main(arguments([], "without", "--names", "a")) == 0
+    rows = [read_rollout(tmp_path / out / "a-0.parquet").joint_pos[0] for out in ("with", "without")]
+    assert (rows[0] - rows[1]).round(9).tolist() == [0.05 * (name == "right_elbow_joint") for name in joint_names()]
+
+
+def test_a_broken_seal_is_refused(arguments: Callable, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    line = arguments([OFFSET], "out", "--names", "a")
+    path = tmp_path / "robot.json"
+    path.write_text(path.read_text().replace("0.05", "0.06"))
+    assert main(line) == 2
+    err = capsys.readouterr().err
+    assert "robot.json: field sha256" in err and err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_nothing_is_overwritten(arguments: Callable, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    assert main(arguments([], "out", "--names", "a")) == 0
+    before = (tmp_path / "out" / "a-0.parquet").read_bytes()
+    assert main(arguments([OFFSET], "out", "--names", "a")) == 2
+    assert (tmp_path / "out" / "a-0.parquet").read_bytes() == before
+    assert "a-0.parquet" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"effect": "gremlin"}, "coulomb_friction"),
+        ({"where": ["left_tail_joint"]}, "a joint of the model"),
+        ({"parameters": {"angle": 0.1}}, r"encoder_offset\.offset"),
+        ({"effect": "link_mass", "where": ["tail"], "parameters": {"mass": 1.0}}, "a body of the model"),
+    ],
+)
+def test_effects_it_does_not_know_are_named(change: dict, expected: str) -> None:
+    with pytest.raises(BadInput, match=expected):
+        to_arrays([{**OFFSET, **change}], build_model(), "robot.json")
+
+
+@pytest.mark.parametrize("content", ["", "{}", '{"effects": []}'])
+def test_a_file_that_is_not_sealed_is_refused(tmp_path: Path, content: str) -> None:
+    (tmp_path / "robot.json").write_text(content)
+    with pytest.raises(BadInput, match=r"robot\.json"):
+        read_sealed(tmp_path / "robot.json")
