@@ -46,7 +46,9 @@ def read_effects(path: Path) -> list[Effect]:
     except FileNotFoundError:
         raise BadInput(path, "an effects file", "no such file") from None
     except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
-        raise BadInput(path, "YAML of plain values", type(error).__name__, "Write it with `bumblebee diagnose`.") from None
+        raise BadInput(
+            path, "YAML of plain values", type(error).__name__, "Write it with `bumblebee diagnose`."
+        ) from None
     _only_keys(path, document, {"schema", "effects"})
     if document.get("schema") != 1:
         raise BadInput(f"{path}: schema", "1", repr(document.get("schema")))

@@ -1,0 +1,94 @@
+"""Command line: `bumblebee diagnose`, `replay` and `gap`. Status 0: done, 2: unusable input, one line on stderr."""
+
+import sys
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+
+app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
+
+Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
+Data = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder that holds rollouts/*.parquet.")]
+
+
+@app.command()
+def diagnose(
+    model: Model,
+    dataset: Data,
+    out: Annotated[Path, typer.Option("--out", help="Folder for the diagnosis.")],
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")] = False,
+    max_windows: Annotated[int, typer.Option(min=8, help="Windows that take part in the fit.")] = 120,
+    seed: Annotated[int, typer.Option(help="Of the perturbed starts.")] = 0,
+) -> None:
+    """Find which effect the model lacks, add it, and report the error before and after."""
+    from bumblebee.diagnosis.diagnose import DiagnosisConfig, diagnose
+    from bumblebee.diagnosis.output import refuse_existing, write_diagnosis
+    from bumblebee.diagnosis.session import open_session
+    from bumblebee.diagnosis.terminal import summary
+
+    refuse_existing(out, overwrite)
+    session = open_session(model, dataset)
+    result = diagnose(session, DiagnosisConfig(max_windows=max_windows, seed=seed), _teller())
+    write_diagnosis(result, out, overwrite)
+    print(summary(result.document))
+    print(f"written: {out / 'diagnosis.json'}, model.xml, effects.yaml, report.html")
+
+
+@app.command()
+def replay(
+    model: Model,
+    dataset: Data,
+    out: Annotated[Path, typer.Option("--out", help="JSON file for the errors.")],
+    effects: Annotated[Path | None, typer.Option("--effects", help="effects.yaml to apply to the model.")] = None,
+) -> None:
+    """The error of any model on any rollouts, by horizon."""
+    from bumblebee.diagnosis.replay import replay, write_json
+    from bumblebee.diagnosis.session import open_session
+    from bumblebee.sim.effects import read_effects
+
+    chosen = read_effects(effects) if effects else []
+    write_json(out, replay(open_session(model, dataset), chosen))
+    print(f"written: {out}")
+
+
+@app.command()
+def gap(
+    model: Model,
+    dataset: Data,
+    out: Annotated[Path | None, typer.Option("--out", help="Also write the table as JSON.")] = None,
+) -> None:
+    """Where the model errs before anything is fitted."""
+    from bumblebee.diagnosis.replay import replay, write_json
+    from bumblebee.diagnosis.session import open_session
+    from bumblebee.diagnosis.terminal import gap_table
+
+    block = replay(open_session(model, dataset))
+    print(gap_table(block))
+    if out:
+        write_json(out, block)
+
+
+def _teller() -> "typer.models.CallbackType":
+    began = time.monotonic()
+
+    def say(text: str) -> None:
+        print(f"[{time.monotonic() - began:5.1f} s] {text}", flush=True)
+
+    return say
+
+
+def main() -> None:
+    """Entry point; bad input ends in one line and status 2."""
+    try:
+        app()
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        raise SystemExit(EXIT_BAD_INPUT) from None
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,157 @@
+"""The declared model and its joints and actuators in the order of the log's columns."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from bumblebee.errors import BadInput
+from bumblebee.measured.rollout import Rollout
+
+_FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
+_ON_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """A model ready to be restarted from measured states. J joints in the log's order, nu actuators in the model's."""
+
+    model: mujoco.MjModel
+    """Compiled without delay buffers: delays act on the commands, which are known in advance."""
+    joints: tuple[str, ...]
+    """(J) names."""
+    qpos: np.ndarray
+    """(J,) addresses in qpos."""
+    dof: np.ndarray
+    """(J,) addresses in qvel."""
+    actuator: np.ndarray
+    """(J,) actuator that drives the joint, -1 for a passive joint."""
+    torque_input: bool
+    """Whether the commands are torques; else they are position targets."""
+    floating: bool
+    """Whether the model has a free base."""
+    base_qpos: int
+    """Address of the base's position in qpos."""
+    base_dof: int
+    """Address of the base's velocity in qvel."""
+    delay: np.ndarray
+    """(nu,) command delay [s] that the model declares."""
+    offset: np.ndarray
+    """(J,) encoder offset [rad] that the servos of the model declare."""
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Named bodies that have a mass and can move."""
+        model = self.model
+        moving = [b for b in range(1, model.nbody) if model.body_mass[b] > 0 and model.body_weldid[b] != 0]
+        return tuple(name for b in moving if (name := model.body(b).name))
+
+
+def load_spec(path: Path) -> mujoco.MjSpec:
+    """Read MJCF as an editable spec; `BadInput` if MuJoCo cannot."""
+    path = Path(path)
+    if not path.is_file():
+        raise BadInput(path, "an MJCF model", "no such file")
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        spec.compile()
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+        raise BadInput(path, "an MJCF model that compiles", str(error)[:200]) from None
+    return spec
+
+
+def make_plant(spec: mujoco.MjSpec, rollout: Rollout, where: object) -> Plant:
+    """Match the model's joints and actuators with the columns of `rollout`; `where` names the model in errors."""
+    spec = spec.copy()
+    delay = np.array([a.delay if a.nsample else 0.0 for a in spec.actuators])
+    for actuator in spec.actuators:
+        actuator.nsample, actuator.delay = 0, 0.0
+    model = spec.compile()
+    # More solver iterations than a training model allows itself: what is compared is physics, not a solver's haste.
+    model.opt.iterations, model.opt.ls_iterations = max(30, model.opt.iterations), max(20, model.opt.ls_iterations)
+    free, joints = _match_joints(model, rollout, where)
+    torque_input = _torque_input(model, joints, rollout, where)
+    actuator = np.array([_actuator_of(model, j) for j in joints], dtype=int)
+    _set_input(model, actuator, torque_input, rollout, where)
+    offset = np.zeros(len(joints))
+    for column, a in enumerate(actuator):
+        if a >= 0 and model.actuator_biasprm[a, 1] != 0:
+            offset[column] = model.actuator_biasprm[a, 0] / model.actuator_biasprm[a, 1] / model.actuator_gear[a, 0]
+    return Plant(
+        model=model,
+        joints=rollout.joints,
+        qpos=model.jnt_qposadr[joints].astype(int),
+        dof=model.jnt_dofadr[joints].astype(int),
+        actuator=actuator,
+        torque_input=torque_input,
+        floating=free >= 0,
+        base_qpos=int(model.jnt_qposadr[free]) if free >= 0 else 0,
+        base_dof=int(model.jnt_dofadr[free]) if free >= 0 else 0,
+        delay=delay if len(delay) else np.zeros(model.nu),
+        offset=offset,
+    )
+
+
+def _match_joints(model: mujoco.MjModel, rollout: Rollout, where: object) -> tuple[int, np.ndarray]:
+    """The free joint's id (-1: none) and the id of every logged joint."""
+    kinds = model.jnt_type.astype(int)
+    names = {model.joint(j).name: j for j in range(model.njnt)}
+    free = [j for j in range(model.njnt) if kinds[j] == _FREE]
+    if len(free) > 1 or (kinds == _BALL).any():
+        raise BadInput(where, "hinge and slide joints and at most one free base", "ball joints or several free bodies")
+    for name in rollout.joints:
+        if name not in names or kinds[names[name]] == _FREE:
+            raise BadInput(f"{where}: joint {name!r} of {rollout.rollout_id}", "a hinge or slide of the model", "none")
+    if missing := [n for n, j in names.items() if kinds[j] != _FREE and n not in rollout.joints]:
+        raise BadInput(f"{rollout.rollout_id}: joints", f"joint {missing[0]!r} of {where}", "no column for it")
+    if free:
+        for column in ("base_quat", "base_ang_vel", "base_lin_vel"):
+            if getattr(rollout, column) is None:
+                raise BadInput(f"{rollout.rollout_id}: column {column}", "a column, the base floats", "none")
+    return (free[0] if free else -1), np.array([names[n] for n in rollout.joints], dtype=int)
+
+
+def _actuator_of(model: mujoco.MjModel, joint: int) -> int:
+    """The first actuator on a joint, -1 if none."""
+    for a in range(model.nu):
+        if int(model.actuator_trntype[a]) in _ON_JOINT and model.actuator_trnid[a, 0] == joint:
+            return a
+    return -1
+
+
+def _torque_input(model: mujoco.MjModel, joints: np.ndarray, rollout: Rollout, where: object) -> bool:
+    """Position targets where they were logged and the model has servos (or gains are known); torques else."""
+    servo = any(model.actuator_biasprm[a, 1] != 0 for j in joints if (a := _actuator_of(model, j)) >= 0)
+    if rollout.joint_target is not None and (servo or rollout.joint_torque_cmd is None):
+        return False
+    if rollout.joint_torque_cmd is None:
+        raise BadInput(f"{rollout.rollout_id}: column joint_target", "joint_target or joint_torque_cmd", "neither")
+    return True
+
+
+def _set_input(model: mujoco.MjModel, actuator: np.ndarray, torque: bool, rollout: Rollout, where: object) -> None:
+    """Make every actuator take what was logged: a servo turned into a motor, or a motor into a servo of known gains."""
+    kp, kd = rollout.meta.get("kp"), rollout.meta.get("kd")
+    for column, a in enumerate(actuator):
+        if a < 0:
+            continue
+        is_servo = model.actuator_biasprm[a, 1] != 0
+        if torque and is_servo:
+            model.actuator_gainprm[a, 0], model.actuator_biasprm[a, :3] = 1.0, 0.0
+        elif not torque and not is_servo:
+            if kp is None or kd is None:
+                raise BadInput(
+                    f"{where}: actuator {model.actuator(a).name!r}",
+                    "a position servo, or kp and kd in the rollouts' metadata",
+                    f"a motor and position targets in {rollout.rollout_id}",
+                )
+            model.actuator_gainprm[a, 0] = kp[column]
+            model.actuator_biastype[a] = int(mujoco.mjtBias.mjBIAS_AFFINE)
+            model.actuator_biasprm[a, :3] = [0.0, -kp[column], -kd[column]]
+            model.actuator_ctrllimited[a] = 0
+
+
+def base_body(model: mujoco.MjModel) -> int:
+    """Body of the free joint."""
+    return int(model.jnt_bodyid[np.flatnonzero(model.jnt_type.astype(int) == _FREE)[0]])

@@ -1,0 +1,171 @@
+"""Windows: short stretches of the logs, each restarted from its measured state and fed the logged commands."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.signals import Layout, measured_readings, rotate
+from bumblebee.diagnosis.stance import stance_heights
+from bumblebee.errors import BadInput
+from bumblebee.measured.rollout import Rollout
+
+# A window starts this long after its rollout, so that a delayed command is known from the start [s].
+LEAD = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """W windows of N compared ticks each."""
+
+    rollout: np.ndarray
+    """(W,) index of the rollout."""
+    start: np.ndarray
+    """(W,) tick of the start."""
+    span: float
+    """Length that is simulated [s]: the longest of the windows."""
+    out_time: np.ndarray
+    """(W, N) time of the compared ticks after the start [s]."""
+    qpos: np.ndarray
+    """(W, nq) measured start, with the encoders' readings as they are."""
+    qvel: np.ndarray
+    """(W, nv)."""
+    measured: np.ndarray
+    """(W, N, D) readings."""
+    quat: np.ndarray | None
+    """(W, N, 4) base orientation."""
+    command: np.ndarray
+    """(W, C, nu) logged commands around the window, in the actuators' own input."""
+    command_time: np.ndarray
+    """(W, C) times at which they were issued, after the start [s]."""
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+def choose_starts(
+    rollouts: Sequence[Rollout], ids: Sequence[int], horizon: float, budget: int
+) -> list[tuple[int, int, int]]:
+    """At most `budget` windows (rollout, first tick, last tick) that do not overlap, spread evenly over the rollouts."""
+    every = []
+    for i in ids:
+        time = rollouts[i].time
+        ticks = max(1, round(horizon * rollouts[i].control_hz))
+        first = int(np.searchsorted(time, time[0] + min(LEAD, 0.25 * (time[-1] - time[0]))))
+        last = len(time) - 1 - ticks
+        every += [(i, k, k + ticks) for k in range(first, last + 1, ticks)]
+    if len(every) > budget:
+        every = [every[k] for k in np.unique(np.linspace(0, len(every) - 1, budget).round().astype(int))]
+    return every
+
+
+def cut(
+    plant: Plant, layout: Layout, rollouts: Sequence[Rollout], starts: list[tuple[int, int, int]], outputs: int = 6
+) -> Windows:
+    """Cut the windows; at most `outputs` ticks of each are compared, the last among them."""
+    ticks = min(last - first for _, first, last in starts)
+    picks = np.unique(np.linspace(1, ticks, min(outputs, ticks)).round().astype(int))
+    cache = {i: measured_readings(rollouts[i], layout) for i in {s[0] for s in starts}}
+    heights = stance_heights(plant, rollouts, {s[0] for s in starts}) if _needs_height(plant, layout) else {}
+    rows = [_one(plant, rollouts[i], cache[i], heights.get(i), k, picks) for i, k, _ in starts]
+    size = max(len(row["command_time"]) for row in rows)
+    quats = [row["quat"] for row in rows]
+    return Windows(
+        rollout=np.array([s[0] for s in starts]),
+        start=np.array([s[1] for s in starts]),
+        span=max(float(row["out_time"][-1]) for row in rows),
+        out_time=np.stack([row["out_time"] for row in rows]),
+        qpos=np.stack([row["qpos"] for row in rows]),
+        qvel=np.stack([row["qvel"] for row in rows]),
+        measured=np.stack([row["measured"] for row in rows]),
+        quat=None if quats[0] is None else np.stack(quats),
+        command=np.stack([_pad(row["command"], size) for row in rows]),
+        command_time=np.stack([_pad(row["command_time"], size) for row in rows]),
+    )
+
+
+def select(windows: Windows, keep: np.ndarray) -> Windows:
+    """The windows at the indices or mask `keep`."""
+    parts = {name: getattr(windows, name) for name in windows.__dataclass_fields__}
+    kept = {name: value[keep] if isinstance(value, np.ndarray) else value for name, value in parts.items()}
+    return Windows(**kept)
+
+
+def controls(windows: Windows, delay: np.ndarray, step: float, count: int) -> np.ndarray:
+    """Commands (W, count, nu) for simulation steps of `step` s: the mean over each step of the held, delayed command."""
+    edges = np.arange(count + 1) * step
+    out = np.empty((len(windows), count, len(delay)))
+    groups = {value: np.flatnonzero(delay == value) for value in np.unique(delay)}
+    for w in range(len(windows)):
+        time, command = windows.command_time[w], windows.command[w]
+        area = np.concatenate(
+            (np.zeros((1, command.shape[1])), np.cumsum(np.diff(time)[:, None] * command[:-1], axis=0))
+        )
+        for value, columns in groups.items():
+            at = edges - value
+            k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 1)
+            integral = area[k][:, columns] + (at - time[k])[:, None] * command[k][:, columns]
+            out[w][:, columns] = np.diff(integral, axis=0) / step
+    return out
+
+
+def _needs_height(plant: Plant, layout: Layout) -> bool:
+    return plant.floating and "base_pos" not in layout.slices
+
+
+def _pad(values: np.ndarray, size: int) -> np.ndarray:
+    """Repeat the last row; padded commands change nothing, for their times never pass."""
+    return np.concatenate((values, np.repeat(values[-1:], size - len(values), axis=0)))
+
+
+def _one(
+    plant: Plant,
+    rollout: Rollout,
+    readings: tuple[np.ndarray, np.ndarray | None],
+    heights: np.ndarray | None,
+    k: int,
+    picks: np.ndarray,
+) -> dict[str, np.ndarray | None]:
+    signals, quat = readings
+    t0 = rollout.time[k]
+    first = max(0, int(np.searchsorted(rollout.time, t0 - 2 * LEAD)))
+    stop = k + int(picks[-1]) + 1
+    qpos, qvel = start_state(plant, rollout, k, None if heights is None else heights[k])
+    return {
+        "out_time": rollout.time[k + picks] - t0,
+        "qpos": qpos,
+        "qvel": qvel,
+        "measured": signals[k + picks],
+        "quat": None if quat is None else quat[k + picks],
+        "command": command_inputs(plant, rollout)[first:stop],
+        "command_time": rollout.time[first:stop] - t0,
+    }
+
+
+def start_state(plant: Plant, rollout: Rollout, k: int, height: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """The measured state of tick k as qpos (nq,) and qvel (nv,)."""
+    qpos, qvel = plant.model.qpos0.copy(), np.zeros(plant.model.nv)
+    qpos[plant.qpos], qvel[plant.dof] = rollout.joint_pos[k], rollout.joint_vel[k]
+    if plant.floating:
+        q, v = plant.base_qpos, plant.base_dof
+        quat = rollout.base_quat[k] / np.linalg.norm(rollout.base_quat[k])
+        qpos[q : q + 3] = rollout.base_pos[k] if height is None else [0.0, 0.0, height]
+        qpos[q + 3 : q + 7] = quat
+        qvel[v : v + 3] = rotate(quat, rollout.base_lin_vel[k])
+        qvel[v + 3 : v + 6] = rollout.base_ang_vel[k]
+    return qpos, qvel
+
+
+def command_inputs(plant: Plant, rollout: Rollout) -> np.ndarray:
+    """Logged commands as the actuators' inputs, (T, nu)."""
+    values = rollout.joint_torque_cmd if plant.torque_input else rollout.joint_target
+    if values is None:
+        raise BadInput(f"{rollout.rollout_id}: column joint_target", "the column that the other rollouts have", "none")
+    out = np.zeros((rollout.frames, plant.model.nu))
+    for column, a in enumerate(plant.actuator):
+        if a >= 0:
+            gear = plant.model.actuator_gear[a, 0]
+            scale = 1.0 / (gear * plant.model.actuator_gainprm[a, 0]) if plant.torque_input else gear
+            out[:, a] = values[:, column] * scale
+    return out

@@ -1,0 +1,35 @@
+"""Stage diagnose: what the declared model lacks, from the accepted rollouts of one round."""
+
+from pathlib import Path
+
+from bumblebee.diagnosis.diagnose import diagnose
+from bumblebee.diagnosis.output import fill
+from bumblebee.diagnosis.session import open_session
+from bumblebee.diagnosis.terminal import summary
+from tasks.stage import log_run, output_folder, run_stage
+
+
+def main(round: int) -> None:
+    """Diagnose data/measured/r<N> against its declared model into data/diagnosis/r<N>."""
+    measured = Path(f"data/measured/r{round}")
+    session = open_session(measured / "model.xml", measured)
+    result = diagnose(session, say=lambda text: print(text, flush=True))
+    with output_folder(f"data/diagnosis/r{round}") as folder:
+        fill(result, folder)
+    print(summary(result.document))
+    log_run("diagnose", round=round, metrics=_metrics(result.document))
+
+
+def _metrics(document: dict) -> dict[str, float]:
+    """Headline numbers: effects found and joint error by horizon."""
+    metrics = {"effects": float(len(document["effects"]))}
+    for part in ("before", "after", "floor"):
+        for horizon, measures in document["error"][part].items():
+            value = measures["joint_pos_rmse"]["value"]
+            if value is not None:
+                metrics[f"joint_pos_rmse_{horizon}s_{part}"] = value
+    return metrics
+
+
+if __name__ == "__main__":
+    run_stage(main)
