@@ -10,18 +10,17 @@ from bumblebee.clustering.config import ClusterConfig
 from bumblebee.clustering.pipeline import Clustering, cluster_clips
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.store import read_index, read_library
+from bumblebee.motion.store import read_library
 from bumblebee.progress import progress
-from tasks.params import FILE, read
+from tasks.sections import loop
 from tasks.stage import load, log_run, output_folder, run_stage
 
-MOTIONS, FILTERED = Path("data/motions"), Path("data/filtered")
-CLUSTERS, MODEL = Path("data/clusters"), Path("models/clustering")
+FILTERED, CLUSTERS, MODEL = Path("data/filtered"), Path("data/clusters"), Path("models/clustering")
 
 
 def main() -> None:
     """Read the kept clips, cluster them, write labels, curves, summary and the autoencoder."""
-    config, names = load("cluster", ClusterConfig), cluster_names()
+    config, names = load("cluster", ClusterConfig), loop().clusters
     clips = kept_clips()
     with progress(config.epochs, "text-motion autoencoder", "epochs") as bar:
         result = cluster_clips(clips, names, config, lambda _, note: bar.update(1, note))
@@ -30,24 +29,16 @@ def main() -> None:
     with output_folder(CLUSTERS) as folder:
         write_tables(folder, result)
     tell(result)
-    log_run("cluster", params=config, metrics=metrics(result), curve=CLUSTERS / "curve.csv", artifacts=[CLUSTERS, MODEL])
-
-
-def cluster_names() -> list[str]:
-    """The list `clusters` of params.yaml: distinct names, slowest cluster first."""
-    names = read().get("clusters")
-    good = isinstance(names, list) and bool(names) and all(isinstance(name, str) and name for name in names)
-    if not good or len(set(names)) < len(names):
-        raise BadInput(f"{FILE}: clusters", "a list of distinct names, such as [c0, c1, c2]", repr(names))
-    return names
+    curve = CLUSTERS / "curve.csv"
+    log_run("cluster", params=config, metrics=metrics(result), curve=curve, artifacts=[CLUSTERS, MODEL])
 
 
 def kept_clips() -> list[Clip]:
     """The clips that the filter kept."""
-    kept = list(read_index(FILTERED)["name"])
-    if not kept:
+    clips = read_library(FILTERED)
+    if not clips:
         raise BadInput(FILTERED / "index.parquet", "at least one kept motion", "none", "See data/filtered/drops.csv")
-    return read_library(FILTERED) if (FILTERED / "clips").is_dir() else read_library(MOTIONS, kept)
+    return clips
 
 
 def write_tables(folder: Path, result: Clustering) -> None:

@@ -12,7 +12,9 @@ from bumblebee.clustering.kmeans import Clusters
 from bumblebee.clustering.statistics import COLUMNS, keywords, names
 
 
-def cluster_table(statistics: pd.DataFrame, captions: Sequence[Sequence[str]], labels: np.ndarray, k: int) -> pd.DataFrame:
+def cluster_table(
+    statistics: pd.DataFrame, captions: Sequence[Sequence[str]], labels: np.ndarray, k: int
+) -> pd.DataFrame:
     """One row a cluster: `clips`, means of the statistics, `keywords`, `label` (the paper's table 2)."""
     means = statistics[list(COLUMNS)].groupby(labels).mean().reindex(range(k))
     means.insert(0, "clips", np.bincount(labels, minlength=k))

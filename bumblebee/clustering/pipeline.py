@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,7 +30,7 @@ class Clustering:
     statistics: pd.DataFrame
     elbow: pd.DataFrame
     curve: pd.DataFrame
-    summary: dict[str, object]
+    summary: dict[str, Any]
     model: TextMotionAutoencoder
 
 
@@ -54,7 +55,8 @@ def cluster_clips(
     fitted = np.array([clip.split != "test" for clip in clips], bool)
     k = len(cluster_names)
     _enough(int(fitted.sum()), k, config.min_clips)
-    table = embed_captions([text for clip in clips for text in clip.captions], config.text_encoder) if table is None else table
+    if table is None:
+        table = embed_captions([text for clip in clips for text in clip.captions], config.text_encoder)
     windows = [motion_windows(clip, config.fps, config.window_seconds) for clip in clips]
     row_of = {text: row for row, text in enumerate(table.captions)}
     captions = [sorted({row_of[text] for text in map(plain_text, clip.captions) if text in row_of}) for clip in clips]
@@ -102,11 +104,11 @@ def _summary(
     clusters: kmeans.Clusters,
     elbow: pd.DataFrame,
     curve: pd.DataFrame,
-) -> dict[str, object]:
+) -> dict[str, Any]:
     train_clips = [clip for clip, use in zip(clips, fitted, strict=True) if use]
     train_statistics = statistics[fitted].reset_index(drop=True)
     table = audit.cluster_table(train_statistics, [clip.captions for clip in train_clips], clusters.labels, len(names))
-    held_out = np.bincount(clusters.predict(latents[~fitted]), minlength=len(names)) if (~fitted).any() else [0] * len(names)
+    held_out = np.bincount(clusters.predict(latents[~fitted]), minlength=len(names))
     rows = table.to_dict("records")
     by_name = {
         name: {**row, "held_out_clips": int(count), "share": row["clips"] / len(train_clips)}

@@ -46,10 +46,7 @@ def clip_statistics(clip: Clip) -> dict[str, float]:
 
 def keywords(captions: Sequence[Sequence[str]], labels: np.ndarray, k: int, count: int = 4) -> list[list[str]]:
     """The words that set each cluster's captions apart, by tf-idf with one document a cluster."""
-    pooled = [
-        " ".join(plain_text(text) for texts, label in zip(captions, labels, strict=True) if label == c for text in texts)
-        for c in range(k)
-    ]
+    pooled = [" ".join(plain_text(text) for i in np.flatnonzero(labels == c) for text in captions[int(i)]) for c in range(k)]
     stop = sorted(ENGLISH_STOP_WORDS | _NO_KEYWORDS)
     vectorizer = TfidfVectorizer(stop_words=stop, token_pattern=r"[A-Za-z]{3,}", sublinear_tf=True)
     try:
@@ -69,7 +66,11 @@ def names(table: pd.DataFrame) -> list[str]:
     """
     kinds = np.where(table["airborne"] > _FLIES, "jump", np.where(table["speed"] > _WALKS, "walk", "stand"))
     share = table["lower_joint"] / (table["lower_joint"] + table["upper_joint"]).clip(lower=1e-9)
-    ends = {"jump": ("low", "high", table["z_move"]), "walk": ("slow", "fast", table["speed"]), "stand": ("up", "low", share)}
+    ends = {
+        "jump": ("low", "high", table["z_move"]),
+        "walk": ("slow", "fast", table["speed"]),
+        "stand": ("up", "low", share),
+    }
     result = list(kinds)
     for kind, (least, most, value) in ends.items():
         rows = [int(i) for i in np.argsort(value.to_numpy(), kind="stable") if kinds[i] == kind]

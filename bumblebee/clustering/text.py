@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -72,7 +73,7 @@ def encoder_folder(encoder: str) -> str:
     return str(folder) if (folder / "config.json").is_file() else encoder
 
 
-def _load(encoder: str) -> tuple[object, torch.nn.Module]:
+def _load(encoder: str) -> tuple[Any, torch.nn.Module]:
     source = encoder_folder(encoder)
     try:
         from transformers import AutoModel, AutoTokenizer

@@ -41,11 +41,11 @@ def loss_terms(model: TextMotionAutoencoder, batch: Batch, config: ClusterConfig
     rows = batch.captioned
     if not rows.any():
         return {name: terms.get(name, z_motion.new_zeros(())) for name in TERMS}
-    z_text, z_paired, mask = model.encode_text(batch.tokens[rows], batch.token_mask[rows]), z_motion[rows], batch.mask[rows]
+    z_text, z_paired = model.encode_text(batch.tokens[rows], batch.token_mask[rows]), z_motion[rows]
     same = losses.same_text(batch.sentences[rows], config.same_text)
     terms["info_nce"] = losses.info_nce(z_text, z_paired, config.temperature, same)
     terms["latent_l2"] = losses.latent_l2(z_text, z_paired)
-    terms["huber_text"] = losses.masked_huber(model.decode(z_text, mask), target[rows], mask)
+    terms["huber_text"] = losses.masked_huber(model.decode(z_text, batch.mask[rows]), target[rows], batch.mask[rows])
     return {name: terms[name] for name in TERMS}
 
 
@@ -116,7 +116,7 @@ def _fit(
         for chosen in _batches(len(clips), config.batch_size, draw):
             terms = loss_terms(model, _batch(clips, captions, table, chosen, draw), config)
             optimiser.zero_grad(set_to_none=True)
-            sum(terms.values()).backward()
+            torch.stack(list(terms.values())).sum().backward()
             torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
             optimiser.step()
             schedule.step()
@@ -144,7 +144,7 @@ def _batch(
     chosen: np.ndarray,
     draw: np.random.Generator,
 ) -> Batch:
-    values, mask = pad([clips[i][draw.integers(len(clips[i]))] for i in chosen])
+    values, mask = pad([clips[i][int(draw.integers(len(clips[i])))] for i in chosen])
     captioned = torch.tensor([len(captions[i]) > 0 for i in chosen])
     rows = torch.tensor([int(draw.choice(captions[i])) if len(captions[i]) else 0 for i in chosen])
     if not captioned.any():

@@ -37,7 +37,13 @@ def made_clip(name: str, kind: str, seed: int = 0, seconds: float = 2.0, split: 
 def library() -> list[Clip]:
     """Eight stands and eight walks of unequal length, one of each held out."""
     return [
-        made_clip(f"{kind}_{i}", kind, seed=100 * (kind == "walk") + i, seconds=1.5 + 0.2 * i, split="test" if i == 7 else "train")
+        made_clip(
+            f"{kind}_{i}",
+            kind,
+            seed=100 * (kind == "walk") + i,
+            seconds=1.5 + 0.2 * i,
+            split="test" if i == 7 else "train",
+        )
         for kind in ("stand", "walk")
         for i in range(8)
     ]
@@ -55,4 +61,6 @@ def table() -> TokenTable:
 @pytest.fixture(scope="session")
 def tiny() -> ClusterConfig:
     """Sizes that train in about a second."""
-    return ClusterConfig(hidden=16, layers=1, heads=2, latent=4, epochs=25, batch_size=8, max_k=6, audit_seeds=3, dropout=0.0)
+    return ClusterConfig(
+        hidden=16, layers=1, heads=2, latent=4, epochs=25, batch_size=8, max_k=6, audit_seeds=3, dropout=0.0
+    )

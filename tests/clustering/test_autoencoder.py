@@ -80,7 +80,9 @@ def test_same_seed_same_weights_and_the_callers_randomness_is_left_alone(
     assert not torch.equal(runs[0]["motion.head.weight"], other["motion.head.weight"])
 
 
-def test_clips_without_captions_train_the_motion_side(library: list[Clip], table: TokenTable, tiny: ClusterConfig) -> None:
+def test_clips_without_captions_train_the_motion_side(
+    library: list[Clip], table: TokenTable, tiny: ClusterConfig
+) -> None:
     clips, _ = _training(library, table)
     empty = TokenTable((), torch.zeros(0, 1, 1), torch.zeros(0, 1, dtype=torch.bool), torch.zeros(0, 1))
     _, curve = train(clips, [[]] * len(clips), empty, replace(tiny, epochs=8))

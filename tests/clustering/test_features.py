@@ -17,7 +17,9 @@ WALK = made_clip("walk", "walk", seed=3, seconds=2.0)
 def moved(clip: Clip, yaw: float, shift: tuple[float, float, float]) -> Clip:
     turn = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
     root_pos = quaternions.rotate(turn, clip.root_pos.astype(float)) + shift
-    return make_clip(clip.name, clip.fps, root_pos, quaternions.multiply(turn, clip.root_quat.astype(float)), clip.joint_pos)
+    return make_clip(
+        clip.name, clip.fps, root_pos, quaternions.multiply(turn, clip.root_quat.astype(float)), clip.joint_pos
+    )
 
 
 def column(window: np.ndarray, name: str) -> np.ndarray:
@@ -50,7 +52,10 @@ def test_walk_goes_forward_at_its_speed() -> None:
 def test_target_keeps_head_pelvis_hands_feet_and_all_the_rest() -> None:
     names = [COLUMNS[i] for i in TARGET_COLUMNS]
     kept = {name.split(".")[1] for name in names if name.startswith("p.")}
-    feet, hands = {f"{s}_ankle_roll_link" for s in ("left", "right")}, {f"{s}_wrist_yaw_link" for s in ("left", "right")}
+    feet, hands = (
+        {f"{s}_ankle_roll_link" for s in ("left", "right")},
+        {f"{s}_wrist_yaw_link" for s in ("left", "right")},
+    )
     assert kept == {"pelvis", "torso_top"} | hands | feet
     assert len(COLUMNS) == 15 * 3 + 3 + 3 + 2 + 6
     assert [n for n in names if not n.startswith("p.")] == [n for n in COLUMNS if not n.startswith("p.")]

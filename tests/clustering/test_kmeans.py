@@ -65,8 +65,10 @@ def test_elbow_stops_at_the_number_of_different_clips() -> None:
 
 def test_projection_keeps_two_dimensions_exactly() -> None:
     """Points of a plane keep their distances; rows that were not fitted are placed by the same map."""
-    flat = np.random.default_rng(0).normal(size=(20, 2)) @ np.linalg.qr(np.random.default_rng(1).normal(size=(6, 2)))[0].T
+    flat = (
+        np.random.default_rng(0).normal(size=(20, 2)) @ np.linalg.qr(np.random.default_rng(1).normal(size=(6, 2)))[0].T
+    )
     plane = project(flat, np.arange(20) < 15)
     between = np.linalg.norm(flat[:, None] - flat[None], axis=-1)
     np.testing.assert_allclose(np.linalg.norm(plane[:, None] - plane[None], axis=-1), between, atol=1e-9)
-    assert project(np.zeros((3, 1)), [True] * 3).shape == (3, 2)
+    assert project(np.array([[0.0], [1.0], [5.0]]), np.ones(3, bool)).shape == (3, 2)

