@@ -44,6 +44,7 @@ def excitation(rng: np.random.Generator, time: np.ndarray, joints: int, size: fl
     return size * waves.mean(axis=0)
 
 
+@cache
 def arm_rollout(
     seed: int, kind: str = "position", size: float = 0.8, hz: float = 50.0, seconds: float = 6.0
 ) -> Rollout:
@@ -67,6 +68,7 @@ def arm_rollout(
     return Rollout(f"arm-{kind}-{seed}", ARM_JOINTS, hz, time + rng.uniform(0, 9), *noisy, **columns, meta=meta)
 
 
+@cache
 def g1_rollout(seed: int, size: float = 0.15, seconds: float = 4.0, heading: float | None = None) -> Rollout:
     """The G1 under random targets about its stand: it sways when small, falls and thrashes when large."""
     rng = np.random.default_rng(seed)

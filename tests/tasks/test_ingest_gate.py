@@ -1,0 +1,157 @@
+"""The stages ingest and gate in a workspace of their own: files, exit codes, one line on standard error."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bumblebee.errors import BadInput
+from bumblebee.measured.rollout import write_rollout
+from tasks import gate as gate_task
+from tasks import ingest
+from tests.measured.simulated import g1_rollout
+
+Setup = Callable[..., Path]
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Setup:
+    """A workspace with two clusters of one rollout each, of which the second may be bad."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(ingest, "log_run", lambda *args, **options: None)
+
+    def make(mode: str = "ask", bad: tuple[str, ...] = (), seed: int = 0) -> Path:
+        (tmp_path / "params.yaml").write_text(f"ingest: {{}}\ngate: {{mode: {mode}}}\n")
+        for number, cluster in enumerate(("c0", "c1")):
+            rollout = g1_rollout(seed + number, 0.1, seconds=2.0)
+            rollout = replace(rollout, meta=rollout.meta | {"cluster": cluster})
+            if cluster in bad:
+                rollout = replace(rollout, joint_pos=np.full_like(rollout.joint_pos, np.nan))
+            write_rollout(Path(f"data/rollouts/r1/{cluster}/rollouts/{rollout.rollout_id}.parquet"), rollout)
+        return tmp_path
+
+    return make
+
+
+def status_of(stage: Callable[[], object]) -> int:
+    try:
+        stage()
+    except SystemExit as ended:
+        return int(ended.code or 0)
+    return 0
+
+
+def approval() -> dict:
+    return json.loads(Path("data/approvals/round-1.json").read_text())
+
+
+def test_a_round_waits_for_a_person_and_goes_on_after_the_answer(
+    workspace: Setup, capsys: pytest.CaptureFixture[str]
+) -> None:
+    workspace(bad=("c1",))
+    ingest.main(1)
+    made = {path.name for path in Path("data/measured/r1").iterdir()}
+    assert made == {"rollouts", "model.xml", "findings.csv", "summary.json", "quarantine", "overview.html"}
+    summary = json.loads(Path("data/measured/r1/summary.json").read_text())
+    assert (summary["accepted"], summary["quarantined"]) == (1, 1)
+    assert approval()["status"] == "pending"
+    capsys.readouterr()
+
+    assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_PENDING
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1 and "python -m tasks.gate --round 1 --approve --by NAME" in line
+    assert not Path("data/gates/round-1.json").exists()
+
+    assert gate_task.command(["--round", "1", "--show"]) == 0
+    shown = capsys.readouterr().out
+    assert "finite" in shown and "data/measured/r1/overview.html" in shown
+    assert gate_task.command(["--round", "1", "--approve", "--by", "Ann"]) == 0
+    gate_task.main(1)
+    passed = json.loads(Path("data/gates/round-1.json").read_text())
+    assert (passed["status"], passed["by"], passed["seen"]["accepted"]) == ("approved", "Ann", 1)
+
+
+def test_a_rejected_round_stops_and_says_who_and_why(workspace: Setup, capsys: pytest.CaptureFixture[str]) -> None:
+    workspace()
+    ingest.main(1)
+    gate_task.command(["--round", "1", "--approve", "--by", "Ann"])
+    gate_task.main(1)
+    gate_task.command(["--round", "1", "--reject", "--by", "Bob", "--note", "wrong\nrobot"])
+    capsys.readouterr()
+    assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_REJECTED
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1 and "Bob" in line and "wrong robot" in line
+    assert not Path("data/gates/round-1.json").exists()
+
+
+def test_other_data_need_another_answer(workspace: Setup, capsys: pytest.CaptureFixture[str]) -> None:
+    workspace()
+    ingest.main(1)
+    gate_task.command(["--round", "1", "--approve", "--by", "Ann"])
+    workspace(seed=4)
+    ingest.main(1)
+    assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_PENDING
+    assert [entry["by"] for entry in approval()["history"]] == ["Ann"]
+
+
+def test_the_same_data_give_the_same_bytes_and_keep_the_answer(workspace: Setup) -> None:
+    workspace()
+    ingest.main(1)
+    first = {path: path.read_bytes() for path in Path("data/measured").rglob("*") if path.is_file()}
+    gate_task.command(["--round", "1", "--approve", "--by", "Ann"])
+    ingest.main(1)
+    assert {path: path.read_bytes() for path in Path("data/measured").rglob("*") if path.is_file()} == first
+    assert approval()["status"] == "approved"
+
+
+def test_the_automatic_gate_answers_itself_and_says_so(workspace: Setup, capsys: pytest.CaptureFixture[str]) -> None:
+    workspace("auto")
+    ingest.main(1)
+    assert approval()["by"] == "automatic (gate.mode: auto)"
+    assert "automatic" in capsys.readouterr().out
+    gate_task.main(1)
+    assert Path("data/gates/round-1.json").exists()
+
+
+def test_the_automatic_gate_does_not_overrule_a_person(workspace: Setup) -> None:
+    workspace("auto")
+    ingest.main(1)
+    gate_task.command(["--round", "1", "--reject", "--by", "Bob"])
+    ingest.main(1)
+    assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_REJECTED
+
+
+def test_a_round_without_one_good_file_fails_and_leaves_nothing(workspace: Setup) -> None:
+    workspace(bad=("c0", "c1"))
+    with pytest.raises(BadInput, match="2 files that all fail"):
+        ingest.main(1)
+    assert not Path("data/approvals").exists()
+    assert not any(path.is_file() for path in Path("data/measured").rglob("*"))
+
+
+def test_models_that_differ_between_clusters_are_named(workspace: Setup) -> None:
+    workspace()
+    for cluster in ("c0", "c1"):
+        Path(f"data/rollouts/r1/{cluster}/model.xml").write_text(f"<mujoco model='{cluster}'/>")
+    with pytest.raises(BadInput, match="same model"):
+        ingest.main(1)
+
+
+def test_as_a_process_the_gate_ends_with_its_status_and_one_line(workspace: Setup) -> None:
+    folder = workspace()
+    root = str(Path(gate_task.__file__).parents[1])
+    run = subprocess.run(
+        [sys.executable, "-m", "tasks.gate", "--round", "1"],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": root},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 2 and run.stderr.count("\n") == 1 and "summary.json" in run.stderr
