@@ -6,7 +6,8 @@ Writes data/evaluation/contract.json, episodes.parquet (one row an episode) and 
 import json
 import tempfile
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -28,12 +29,13 @@ from bumblebee.evaluation.contract import (
 )
 from bumblebee.evaluation.episodes import rollout_metrics
 from bumblebee.evaluation.summary import COLUMNS, comparisons, results
+from bumblebee.evaluation.untrained import export_untrained
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
 from bumblebee.progress import progress
 from tasks.params import FILE, read
-from tasks.rollouts import library_folder, start_stand_in
+from tasks.rollouts import cut, library_folder, start_stand_in
 from tasks.stage import load, log_run, output_folder, run_stage
 
 OUT = Path("data/evaluation")
@@ -146,13 +148,6 @@ def motions(config: EvaluateConfig) -> tuple[list[Clip], dict[str, str]]:
     return clips, dict(zip(labels["name"], labels["cluster"], strict=True))
 
 
-def cut(clip: Clip, seconds: float) -> Clip:
-    """The beginning of a clip, at most `seconds` long."""
-    frames = min(clip.frames, int(seconds * clip.fps) + 1)
-    arrays = {name: getattr(clip, name)[:frames] for name in ("root_pos", "root_quat", "joint_pos", "key_pos")}
-    return replace(clip, **arrays)
-
-
 def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
     """The contract; one that is not the wanted one is refused, with what differs if the old one is still there."""
     unknown = [name for name in config.engines if name not in ENGINES]
@@ -190,7 +185,8 @@ def candidates(scratch: Path | None) -> tuple[list[Candidate], list[str]]:
     if not found:
         raise BadInput("models", "at least one exported policy", "none", "Train first.")
     if scratch is not None:
-        found.insert(0, Candidate("untrained", "untrained", untrained(scratch / "untrained", found[0].folder)))
+        export_untrained(found[0].folder, scratch / "untrained")
+        found.insert(0, Candidate("untrained", "untrained", scratch / "untrained"))
     return found, missing
 
 
@@ -260,19 +256,11 @@ def stand_in(
     return (read_rollout(scratch / "rollouts" / f"{e.rollout_id}.parquet") for e in planned)
 
 
-def untrained(folder: Path, like: Path) -> Path:
-    """A policy of the same shape as `like` with fresh weights, exported."""
-    from bumblebee.evaluation.untrained import export_untrained
-
-    export_untrained(like, folder)
-    return folder
-
-
 def chain(found: list[Candidate]) -> list[tuple[str, str]]:
     """What is compared with what: each step of the loop, and the generalist with all before it."""
     rounds = sorted({c.round for c in found if c.round is not None})
     steps = ["untrained", "base", *(f"experts-r{number}" for number in rounds), "generalist"]
-    pairs = list(zip(steps, steps[1:], strict=False))
+    pairs = list(pairwise(steps))
     extra = [("base", steps[-2]), ("base", "generalist")]
     return list(dict.fromkeys(pairs + [pair for pair in extra if pair[0] != pair[1]]))
 

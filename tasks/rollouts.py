@@ -5,21 +5,28 @@ The robot is the stand-in, a process of its own, or, where `rollouts.source` nam
 """
 
 import json
+import os
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
+import tempfile
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+import bumblebee
+from bumblebee.deploy.episodes import Episode, run_episodes
+from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.deploy.robots import NominalRobots
+from bumblebee.deploy.sensors import NO_NOISE
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.episodes import rollout_metrics
 from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.store import read_index, read_library
+from bumblebee.motion.store import read_index, read_library, write_library
 from bumblebee.robot.model import write_xml
 from tasks.params import FILE, read
 from tasks.stage import load, log_run, output_folder, run_stage
@@ -42,7 +49,7 @@ class RolloutsConfig:
     threads: int = 2
     """CPU threads of the stand-in."""
     max_seconds: float = 10.0
-    """Longer clips are not run."""
+    """Longer clips are cut to their beginning [s]."""
 
 
 def main(round: int, cluster: str) -> None:
@@ -51,16 +58,17 @@ def main(round: int, cluster: str) -> None:
     target = Path(f"data/rollouts/r{round}/{cluster}")
     with output_folder(target) as folder:
         if config.source is not None:
-            count = copy_users(config.source / f"r{round}" / cluster, folder)
-            chosen = pd.DataFrame()
+            copy_users(config.source / f"r{round}" / cluster, folder)
         else:
             policy = Path(f"models/experts/r{parent_round(round)}/{cluster}")
-            chosen = choose(policy, cluster, config, round)
+            clips = draw(candidates(cluster, config.max_seconds), config, round, cluster)
+            chosen = choose(policy, clips, config)
             chosen.to_csv(folder / "chosen.csv", index=False)
-            run_stand_in(policy, cluster, list(chosen["motion"][chosen["run"]]), folder, config, round)
-            count = len(list((folder / "rollouts").glob("*.parquet")))
+            run_names = set(chosen["motion"][chosen["run"]])
+            run_stand_in(policy, cluster, [clip for clip in clips if clip.name in run_names], folder, config, round)
         if not (folder / "model.xml").exists():
             write_xml(folder / "model.xml")
+        count = len(list((folder / "rollouts").glob("*.parquet")))
     print(f"round {round}, {cluster}: {count} measured rollouts in {target}")
     log_run("rollouts", cluster=cluster, round=round, params=config, metrics={"rollouts": count})
 
@@ -74,22 +82,19 @@ def parent_round(round: int, rounds: list[dict[str, Any]] | None = None) -> int:
     raise BadInput(f"{FILE}: rounds", f"an entry with n: {round} and its parent", str(listed))
 
 
-def choose(policy: Path, cluster: str, config: RolloutsConfig, round: int) -> pd.DataFrame:
-    """Which motions are run: a seeded draw among those that the policy follows in the nominal simulation.
+def draw(clips: list[Clip], config: RolloutsConfig, round: int, cluster: str) -> list[Clip]:
+    """The clips in a drawn order, another in every round; no more than four times those that are run."""
+    rng = np.random.default_rng([config.seed, round, *cluster.encode()])
+    return [clips[i] for i in rng.permutation(len(clips))[: 4 * config.motions]]
+
+
+def choose(policy: Path, clips: list[Clip], config: RolloutsConfig) -> pd.DataFrame:
+    """Which of the drawn clips are run: the first that the policy follows to their end in the nominal simulation.
 
     Where it follows fewer than wanted, those that it followed longest fill up: they give data until the fall. Columns:
-    motion, family, success, frames (before termination), mpkpe_mm, run.
+    motion, family, success, frames (before termination), share (of the clip), mpkpe_mm, run.
     """
-    clips = candidates(cluster, config.max_seconds)
-    if not clips:
-        raise BadInput(
-            "data/clusters/labels.parquet",
-            f"motions of {cluster} in the train split, at most {config.max_seconds:g} s",
-            "none",
-        )
     table = followed(policy, clips, config.threads)
-    rng = np.random.default_rng([config.seed, round, *cluster.encode()])
-    table = table.iloc[rng.permutation(len(table))]
     # Stable: the draw decides among those that succeed, the share that was followed among those that do not.
     table = table.sort_values("share", ascending=False, kind="stable").reset_index(drop=True)
     table["run"] = np.arange(len(table)) < config.motions
@@ -98,11 +103,6 @@ def choose(policy: Path, cluster: str, config: RolloutsConfig, round: int) -> pd
 
 def followed(policy: Path, clips: list[Clip], threads: int) -> pd.DataFrame:
     """How far the policy follows each clip in the declared model, without noise."""
-    from bumblebee.deploy.episodes import Episode, run_episodes
-    from bumblebee.deploy.policy import ExportedPolicy
-    from bumblebee.deploy.robots import NominalRobots
-    from bumblebee.deploy.sensors import NO_NOISE
-
     episodes = [Episode(clip.name, "expert", clip.name, 0) for clip in clips]
     by_name = {clip.name: clip for clip in clips}
     rollouts = run_episodes(
@@ -112,22 +112,26 @@ def followed(policy: Path, clips: list[Clip], threads: int) -> pd.DataFrame:
     for clip, rollout in zip(clips, rollouts, strict=True):
         result = rollout_metrics(rollout, clip, success_threshold(clip.family))
         share = 1.0 if result.success else result.frames / clip.frames
-        rows.append((clip.name, clip.family, result.success, result.frames, round_to(share), result.mpkpe_mm))
+        rows.append((clip.name, clip.family, result.success, result.frames, share, result.mpkpe_mm))
     return pd.DataFrame(rows, columns=["motion", "family", "success", "frames", "share", "mpkpe_mm"])
 
 
-def round_to(share: float) -> float:
-    """Shares in steps of a tenth, so that the draw still matters among equals."""
-    return float(np.floor(share * 10) / 10)
-
-
 def candidates(cluster: str, max_seconds: float) -> list[Clip]:
-    """Kept clips of the cluster that were trained on and are short enough."""
+    """Kept clips of the cluster that were trained on, cut to their beginning where they are longer."""
     labels = pd.read_parquet("data/clusters/labels.parquet")
     index = read_index(Path("data/filtered"))
-    usable = set(index["name"][(index["split"] == "train") & (index["duration"] <= max_seconds)])
+    usable = set(index["name"][index["split"] == "train"])
     names = [name for name in labels["name"][labels["cluster"] == cluster] if name in usable]
-    return read_library(library_folder(), names)
+    if not names:
+        raise BadInput("data/clusters/labels.parquet", f"motions of {cluster} in the train split", "none")
+    return [cut(clip, max_seconds) for clip in read_library(library_folder(), names)]
+
+
+def cut(clip: Clip, seconds: float) -> Clip:
+    """The beginning of a clip, at most `seconds` long."""
+    frames = min(clip.frames, int(seconds * clip.fps) + 1)
+    arrays = {name: getattr(clip, name)[:frames] for name in ("root_pos", "root_quat", "joint_pos", "key_pos")}
+    return replace(clip, **arrays)
 
 
 def library_folder() -> Path:
@@ -137,37 +141,39 @@ def library_folder() -> Path:
 
 
 def run_stand_in(
-    policy: Path, cluster: str, names: list[str], folder: Path, config: RolloutsConfig, round: int
+    policy: Path, cluster: str, clips: list[Clip], folder: Path, config: RolloutsConfig, round: int
 ) -> None:
     """Start the stand-in as its own process and wait; its one line of complaint becomes ours."""
-    parent = parent_round(round)
-    meta = {
-        "cluster": cluster,
-        "policy": {"name": f"expert-{cluster}", "version": f"r{parent}", "sha256": _sha256(policy)},
-    }
+    name, parent = f"expert-{cluster}", parent_round(round)
+    used = {"name": name, "version": f"r{parent}", "sha256": ExportedPolicy.load(policy).sha256}
     episodes = [
         {
-            "rollout_id": f"r{round}-{cluster}-{name}-{run}",
-            "policy": f"expert-{cluster}",
-            "motion": name,
+            "rollout_id": f"r{round}-{cluster}-{clip.name}-{run}",
+            "policy": name,
+            "motion": clip.name,
             "seed": config.seed + 1000 * round + run,
-            "meta": meta,
+            "meta": {"cluster": cluster, "policy": used},
         }
-        for name in names
+        for clip in clips
         for run in range(config.repeats)
     ]
-    plan = {"policies": {f"expert-{cluster}": str(policy)}, "episodes": episodes}
-    start_stand_in(plan, library_folder(), folder / "rollouts", folder, config.threads)
+    plan = {"policies": {name: str(policy.resolve())}, "episodes": episodes}
+    with tempfile.TemporaryDirectory() as scratch:
+        write_library(Path(scratch) / "clips", clips)
+        start_stand_in(plan, Path(scratch) / "clips", folder / "rollouts", Path(scratch), config.threads)
 
 
 def start_stand_in(plan: dict[str, Any], clips: Path, out: Path, work: Path, threads: int) -> None:
     """Run a plan on the stand-in robot, in another process, which alone reads the sealed effects."""
-    file = work / ".plan.json"
+    file = work / "plan.json"
     file.write_text(json.dumps(plan))
     command = [sys.executable, "-m", "bumblebee.deploy.stand_in", "--sealed", str(SEALED), "--clips", str(clips)]
     command += ["--plan", str(file), "--out", str(out), "--threads", str(threads)]
-    ended = subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False)
-    file.unlink()
+    # The same code as ours, also where it is not installed and the workspace is elsewhere.
+    code = os.pathsep.join(filter(None, (str(Path(bumblebee.__file__).parents[1]), os.environ.get("PYTHONPATH"))))
+    ended = subprocess.run(
+        command, stderr=subprocess.PIPE, text=True, check=False, env={**os.environ, "PYTHONPATH": code}
+    )
     if ended.returncode:
         lines = ended.stderr.strip().splitlines()
         raise BadInput(
@@ -175,7 +181,7 @@ def start_stand_in(plan: dict[str, Any], clips: Path, out: Path, work: Path, thr
         )
 
 
-def copy_users(source: Path, folder: Path) -> int:
+def copy_users(source: Path, folder: Path) -> None:
     """Copy the user's rollouts and model; the originals are not touched."""
     inner = source / "rollouts" if (source / "rollouts").is_dir() else source
     files = sorted(inner.glob("*.parquet")) if inner.is_dir() else []
@@ -188,13 +194,6 @@ def copy_users(source: Path, folder: Path) -> int:
         shutil.copy2(file, folder / "rollouts" / file.name)
     if (source / "model.xml").is_file():
         shutil.copy2(source / "model.xml", folder / "model.xml")
-    return len(files)
-
-
-def _sha256(policy: Path) -> str:
-    from bumblebee.deploy.policy import read_policy_contract
-
-    return str(read_policy_contract(policy / "contract.json")["onnx_sha256"])
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ def main() -> None:
     effects = draw(config)
     sealed = {
         "schema": 1,
-        "sealed": "Undeclared effects of the stand-in robot. Read by the stand-in's process and by the final report, by no other stage.",
+        "sealed": "Undeclared effects of the stand-in robot, for its process and the final report only.",
         "seed": config.seed,
         "null": config.null,
         "effects": effects,

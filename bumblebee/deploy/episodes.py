@@ -92,9 +92,9 @@ def run_episodes(
 def start_states(
     clips: Sequence[Clip], rngs: Sequence[np.random.Generator], noise: StartNoise
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Start states at the clips' first frames with noise on the joints, soles on the floor: qpos (B, 7+J), qvel (B, 6+J).
+    """Start states at the clips' first frames, joints with noise, soles on the floor.
 
-    A clip whose first frame is further than 10 cm from the floor (it starts in the air) is left where it is.
+    Returns qpos (B, 7 + J) and qvel (B, 6 + J). A clip whose first frame is further than 10 cm from the floor (it starts in the air) is left where it is.
     """
     first = [velocities(clip) for clip in clips]
     joints = np.stack([clip.joint_pos[0] for clip in clips]).astype(np.float64)

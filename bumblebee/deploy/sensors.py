@@ -12,8 +12,8 @@ class Sensors:
     """Readings of B robots, float64; the measured-rollout contract's columns of the same names.
 
     `joint_pos` (B, J) [rad], `joint_vel` (B, J) [rad/s], `base_quat` (B, 4) wxyz, `base_ang_vel` (B, 3) [rad/s, base],
-    `base_lin_vel` (B, 3) [m/s, base], `base_pos` (B, 3) [m, world], `joint_torque` (B, J) [N m] as the drive reports it,
-    `foot_force` (B, 2, 3) [N, world].
+    `base_lin_vel` (B, 3) [m/s, base], `base_pos` (B, 3) [m, world], `joint_torque` (B, J) [N m] that the drive
+    reports, `foot_force` (B, 2, 3) [N, world].
     """
 
     joint_pos: np.ndarray

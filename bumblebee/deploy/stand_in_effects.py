@@ -30,8 +30,9 @@ STEP_MS = 1
 class SealedEffects:
     """What is undeclared in this robot; J joints in the model's order.
 
-    `coulomb` (J,) [N m], `viscous` (J,) [N m s/rad], `strength` (J,) factor on the servo's torque, `delay_ms` (J,) whole
-    milliseconds of command delay, `offset` (J,) [rad] that encoders add, `armature` {dof: kg m^2}, `mass` {body id: kg}.
+    `coulomb` (J,) [N m], `viscous` (J,) [N m s/rad], `strength` (J,) factor on the servo's torque, `delay_ms` (J,)
+    whole milliseconds of command delay, `offset` (J,) [rad] that encoders add, `armature` {dof: kg m^2}, `mass`
+    {body id: kg}.
     """
 
     coulomb: np.ndarray

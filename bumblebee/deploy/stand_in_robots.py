@@ -54,7 +54,7 @@ class StandInRobots:
         self.batch.forward()
 
     def read(self) -> Sensors:
-        """Readings of all robots without noise, but with the encoders' offset and the drives' belief of their torque."""
+        """Readings of all robots without noise, with the encoders' offset and the drives' belief of their torque."""
         true = self._view.sensors(self._reported)
         return Sensors(**{**vars(true), "joint_pos": true.joint_pos + self.effects.offset})
 

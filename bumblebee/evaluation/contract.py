@@ -146,7 +146,7 @@ def read_contract(path: Path) -> dict[str, Any]:
 
 
 def require_same(first: dict[str, Any], second: dict[str, Any], where: object) -> None:
-    """Refuse to compare two evaluations (as `Contract.as_dict`) of different contracts; names the fields that differ."""
+    """Refuse to compare evaluations of different contracts (`Contract.as_dict`); names the fields that differ."""
     if first["sha256"] == second["sha256"]:
         return
     keys = sorted((set(first) | set(second)) - {"sha256"})

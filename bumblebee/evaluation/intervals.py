@@ -44,7 +44,7 @@ def success_rate(success: np.ndarray, motions: np.ndarray) -> Estimate:
     """Share of successes with Wilson's interval at the effective number of episodes.
 
     The effective number is n / deff, deff from the variance between motions (cluster-robust variance over the binomial
-    one, not below 1). Where the variance is nought (all succeed, or none) it is the number of motions: the cautious end.
+    one, not below 1). Where the variance is nought (all succeed, or none) it is the number of motions.
 
     Args:
         success: (N,) bool, one per episode.
@@ -128,7 +128,7 @@ def sign_flip_test(differences: np.ndarray, seed: int = 0) -> float:
 
 
 def mcnemar_test(first: np.ndarray, second: np.ndarray) -> float:
-    """Exact two-sided p-value of McNemar's test for paired successes (N,) bool: the binomial of the discordant pairs."""
+    """Exact two-sided p-value of McNemar's test for paired successes (N,) bool: a binomial of discordant pairs."""
     first, second = np.asarray(first, dtype=bool), np.asarray(second, dtype=bool)
     gained, lost = int((second & ~first).sum()), int((first & ~second).sum())
     return 1.0 if gained + lost == 0 else float(stats.binomtest(gained, gained + lost, 0.5).pvalue)

@@ -1,0 +1,137 @@
+"""The stages that run policies, on a workspace of three short clips and a policy that follows blindly."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bumblebee.errors import BadInput
+from bumblebee.learning.export import write_export
+from bumblebee.measured.rollout import read_dataset
+from bumblebee.motion.store import write_library
+from bumblebee.tracking.library import AHEAD
+from tasks import evaluate, rollouts, seal
+from tests.deploy.conftest import linear_onnx, nod
+
+PARAMS = """
+clusters: [c0, c1]
+rounds: [{n: 1, parent: 0}]
+seal: {seed: 3}
+rollouts: {motions: 1, repeats: 2, threads: 1}
+evaluate: {threads: 1}
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace as it is before the first round's rollouts."""
+    root = tmp_path_factory.mktemp("workspace")
+    (root / "params.yaml").write_text(PARAMS)
+    clips = [nod("a", 10), nod("b", 14), nod("far", 12, split="test")]
+    write_library(root / "data/filtered", clips)
+    (root / "data/clusters").mkdir()
+    labels = pd.DataFrame({"name": ["a", "b", "far"], "cluster": ["c0", "c0", "c1"], "x": 0.0, "y": 0.0})
+    labels.to_parquet(root / "data/clusters/labels.parquet")
+    for folder in ("models/base", "models/experts/r0/c0", "models/experts/r0/c1"):
+        (root / folder).mkdir(parents=True)
+        write_export(root / folder, linear_onnx(0.0), AHEAD)
+    return root
+
+
+@pytest.fixture
+def workspace(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of it to work in, without MLflow."""
+    shutil.copytree(made, tmp_path / "work")
+    monkeypatch.chdir(tmp_path / "work")
+    for module in (rollouts, evaluate):
+        monkeypatch.setattr(module, "log_run", lambda *_, **__: None)
+    return tmp_path / "work"
+
+
+def test_a_round_of_one_cluster_gives_a_dataset_of_the_contract(workspace: Path) -> None:
+    seal.main()
+    rollouts.main(round=1, cluster="c0")
+    dataset = read_dataset(workspace / "data/rollouts/r1/c0")
+    chosen = pd.read_csv(workspace / "data/rollouts/r1/c0/chosen.csv")
+    assert dataset.model_path is not None and len(dataset.rollouts) == 2
+    assert chosen["run"].sum() == 1 and chosen["success"].all()
+    assert {r.meta["motion"] for r in dataset.rollouts} == set(chosen["motion"][chosen["run"]]) <= {"a", "b"}
+    assert {r.meta["policy"]["version"] for r in dataset.rollouts} == {"r0"}
+    assert not np.array_equal(dataset.rollouts[0].joint_pos, dataset.rollouts[1].joint_pos)
+
+
+def test_without_a_sealed_robot_the_stage_says_so_and_leaves_nothing(workspace: Path) -> None:
+    with pytest.raises(BadInput, match=r"data/sealed/robot\.json"):
+        rollouts.main(round=1, cluster="c0")
+    assert not list((workspace / "data/rollouts/r1").glob("*"))
+
+
+def test_held_out_motions_are_not_run(workspace: Path) -> None:
+    with pytest.raises(BadInput, match="c1 in the train split"):
+        rollouts.main(round=1, cluster="c1")
+
+
+def test_a_round_that_is_not_in_params_is_refused(workspace: Path) -> None:
+    with pytest.raises(BadInput, match="n: 7"):
+        rollouts.main(round=7, cluster="c0")
+
+
+def test_the_users_own_files_take_the_stand_ins_place(workspace: Path) -> None:
+    own = workspace / "mine/r1/c0"
+    own.mkdir(parents=True)
+    (own / "walk.parquet").write_bytes(b"whatever the robot wrote")
+    (workspace / "params.yaml").write_text(PARAMS.replace("motions: 1,", "motions: 1, source: mine,"))
+    rollouts.main(round=1, cluster="c0")
+    copied = workspace / "data/rollouts/r1/c0"
+    assert (copied / "rollouts/walk.parquet").read_bytes() == (own / "walk.parquet").read_bytes()
+    assert (copied / "model.xml").exists()
+    with pytest.raises(BadInput, match="mine/r1/c1"):
+        rollouts.main(round=1, cluster="c1")
+
+
+def test_evaluation_covers_policies_engines_and_splits_and_repeats_itself(workspace: Path) -> None:
+    seal.main()
+    evaluate.main()
+    summary = json.loads((workspace / "data/evaluation/summary.json").read_text())
+    episodes = pd.read_parquet(workspace / "data/evaluation/episodes.parquet")
+    counts = episodes.groupby(["engine", "policy"]).size().to_dict()
+    for engine in ("nominal", "stand_in"):
+        assert {name: counts[engine, name] for name in ("untrained", "base", "expert-c0-r0", "expert-c1-r0")} == {
+            "untrained": 3,
+            "base": 3,
+            "expert-c0-r0": 2,
+            "expert-c1-r0": 1,
+        }
+    assert episodes[episodes["policy"] == "base"]["success"].all()
+    assert set(episodes["split"]) == {"train", "test"}
+    assert set(summary["missing"]) == {"generalist", "expert-c0-r1", "expert-c1-r1"}
+    same = [c for c in summary["comparisons"] if (c["from"], c["to"]) == ("base", "experts-r0") and c["split"] == "all"]
+    assert {c["engine"] for c in same} == {"nominal", "stand_in"}
+    assert all(c["success"]["value"] == 0.0 and c["success"]["p"] == 1.0 for c in same)
+    contract = json.loads((workspace / "data/evaluation/contract.json").read_text())
+    assert summary["contract_sha256"] == contract["sha256"]
+    evaluate.main()
+    assert pd.read_parquet(workspace / "data/evaluation/episodes.parquet").equals(episodes)
+
+
+def test_another_contract_than_the_wanted_one_is_refused_with_what_differs(workspace: Path) -> None:
+    (workspace / "params.yaml").write_text(
+        PARAMS.replace("{threads: 1}", "{threads: 1, engines: [nominal], untrained: false}")
+    )
+    evaluate.main()
+    wanted = json.loads((workspace / "data/evaluation/contract.json").read_text())["sha256"]
+    changed = f"{{threads: 1, engines: [nominal], seeds: [1], contract: {wanted}}}"
+    (workspace / "params.yaml").write_text(PARAMS.replace("evaluate: {threads: 1}", f"evaluate: {changed}"))
+    before = (workspace / "data/evaluation/summary.json").read_bytes()
+    with pytest.raises(BadInput, match="seeds"):
+        evaluate.main()
+    assert (workspace / "data/evaluation/summary.json").read_bytes() == before
+
+
+def test_an_unknown_engine_is_named(workspace: Path) -> None:
+    (workspace / "params.yaml").write_text(PARAMS.replace("{threads: 1}", "{engines: [gazebo]}"))
+    with pytest.raises(BadInput, match="gazebo"):
+        evaluate.main()
