@@ -49,17 +49,23 @@ def read_stages(workspace: Path) -> list[Stage]:
             graph = repo.index.graph
             found = {}
             for node in repo.index.stages:
-                needs = frozenset(other.addressing for other in graph.successors(node))
+                needs = frozenset(_name(other.addressing) for other in graph.successors(node))
                 made = {str(out.fs_path) for out in repo.index.outs}
                 lacks = frozenset(
                     str(dep.def_path)
                     for dep in node.deps
                     if dep.def_path and not dep.exists and not any(_inside(str(dep.fs_path), out) for out in made)
                 )
-                found[node.addressing] = Stage(node.addressing, str(node.cmd), needs, lacks)
+                name = _name(node.addressing)
+                found[name] = Stage(name, str(node.cmd), needs, lacks)
     except DvcException as error:
         raise BadInput(workspace / "dvc.yaml", "stages that DVC can read", str(error)) from None
     return in_order(found.values())
+
+
+def _name(address: str) -> str:
+    """A stage's name; seen from another folder, DVC puts the path of dvc.yaml before it."""
+    return address.rpartition(":")[2]
 
 
 def _inside(path: str, out: str) -> bool:
@@ -87,7 +93,7 @@ def changed_stages(workspace: Path) -> set[str]:
     from dvc.repo import Repo
 
     with Repo(str(workspace)) as repo:
-        return {name.removeprefix("dvc.yaml:") for name in repo.status()}
+        return {_name(address) for address in repo.status()}
 
 
 def downstream(stages: list[Stage], name: str) -> set[str]:

@@ -1,0 +1,72 @@
+"""The graph of stages: order, what is touched by a change, and gates that hold up nobody."""
+
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from dvc.repo import Repo
+
+from bumblebee.errors import BadInput
+from flows.stages import Stage, changed_stages, downstream, in_order, read_stages, to_run
+
+
+def stage(name: str, *needs: str, command: str = "") -> Stage:
+    return Stage(name, command, frozenset(needs), frozenset())
+
+
+DIAMOND = [stage("d", "b", "c"), stage("b", "a"), stage("c", "a"), stage("a"), stage("x")]
+
+
+def test_each_stage_comes_after_those_it_needs():
+    order = [each.name for each in in_order(DIAMOND)]
+    assert sorted(order) == ["a", "b", "c", "d", "x"]
+    assert order.index("a") < order.index("b") < order.index("d") and order.index("c") < order.index("d")
+
+
+def test_a_change_touches_what_follows_and_nothing_else():
+    assert to_run(DIAMOND, {"b"}) == {"b", "d"}
+    assert to_run(DIAMOND, set()) == set()
+    assert downstream(DIAMOND, "a") == {"b", "c", "d"}
+
+
+def test_a_title_names_round_and_cluster():
+    refine = stage("refine@after0-c1", command="python -m tasks.refine --round 1 --cluster c1")
+    assert (refine.kind, refine.title, refine.option("round")) == ("refine", "refine round 1 c1", "1")
+    assert stage("seal", command="python -m tasks.seal").option("round") is None
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    """Two stages, the second of which reads an answer that no stage makes."""
+    write = f"{sys.executable} -c \"import pathlib; pathlib.Path('{{}}').write_text('1')\""
+    stages = {
+        "one": {"cmd": write.format("a.txt"), "params": ["one"], "outs": ["a.txt"]},
+        "two": {"cmd": write.format("b.txt"), "deps": ["a.txt", "answer.json"], "outs": ["b.txt"]},
+    }
+    (tmp_path / "dvc.yaml").write_text(yaml.safe_dump({"stages": stages}))
+    (tmp_path / "params.yaml").write_text("one: {a: 1}\n")
+    Repo.init(str(tmp_path), no_scm=True)
+    return tmp_path
+
+
+def test_stages_are_read_with_their_needs_and_what_is_lacking(workspace: Path):
+    one, two = read_stages(workspace)
+    assert (one.name, one.needs, one.lacks) == ("one", frozenset(), frozenset())
+    assert (two.name, two.needs, two.lacks) == ("two", frozenset({"one"}), frozenset({"answer.json"}))
+
+
+def test_what_dvc_ran_is_not_changed_until_its_parameters_are(workspace: Path):
+    (workspace / "answer.json").write_text("{}")
+    assert changed_stages(workspace) == {"one", "two"}
+    with Repo(str(workspace)) as repo:
+        repo.reproduce()
+    assert changed_stages(workspace) == set()
+    (workspace / "params.yaml").write_text("one: {a: 2}\n")
+    assert changed_stages(workspace) == {"one"}
+
+
+def test_a_pipeline_that_dvc_cannot_read_is_bad_input(workspace: Path):
+    (workspace / "dvc.yaml").write_text("stages: {one: {cmd: 1, typo: 2}}\n")
+    with pytest.raises(BadInput, match="stages that DVC can read"):
+        read_stages(workspace)

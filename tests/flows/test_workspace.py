@@ -1,0 +1,60 @@
+"""A workspace holds its own settings and data, uses the checkout's code, and keeps what it has."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from bumblebee.errors import BadInput
+from flows import workspace as workspaces
+from flows.stages import read_stages
+from tasks.params import read
+
+
+def test_sections_merge_and_everything_else_is_replaced():
+    base = {"clusters": ["c0", "c1"], "base": {"ppo": {"iterations": 600, "gamma": 0.97}, "seed": 0}}
+    over = {"clusters": ["c0"], "base": {"ppo": {"iterations": 2}}}
+    merged = workspaces.merge(base, over)
+    assert merged == {"clusters": ["c0"], "base": {"ppo": {"iterations": 2, "gamma": 0.97}, "seed": 0}}
+    assert base["base"]["ppo"]["iterations"] == 600
+
+
+def test_every_profile_only_changes_keys_that_are_known():
+    known = set(read(workspaces.HOME / "params.yaml"))
+    for profile in (workspaces.HOME / "profiles").glob("*.yaml"):
+        assert set(read(profile)) <= known
+
+
+def test_a_workspace_has_the_checkouts_graph_and_its_own_parameters(tmp_path: Path):
+    folder = workspaces.create(tmp_path / "lab", gate={"mode": "ask"})
+    assert {s.name for s in read_stages(folder)} == {s.name for s in read_stages(workspaces.HOME)}
+    assert read(folder / "params.yaml")["gate"] == {"mode": "ask"}
+    assert (folder / "bumblebee" / "errors.py").samefile(workspaces.HOME / "bumblebee" / "errors.py")
+
+
+def test_making_it_again_changes_nothing_and_keeps_data(tmp_path: Path):
+    folder = workspaces.create(tmp_path / "lab")
+    (folder / "data").mkdir()
+    (folder / "data" / "x").touch()
+    before = {p: p.lstat().st_mtime_ns for p in folder.rglob("*") if ".dvc/tmp" not in str(p)}
+    workspaces.create(folder)
+    assert {p: p.lstat().st_mtime_ns for p in folder.rglob("*") if ".dvc/tmp" not in str(p)} == before
+
+
+def test_the_users_motions_are_a_dependency_of_the_stage_that_reads_them(tmp_path: Path):
+    motions = tmp_path / "mocap"
+    motions.mkdir()
+    folder = workspaces.create(tmp_path / "lab", motions=motions)
+    stages = yaml.safe_load((folder / "dvc.yaml").read_text())["stages"]
+    assert str(motions) in stages["motions"]["deps"]
+    assert read(folder / "params.yaml")["motions"]["source"] == str(motions)
+
+
+def test_missing_motions_and_unknown_names_are_bad_input(tmp_path: Path):
+    with pytest.raises(BadInput, match="a folder of motion files"):
+        workspaces.create(tmp_path / "lab", motions=tmp_path / "nothing")
+    assert not (tmp_path / "lab").exists()
+    with pytest.raises(BadInput, match="smoke"):
+        workspaces.create(tmp_path / "lab", profile="smkoe")
+    with pytest.raises(BadInput, match="a workspace"):
+        workspaces.named("no-such-workspace")
