@@ -10,6 +10,8 @@ from bumblebee.motion import safe_pickle
 from bumblebee.motion.raw import RawMotion
 from bumblebee.robot.facts import joint_names
 
+_MAX_FRAMES = 5_000_000  # in all motions of a file; a pickle may name one array many times
+
 # What we call it -> what the field calls it, ASAP's name first, then GMR's.
 _FIELDS = {
     "root_pos": ("root_trans_offset", "root_pos"),
@@ -27,7 +29,10 @@ def read_asap_pickle(path: Path) -> list[RawMotion]:
         return [_motion(path, path.stem, "", content)]
     if len(content) == 1:
         return [_motion(path, path.stem, "", next(iter(content.values())))]
-    return [_motion(path, f"{path.stem}_{name}", str(name), motion) for name, motion in content.items()]
+    motions = [_motion(path, f"{path.stem}_{name}", str(name), motion) for name, motion in content.items()]
+    if sum(len(motion.root_pos) for motion in motions) > _MAX_FRAMES:
+        raise BadInput(path, f"at most {_MAX_FRAMES} frames in a file", "more", "Split the file.")
+    return motions
 
 
 def _motion(path: Path, name: str, part: str, motion: Any) -> RawMotion:
@@ -45,7 +50,8 @@ def _motion(path: Path, name: str, part: str, motion: Any) -> RawMotion:
     if isinstance(fps, np.ndarray) and fps.size == 1:
         fps = fps.item()
     if isinstance(fps, bool) or not isinstance(fps, int | float) or not 1 <= fps <= 1000:
-        raise BadInput(f"{where}, fps", "a number of frames a second from 1 to 1000", repr(fps)[:60])
+        came = str(fps) if isinstance(fps, int | float) else f"a {type(fps).__name__}"
+        raise BadInput(f"{where}, fps", "a number of frames a second from 1 to 1000", came)
     xyzw = root_quat[:, [3, 0, 1, 2]]
     return RawMotion(name, float(fps), root_pos, xyzw, actuated(joint_pos), path, first_row=0, part=part)
 

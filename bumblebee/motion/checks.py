@@ -74,6 +74,7 @@ def quaternion_order(raw: RawMotion) -> None:
 
     A robot that stands becomes one that lies or hangs in the air when the order is mistaken, so both readings are
     compared: by the pelvis's up axis, and by the distance of the robot's lowest point from the floor.
+    On 110 real files read right, the other way was never the more upright one.
     """
     some = slice(None, None, max(1, len(raw.root_pos) // 200))
     as_read = quaternions.normalised(raw.root_quat[some])
@@ -81,7 +82,7 @@ def quaternion_order(raw: RawMotion) -> None:
     other = as_read[:, [1, 2, 3, 0]]
     up, floor = _upright(as_read), _floor_error(raw, as_read, some)
     other_up, other_floor = _upright(other), _floor_error(raw, other, some)
-    if other_up > up + 0.5 and other_floor < floor:
+    if other_up > up + 0.05 and other_floor < 0.6 * floor:
         raise BadInput(
             f"{raw.where}, root quaternion",
             "the order xyzw",

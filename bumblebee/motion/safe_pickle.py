@@ -38,7 +38,7 @@ def load(path: Path) -> Any:
     """
     try:
         data = _unpacked(path)
-        return _plain(_SafeUnpickler(data).load())
+        return _plain(_SafeUnpickler(data).load(), {})
     except RefusedError as refusal:
         raise BadInput(
             path, "a pickle of plain values and numeric arrays", str(refusal), "Nothing of it was executed."
@@ -49,7 +49,7 @@ def load(path: Path) -> Any:
         ended = "truncated" in str(error) or "exhausted" in str(error)
         came = f"one that ends early ({error})" if ended else f"a broken one ({error})"
         raise BadInput(path, "a whole pickle", came, "Copy the file again.") from None
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError, MemoryError) as error:
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError, MemoryError, RecursionError) as error:
         came = f"a broken one ({type(error).__name__}: {error})"
         raise BadInput(path, "a whole pickle", came, "Copy the file again.") from None
 
@@ -181,16 +181,21 @@ def _encode(text: Any, encoding: Any = "latin1") -> bytes:
     return text.encode("latin1")
 
 
+def _no_bytes() -> bytes:
+    return b""  # so protocols 0 to 2 write the bytes of an empty array
+
+
 _NAMES: dict[tuple[str, str], Any] = {
     ("numpy", "ndarray"): _NDArray,
     ("numpy", "dtype"): _DType,
     ("joblib.numpy_pickle", "NumpyArrayWrapper"): _JoblibWrapper,
     ("_codecs", "encode"): _encode,
+    ("__builtin__", "bytes"): _no_bytes,
     **{(f"numpy.{core}.multiarray", "_reconstruct"): _reconstruct for core in ("core", "_core")},
     **{(f"numpy.{core}.multiarray", "scalar"): _scalar for core in ("core", "_core")},
     **{(f"numpy.{core}.numeric", "_frombuffer"): _array for core in ("core", "_core")},
 }
-_CALLABLE = (_DType, _reconstruct, _scalar, _array, _encode)
+_CALLABLE = (_DType, _reconstruct, _scalar, _array, _encode, _no_bytes)
 
 
 class _SafeUnpickler(pickle._Unpickler):  # the one in Python: it reads no further than joblib's arrays begin
@@ -217,7 +222,7 @@ class _SafeUnpickler(pickle._Unpickler):  # the one in Python: it reads no furth
 
     def load_reduce(self) -> None:
         args, function = self.stack.pop(), self.stack[-1]
-        if function not in _CALLABLE or not isinstance(args, tuple):
+        if not any(function is known for known in _CALLABLE) or not isinstance(args, tuple):
             raise RefusedError(f"a call of {_called(function)}")
         self.stack[-1] = function(*args)
 
@@ -256,14 +261,16 @@ def _called(function: Any) -> str:
     return str(getattr(function, "__name__", type(function).__name__)).lstrip("_")
 
 
-def _plain(value: Any, depth: int = 0) -> Any:
-    """Stand-ins replaced by what they stand for, in dicts and sequences a few levels deep."""
-    if isinstance(value, _Array):
-        if value.value is None:
-            raise RefusedError("an array without its values")
-        return value.value
-    if isinstance(value, dict) and depth < 3:
-        return {key: _plain(item, depth + 1) for key, item in value.items() if isinstance(key, str | int)}
-    if isinstance(value, list | tuple) and depth < 3:
-        return [_plain(item, depth + 1) for item in value]
-    return value
+def _plain(value: Any, done: dict[int, Any]) -> Any:
+    """Arrays in place of their stand-ins, in a dict or a dict of dicts; what the file repeats is converted once."""
+    if id(value) not in done:
+        if isinstance(value, _Array):
+            if value.value is None:
+                raise RefusedError("an array without its values")
+            done[id(value)] = value.value
+        elif isinstance(value, dict):
+            done[id(value)] = value  # a dict that holds itself ends here
+            done[id(value)] = {key: _plain(item, done) for key, item in value.items() if isinstance(key, str | int)}
+        else:
+            return value
+    return done[id(value)]

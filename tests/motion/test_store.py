@@ -1,0 +1,84 @@
+"""A library comes back as it was written, and appears whole or not at all."""
+
+import errno
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bumblebee.errors import BadInput
+from bumblebee.motion import store
+from bumblebee.motion.store import INDEX_COLUMNS, read_index, read_library, write_library
+
+
+def test_round_trip_keeps_every_byte_and_fact(motions, tmp_path):
+    about = {
+        "captions": ("a person sways.#a/DET#0.0#0.0",),
+        "family": "stand",
+        "split": "test",
+        "caption_source": "file",
+    }
+    clips = [motions.clip("b", 40, source="x.pkl", licence="MIT", sha256="ff", **about), motions.clip("a", 20)]
+    write_library(tmp_path / "lib", clips, pd.DataFrame({"file": ["c.npz"], "reason": ["SMPL"]}))
+    for wrote, came in zip(clips, read_library(tmp_path / "lib"), strict=True):
+        for name, value in vars(wrote).items():
+            np.testing.assert_array_equal(getattr(came, name), value)
+    index = read_index(tmp_path / "lib")
+    assert list(index.columns) == list(INDEX_COLUMNS)
+    assert list(index["name"]) == ["b", "a"]
+    assert list(index["captions"][0]) == list(about["captions"])
+    assert index["frames"].tolist() == [40, 20]
+    assert pd.read_csv(tmp_path / "lib/skipped.csv").to_dict("records") == [{"file": "c.npz", "reason": "SMPL"}]
+
+
+def test_named_clips_come_in_the_order_asked_for(motions, tmp_path):
+    write_library(tmp_path / "lib", [motions.clip(name, 12) for name in "abc"])
+    assert [clip.name for clip in read_library(tmp_path / "lib", ["c", "a"])] == ["c", "a"]
+    with pytest.raises(BadInput, match="'d'"):
+        read_library(tmp_path / "lib", ["d"])
+
+
+def test_a_full_disk_leaves_the_old_library_and_no_rubbish(motions, tmp_path, monkeypatch):
+    write_library(tmp_path / "lib", [motions.clip("old", 12)])
+    write_clip, written = store.write_clip, []
+
+    def full(path, clip):
+        if written:
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        written.append(path)
+        write_clip(path, clip)
+
+    monkeypatch.setattr(store, "write_clip", full)
+    with pytest.raises(BadInput, match="No space left on device") as caught:
+        write_library(tmp_path / "lib", [motions.clip("n1", 12), motions.clip("n2", 12)])
+    assert "\n" not in str(caught.value)
+    assert [clip.name for clip in read_library(tmp_path / "lib")] == ["old"]
+    assert [path.name for path in tmp_path.iterdir()] == ["lib"]
+
+
+def test_a_failure_between_clips_leaves_nothing(motions, tmp_path):
+    with pytest.raises(BadInput, match="two clips named 'a'"):
+        write_library(tmp_path / "lib", [motions.clip("a", 12), motions.clip("a", 12)])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_place_that_cannot_be_written_gives_one_line(motions, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BadInput, match="file/lib: expected a folder that can be written"):
+        write_library(tmp_path / "file" / "lib", [motions.clip("a", 12)])
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1 rubbish PAR1", None])
+def test_a_clip_that_is_no_parquet_is_named(motions, tmp_path, content):
+    write_library(tmp_path / "lib", [motions.clip("a", 12)])
+    path = tmp_path / "lib/clips/a.parquet"
+    path.unlink()
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(BadInput, match=r"a\.parquet"):
+        read_library(tmp_path / "lib")
+
+
+def test_a_folder_without_index_is_named(tmp_path):
+    with pytest.raises(BadInput, match="index of a motion library, came no such file"):
+        read_library(tmp_path)
