@@ -165,6 +165,8 @@ def run_stand_in(
 
 def start_stand_in(plan: dict[str, Any], clips: Path, out: Path, work: Path, threads: int) -> None:
     """Run a plan on the stand-in robot, in another process, which alone reads the sealed effects."""
+    if not SEALED.exists():
+        raise BadInput(SEALED, "the sealed robot", "no such file", "Run the stage seal.")
     file = work / "plan.json"
     file.write_text(json.dumps(plan))
     command = [sys.executable, "-m", "bumblebee.deploy.stand_in", "--sealed", str(SEALED), "--clips", str(clips)]

@@ -94,7 +94,8 @@ def start_states(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Start states at the clips' first frames, joints with noise, soles on the floor.
 
-    Returns qpos (B, 7 + J) and qvel (B, 6 + J). A clip whose first frame is further than 10 cm from the floor (it starts in the air) is left where it is.
+    Returns qpos (B, 7 + J) and qvel (B, 6 + J). A clip whose first frame is further than 10 cm
+    from the floor (it starts in the air) is left where it is.
     """
     first = [velocities(clip) for clip in clips]
     joints = np.stack([clip.joint_pos[0] for clip in clips]).astype(np.float64)

@@ -26,8 +26,8 @@ def results(episodes: pd.DataFrame) -> list[dict[str, Any]]:
     """One entry for each policy, engine, split and group.
 
     `policy` is also "experts-r<N>": every motion by its own cluster's expert of round N. `group_by` is "all",
-    "family" or "cluster" (of the motion). Errors are means over motions, over all episodes up to termination and, apart, over
-    successful ones (`*_successful`), since errors of failures stop at the failure and so flatter it.
+    "family" or "cluster" (of the motion). Errors are means over motions, over all episodes up to termination and,
+    apart, over successful ones (`*_successful`), since errors of failures stop at the failure and so flatter it.
     """
     return [
         {

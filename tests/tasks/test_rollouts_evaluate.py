@@ -92,7 +92,7 @@ def test_the_users_own_files_take_the_stand_ins_place(workspace: Path) -> None:
         rollouts.main(round=1, cluster="c1")
 
 
-def test_evaluation_covers_policies_engines_and_splits_and_repeats_itself(workspace: Path) -> None:
+def test_evaluation_covers_policies_engines_and_splits(workspace: Path) -> None:
     seal.main()
     evaluate.main()
     summary = json.loads((workspace / "data/evaluation/summary.json").read_text())
@@ -113,15 +113,16 @@ def test_evaluation_covers_policies_engines_and_splits_and_repeats_itself(worksp
     assert all(c["success"]["value"] == 0.0 and c["success"]["p"] == 1.0 for c in same)
     contract = json.loads((workspace / "data/evaluation/contract.json").read_text())
     assert summary["contract_sha256"] == contract["sha256"]
-    evaluate.main()
-    assert pd.read_parquet(workspace / "data/evaluation/episodes.parquet").equals(episodes)
 
 
-def test_another_contract_than_the_wanted_one_is_refused_with_what_differs(workspace: Path) -> None:
+def test_it_repeats_itself_and_refuses_another_contract_than_the_wanted_one(workspace: Path) -> None:
     (workspace / "params.yaml").write_text(
         PARAMS.replace("{threads: 1}", "{threads: 1, engines: [nominal], untrained: false}")
     )
     evaluate.main()
+    first = pd.read_parquet(workspace / "data/evaluation/episodes.parquet")
+    evaluate.main()
+    assert pd.read_parquet(workspace / "data/evaluation/episodes.parquet").equals(first)
     wanted = json.loads((workspace / "data/evaluation/contract.json").read_text())["sha256"]
     changed = f"{{threads: 1, engines: [nominal], seeds: [1], contract: {wanted}}}"
     (workspace / "params.yaml").write_text(PARAMS.replace("evaluate: {threads: 1}", f"evaluate: {changed}"))
