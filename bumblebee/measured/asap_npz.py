@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.checks_base import conjugate, rotate
+from bumblebee.measured.quaternion import conjugate, rotate
 from bumblebee.measured.rollout import Rollout
 from bumblebee.measured.source import Source, measured_rate, open_source, read_arrays, rollout_names
 from bumblebee.robot.facts import joint_names

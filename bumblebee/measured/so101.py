@@ -4,6 +4,7 @@ Traps of the layout: time stamps are microseconds; the Jaw is a share of its tra
 current estimates and are left out.
 """
 
+import contextlib
 import io
 import json
 from pathlib import Path, PurePosixPath
@@ -74,19 +75,24 @@ def _read_table(
             raise BadInput(f"{where}: column {column}", "this column", f"only {', '.join(map(str, table.columns))}")
     vectors = {}
     for column in columns:
-        rows = [_vector(f"{where}: column {column}, row {row}", text, width) for row, text in enumerate(table[column])]
-        vectors[column] = np.array(rows, dtype=np.float64).reshape(-1, width)
+        vectors[column] = _vectors(f"{where}: column {column}", table[column].astype(str).tolist(), width)
     try:
         return table["timestamp"].to_numpy(dtype=np.float64), vectors
     except ValueError as error:
         raise BadInput(f"{where}: column timestamp", "microseconds", str(error)) from None
 
 
-def _vector(where: str, text: object, width: int) -> list[float]:
-    try:
-        values = [float(value) for value in json.loads(str(text))]
-    except (ValueError, TypeError):
-        raise BadInput(where, f"a JSON list of {width} numbers", repr(text)[:60]) from None
-    if len(values) != width:
-        raise BadInput(where, f"{width} values", str(len(values)))
-    return values
+def _vectors(where: str, texts: list[str], width: int) -> np.ndarray:
+    """(rows, width) from JSON lists, parsed at once; only where that fails row by row, to name the row."""
+    with contextlib.suppress(ValueError, TypeError):
+        values = np.array(json.loads(f"[{','.join(texts)}]"), dtype=np.float64)
+        if values.shape == (len(texts), width):
+            return values
+    for row, text in enumerate(texts):
+        try:
+            values = [float(value) for value in json.loads(text)]
+        except (ValueError, TypeError):
+            raise BadInput(f"{where}, row {row}", f"a JSON list of {width} numbers", repr(text)[:60]) from None
+        if len(values) != width:
+            raise BadInput(f"{where}, row {row}", f"{width} values", str(len(values)))
+    raise BadInput(where, f"JSON lists of {width} numbers", "lists that do not fit together")

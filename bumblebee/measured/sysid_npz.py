@@ -1,10 +1,11 @@
-"""Importer of `mujoco.sysid` files (.npz): a SystemTrajectory, or one TimeSeries that holds controls and states.
+"""Importer of `mujoco.sysid` files (.npz): a SystemTrajectory, or TimeSeries whose names differ in their last word.
 
 Signals are found by the JSON mapping name -> [type, columns] that mujoco.sysid writes (types: 0 sensor, 2 qpos, 3 qvel,
 5 control). States come from qpos and qvel signals, or from jointpos and jointvel sensors of the model.
 """
 
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from bumblebee.measured.rollout import Rollout
 from bumblebee.measured.source import Source, measured_rate, open_source, read_arrays, rollout_names
 
 SENSOR, QPOS, QVEL, CTRL = 0, 2, 3, 5
+PART = re.compile(r"[_.-](control|controls|ctrl|sensordata|sensor|sensors|state|states|measured)$")
 NOTES = "mujoco.sysid; controls held, states interpolated to the controls' times. Sensor data of mujoco.sysid may lag."
 
 
@@ -34,13 +36,17 @@ def import_sysid(place: Path, model: mujoco.MjModel) -> list[Rollout]:
     names = source.ending(".npz")
     if not names:
         raise BadInput(place, ".npz files", "none")
-    ids = rollout_names(names, ".npz")
-    return [_read(source, name, ids[name], model) for name in names]
+    groups: dict[str, list[str]] = {}
+    for name, rollout_id in rollout_names(names, ".npz").items():
+        groups.setdefault(PART.sub("", rollout_id) or rollout_id, []).append(name)
+    return [_read(source, files, rollout_id, model) for rollout_id, files in groups.items()]
 
 
-def _read(source: Source, name: str, rollout_id: str, model: mujoco.MjModel) -> Rollout:
-    where, table = source.where(name), read_arrays(source, name)
-    signals = _signals(where, table, model)
+def _read(source: Source, files: list[str], rollout_id: str, model: mujoco.MjModel) -> Rollout:
+    where, signals, table = source.where(files[0]), {}, {}
+    for name in files:
+        table = read_arrays(source, name)
+        signals |= _signals(source.where(name), table, model)
     controls = {key[1]: signal for key, signal in signals.items() if key[0] == "ctrl"}
     if not controls:
         raise BadInput(where, "control signals with their mapping", f"only {', '.join(table)}")

@@ -245,3 +245,18 @@ def test_a_joint_that_is_missing_from_the_log_is_a_warning() -> None:
     part = {column: getattr(rollout, column)[:, :2] for column in rollout.columns}
     found = findings(replace(rollout, joints=rollout.joints[:2], meta={}, **part))
     assert [(finding.rule, finding.fatal) for finding in found] == [("joint-missing", False)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("size", [0.3, 0.6])
+def test_without_motion_capture_the_standing_foot_tells_the_frame(seed: int, size: float) -> None:
+    """Fatal for a world-frame velocity, nothing for the right one."""
+    rollout = replace(g1_rollout(seed, size, heading=2.0 + 0.5 * seed), base_pos=None)
+    assert findings(rollout) == []
+    assert ("velocity-frame", "base_lin_vel") in fatal_rules(replace(rollout, base_lin_vel=turned(rollout)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("size", [0.0, 0.1, 1.5])
+def test_without_motion_capture_good_robots_raise_nothing(seed: int, size: float) -> None:
+    assert findings(replace(g1_rollout(seed, size), base_pos=None)) == []
