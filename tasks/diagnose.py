@@ -1,23 +1,39 @@
 """Stage diagnose: what the declared model lacks, from the accepted rollouts of one round."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
-from bumblebee.diagnosis.diagnose import diagnose
+from bumblebee.diagnosis.diagnose import DiagnosisConfig, diagnose
 from bumblebee.diagnosis.output import fill
 from bumblebee.diagnosis.session import open_session
 from bumblebee.diagnosis.terminal import summary
-from tasks.stage import log_run, output_folder, run_stage
+from tasks.stage import load, log_run, output_folder, run_stage
+
+
+@dataclass(frozen=True)
+class DiagnoseConfig:
+    """Section `diagnose` of params.yaml."""
+
+    max_windows: int = 120
+    """Windows of 0.2 s that take part in the fit."""
+    max_holdout_windows: int = 60
+    """Held-out windows that acceptance is decided on."""
+    report_windows: int = 80
+    """Windows for each horizon of the error block."""
+    seed: int = 0
+    """Of the perturbed starts."""
 
 
 def main(round: int) -> None:
     """Diagnose data/measured/r<N> against its declared model into data/diagnosis/r<N>."""
+    config = load("diagnose", DiagnoseConfig)
     measured = Path(f"data/measured/r{round}")
     session = open_session(measured / "model.xml", measured)
-    result = diagnose(session, say=lambda text: print(text, flush=True))
+    result = diagnose(session, DiagnosisConfig(**vars(config)), say=lambda text: print(text, flush=True))
     with output_folder(f"data/diagnosis/r{round}") as folder:
         fill(result, folder)
     print(summary(result.document))
-    log_run("diagnose", round=round, metrics=_metrics(result.document))
+    log_run("diagnose", round=round, params=config, metrics=_metrics(result.document))
 
 
 def _metrics(document: dict) -> dict[str, float]:

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.plant import Plant
-from bumblebee.sim.effects import CATALOGUE, Effect
+from bumblebee.sim.effect_catalogue import CATALOGUE, STICTION_SOLIMP, STICTION_SOLREF, Effect
 
 _ORDER = tuple(CATALOGUE)
 
@@ -50,6 +50,7 @@ def _apply(
     dof, actuator = plant.dof[column], plant.actuator[column]
     if kind == "coulomb_friction":
         model.dof_frictionloss[dof] = value
+        model.dof_solref[dof], model.dof_solimp[dof, :2] = STICTION_SOLREF, STICTION_SOLIMP
     elif kind == "viscous_friction":
         model.dof_damping[dof] = value
     elif kind == "armature":

@@ -3,6 +3,12 @@
 import math
 from dataclasses import dataclass
 
+# MuJoCo's default dry friction creeps where a real joint sticks; a joint with `coulomb_friction` gets it stiff.
+STICTION_SOLREF = (0.004, 1.0)
+STICTION_SOLIMP = 0.99
+# The solver needs this many iterations to hold several stuck joints and contacts at once.
+STICTION_ITERATIONS = 20
+
 
 @dataclass(frozen=True)
 class Kind:

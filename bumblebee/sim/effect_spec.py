@@ -2,7 +2,7 @@
 
 | effect | MJCF |
 |---|---|
-| coulomb_friction, viscous_friction, armature | joint frictionloss, damping, armature |
+| coulomb_friction, viscous_friction, armature | joint frictionloss (stiff), damping, armature |
 | motor_strength, kp, kd | the servo's gainprm and biasprm |
 | command_delay | actuator delay, nsample, interp="linear": the mean of the held, delayed command over each step |
 | encoder_offset | biasprm[0] = biasprm[1] * offset: the servo's part; the reading's part is a runtime hook |
@@ -16,7 +16,13 @@ from typing import Any
 import mujoco
 
 from bumblebee.errors import BadInput
-from bumblebee.sim.effect_catalogue import CATALOGUE, Effect
+from bumblebee.sim.effect_catalogue import (
+    CATALOGUE,
+    STICTION_ITERATIONS,
+    STICTION_SOLIMP,
+    STICTION_SOLREF,
+    Effect,
+)
 
 # The order matters: the encoder's offset is multiplied with the gain that is in force.
 _ORDER = tuple(CATALOGUE)
@@ -47,7 +53,12 @@ def _servos(spec: mujoco.MjSpec, joint: str) -> list[Any]:
 
 
 def _frictionloss(spec: mujoco.MjSpec, name: str, value: float) -> None:
-    _joint(spec, name).frictionloss = value
+    joint = _joint(spec, name)
+    joint.frictionloss = value
+    joint.solref_friction = STICTION_SOLREF
+    joint.solimp_friction = [STICTION_SOLIMP, STICTION_SOLIMP, *joint.solimp_friction[2:]]
+    spec.option.iterations = max(spec.option.iterations, STICTION_ITERATIONS)
+    spec.option.ls_iterations = max(spec.option.ls_iterations, STICTION_ITERATIONS)
 
 
 def _damping(spec: mujoco.MjSpec, name: str, value: float) -> None:
