@@ -1,0 +1,67 @@
+"""Cutting loses no frame; the split into training and held-out motions hangs on names alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bumblebee.motion.pieces import hold_out, motion_of, split_long
+
+
+@pytest.mark.parametrize("seconds", [0.5, 0.8, 1.0, 1.59])
+def test_pieces_are_short_and_make_up_the_whole(motions, seconds):
+    clip = motions.clip("walk", 81, family="walk")
+    pieces = split_long(clip, seconds)
+    assert [piece.name for piece in pieces] == [f"walk_p{i}" for i in range(len(pieces))]
+    assert max(piece.duration for piece in pieces) <= seconds + 1e-9
+    assert max(p.frames for p in pieces) - min(p.frames for p in pieces) <= 1
+    for field in ("root_pos", "root_quat", "joint_pos", "key_pos"):
+        np.testing.assert_array_equal(np.concatenate([getattr(p, field) for p in pieces]), getattr(clip, field))
+    assert {(p.family, motion_of(p.name)) for p in pieces} == {("walk", "walk")}
+
+
+@pytest.mark.parametrize("seconds", [1.6, 5.0, 0.0])
+def test_short_motions_and_a_limit_of_0_stay_whole(motions, seconds):
+    clip = motions.clip("walk", 81)
+    assert split_long(clip, seconds) == [clip]
+
+
+def named(clip, names: list[str], family: str = "walk"):
+    return [replace(clip, name=name, family=family) for name in names]
+
+
+def held(clips) -> set[str]:
+    return {clip.name for clip in clips if clip.split == "test"}
+
+
+def test_the_split_hangs_on_names_alone(motions):
+    clips = named(motions.clip("x", 12), [f"walk{i}" for i in range(40)])
+    forward, backward = hold_out(clips, 0.3), hold_out(clips[::-1], 0.3)
+    assert held(forward) == held(backward)
+    assert 4 <= len(held(forward)) <= 20
+    assert [clip.name for clip in forward] == [clip.name for clip in clips]
+    more = hold_out([*clips, *named(clips[0], ["new1", "new2"])], 0.3)
+    assert held(forward) <= held(more)
+
+
+@pytest.mark.parametrize(("size", "least"), [(3, 0), (4, 1), (12, 1)])
+def test_a_family_of_four_has_one_held_out_and_one_left(motions, size, least):
+    clip = motions.clip("x", 12)
+    for share in (1e-9, 0.15, 0.999):
+        names = [f"jump{i}" for i in range(size)]
+        count = len(held(hold_out(named(clip, names, "jump"), share)))
+        assert least <= count <= size - 1
+
+
+def test_pieces_of_one_motion_stay_together(motions):
+    clips = named(motions.clip("x", 12), [f"walk{i}_p{j}" for i in range(8) for j in range(3)])
+    sides = {
+        motion: {c.split for c in hold_out(clips, 0.4) if motion_of(c.name) == motion}
+        for motion in map(motion_of, {c.name for c in clips})
+    }
+    assert all(len(side) == 1 for side in sides.values())
+    assert {split for side in sides.values() for split in side} == {"train", "test"}
+
+
+def test_a_share_of_0_holds_nothing_out(motions):
+    assert held(hold_out(named(motions.clip("x", 12), list("abcdefgh")), 0.0)) == set()
