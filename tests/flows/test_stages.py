@@ -37,7 +37,7 @@ def test_a_title_names_round_and_cluster():
 
 
 @pytest.fixture
-def workspace(tmp_path: Path) -> Path:
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Two stages, the second of which reads an answer that no stage makes."""
     write = f"{sys.executable} -c \"import pathlib; pathlib.Path('{{}}').write_text('1')\""
     stages = {
@@ -47,6 +47,7 @@ def workspace(tmp_path: Path) -> Path:
     (tmp_path / "dvc.yaml").write_text(yaml.safe_dump({"stages": stages}))
     (tmp_path / "params.yaml").write_text("one: {a: 1}\n")
     Repo.init(str(tmp_path), no_scm=True)
+    monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
