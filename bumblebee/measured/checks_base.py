@@ -44,7 +44,7 @@ def _check_turning(view: View, quat: np.ndarray) -> None:
     limits, rollout = view.limits, view.rollout
     for seconds in TURN_SECONDS:
         window = view.window(min(seconds, 0.25 * rollout.duration))
-        gyro = integral(rollout.time, rollout.base_ang_vel, window)
+        gyro = integral(rollout.time, view.values("base_ang_vel"), window)
         body, world = turns(quat, window)
         size = max(_robust(body), min(_robust(gyro), np.pi))
         if size > limits.turn_wanted:
@@ -93,9 +93,10 @@ def _check_travel(view: View, quat: np.ndarray) -> None:
     """base_lin_vel against the derivative of base_pos, as base-frame and as world-frame velocity."""
     rollout, limits = view.rollout, view.limits
     window = view.window(0.1)
-    moved = rollout.base_pos[window:] - rollout.base_pos[:-window]
+    place, speed = view.values("base_pos"), view.values("base_lin_vel")
+    moved = place[window:] - place[:-window]
     span = (rollout.time[window:] - rollout.time[:-window])[:, None]
-    readings = {"base": rotate(quat, rollout.base_lin_vel), "world": rollout.base_lin_vel}
+    readings = {"base": rotate(quat, speed), "world": speed}
     errors = {name: _robust((moved - integral(rollout.time, value, window)) / span) for name, value in readings.items()}
     if errors["base"] < limits.drift_floor:
         return

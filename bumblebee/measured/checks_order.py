@@ -121,7 +121,8 @@ def check_response(view: View) -> None:
     """
     rollout, limits = view.rollout, view.limits
     by_target = rollout.joint_target is not None
-    command = rollout.joint_target if by_target else rollout.joint_torque_cmd
+    name = "joint_target" if by_target else "joint_torque_cmd"
+    command = view.values(name)
     if view.found("velocity-sign") or view.found("joint-order") or view.found("degrees"):
         return
     for joint in range(len(rollout.joints)):
@@ -134,7 +135,6 @@ def check_response(view: View) -> None:
         sums = [np.convolve(move, np.ones(window), "valid") for move in moves]
         together = _correlation(*sums)
         if z < -limits.response_z and (not by_target or together < limits.response_correlation):
-            name = "joint_target" if by_target else "joint_torque_cmd"
             came = f"motion against it ({-z:.0f} standard errors, correlation {together:.2f})"
             view.add(
                 view.label(name, joint), None, "response-sign", "a joint that follows its command", came, fatal=True

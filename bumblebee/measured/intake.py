@@ -10,12 +10,13 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
 import pandas as pd
 
 from bumblebee.errors import BadInput
@@ -133,14 +134,13 @@ def _take(
     if fatal:
         _set_aside(source, digest, quarantine, findings)
     meta = rollout.meta if rollout else {}
-    usable = rollout is not None and rollout.frames > 1
     return Item(
         source.name,
         digest,
         not fatal,
         str(meta.get("motion", "")),
         str(meta.get("cluster", "")),
-        round(rollout.duration, 6) if usable and rollout.duration == rollout.duration else 0.0,
+        round(rollout.duration, 6) if rollout and np.isfinite(rollout.duration) else 0.0,
         rollout.joints if rollout else (),
     ), findings
 
@@ -181,7 +181,7 @@ def write_new(target: Path, content: bytes) -> None:
 
 
 @contextlib.contextmanager
-def _appearing(target: Path) -> Any:  # noqa: ANN401 (context manager of a path)
+def _appearing(target: Path) -> Iterator[Path]:
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=".part")
     os.close(handle)

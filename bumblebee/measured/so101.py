@@ -90,9 +90,9 @@ def _vectors(where: str, texts: list[str], width: int) -> np.ndarray:
             return values
     for row, text in enumerate(texts):
         try:
-            values = [float(value) for value in json.loads(text)]
+            row_values = [float(value) for value in json.loads(text)]
         except (ValueError, TypeError):
             raise BadInput(f"{where}, row {row}", f"a JSON list of {width} numbers", repr(text)[:60]) from None
-        if len(values) != width:
-            raise BadInput(f"{where}, row {row}", f"{width} values", str(len(values)))
+        if len(row_values) != width:
+            raise BadInput(f"{where}, row {row}", f"{width} values", str(len(row_values)))
     raise BadInput(where, f"JSON lists of {width} numbers", "lists that do not fit together")

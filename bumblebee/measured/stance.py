@@ -22,7 +22,7 @@ def check_stance(view: View, quat: np.ndarray) -> None:
     expected = stance_velocity(view, quat, rows)
     if expected is None:
         return
-    given = rollout.base_lin_vel[rows]
+    given = view.values("base_lin_vel")[rows]
     as_world = rotate(conjugate(quat[rows]), given)
     telling = np.linalg.norm(as_world - given, axis=1) > 2 * limits.drift_floor  # else both readings are one
     if telling.sum() < 10:
@@ -48,7 +48,7 @@ def stance_velocity(view: View, quat: np.ndarray, rows: np.ndarray) -> np.ndarra
     for index, row in enumerate(rows):
         data.qpos[place + 3 : place + 7] = quat[row]
         data.qpos[model.jnt_qposadr[joints]] = rollout.joint_pos[row]
-        data.qvel[speed + 3 : speed + 6] = rollout.base_ang_vel[row]
+        data.qvel[speed + 3 : speed + 6] = view.values("base_ang_vel")[row]
         data.qvel[model.jnt_dofadr[joints]] = rollout.joint_vel[row]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)

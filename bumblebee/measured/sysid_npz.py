@@ -43,7 +43,8 @@ def import_sysid(place: Path, model: mujoco.MjModel) -> list[Rollout]:
 
 
 def _read(source: Source, files: list[str], rollout_id: str, model: mujoco.MjModel) -> Rollout:
-    where, signals, table = source.where(files[0]), {}, {}
+    where, table = source.where(files[0]), {}
+    signals: dict[tuple[str, str], _Signal] = {}
     for name in files:
         table = read_arrays(source, name)
         signals |= _signals(source.where(name), table, model)

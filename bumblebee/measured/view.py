@@ -22,7 +22,9 @@ class View:
     limits: Thresholds
     findings: list[Finding] = field(default_factory=list)
 
-    def add(self, column: str, row: int | None, rule: str, expected: str, came: str, *, fatal: bool) -> None:
+    def add(
+        self, column: str, row: int | np.integer | None, rule: str, expected: str, came: str, *, fatal: bool
+    ) -> None:
         """Note a finding."""
         row = None if row is None else int(row)
         self.findings.append(Finding(self.file, column, row, rule, expected, came, bool(fatal)))
@@ -31,7 +33,13 @@ class View:
         """Whether a rule was broken before, in a column whose name starts so."""
         return any(finding.rule == rule and finding.column.startswith(column) for finding in self.findings)
 
-    def label(self, column: str, joint: int) -> str:
+    def values(self, column: str) -> np.ndarray:
+        """A column that is known to be there."""
+        values = getattr(self.rollout, column)
+        assert values is not None, column
+        return values
+
+    def label(self, column: str, joint: int | np.integer) -> str:
         """The column's name with the joint in brackets."""
         return f"{column}[{self.rollout.joints[joint]}]"
 

@@ -260,3 +260,15 @@ def test_without_motion_capture_the_standing_foot_tells_the_frame(seed: int, siz
 @pytest.mark.parametrize("size", [0.0, 0.1, 1.5])
 def test_without_motion_capture_good_robots_raise_nothing(seed: int, size: float) -> None:
     assert findings(replace(g1_rollout(seed, size), base_pos=None)) == []
+
+
+@pytest.mark.parametrize("ticks", [1, 2, 3, 5])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_robot_that_answers_late_or_weakly_is_no_bad_file(seed: int, ticks: int) -> None:
+    """Delay and encoder offset are effects for the diagnosis to find, not faults of the log."""
+    for rollout in (arm_rollout(seed), arm_rollout(seed, "motor", size=0.5), g1_rollout(seed, 0.3)):
+        command = "joint_target" if rollout.joint_target is not None else "joint_torque_cmd"
+        early = np.roll(getattr(rollout, command), -ticks, axis=0)
+        early[-ticks:] = early[-ticks - 1]
+        late = replace(rollout, **{command: early}, joint_pos=rollout.joint_pos + 0.04)
+        assert [finding.message for finding in findings(late)] == []
