@@ -28,7 +28,7 @@ CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
 class BoundedPpo(PPO):
     """rsl_rl's PPO with bounds on the adaptive learning rate, which are constants there (1e-5 and 1e-2)."""
 
-    def __init__(self, *args: Any, learning_rate_range: tuple[float, float], **kwargs: Any) -> None:  # noqa: ANN401
+    def __init__(self, *args: Any, learning_rate_range: tuple[float, float], **kwargs: Any) -> None:
         self._bounds = learning_rate_range
         super().__init__(*args, **kwargs)
 

@@ -12,10 +12,23 @@ from bumblebee.motion.clip import Clip
 from bumblebee.sim.mujoco_cpu import Hooks, MujocoCpu
 from bumblebee.tracking.env import ActionAdapter, action_scale, start_state
 from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.observations import joint_targets, observe
+from bumblebee.tracking.noise import noise_levels
+from bumblebee.tracking.observations import joint_targets, layout, observe
 from bumblebee.tracking.terminations import fallen, key_distance, success_threshold
 
 _WORLDS = 128  # at once
+
+
+@dataclass(frozen=True)
+class Trials:
+    """How often and how roughly a policy is tried; the same settings give the same starts and the same noise."""
+
+    repeats: int = 1
+    """Rollouts of each clip."""
+    noise: float = 0.0
+    """Factor on the noise of the start and of the sensors."""
+    seed: int = 0
+    """Of that noise."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +42,21 @@ class World:
 
 
 def try_policy(
-    policy: Callable[[Tensor], Tensor], clips: Sequence[Clip], world: World, ahead: Sequence[float]
+    policy: Callable[[Tensor], Tensor],
+    clips: Sequence[Clip],
+    world: World,
+    ahead: Sequence[float],
+    trials: Trials | None = None,
 ) -> pd.DataFrame:
-    """One rollout of each clip.
+    """Roll out each clip, from its first frame.
 
     Returns:
-        a row a clip: name, family, split, success, share (of the clip until it failed), key_error [m] and joint_error
+        a row a rollout: name, family, split, success, share (of the clip until it failed), key_error [m] and joint_error
         [rad] (means until then).
     """
-    tables = [_try_some(policy, clips[i : i + _WORLDS], world, ahead) for i in range(0, len(clips), _WORLDS)]
+    trials = trials or Trials()
+    every = [clip for clip in clips for _ in range(trials.repeats)]
+    tables = [_try_some(policy, every[i : i + _WORLDS], world, ahead, trials) for i in range(0, len(every), _WORLDS)]
     return pd.concat(tables, ignore_index=True)
 
 
@@ -49,15 +68,17 @@ def success_by_family(trials: pd.DataFrame) -> dict[str, float]:
 
 @torch.inference_mode()
 def _try_some(
-    policy: Callable[[Tensor], Tensor], clips: Sequence[Clip], world: World, ahead: Sequence[float]
+    policy: Callable[[Tensor], Tensor], clips: Sequence[Clip], world: World, ahead: Sequence[float], trials: Trials
 ) -> pd.DataFrame:
     n = len(clips)
+    generator = torch.Generator().manual_seed(trials.seed)
     library = MotionLibrary(clips, ahead)
     engine = MujocoCpu(world.model, n, threads=min(world.threads, n), hooks=world.hooks)
     ids, scale, dt = torch.arange(n), action_scale(), engine.control_dt
+    levels = trials.noise * noise_levels(layout(library.num_joints, len(library.ahead)))
     limit = torch.tensor([success_threshold(clip.family) for clip in clips])
     first = library.frames(ids, torch.zeros(n))
-    qpos, qvel = start_state(first, 0.0, torch.Generator())
+    qpos, qvel = start_state(first, trials.noise, generator)
     engine.reset(ids, qpos, qvel, first.joint_pos)
     action = torch.zeros(n, library.num_joints)
     alive = torch.ones(n, dtype=torch.bool)
@@ -66,7 +87,8 @@ def _try_some(
         ref = library.frames(ids, torch.full((n,), (frame + 1) * dt))
         state = engine.state()
         seen = observe(state, ref, action)
-        action = policy(seen)
+        noise = levels * (2 * torch.rand(seen.shape, generator=generator) - 1) if trials.noise else 0.0
+        action = policy(seen + noise)
         motor = action if world.action_adapter is None else world.action_adapter(state, seen, action)
         engine.step(joint_targets(ref, motor, scale))
         state = engine.state()

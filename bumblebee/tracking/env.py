@@ -195,7 +195,7 @@ class TrackingEnv(VecEnv):
 
 
 def start_state(ref: ReferenceFrame, noise: float, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-    """qpos (n, 7 + J) and qvel (n, 6 + J) at the reference, with uniform noise times `noise`."""
+    """Start qpos (n, 7 + J) and qvel (n, 6 + J) at the reference, with uniform noise times `noise`."""
     n, j = ref.joint_pos.shape
 
     def uniform(columns: int, size: float) -> Tensor:
@@ -207,5 +207,3 @@ def start_state(ref: ReferenceFrame, noise: float, generator: torch.Generator) -
     qpos = torch.cat((ref.root_pos_w + shift, quat, ref.joint_pos + uniform(j, 0.03)), dim=-1)
     speeds = (ref.root_lin_vel_w + uniform(3, 0.1), ref.root_ang_vel_b + uniform(3, 0.2))
     return qpos, torch.cat((*speeds, ref.joint_vel + uniform(j, 0.3)), dim=-1)
-
-

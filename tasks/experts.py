@@ -1,0 +1,41 @@
+"""Fine-tune an expert from base on its cluster's clips: -> models/experts/r0/<cluster> (paper, section 3.2)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from bumblebee.learning.trial import World
+from bumblebee.sim.sensors import load_model
+from tasks.stage import load, run_stage
+from tasks.training import Job, TrainingConfig, cluster_clips, train_policy
+
+
+@dataclass(frozen=True)
+class ExpertsConfig(TrainingConfig):
+    """The fine-tuning of the experts."""
+
+    others: float = 0.1
+    """Share of the draws that goes to other clusters' clips, so that an expert forgets nothing that it will need."""
+
+
+def main(cluster: str) -> None:
+    """Fill models/experts/r0/<cluster>."""
+    config = load("experts", ExpertsConfig)
+    clips, share, tried = cluster_clips(cluster, config.others)
+    world = World(load_model(physics_hz=config.env.physics_hz), threads=config.env.threads)
+    job = Job(
+        stage="experts",
+        name=f"expert-{cluster}-r0",
+        out=Path("models/experts/r0") / cluster,
+        clips=clips,
+        tried=tried,
+        world=world,
+        share=share,
+        parent=Path("models/base"),
+        cluster=cluster,
+        round=0,
+    )
+    train_policy(job, config)
+
+
+if __name__ == "__main__":
+    run_stage(main)

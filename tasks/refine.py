@@ -1,0 +1,64 @@
+"""Refine an expert in the corrected simulator: -> models/experts/r<round>/<cluster> (paper, section 3.4).
+
+The simulator is the round's corrected model, the effects that MJCF cannot hold, and the delta action if it was kept.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from bumblebee.errors import BadInput
+from bumblebee.learning.delta import action_adapter, load_delta
+from bumblebee.learning.trial import World
+from bumblebee.sim.effects import read_effects, runtime_hooks
+from bumblebee.sim.sensors import load_model
+from bumblebee.tracking.env import action_scale
+from tasks.experts import ExpertsConfig
+from tasks.sections import loop
+from tasks.stage import load, run_stage
+from tasks.training import Job, cluster_clips, train_policy
+
+
+@dataclass(frozen=True)
+class RefineConfig(ExpertsConfig):
+    """The refinement of the experts."""
+
+
+def main(round: int, cluster: str) -> None:
+    """Fill models/experts/r<round>/<cluster>."""
+    config = load("refine", RefineConfig)
+    clips, share, tried = cluster_clips(cluster, config.others)
+    job = Job(
+        stage="refine",
+        name=f"expert-{cluster}-r{round}",
+        out=Path(f"models/experts/r{round}") / cluster,
+        clips=clips,
+        tried=tried,
+        world=corrected_world(round, cluster, config.env.physics_hz, config.env.threads),
+        share=share,
+        parent=Path(f"models/experts/r{parent_of(round)}") / cluster,
+        cluster=cluster,
+        round=round,
+    )
+    train_policy(job, config)
+
+
+def parent_of(round: int) -> int:
+    """The round whose experts this one refines."""
+    for item in loop().rounds:
+        if item.n == round:
+            return item.parent
+    raise BadInput("params.yaml: rounds", f"round {round}", f"{[item.n for item in loop().rounds]}")
+
+
+def corrected_world(round: int, cluster: str, physics_hz: float, threads: int) -> World:
+    """The simulator as the round's diagnosis and delta action describe the robot."""
+    folder = Path(f"data/diagnosis/r{round}")
+    model = load_model(folder / "model.xml", physics_hz)
+    hooks = runtime_hooks(read_effects(folder / "effects.yaml"), model)
+    delta = load_delta(Path(f"models/delta/r{round}/{cluster}"))
+    adapter = action_adapter(delta, action_scale()) if delta is not None else None
+    return World(model, hooks, adapter, threads)
+
+
+if __name__ == "__main__":
+    run_stage(main)

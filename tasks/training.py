@@ -1,0 +1,187 @@
+"""What base, experts and refine share: train a policy, try it before and after, write its folder."""
+
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import torch
+
+from bumblebee.errors import BadInput
+from bumblebee.learning.config import PpoConfig
+from bumblebee.learning.export import export_policy
+from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.ppo import CURVE, Trainer
+from bumblebee.learning.trial import Trials, World, success_by_family, try_policy
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.store import read_library
+from bumblebee.sim.mujoco_cpu import MujocoCpu
+from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.env import TrackingEnv
+from bumblebee.tracking.library import MotionLibrary
+from tasks.stage import log_run, output_folder, scratch
+
+FILTERED, LABELS = Path("data/filtered"), Path("data/clusters/labels.parquet")
+BEFORE = "before.parquet"
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """One training of a tracking policy."""
+
+    seed: int = 0
+    """Of the network, the draws of clips and frames, and the differences between the worlds."""
+    env: EnvConfig = field(default_factory=EnvConfig)
+    """The task."""
+    ppo: PpoConfig = field(default_factory=PpoConfig)
+    """The algorithm."""
+    trials: Trials = field(default_factory=Trials)
+    """How the policy is tried before and after."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is trained where, on what, from what."""
+
+    stage: str
+    name: str
+    out: Path
+    clips: Sequence[Clip]
+    """Clips to train on."""
+    tried: Sequence[Clip]
+    """Clips to be tried on, held-out ones too."""
+    world: World
+    share: torch.Tensor | None = None
+    """Factor on how often each clip is drawn."""
+    parent: Path | None = None
+    """Folder of the policy to start from."""
+    cluster: str | None = None
+    round: int | None = None
+
+
+def training_clips() -> list[Clip]:
+    """All clips that the filter kept, held-out ones too.
+
+    Raises:
+        BadInput: if none is to train on.
+    """
+    clips = read_library(FILTERED)
+    if not any(clip.split == "train" for clip in clips):
+        raise BadInput(FILTERED / "index.parquet", "at least one motion to train on", "none", "Keep more motions.")
+    return clips
+
+
+def cluster_clips(cluster: str, others: float) -> tuple[list[Clip], torch.Tensor, list[Clip]]:
+    """The clips to train a cluster's expert on.
+
+    Args:
+        cluster: its name.
+        others: share of the draws that goes to the clips of the other clusters.
+
+    Returns:
+        the training clips, how often each is drawn (N,), and the clips to try the expert on: all of its cluster.
+    """
+    labels = pd.read_parquet(LABELS).set_index("name")["cluster"]
+    clips = [clip for clip in training_clips() if clip.name in labels.index]
+    own = [clip for clip in clips if labels[clip.name] == cluster]
+    if not any(clip.split == "train" for clip in own):
+        raise BadInput(LABELS, f"motions to train on in cluster {cluster}", "none", "Check `clusters`.")
+    used = [clip for clip in clips if clip.split == "train" and (others > 0 or labels[clip.name] == cluster)]
+    mine = torch.tensor([labels[clip.name] == cluster for clip in used])
+    length = torch.tensor([float(clip.frames) for clip in used])
+    share = torch.where(mine, (1 - others) / length[mine].sum(), others / length[~mine].sum().clamp(min=1.0))
+    return used, share, own
+
+
+def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
+    """Train, try before and after on the same starts, write the policy's folder; returns its card."""
+    torch.set_num_threads(config.env.threads)
+    folder = scratch(f"{job.stage}-{job.name}", job.parent or FILTERED, config)
+    library = MotionLibrary(job.clips, config.env.ahead)
+    engine = MujocoCpu(job.world.model, config.env.num_worlds, threads=config.env.threads, hooks=job.world.hooks)
+    env = TrackingEnv(library, engine, config.env, config.seed, job.world.action_adapter, job.share)
+    trainer = Trainer(env, config.ppo, folder, config.seed, job.parent)
+    if trainer.iteration == 0:
+        _try(trainer.policy(), job, config).to_parquet(folder / BEFORE)
+    before = pd.read_parquet(folder / BEFORE)
+    trainer.train(job.name)
+    after = _try(trainer.policy(), job, config)
+    policy, kept = trainer.policy(), "child"
+    if job.parent is not None and _score(after) < _score(before):
+        policy, kept = load_policy(job.parent), "parent"
+    card = _card(job, config, trainer, before, after, kept)
+    with output_folder(job.out) as out:
+        policy.save(out)
+        export_policy(out, policy, config.env.physics_hz)
+        shutil.copy(folder / CURVE, out / CURVE)
+        (out / "card.json").write_text(json.dumps(card, indent=1) + "\n")
+        after.assign(before=before["success"], key_error_before=before["key_error"]).to_csv(out / "trials.csv")
+    _tell(job, card)
+    metrics = {f"{when}/{family}": rate for when in ("before", "after") for family, rate in card[when].items()}
+    metrics |= {"frames_per_second": card["frames_per_second"], "unstable_worlds": card["unstable_worlds"]}
+    log_run(
+        job.stage,
+        cluster=job.cluster,
+        round=job.round,
+        params=config,
+        metrics=metrics,
+        curve=job.out / CURVE,
+        artifacts=[job.out],
+    )
+    return card
+
+
+def _try(policy: Policy, job: Job, config: TrainingConfig) -> pd.DataFrame:
+    return try_policy(policy, job.tried, job.world, config.env.ahead, config.trials)
+
+
+def _score(trials: pd.DataFrame) -> tuple[float, float]:
+    """Success on the training clips, then accuracy: what decides between parent and child."""
+    train = trials[trials["split"] == "train"]
+    return float(train["success"].mean()), -float(train["key_error"].mean())
+
+
+def _card(
+    job: Job, config: TrainingConfig, trainer: Trainer, before: pd.DataFrame, after: pd.DataFrame, kept: str
+) -> dict[str, Any]:
+    curve = pd.read_csv(trainer.folder / CURVE)
+    seconds = float(curve["seconds"].iloc[-1])
+    card: dict[str, Any] = {
+        "schema": 1,
+        "stage": job.stage,
+        "cluster": job.cluster,
+        "round": job.round,
+        "parent": str(job.parent) if job.parent else None,
+        "kept": kept,
+        "iterations": trainer.iteration,
+        "frames": trainer.frames,
+        "seconds": round(seconds, 1),
+        "frames_per_second": round(trainer.frames / max(seconds, 1e-9)),
+        "unstable_worlds": int(curve["unstable"].sum()),
+        "training_clips": [clip.name for clip in job.clips],
+        "rollouts_a_clip": config.trials.repeats,
+    }
+    for when, trials in (("before", before), ("after", after)):
+        card[when] = success_by_family(trials)
+        held_out = trials[trials["split"] == "test"]
+        card[f"{when}_held_out"] = success_by_family(held_out) if len(held_out) else {}
+        card[f"{when}_key_error"] = round(float(trials["key_error"].mean()), 4)
+    card["gained"] = _names(after[after["success"] & ~before["success"]])
+    card["lost"] = _names(after[~after["success"] & before["success"]])
+    card["config"] = asdict(config)
+    return card
+
+
+def _names(trials: pd.DataFrame) -> list[str]:
+    return sorted(set(trials["name"]))
+
+
+def _tell(job: Job, card: dict[str, Any]) -> None:
+    before, after = card["before"], card["after"]
+    families = ", ".join(f"{f} {before.get(f, 0):.0%} -> {rate:.0%}" for f, rate in after.items())
+    print(f"{job.name}: success {families}; key error {card['after_key_error'] * 100:.1f} cm")
+    if card["kept"] == "parent":
+        print(f"{job.name}: training made it no better here: the parent's policy is kept")
