@@ -11,7 +11,7 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import FAMILIES, EmbeddedConfig, checks, make_library
 from bumblebee.motion.embedded.captions import caption_line
 from bumblebee.motion.embedded.kinds import kinds
-from bumblebee.motion.embedded.solver import derivatives, zmp
+from bumblebee.motion.embedded.solver import derivatives, floor_wrench, zmp
 from bumblebee.motion.embedded.vary import Vary
 from bumblebee.robot.facts import joint_names, joints, stand_pose
 
@@ -124,13 +124,11 @@ def test_the_centre_of_mass_stays_over_the_feet_that_stand(library: dict[str, Ma
 
 def test_the_zero_moment_point_stays_inside_the_support(library: dict[str, Made]) -> None:
     for made in of(library, *QUASI_STATIC, *STEPPING):
-        margin = checks.support_margin(zmp(checks.qpos_of(made.clip)), made.soles, made.contact)
+        margin = checks.support_margin(zmp(floor_wrench(checks.qpos_of(made.clip))[0]), made.soles, made.contact)
         assert margin.min() > -0.01, made.clip.name
 
 
 def test_floor_and_motors_can_supply_the_forces(library: dict[str, Made]) -> None:
-    limits = np.array([joint.effort_limit for joint in joints()])
-    assert limits.min() > 0
     for made in library.values():
         if made.clip.family != "jump":
             loads = checks.loads(made.clip, made.contact, every=5)
@@ -146,8 +144,9 @@ def test_a_jump_falls_freely_while_it_is_in_the_air(library: dict[str, Made]) ->
             assert 0.1 <= (len(run) + 1) / made.clip.fps <= 0.3
             assert np.abs(acceleration[run[1:-1] - 1] - [0, 0, -9.81]).max() < 0.5, made.clip.name
         loads = checks.loads(made.clip, made.contact)
-        carrying = made.contact.any(axis=1)
-        assert np.abs(loads.torque[carrying]).max() < 0.9, made.clip.name
+        assert np.abs(loads.torque).max() < 0.9, made.clip.name
+        assert np.abs(loads.missing[:, :3]).max() < 20.0, made.clip.name
+        assert np.abs(loads.missing[:, 3:]).max() < 30.0, made.clip.name
 
 
 def test_arms_and_legs_do_not_meet_the_body(library: dict[str, Made]) -> None:
@@ -202,8 +201,7 @@ def test_a_limit_spans_the_families() -> None:
 def test_a_caption_is_tagged_with_base_forms() -> None:
     line = caption_line("a person waves with the left hand")
     assert line == (
-        "a person waves with the left hand"
-        "#a/DET person/NOUN wave/VERB with/ADP the/DET left/ADJ hand/NOUN#0.0#0.0"
+        "a person waves with the left hand#a/DET person/NOUN wave/VERB with/ADP the/DET left/ADJ hand/NOUN#0.0#0.0"
     )
     assert "step/NOUN" in caption_line("a person takes slow steps forward")
     assert "step/VERB" in caption_line("a person steps to the left")

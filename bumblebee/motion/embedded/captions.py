@@ -14,18 +14,27 @@ _WORDS = {
     "NUM": "one two three four ninety",
     "ADV": "slowly quickly forward backward backwards up down together then straight out sideways calmly again ahead "
     "overhead low apart far twice deeply slightly sharply steadily",
-    "ADJ": "left right small slow fast full deep shallow big short normal steady single other low quick half large high",
+    "ADJ": "left right small slow fast full deep shallow big short normal steady single other quick half large high",
     "PART": "not",
     "AUX": "is",
 }
+
+
+def _own(words: str) -> dict[str, str]:
+    return {word: word for word in words.split()}
+
+
 _LEMMAS = {
     "NOUN": {
-        **{w: w for w in "person hand arm body leg foot knee chest side place circle floor step head torso waist front "
-                         "ground weight pace curve jump squat stand balance air kick punch hip way degree man hop bow "
-                         "robot shoulder turn walk direction someone guard lunge march".split()},
+        **_own(
+            "person hand arm body leg foot knee chest side place circle floor step head torso waist front ground "
+            "weight pace curve jump squat stand balance air kick punch hip way degree man hop bow robot shoulder turn "
+            "walk direction someone guard lunge march elbow"
+        ),
         **{"hands": "hand", "arms": "arm", "legs": "leg", "feet": "foot", "knees": "knee", "circles": "circle",
-           "steps": "step", "degrees": "degree", "punches": "punch", "squats": "squat", "sides": "side",
-           "hips": "hip", "shoulders": "shoulder", "times": "time", "time": "time", "hops": "hop", "jumps": "jump"},
+           "steps": "step", "degrees": "degree", "punches": "punch", "squats": "squat", "elbows": "elbow",
+           "sides": "side", "hips": "hip", "shoulders": "shoulder", "times": "time", "time": "time", "hops": "hop",
+           "jumps": "jump"},
     },
     "VERB": {
         "waves": "wave", "waving": "wave", "raises": "raise", "lifts": "lift", "lowers": "lower", "claps": "clap",

@@ -32,7 +32,7 @@ class Loads:
 
 
 def qpos_of(clip: Clip) -> np.ndarray:
-    """qpos (T, 30) in float64."""
+    """The clip as `qpos` (T, 30) in float64."""
     return np.concatenate([clip.root_pos, clip.root_quat, clip.joint_pos], axis=1).astype(np.float64)
 
 
@@ -105,7 +105,7 @@ def loads(clip: Clip, contact: np.ndarray, every: int = 1) -> Loads:
 def _contact_maps(
     model: mujoco.MjModel, data: mujoco.MjData, corners: np.ndarray, contact: np.ndarray, middle: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Maps from the friction cones' edges (4 a corner) to the wrench about `middle` (6, N) and to the joints (23, N)."""
+    """Maps from the friction cones' edges, 4 a corner, to the wrench about `middle` (6, N) and the joints (23, N)."""
     edges = np.array([[FRICTION, 0, 1], [-FRICTION, 0, 1], [0, FRICTION, 1], [0, -FRICTION, 1]]).T
     wrenches, torques = [np.empty((6, 0))], [np.empty((model.nv - 6, 0))]
     jacobian = np.zeros((3, model.nv))

@@ -19,7 +19,7 @@ ASIDE = (0.1, 1.45, 0.0, 1.35)
 AHEAD = (-1.4, 0.2, 0.0, 1.35)
 CLAPPING = (-0.75, 0.12, 0.05, 0.25)
 GUARD = (0.15, 0.2, -0.15, -0.65)
-HAND_ON_HIP = (0.6, 1.1, -1.0, 0.15)
+ELBOWS_OUT = (0.6, 1.1, -1.0, 0.15)
 START = 0.5  # s of standing still before and after
 
 Keys = Sequence[tuple[float, Sequence[float]]]
@@ -151,7 +151,8 @@ def sway(vary: Vary, reach: float, cycles: int) -> Plan:
     plan = standing(2 * START + seconds)
     zmp = plan.zmp.copy()
     zmp[:, 1] += vary(reach) * swing(plan.time, START, START + seconds, cycles, rise=1.0)
-    down = 0.015 * track(plan.time, [(START, 0.0), (START + 1, 1.0), (START + seconds - 1, 1.0), (START + seconds, 0.0)])
+    end = START + seconds
+    down = 0.015 * track(plan.time, [(START, 0.0), (START + 1, 1.0), (end - 1, 1.0), (end, 0.0)])
     return replace(plan, zmp=zmp, height=plan.height - down)
 
 
@@ -180,6 +181,6 @@ def punch(vary: Vary) -> Plan:
     return add(plan, yaw=-0.2 * swing(plan.time, *ends, 2))
 
 
-def _tidy(keys: list[tuple[float, Sequence[float]]]) -> Keys:
+def _tidy(keys: Keys) -> Keys:
     """Drop keys that repeat a time."""
     return [key for i, key in enumerate(keys) if i == 0 or key[0] > keys[i - 1][0] + 1e-9]

@@ -4,6 +4,7 @@ The push ends with the acceleration of free fall, so the floor's force goes to z
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -39,7 +40,7 @@ def jump(vary: Vary, airborne: float, ahead: float = 0.0, crouch: float = 0.075,
     knots.append((knots[-1][0] + RISE, (COM_HEIGHT, 0.0, 0.0)))
     plan = standing(knots[-1][0] + END)
     height = np.interp(plan.time, [0.0], [COM_HEIGHT])
-    for start, end in zip(knots, knots[1:], strict=False):
+    for start, end in pairwise(knots):
         inside = (plan.time >= start[0] - 1e-9) & (plan.time <= end[0] + 1e-9)
         height[inside] = quintic(plan.time[inside], start, end)
     plan = _fly(replace(plan, height=height, ballistic=True), flights, airborne, vary(ahead))

@@ -103,7 +103,7 @@ def swing(time: np.ndarray, start: float, end: float, cycles: int, rise: float =
     return window * np.sin(2 * np.pi * cycles * (time - start) / (end - start))
 
 
-def mirrored(arm: Sequence[float]) -> np.ndarray:
+def mirrored(arm: Sequence[float] | np.ndarray) -> np.ndarray:
     """The right arm's (pitch, roll, yaw, elbow) for the left arm's; works for (..., 4) too."""
     return np.asarray(arm, dtype=float) * [1, -1, -1, 1]
 

@@ -8,6 +8,7 @@
    step 1 and is added to the centre of mass (the dynamic filter of Kajita et al., 2003).
 """
 
+from dataclasses import dataclass
 from functools import cache
 
 import mujoco
@@ -15,17 +16,19 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from bumblebee.errors import BadInput
+from bumblebee.motion.embedded.flight import spare_moment
 from bumblebee.motion.embedded.plan import ANKLE_X, FPS, PELVIS_HEIGHT, Plan, ease
 from bumblebee.robot.facts import FEET, stand_pose
 from bumblebee.robot.model import build_model
 
 GRAVITY = 9.81
 DT = 1.0 / FPS
-FILTER_PASSES = 3
+FILTER_PASSES, FLIGHT_PASSES = 3, 6
 NEWTON_STEPS = 30
 TOLERANCE = 1e-7
 END_EASE = 0.4  # s
-LEG_DOFS = np.arange(6, 18)
+LARGEST_STEP = 0.3  # rad or m
+FREE_DOFS = np.r_[0:3, 6:18]  # the pelvis' position and the legs
 AIRBORNE = 0.4
 """Below this share of the weight on the floor there is no ZMP to speak of."""
 
@@ -40,13 +43,17 @@ def plain_model() -> mujoco.MjModel:
 
 def solve(plan: Plan) -> np.ndarray:
     """Joint-space trajectory that does what the plan says: qpos (T, 30)."""
-    com = com_from_zmp(plan, plan.zmp)
-    for _ in range(FILTER_PASSES):
-        qpos = inverse_kinematics(plan, com)
-        error = (plan.zmp - zmp(qpos)) * (load(plan) > AIRBORNE)[:, None]
+    com, qpos = com_from_zmp(plan, plan.zmp), None
+    for _ in range(FLIGHT_PASSES if plan.ballistic else FILTER_PASSES):
+        qpos = inverse_kinematics(plan, com, qpos)
+        wrench, _ = floor_wrench(qpos)
+        if plan.ballistic:
+            moment = wrench[:, 4] - (plan.height * wrench[:, 0] - com[:, 0] * wrench[:, 2])
+            plan = spare_moment(plan, moment)
+        error = (plan.zmp - zmp(wrench)) * (load(plan) > AIRBORNE)[:, None]
         error[[0, -1]] = 0.0
         com = com + com_from_zmp(plan, error)
-    return inverse_kinematics(plan, com)
+    return inverse_kinematics(plan, com, qpos)
 
 
 def load(plan: Plan) -> np.ndarray:
@@ -73,50 +80,68 @@ def com_from_zmp(plan: Plan, target: np.ndarray) -> np.ndarray:
 
 
 def _rested(com: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """The same, eased into its first and last value: the solution leans ahead of the ZMP's first move by millimetres."""
+    """The same, eased into its first and last value: it leads the ZMP's first move by millimetres."""
     start, end = ease(time / END_EASE)[:, None], ease((time[-1] - time) / END_EASE)[:, None]
     com = com[0] + (com - com[0]) * start
     return com[-1] + (com - com[-1]) * end
 
 
-def inverse_kinematics(plan: Plan, com: np.ndarray) -> np.ndarray:
-    """qpos (T, 30) with feet, pelvis orientation and upper body as planned and the centre of mass over `com`."""
+@dataclass(frozen=True)
+class _Work:
+    """The model's state and the arrays that Newton's method writes to, with views of their parts."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    feet: tuple[int, int]
+    jacobian: np.ndarray
+    error: np.ndarray
+    turn: np.ndarray
+
+
+def inverse_kinematics(plan: Plan, com: np.ndarray, guess: np.ndarray | None = None) -> np.ndarray:
+    """The `qpos` (T, 30) with feet, pelvis and upper body as planned and the centre of mass over `com` (T, 2).
+
+    It starts each frame from the `guess` (T, 30), or from where the frames before lead.
+    """
     model = plain_model()
     data = mujoco.MjData(model)
+    feet_ids = (model.body(FEET[0]).id, model.body(FEET[1]).id)
+    work = _Work(model, data, feet_ids, np.zeros((15, model.nv)), np.zeros(15), np.zeros(3))
     pelvis = _quats(plan.pelvis)
     feet = _quats(np.stack([plan.foot_yaw, plan.foot_pitch, np.zeros_like(plan.foot_yaw)], axis=-1))
     data.qpos[:3] = [com[0, 0] + ANKLE_X * 0.5, com[0, 1], PELVIS_HEIGHT]
     data.qpos[7:] = stand_pose()
     out = np.empty((len(com), model.nq))
     for k in range(len(com)):
+        if guess is not None:
+            data.qpos[:] = guess[k]
+        elif k > 1:
+            data.qpos[7:19] += out[k - 1, 7:19] - out[k - 2, 7:19]
+            data.qpos[:3] += out[k - 1, :3] - out[k - 2, :3]
         data.qpos[3:7] = pelvis[k]
         data.qpos[19:] = plan.upper[k]
         if not plan.ballistic:
             data.qpos[2] = plan.height[k]
-        _newton(model, data, plan, com[k], feet[k], k)
+        worst = _newton(work, plan, com[k], feet[k], k)
+        if worst >= TOLERANCE:
+            where = f"embedded motion, frame {k}"
+            raise BadInput(where, "a pose within reach", f"{worst:.4f} m of error", "Step shorter or vary less.")
         out[k] = data.qpos
-        if k > 0:  # start the next frame where this one's speed leads
-            data.qpos[7:19] += 0.9 * (out[k, 7:19] - out[k - 1, 7:19])
-            data.qpos[:3] += out[k, :3] - out[k - 1, :3]
     return out
 
 
-def _newton(
-    model: mujoco.MjModel, data: mujoco.MjData, plan: Plan, com: np.ndarray, feet: np.ndarray, frame: int
-) -> None:
-    ids = [model.body(name).id for name in FEET]
-    dofs = np.concatenate([[0, 1, 2], LEG_DOFS])
-    jacobian, turn = np.zeros((15, model.nv)), np.zeros(3)
-    error = np.zeros(15)
+def _newton(work: _Work, plan: Plan, com: np.ndarray, feet: np.ndarray, frame: int) -> float:
+    """Bring `work.data.qpos` to the frame's targets; returns the largest error that is left [m or rad]."""
+    model, data, jacobian, error = work.model, work.data, work.jacobian, work.error
     for _ in range(NEWTON_STEPS):
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        for i, body in enumerate(ids):
+        for i, body in enumerate(work.feet):
             row = 6 * i
             mujoco.mj_jacBody(model, data, jacobian[row : row + 3], jacobian[row + 3 : row + 6], body)
             error[row : row + 3] = plan.foot_pos[frame, i] - data.xpos[body]
-            mujoco.mju_subQuat(turn, feet[i], data.xquat[body])
-            error[row + 3 : row + 6] = data.xmat[body].reshape(3, 3) @ turn
+            mujoco.mju_subQuat(work.turn, feet[i], data.xquat[body])
+            error[row + 3 : row + 6] = data.xmat[body].reshape(3, 3) @ work.turn
         mujoco.mj_jacSubtreeCom(model, data, jacobian[12:15], 1)
         error[12:14] = com - data.subtree_com[1, :2]
         if plan.ballistic:
@@ -125,14 +150,14 @@ def _newton(
             jacobian[14] = 0.0
             jacobian[14, 2] = 1.0
             error[14] = plan.height[frame] - data.qpos[2]
-        if np.abs(error).max() < TOLERANCE:
-            return
-        step = np.linalg.solve(jacobian[:, dofs], error)
-        step *= min(1.0, 0.3 / np.abs(step).max())
+        worst = float(np.abs(error).max())
+        if worst < TOLERANCE:
+            break
+        step = np.linalg.solve(jacobian[:, FREE_DOFS], error)
+        step *= min(1.0, LARGEST_STEP / np.abs(step).max())
         data.qpos[:3] += step[:3]
         data.qpos[7:19] += step[3:]
-    worst = np.abs(error).max()
-    raise BadInput(f"embedded motion, frame {frame}", "a pose within reach", f"{worst:.4f} m of error", "Step shorter.")
+    return worst
 
 
 def _quats(angles: np.ndarray) -> np.ndarray:
@@ -154,7 +179,7 @@ def derivatives(qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def floor_wrench(qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What the floor must supply: force and moment about the world's origin (T, 6), and the generalised force (T, 29)."""
+    """What the floor must supply, force and moment about the world's origin (T, 6), and generalised forces (T, 29)."""
     model = plain_model()
     data = mujoco.MjData(model)
     qvel, qacc = derivatives(qpos)
@@ -162,15 +187,14 @@ def floor_wrench(qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     for k in range(len(qpos)):
         data.qpos[:], data.qvel[:], data.qacc[:] = qpos[k], qvel[k], qacc[k]
         mujoco.mj_inverse(model, data)
-        force = data.qfrc_inverse[:3]
-        torque = data.xmat[1].reshape(3, 3) @ data.qfrc_inverse[3:6]
-        wrench[k] = np.concatenate([force, torque + np.cross(qpos[k, :3], force)])
+        wrench[k, :3] = data.qfrc_inverse[:3]
+        wrench[k, 3:] = data.xmat[1].reshape(3, 3) @ data.qfrc_inverse[3:6]
         generalised[k] = data.qfrc_inverse
+    wrench[:, 3:] += np.cross(qpos[:, :3], wrench[:, :3])
     return wrench, generalised
 
 
-def zmp(qpos: np.ndarray) -> np.ndarray:
-    """Zero-moment point of the whole body (T, 2) [m]; the stand's middle where the floor carries nothing."""
-    wrench, _ = floor_wrench(qpos)
+def zmp(wrench: np.ndarray) -> np.ndarray:
+    """Zero-moment point (T, 2) [m] of a `floor_wrench` (T, 6); it means nothing where the floor carries little."""
     weight = np.maximum(wrench[:, 2], AIRBORNE * 33 * GRAVITY)
     return np.stack([-wrench[:, 4] / weight, wrench[:, 3] / weight], axis=1)

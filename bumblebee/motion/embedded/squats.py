@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.motion.embedded.gestures import AHEAD, RELAXED, START, add, arms
-from bumblebee.motion.embedded.plan import PELVIS_HEIGHT, SIDES, WAIST, Plan, standing, track
+from bumblebee.motion.embedded.gestures import AHEAD, RELAXED, START, add
+from bumblebee.motion.embedded.plan import PELVIS_HEIGHT, SIDES, Plan, pose_arm, standing, track
 from bumblebee.motion.embedded.vary import Vary
 
 REACHING = (-1.05, 0.1, 0.0, 1.3)
@@ -33,19 +33,14 @@ def reach_low(vary: Vary, sides: tuple[str, ...], depth: float) -> Plan:
     keys = [(START, 0.0), (START + move, 1.0), (START + move + pause, 1.0), (START + 2 * move + pause, 0.0)]
     phase = track(plan.time, keys)
     plan = _down(plan, phase, depth, REACHING, sides)
-    sign = {("left",): -1.0, ("right",): 1.0}.get(sides, 0.0)
+    sign = (sides == ("right",)) * 1.0 - (sides == ("left",)) * 1.0
     return add(plan, yaw=sign * 0.35 * phase, pitch=0.2 * phase)
 
 
 def _down(plan: Plan, phase: np.ndarray, depth: float, arm: tuple[float, ...], sides: tuple[str, ...]) -> Plan:
     lean = PITCH_PER_DEPTH * depth * phase
     plan = add(plan, pelvis_pitch=lean, pitch=0.25 * lean)
-    relaxed, target = np.array(RELAXED), np.array(arm)
     upper = plan.upper.copy()
     for side in sides:
-        posed = arms(plan, **{side: [(0.0, relaxed)]}).upper.copy()
-        moved = arms(plan, **{side: [(0.0, target)]}).upper
-        columns = slice(3, 7) if side == "left" else slice(7, 11)
-        upper[:, columns] = posed[:, columns] + phase[:, None] * (moved - posed)[:, columns]
-    upper[:, WAIST["pitch"]] = plan.upper[:, WAIST["pitch"]]
+        pose_arm(upper, side, np.array(RELAXED) + np.multiply.outer(phase, np.subtract(arm, RELAXED)))
     return replace(plan, upper=upper, height=PELVIS_HEIGHT - depth * phase)
