@@ -23,7 +23,7 @@ class MotionsConfig:
     source: str = EMBEDDED
     """"embedded" for the library that comes with BumbleBee, or a folder (or one file) of motions."""
     holdout_share: float = 0.15
-    """Share of the motions that no policy trains on, by a hash of their names; each family of 4 or more has one."""
+    """Share of the motions that no policy trains on, by a hash of their names, in each family of 4 or more."""
     embedded: EmbeddedConfig = field(default_factory=EmbeddedConfig)
     """Which clips the embedded library has."""
     read: ReadConfig = field(default_factory=ReadConfig)

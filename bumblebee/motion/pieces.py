@@ -36,10 +36,10 @@ def motion_of(name: str) -> str:
 
 
 def hold_out(clips: Iterable[Clip], share: float) -> list[Clip]:
-    """The clips with `split` set: about `share` of the motions are "test", by a hash of their names.
+    """The clips with `split` set: `share` of the motions of each family are "test", by a hash of their names.
 
-    All pieces of one motion go to the same side. A family of at least four motions has at least one held out, and at
-    least one left; none is held out where `share` is 0.
+    All pieces of one motion go to the same side. A family of at least four motions has at least one held out and one
+    left; a smaller one has none held out, and none has where `share` is 0.
     """
     clips = list(clips)
     families: dict[str, set[str]] = defaultdict(set)
@@ -47,11 +47,9 @@ def hold_out(clips: Iterable[Clip], share: float) -> list[Clip]:
         families[clip.family].add(motion_of(clip.name))
     held: set[str] = set()
     for motions in families.values():
-        ranked = sorted(motions, key=_position)
-        chosen = [motion for motion in ranked if _position(motion) < share]
-        if share > 0 and not chosen and len(ranked) >= FAMILY_MINIMUM:
-            chosen = ranked[:1]
-        held |= set(chosen[: max(len(ranked) - 1, 0)] if share < 1 else chosen)
+        if share > 0 and len(motions) >= FAMILY_MINIMUM:
+            count = min(max(1, round(share * len(motions))), len(motions) - 1)
+            held |= set(sorted(motions, key=_position)[:count])
     return [replace(clip, split="test" if motion_of(clip.name) in held else "train") for clip in clips]
 
 

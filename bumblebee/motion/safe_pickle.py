@@ -26,6 +26,9 @@ _MAX_DIMENSIONS = 8
 _NUMERIC = re.compile(r"[<>=|]?[biuf][1248]|bool")
 
 
+_BROKEN = (ValueError, TypeError, LookupError, AttributeError, OverflowError, MemoryError, RecursionError)
+
+
 class RefusedError(Exception):
     """The pickle holds something that is neither a plain value nor a numeric array."""
 
@@ -49,7 +52,7 @@ def load(path: Path) -> Any:
         ended = "truncated" in str(error) or "exhausted" in str(error)
         came = f"one that ends early ({error})" if ended else f"a broken one ({error})"
         raise BadInput(path, "a whole pickle", came, "Copy the file again.") from None
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError, MemoryError, RecursionError) as error:
+    except _BROKEN as error:
         came = f"a broken one ({type(error).__name__}: {error})"
         raise BadInput(path, "a whole pickle", came, "Copy the file again.") from None
 

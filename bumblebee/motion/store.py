@@ -11,7 +11,6 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -105,8 +104,9 @@ def read_clip(path: Path) -> Clip:
     values = np.stack([column.to_numpy() for column in table.columns], axis=1)
     root_pos, root_quat, joint_pos, key_pos = np.split(values, [3, 7, 7 + len(joint_names())], axis=1)
     key_pos = key_pos.reshape(-1, len(KEY_BODIES), 3)
-    arrays: dict[str, Any] = {"root_pos": root_pos, "root_quat": root_quat, "joint_pos": joint_pos, "key_pos": key_pos}
-    return Clip(**facts, **{name: np.ascontiguousarray(values) for name, values in arrays.items()})
+    arrays = {"root_pos": root_pos, "root_quat": root_quat, "joint_pos": joint_pos, "key_pos": key_pos}
+    facts.update({name: np.ascontiguousarray(values) for name, values in arrays.items()})
+    return Clip(**facts)
 
 
 def index_of(clips: Iterable[Clip]) -> pd.DataFrame:
