@@ -48,7 +48,7 @@ def contract(onnx_bytes: bytes, ahead: tuple[float, ...], physics_hz: float) -> 
         "action": {
             "base": "reference",
             "scale": [round(float(s), 6) for s in action_scale()],
-            "feed_forward": None,
+            "feed_forward": "quasi-static",  # tracking/feed_forward.py, of the clip and the declared model
         },
         "observation": [{"name": name, "size": size} for name, size in parts],
         "onnx_sha256": hashlib.sha256(onnx_bytes).hexdigest(),

@@ -51,8 +51,8 @@ def try_policy(
     """Roll out each clip, from its first frame.
 
     Returns:
-        a row a rollout: name, family, split, success, share (of the clip until it failed), key_error [m] and joint_error
-        [rad] (means until then).
+        a row a rollout: name, family, split, success, share (of the clip until it failed), key_error [m] and
+        joint_error [rad] (means until then).
     """
     trials = trials or Trials()
     every = [clip for clip in clips for _ in range(trials.repeats)]
@@ -79,7 +79,7 @@ def _try_some(
     limit = torch.tensor([success_threshold(clip.family) for clip in clips])
     first = library.frames(ids, torch.zeros(n))
     qpos, qvel = start_state(first, trials.noise, generator)
-    engine.reset(ids, qpos, qvel, first.joint_pos)
+    engine.reset(ids, qpos, qvel, first.hold_pos)
     action = torch.zeros(n, library.num_joints)
     alive = torch.ones(n, dtype=torch.bool)
     survived, key_sum, joint_sum = torch.zeros(n), torch.zeros(n), torch.zeros(n)

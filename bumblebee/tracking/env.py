@@ -172,7 +172,7 @@ class TrackingEnv(VecEnv):
         self._clip[ids], self._frame[ids] = self.sampler.draw(n, g)
         ref = self.library.frames(self._clip[ids], self._frame[ids] * self.dt)
         qpos, qvel = start_state(ref, self.cfg.reset_noise, g)
-        self.engine.reset(ids, qpos, qvel, ref.joint_pos)
+        self.engine.reset(ids, qpos, qvel, ref.hold_pos)
         self._action[ids] = 0.0
         self._action_before[ids] = 0.0
         self.episode_length_buf[ids] = 0

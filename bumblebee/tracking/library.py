@@ -19,7 +19,7 @@ class ReferenceFrame:
     """One frame of the reference for each of B robots.
 
     `root_pos_w` (B, 3), `root_quat_w` (B, 4) wxyz, `root_lin_vel_w` (B, 3), `root_ang_vel_b` (B, 3), `joint_pos`
-    (B, J), `joint_vel` (B, J), `key_pos_w` (B, 14, 3), and A frames further ahead: `ahead_root_pos_w` (B, A, 3),
+    (B, J), `joint_vel` (B, J), `key_pos_w` (B, 14, 3), `lead` (B, J) [rad] of the gravity feed-forward, and A frames further ahead: `ahead_root_pos_w` (B, A, 3),
     `ahead_root_quat_w` (B, A, 4), `ahead_joint_pos` (B, A, J).
     """
 
@@ -30,9 +30,15 @@ class ReferenceFrame:
     joint_pos: Tensor
     joint_vel: Tensor
     key_pos_w: Tensor
+    lead: Tensor
     ahead_root_pos_w: Tensor
     ahead_root_quat_w: Tensor
     ahead_joint_pos: Tensor
+
+    @property
+    def hold_pos(self) -> Tensor:
+        """Servo targets (B, J) [rad] that carry the reference pose: what an action of zero commands."""
+        return self.joint_pos + self.lead
 
     @property
     def ahead(self) -> int:
@@ -46,10 +52,12 @@ class MotionLibrary:
     Args:
         clips: at least one; all at the same fps.
         ahead: look-ahead times [s] of the frames further ahead.
+        feed_forward: whether `lead` is computed; zeros otherwise.
     """
 
-    def __init__(self, clips: "Sequence[Clip]", ahead: Sequence[float] = AHEAD) -> None:
+    def __init__(self, clips: "Sequence[Clip]", ahead: Sequence[float] = AHEAD, feed_forward: bool = True) -> None:
         from bumblebee.motion.clip import velocities
+        from bumblebee.tracking.feed_forward import lead_angles
 
         self.clips = list(clips)
         self.names = [clip.name for clip in self.clips]
@@ -69,6 +77,7 @@ class MotionLibrary:
                 clip.root_quat,
                 clip.joint_pos,
                 flat,
+                lead_angles(clip) if feed_forward else clip.joint_pos * 0,
                 speed.root_lin_vel_w,
                 speed.root_ang_vel_b,
                 speed.joint_vel,
@@ -102,8 +111,8 @@ class MotionLibrary:
 
     def _unpack(self, row: Tensor) -> ReferenceFrame:
         j, keys = self.num_joints, self.clips[0].key_pos.shape[1]
-        sizes = (3, 4, j, 3 * keys, 3, 3, j)
-        root_pos, root_quat, joint_pos, key_pos, lin_vel, ang_vel, joint_vel = row.split(sizes, dim=-1)
+        sizes = (3, 4, j, 3 * keys, j, 3, 3, j)
+        root_pos, root_quat, joint_pos, key_pos, lead, lin_vel, ang_vel, joint_vel = row.split(sizes, dim=-1)
         return ReferenceFrame(
             root_pos_w=root_pos[:, 0],
             root_quat_w=root_quat[:, 0],
@@ -112,6 +121,7 @@ class MotionLibrary:
             joint_pos=joint_pos[:, 0],
             joint_vel=joint_vel[:, 0],
             key_pos_w=key_pos[:, 0].unflatten(-1, (keys, 3)),
+            lead=lead[:, 0],
             ahead_root_pos_w=root_pos[:, 1:],
             ahead_root_quat_w=root_quat[:, 1:],
             ahead_joint_pos=joint_pos[:, 1:],

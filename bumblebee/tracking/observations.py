@@ -33,7 +33,7 @@ def layout(joints: int = 23, ahead: int = 0) -> list[tuple[str, int]]:
         ("ref_lin_vel_b", 3),
         ("ref_ang_vel", 3),
         ("ref_height", 1),
-        ("ref_joint_pos", joints),
+        ("ref_joint_pos", joints),  # what an action of zero commands
         ("ref_joint_vel", joints),
     ]
     for i in range(1, ahead + 1):
@@ -68,7 +68,7 @@ def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tens
         rotate_inverse(quat, ref.root_lin_vel_w),
         ref.root_ang_vel_b,
         ref.root_pos_w[:, 2:],
-        ref.joint_pos,
+        ref.hold_pos,
         ref.joint_vel,
     ]
     for i in range(ref.ahead):
@@ -78,8 +78,11 @@ def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tens
 
 
 def joint_targets(ref: ReferenceFrame, action: Tensor, scale: Tensor) -> Tensor:
-    """Targets (B, J) [rad] of the position servos: the reference one step ahead plus scale (J,) [rad] times action."""
-    return ref.joint_pos + scale * action
+    """Targets (B, J) [rad] of the position servos.
+
+    What holds the reference one step ahead against gravity, plus scale (J,) [rad] times action.
+    """
+    return ref.hold_pos + scale * action
 
 
 def _six(quat: Tensor) -> Tensor:
