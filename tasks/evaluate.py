@@ -65,7 +65,7 @@ class EvaluateConfig:
     """Which robots: the declared model, the stand-in."""
     max_seconds: float = 10.0
     """Longer motions are cut to their beginning [s]."""
-    max_motions: int = 60
+    max_motions: int = 40
     """A larger library is thinned evenly within each split."""
     untrained: bool = True
     """Also a policy with fresh weights: what there is before training."""

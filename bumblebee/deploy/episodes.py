@@ -9,7 +9,7 @@ import numpy as np
 
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import CONTROL_HZ, Robots
-from bumblebee.deploy.runner import PolicyRunner
+from bumblebee.deploy.runner import PolicyRunner, reference_key, reference_library
 from bumblebee.deploy.sensors import SensorNoise, Sensors, add_noise, draws
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.measured.rollout import Rollout
@@ -19,6 +19,7 @@ from bumblebee.motion.kinematics import sole_points
 from bumblebee.robot.facts import joint_names
 from bumblebee.robot.facts import joints as robot_joints
 from bumblebee.robot.model import gains
+from bumblebee.tracking.library import MotionLibrary
 
 FALL_TILT = np.radians(60.0)  # of the pelvis' up axis against the reference's
 FALL_DROP = 0.35  # m: of the pelvis below the reference's
@@ -67,9 +68,12 @@ def run_episodes(
     lengths = np.array([clip.frames for clip in own])
     rngs = [_generator(episode) for episode in episodes]
     qpos, qvel = start_states(own, rngs, start or StartNoise())
-    robots.reset(qpos, qvel, qpos[:, 7:])
-    normal = [rng.standard_normal((clip.frames, draws(qpos.shape[1] - 7))) for rng, clip in zip(rngs, own, strict=True)]
     groups = _groups(episodes, policies, own)
+    held = np.zeros_like(qpos[:, 7:])
+    for ids, runner in groups:
+        held[ids] = runner.hold()
+    robots.reset(qpos, qvel, held)
+    normal = [rng.standard_normal((clip.frames, draws(qpos.shape[1] - 7))) for rng, clip in zip(rngs, own, strict=True)]
     log, ended = _Log(len(episodes)), np.zeros(len(episodes), dtype=bool)
     for tick in range(int(lengths.max())):
         alive = np.flatnonzero(~ended & (tick < lengths))
@@ -149,7 +153,16 @@ def _groups(
     members: dict[str, list[int]] = {}
     for index, episode in enumerate(episodes):
         members.setdefault(episode.policy, []).append(index)
-    return [(np.array(ids), PolicyRunner(policies[key], [clips[i] for i in ids])) for key, ids in members.items()]
+    distinct = list({clip.name: clip for clip in clips}.values())
+    shared: dict[object, MotionLibrary] = {}
+    groups = []
+    for key, ids in members.items():
+        policy = policies[key]
+        wanted = reference_key(policy)
+        if wanted not in shared:
+            shared[wanted] = reference_library(policy, distinct)
+        groups.append((np.array(ids), PolicyRunner(policy, shared[wanted], [clips[i].name for i in ids])))
+    return groups
 
 
 def _act(groups: list, alive: np.ndarray, tick: int, sensors: Sensors) -> tuple[np.ndarray, np.ndarray]:

@@ -16,6 +16,7 @@ from bumblebee.tracking.observations import layout
 if TYPE_CHECKING:
     import onnxruntime
 
+FEED_FORWARDS = (None, "quasi-static")
 _REQUIRED = ("joints", "kp", "kd", "control_hz", "action", "observation", "onnx_sha256")
 
 
@@ -87,6 +88,8 @@ def read_policy_contract(path: Path) -> dict[str, Any]:
     if missing:
         raise BadInput(f"{path}: field {missing[0]}", "a policy contract", "no such field", "Export the policy again.")
     _check_joints(path, contract)
+    if contract["action"].get("feed_forward") not in FEED_FORWARDS:
+        raise BadInput(f"{path}: action.feed_forward", str(FEED_FORWARDS), str(contract["action"]["feed_forward"]))
     expected = [[name, size] for name, size in layout(len(contract["joints"]), ahead_frames(contract))]
     came = [[part["name"], part["size"]] for part in contract["observation"]]
     for index in range(max(len(expected), len(came))):

@@ -15,7 +15,7 @@ from bumblebee.deploy.sensors import Sensors
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import forward_key_positions
 from bumblebee.sim.engine import RobotState
-from bumblebee.tracking.library import AHEAD, MotionLibrary
+from bumblebee.tracking.library import AHEAD, MotionLibrary, ReferenceFrame
 from bumblebee.tracking.observations import joint_targets, observe
 
 
@@ -38,18 +38,21 @@ class PolicyRunner:
 
     Args:
         policy: what acts.
-        clips: (B) the clip of each robot, all at the policy's rate.
+        library: the reference motions, as `reference_library` makes them for this policy.
+        names: (B) the clip of each robot.
     """
 
-    def __init__(self, policy: ExportedPolicy, clips: Sequence[Clip]) -> None:
-        self.policy = policy
-        distinct = {clip.name: clip for clip in clips}
-        order = {name: index for index, name in enumerate(distinct)}
-        self._library = MotionLibrary(list(distinct.values()), ahead=look_ahead(policy))
-        self._ids = torch.tensor([order[clip.name] for clip in clips])
+    def __init__(self, policy: ExportedPolicy, library: MotionLibrary, names: Sequence[str]) -> None:
+        self.policy, self._library = policy, library
+        order = {name: index for index, name in enumerate(library.names)}
+        self._ids = torch.tensor([order[name] for name in names])
         self._scale = torch.as_tensor(policy.scale, dtype=torch.float32)
         self._dt = 1.0 / float(policy.contract["control_hz"])
-        self._last_action = torch.zeros(len(clips), len(self._scale))
+        self._last_action = torch.zeros(len(names), len(self._scale))
+
+    def hold(self) -> np.ndarray:
+        """Joint targets (B, J) [rad] that carry each clip's first frame: what the servos hold before the start."""
+        return self._reference(np.arange(len(self._ids)), -1).hold_pos.numpy().astype(np.float64)
 
     def observe(self, robots: np.ndarray, tick: int, sensors: Sensors) -> Tensor:
         """Observations (n, D) of `robots` (n,) at control tick `tick`; sensors are those of these robots."""
@@ -62,15 +65,22 @@ class PolicyRunner:
         target = joint_targets(self._reference(robots, tick), action, self._scale)
         return action.numpy().astype(np.float64), target.numpy().astype(np.float64)
 
-    def _reference(self, robots: np.ndarray, tick: int):  # noqa: ANN202 (ReferenceFrame)
+    def _reference(self, robots: np.ndarray, tick: int) -> ReferenceFrame:
         ids = self._ids[torch.as_tensor(robots)]
         return self._library.frames(ids, torch.full((len(robots),), (tick + 1) * self._dt))
 
 
-def look_ahead(policy: ExportedPolicy) -> tuple[float, ...]:
-    """Times [s] of the further reference frames; the contract's own where it states them."""
+def reference_key(policy: ExportedPolicy) -> tuple[tuple[float, ...], bool]:
+    """What of the references depends on the policy: look-ahead times [s], and whether gravity is fed forward."""
     stated = policy.contract.get("ahead")
-    return tuple(stated) if stated is not None else AHEAD[: policy.ahead]
+    ahead = tuple(map(float, stated)) if stated is not None else AHEAD[: policy.ahead]
+    return ahead, policy.contract["action"].get("feed_forward") is not None
+
+
+def reference_library(policy: ExportedPolicy, clips: Sequence[Clip]) -> MotionLibrary:
+    """The clips as this policy was trained to see them; policies of equal `reference_key` can share one."""
+    ahead, feed_forward = reference_key(policy)
+    return MotionLibrary(clips, ahead, feed_forward)
 
 
 def _float(values: np.ndarray) -> Tensor:

@@ -10,12 +10,11 @@ import torch
 from bumblebee.deploy.episodes import Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import NominalRobots
-from bumblebee.deploy.runner import PolicyRunner, robot_state
+from bumblebee.deploy.runner import PolicyRunner, reference_library, robot_state
 from bumblebee.deploy.sensors import NO_NOISE, SensorNoise, Sensors, add_noise, draws
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.observations import joint_targets, observe
 from tests.deploy.conftest import nod
 
@@ -23,9 +22,9 @@ from tests.deploy.conftest import nod
 def test_observation_and_motion_equal_the_engines_step_by_step(policy_folder: Callable[..., Path]) -> None:
     """The same policy closed-loop in the training engine and through the runner: equal observations for ten ticks."""
     clip, policy = nod(), ExportedPolicy.load(policy_folder(gain=0.02))
-    library, ids = MotionLibrary([clip]), torch.zeros(1, dtype=torch.long)
+    library, ids = reference_library(policy, [clip]), torch.zeros(1, dtype=torch.long)
     engine = MujocoCpu(load_model(), 1, threads=1)
-    robots, runner = NominalRobots(1, threads=1), PolicyRunner(policy, [clip])
+    robots, runner = NominalRobots(1, threads=1), PolicyRunner(policy, library, [clip.name])
     qpos = np.concatenate([clip.root_pos[:1], clip.root_quat[:1], clip.joint_pos[:1]], axis=1).astype(np.float64)
     qvel = np.random.default_rng(0).normal(0, 0.1, (1, 29))
     robots.reset(qpos, qvel, qpos[:, 7:])

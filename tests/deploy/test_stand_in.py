@@ -14,6 +14,7 @@ from bumblebee.measured.rollout import read_rollout
 from bumblebee.motion.store import write_library
 from bumblebee.robot.facts import joint_names, joints
 from bumblebee.robot.model import build_model, gains
+from bumblebee.tracking.feed_forward import lead_angles
 from tests.deploy.conftest import nod
 
 OFFSET = {"effect": "encoder_offset", "where": ["right_elbow_joint"], "parameters": {"offset": 0.05}}
@@ -53,11 +54,11 @@ def test_rollouts_keep_the_contract_and_the_seed_decides_them(arguments: Callabl
 
 
 def test_a_command_issued_in_a_row_acts_before_the_next(arguments: Callable, tmp_path: Path) -> None:
-    """Row k's target moves the joint between row k and k+1: the measured speed follows the reference's swing."""
+    """Row k's target, of a policy that adds nothing, is the reference of row k+1 led against gravity."""
     assert main(arguments([], "out", "--names", "b")) == 0
     rollout = read_rollout(tmp_path / "out" / "b-0.parquet")
-    shoulder = joint_names().index("left_shoulder_roll_joint")
-    assert nod("b", 15).joint_pos[1:, shoulder] == pytest.approx(rollout.joint_target[:-1, shoulder], abs=1e-6)
+    clip = nod("b", 15)
+    assert rollout.joint_target[:-1] == pytest.approx((clip.joint_pos + lead_angles(clip))[1:], abs=1e-6)
 
 
 def test_sealed_effects_reach_the_robot(arguments: Callable, tmp_path: Path) -> None:
