@@ -8,7 +8,7 @@ from bumblebee.motion.embedded.gestures import AHEAD, RELAXED, START, add
 from bumblebee.motion.embedded.plan import PELVIS_HEIGHT, SIDES, Plan, pose_arm, standing, track
 from bumblebee.motion.embedded.vary import Vary
 
-REACHING = (-1.05, 0.1, 0.0, 1.3)
+REACHING = (-1.2, 0.2, 0.0, 1.3)
 FOR_BALANCE = (-0.75, 0.2, 0.0, 0.9)
 PITCH_PER_DEPTH = 2.1
 """Lean of the pelvis for a metre of depth [rad/m]."""
