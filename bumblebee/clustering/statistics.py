@@ -14,8 +14,8 @@ LOWER = tuple(i for i, name in enumerate(joint_names()) if any(part in name for 
 UPPER = tuple(i for i in range(len(joint_names())) if i not in LOWER)
 COLUMNS = ("displacement", "z_move", "speed", "joint", "lower_joint", "upper_joint", "airborne")
 
-_WALKS = 0.2  # m/s: a cluster whose root moves faster than this on average is called a walk
-_FLIES = 0.03  # a cluster that is in the air for a larger share of its time than this is called a jump
+_WALKS = 0.15  # m/s: above it a cluster is called a walk; the paper's stands reach 0.148, its walks start at 0.353
+_FLIES, _BOUNCES = 0.03, 3.0  # above both, airborne share and z_move [mm], it is called a jump
 _NO_KEYWORDS = {"person", "man", "woman", "someone", "figure", "robot", "human", "does", "doing", "makes"}
 
 
@@ -46,7 +46,9 @@ def clip_statistics(clip: Clip) -> dict[str, float]:
 
 def keywords(captions: Sequence[Sequence[str]], labels: np.ndarray, k: int, count: int = 4) -> list[list[str]]:
     """The words that set each cluster's captions apart, by tf-idf with one document a cluster."""
-    pooled = [" ".join(plain_text(text) for i in np.flatnonzero(labels == c) for text in captions[int(i)]) for c in range(k)]
+    pooled = [
+        " ".join(plain_text(text) for i in np.flatnonzero(labels == c) for text in captions[int(i)]) for c in range(k)
+    ]
     stop = sorted(ENGLISH_STOP_WORDS | _NO_KEYWORDS)
     vectorizer = TfidfVectorizer(stop_words=stop, token_pattern=r"[A-Za-z]{3,}", sublinear_tf=True)
     try:
@@ -60,11 +62,12 @@ def keywords(captions: Sequence[Sequence[str]], labels: np.ndarray, k: int, coun
 def names(table: pd.DataFrame) -> list[str]:
     """A readable name for each row of cluster statistics, in the paper's words: jump, walk-fast, stand-up ...
 
-    In the air -> jump; travelling -> walk; else stand. Of several walks the fastest is walk-fast, the slowest
-    walk-slow; of several stands the one with the most leg motion relative to the arms' is stand-low, the least
+    In the air and bouncing -> jump; travelling -> walk; else stand. Of several walks the fastest is walk-fast, the
+    slowest walk-slow; of several stands the one with the most leg motion relative to the arms' is stand-low, the least
     stand-up. Anything between is -mid (and numbered if that is not enough).
     """
-    kinds = np.where(table["airborne"] > _FLIES, "jump", np.where(table["speed"] > _WALKS, "walk", "stand"))
+    jumps = (table["airborne"] > _FLIES) & (table["z_move"] > _BOUNCES)
+    kinds = np.where(jumps, "jump", np.where(table["speed"] > _WALKS, "walk", "stand"))
     share = table["lower_joint"] / (table["lower_joint"] + table["upper_joint"]).clip(lower=1e-9)
     ends = {
         "jump": ("low", "high", table["z_move"]),

@@ -46,7 +46,9 @@ def test_names_follow_the_papers_table() -> None:
         (0, 0.12, 0.17, 0.22),
     ]
     rows.append((0, 0.15, 0.28, 0.27))
-    table = pd.DataFrame(rows, columns=["airborne", "speed", "lower_joint", "upper_joint"]).assign(z_move=1.0)
+    table = pd.DataFrame(rows, columns=["airborne", "speed", "lower_joint", "upper_joint"]).assign(
+        z_move=[9.0, 1.0, 5.0, 0.7, 0.8, 1.5]
+    )
     assert names(table) == ["jump", "walk-slow", "walk-fast", "stand-up", "stand-mid", "stand-low"]
     many = pd.concat([table.iloc[[3]].assign(lower_joint=0.1 * i) for i in range(1, 6)])
     assert len(set(names(many))) == 5
