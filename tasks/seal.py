@@ -54,7 +54,7 @@ def main() -> None:
     """Draw and seal."""
     config = load("seal", SealConfig)
     effects = draw(config)
-    sealed = {
+    sealed: dict[str, Any] = {
         "schema": 1,
         "sealed": "Undeclared effects of the stand-in robot, for its process and the final report only.",
         "seed": config.seed,

@@ -114,13 +114,10 @@ def _check_joints(path: Path, contract: dict[str, Any]) -> None:
             (i for i, pair in enumerate(zip(expected, came, strict=False)) if pair[0] != pair[1]),
             min(len(expected), len(came)),
         )
-        one, other = (names[index] if index < len(names) else "nothing" for names in (expected, came))
+        one, other = (str(names[index]) if index < len(names) else "nothing" for names in (expected, came))
         raise BadInput(f"{path}: joints[{index}]", one, other, "The policy was made for another robot or joint order.")
-    for field, values in (
-        ("kp", contract["kp"]),
-        ("kd", contract["kd"]),
-        ("action.scale", contract["action"]["scale"]),
-    ):
+    sizes = {"kp": contract["kp"], "kd": contract["kd"], "action.scale": contract["action"]["scale"]}
+    for field, values in sizes.items():
         if len(values) != len(expected):
             raise BadInput(f"{path}: {field}", f"{len(expected)} numbers", str(len(values)))
     servo = [gains(joint) for joint in joints()]
@@ -128,10 +125,8 @@ def _check_joints(path: Path, contract: dict[str, Any]) -> None:
         declared = [pair[index] for pair in servo]
         if not np.allclose(contract[field], declared, rtol=1e-3):
             worst = int(np.argmax(np.abs(np.asarray(contract[field]) / declared - 1)))
-            came = f"{contract[field][worst]:g}"
-            raise BadInput(
-                f"{path}: {field}[{worst}]", f"{declared[worst]:g}, the servo's gain", came, "Train with it."
-            )
+            wanted = f"{declared[worst]:g}, the servo's gain"
+            raise BadInput(f"{path}: {field}[{worst}]", wanted, f"{contract[field][worst]:g}", "Train with it.")
 
 
 def _check_sizes(policy: ExportedPolicy) -> None:

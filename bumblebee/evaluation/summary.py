@@ -148,4 +148,4 @@ def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
 
 
 def _int(value: object) -> int | None:
-    return None if pd.isna(value) else int(value)  # type: ignore[arg-type, call-overload]
+    return None if pd.isna(value) else int(value)  # type: ignore[call-overload]
