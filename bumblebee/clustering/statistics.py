@@ -15,7 +15,7 @@ UPPER = tuple(i for i in range(len(joint_names())) if i not in LOWER)
 COLUMNS = ("displacement", "z_move", "speed", "joint", "lower_joint", "upper_joint", "airborne")
 
 _WALKS = 0.15  # m/s: above it a cluster is called a walk; the paper's stands reach 0.148, its walks start at 0.353
-_FLIES, _BOUNCES = 0.03, 3.0  # above both, airborne share and z_move [mm], it is called a jump
+_FLIES, _BOUNCES = 0.03, 1.5  # a jump is in the air for more than this share and bounces this often the median cluster
 _NO_KEYWORDS = {"person", "man", "woman", "someone", "figure", "robot", "human", "does", "doing", "makes"}
 
 
@@ -62,11 +62,11 @@ def keywords(captions: Sequence[Sequence[str]], labels: np.ndarray, k: int, coun
 def names(table: pd.DataFrame) -> list[str]:
     """A readable name for each row of cluster statistics, in the paper's words: jump, walk-fast, stand-up ...
 
-    In the air and bouncing -> jump; travelling -> walk; else stand. Of several walks the fastest is walk-fast, the
-    slowest walk-slow; of several stands the one with the most leg motion relative to the arms' is stand-low, the least
-    stand-up. Anything between is -mid (and numbered if that is not enough).
+    In the air and bouncing more than the others -> jump; travelling -> walk; else stand. Of several walks the fastest
+    is walk-fast, the slowest walk-slow; of several stands the one with the most leg motion relative to the arms' is
+    stand-low, the least stand-up. Anything between is -mid (and numbered if that is not enough).
     """
-    jumps = (table["airborne"] > _FLIES) & (table["z_move"] > _BOUNCES)
+    jumps = (table["airborne"] > _FLIES) & (table["z_move"] > _BOUNCES * table["z_move"].median())
     kinds = np.where(jumps, "jump", np.where(table["speed"] > _WALKS, "walk", "stand"))
     share = table["lower_joint"] / (table["lower_joint"] + table["upper_joint"]).clip(lower=1e-9)
     ends = {

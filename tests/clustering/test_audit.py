@@ -50,6 +50,8 @@ def test_names_follow_the_papers_table() -> None:
         z_move=[9.0, 1.0, 5.0, 0.7, 0.8, 1.5]
     )
     assert names(table) == ["jump", "walk-slow", "walk-fast", "stand-up", "stand-mid", "stand-low"]
+    floating = table.assign(airborne=0.1, z_move=3.0)  # poor motion capture: feet hover, but no cluster bounces
+    assert not any("jump" in name for name in names(floating))
     many = pd.concat([table.iloc[[3]].assign(lower_joint=0.1 * i) for i in range(1, 6)])
     assert len(set(names(many))) == 5
 
