@@ -80,3 +80,10 @@ def test_a_broken_contract_is_one_line(policy_folder: Make, content: str) -> Non
 def test_an_absent_policy_is_named(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"contract.json"):
         ExportedPolicy.load(tmp_path)
+
+
+def test_an_unknown_feed_forward_is_refused(policy_folder: Make) -> None:
+    folder = policy_folder()
+    edit(folder, lambda contract: contract["action"].update(feed_forward="learned"))
+    with pytest.raises(BadInput, match=r"action\.feed_forward"):
+        ExportedPolicy.load(folder)
