@@ -21,7 +21,7 @@ def main(argv: list[str] | None = None) -> int:
     """Run; 0 done, 1 a stage failed, 2 bad input, 3 a gate waits for an answer."""
     options = parser().parse_args(argv)
     try:
-        folder = choose(options.name, options.profile, options.motions)
+        folder = options.workspace or choose(options.name, options.profile, options.motions)
         return run(folder, options.prefect_port, options.mlflow_port)
     except BadInput as error:
         print(error, file=sys.stderr)
@@ -36,6 +36,7 @@ def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(prog="python -m flows.demo", description=__doc__)
     made.add_argument("--motions", type=Path, help="folder of motion files instead of the embedded ones")
     made.add_argument("--name", default="", help="workspace under runs/; by default after the motions' folder")
+    made.add_argument("--workspace", type=Path, help="an existing workspace anywhere, as it is")
     made.add_argument("--profile", default="", help="file of profiles/ whose values replace those of params.yaml")
     add_ports(made)
     return made

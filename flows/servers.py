@@ -30,8 +30,10 @@ class Addresses:
     """Of Prefect's pages; its interface is below `/api`."""
     mlflow: str
     """Of MLflow's pages and interface."""
-    pid: int
-    """The process that keeps them."""
+    keeper: int
+    """The process that started them and ends them."""
+    pids: tuple[int, ...]
+    """The servers' own processes."""
 
 
 def free_port(wanted: int = 0) -> int:
@@ -71,7 +73,10 @@ def answers(url: str) -> bool:
 
 @contextmanager
 def servers(workspace: Path, prefect_port: int = 0, mlflow_port: int = 0) -> Iterator[Addresses]:
-    """Both servers for the length of a block; those already running for the workspace are used and left running.
+    """Both servers for the length of a block.
+
+    Those that another process keeps for this workspace are used and left to it; those whose keeper was killed are
+    taken over and ended with the block.
 
     Raises:
         BadInput: when a wanted port is taken or a server ends at once.
@@ -79,7 +84,12 @@ def servers(workspace: Path, prefect_port: int = 0, mlflow_port: int = 0) -> Ite
     workspace = workspace.resolve()
     found = running(workspace)
     if found is not None:
-        yield found
+        try:
+            yield found
+        finally:
+            if not alive(found.keeper):
+                (workspace / SERVERS / "addresses.json").unlink(missing_ok=True)
+                stop(list(found.pids))
         return
     ports = {"prefect": free_port(prefect_port), "mlflow": free_port(mlflow_port)}
     folder = workspace / SERVERS
@@ -89,14 +99,15 @@ def servers(workspace: Path, prefect_port: int = 0, mlflow_port: int = 0) -> Ite
     try:
         for name, command in commands(workspace, ports).items():
             started[name] = _start(name, command, workspace)
-        addresses = Addresses(**{name: f"http://{HOST}:{port}" for name, port in ports.items()}, pid=os.getpid())
+        urls = {name: f"http://{HOST}:{port}" for name, port in ports.items()}
+        addresses = Addresses(**urls, keeper=os.getpid(), pids=tuple(each.pid for each in started.values()))
         _wait(started["prefect"], f"{addresses.prefect}/api/health", folder / "prefect.log")
         _wait(started["mlflow"], f"{addresses.mlflow}/health", folder / "mlflow.log")
         (folder / "addresses.json").write_text(json.dumps(vars(addresses)))
         yield addresses
     finally:
         (folder / "addresses.json").unlink(missing_ok=True)
-        stop(list(started.values()))
+        stop([each.pid for each in started.values()])
 
 
 def commands(workspace: Path, ports: dict[str, int]) -> dict[str, list[str]]:
@@ -137,20 +148,36 @@ def _wait(process: subprocess.Popen[bytes], url: str, log: Path) -> None:
         time.sleep(0.2)
 
 
-def stop(processes: list[subprocess.Popen[bytes]]) -> None:
-    """End the processes and everything that they started, first politely."""
-    for process in processes:
-        _signal(process, signal.SIGTERM)
-    end = time.monotonic() + STOP_LIMIT
-    for process in processes:
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(max(end - time.monotonic(), 0.1))
-        _signal(process, signal.SIGKILL)  # what is left of its group
-        process.wait()
-
-
-def _signal(process: subprocess.Popen[bytes], number: int) -> None:
+def alive(pid: int) -> bool:
+    """Whether a process of this number runs."""
     try:
-        os.killpg(process.pid, number)
+        os.kill(pid, 0)
     except ProcessLookupError:
-        return
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def stop(pids: list[int]) -> None:
+    """End the processes, each the head of a group, and everything that they started; first politely."""
+    for pid in pids:
+        _signal(pid, signal.SIGTERM)
+    end = time.monotonic() + STOP_LIMIT
+    while any(_running(pid) for pid in pids) and time.monotonic() < end:
+        time.sleep(0.05)
+    for pid in pids:
+        _signal(pid, signal.SIGKILL)  # what is left of its group
+        _running(pid)
+
+
+def _running(pid: int) -> bool:
+    try:
+        return os.waitpid(pid, os.WNOHANG) == (0, 0)
+    except ChildProcessError:  # another process's child, or already waited for
+        return alive(pid)
+
+
+def _signal(pid: int, number: int) -> None:
+    with suppress(ProcessLookupError):
+        os.killpg(pid, number)

@@ -19,6 +19,7 @@ SECTIONS = {
     "rollouts": "tasks.rollouts:RolloutsConfig",
     "ingest": "tasks.ingest:IngestConfig",
     "gate": "bumblebee.measured.gate:GateConfig",
+    "diagnose": "tasks.diagnose:DiagnoseConfig",
     "delta": "bumblebee.learning.delta:DeltaConfig",
     "refine": "tasks.refine:RefineConfig",
     "distill": "bumblebee.learning.distill:DistillConfig",
