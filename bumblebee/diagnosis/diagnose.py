@@ -8,7 +8,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, all_candidates, still_joints
 from bumblebee.diagnosis.classes import detectable, equivalents
-from bumblebee.diagnosis.error_block import error_block, horizon_windows
+from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_whiteners, horizon_windows
 from bumblebee.diagnosis.fit import Fit, interval
 from bumblebee.diagnosis.problem import Problem, make_problem
 from bumblebee.diagnosis.search import Search, SearchConfig, search
@@ -181,11 +181,15 @@ def _errors(session: Session, effects: Sequence[Effect], config: DiagnosisConfig
     """before, after and floor on held-out rollouts (on all of them where there is only one)."""
     ids = session.holdout or session.train
     windows = horizon_windows(session.plant, session.layout, session.rollouts, ids, config.report_windows)
-    models = {"before": vary(session.plant, []), "after": vary(session.plant, effects)}
+    before, after = vary(session.plant, []), vary(session.plant, effects)
     common = (session.plant, session.layout, windows)
-    out = {name: error_block(*common, m, session.sigma, session.steps, config.seed) for name, m in models.items()}
-    out["floor"] = error_block(*common, models["after"], session.sigma, session.steps, config.seed, floor=True)
-    return out
+    whiteners = horizon_whiteners(*common, after, session.sigma, session.steps[1], config.seed)
+    fine = session.steps[0]
+    return {
+        "before": error_block(*common, whiteners, before, fine, config.seed),
+        "after": error_block(*common, whiteners, after, fine, config.seed),
+        "floor": floor_block(*common, whiteners, after, session.sigma, fine, config.seed),
+    }
 
 
 def example_window(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -11,14 +11,16 @@ import numpy as np
 
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.signals import Layout
-from bumblebee.diagnosis.simulate import residuals
+from bumblebee.diagnosis.simulate import Starts, residuals
 from bumblebee.diagnosis.variation import Variation
-from bumblebee.diagnosis.whiten import fit_whitener, perturbed_starts
-from bumblebee.diagnosis.windows import Windows, choose_starts, cut
+from bumblebee.diagnosis.whiten import Whitener, fit_whitener, perturbed_starts
+from bumblebee.diagnosis.windows import Windows, choose_starts, cut, select
 from bumblebee.measured.rollout import Rollout
 
 HORIZONS = ("0.02", "0.2", "1.0")
 _RESAMPLES = 400
+_WHITENED = {"0.02": 60, "0.2": 40, "1.0": 12}
+_FLOOR_STARTS = 8
 
 
 def horizon_windows(
@@ -33,41 +35,86 @@ def horizon_windows(
     return found
 
 
-def error_block(
+def horizon_whiteners(
     plant: Plant,
     layout: Layout,
     windows: dict[str, Windows],
     variation: Variation,
     sigma: np.ndarray,
-    steps: tuple[float, float],
+    step: float,
+    seed: int,
+) -> dict[str, tuple[np.ndarray, Whitener]]:
+    """For every horizon some of its windows (indices) and their whitener; the longer, the fewer, for they cost more."""
+    rng = np.random.default_rng(seed)
+    found = {}
+    for name, part in windows.items():
+        count = min(len(part), _WHITENED[name])
+        keep = np.unique(np.linspace(0, len(part) - 1, count).round().astype(int))
+        found[name] = keep, fit_whitener(plant, layout, select(part, keep), variation, sigma, step, rng)
+    return found
+
+
+def error_block(
+    plant: Plant,
+    layout: Layout,
+    windows: dict[str, Windows],
+    whiteners: dict[str, tuple[np.ndarray, Whitener]],
+    variation: Variation,
+    step: float,
     seed: int = 0,
-    floor: bool = False,
 ) -> dict[str, Any]:
-    """One of before, after, floor: horizon -> measure -> value, ci95 and, for joints, per_joint."""
+    """`before` or `after`: horizon -> measure -> value, ci95 and, for joints, per_joint."""
     rng = np.random.default_rng(seed)
     block = {}
     for name, part in windows.items():
-        whitener = fit_whitener(plant, layout, part, variation, sigma, steps[1], rng)
-        if floor:
-            starts = perturbed_starts(plant, layout, part, sigma, rng)
-            centre = residuals(plant, layout, part, [variation], steps[1])[0]
-            error = (residuals(plant, layout, part, [variation], steps[1], starts) - centre)[:8]
-            error = error + sigma * rng.standard_normal(error.shape)
-            error, chi = error.reshape(-1, layout.size), whitener(error).reshape(-1, error.shape[-1])
-            groups = np.tile(part.rollout, 8)
-        else:
-            raw = residuals(plant, layout, part, [variation], steps[0])[0]
-            error, chi, groups = raw[:, 0], whitener(raw), part.rollout
-        good = np.isfinite(error).all(axis=1)
-        block[name] = _measures(plant, layout, error[good], chi[good], groups[good], rng)
+        keep, whitener = whiteners[name]
+        raw = residuals(plant, layout, part, [variation], step)[0]
+        good = np.isfinite(raw).all(axis=(1, 2))
+        chi = (whitener(raw[keep]) ** 2).mean(axis=1)[good[keep]]
+        chi_groups = part.rollout[keep][good[keep]]
+        block[name] = _measures(plant, layout, raw[good, 0], part.rollout[good], chi, chi_groups, rng)
         block[name]["windows"] = {"value": int(good.sum()), "diverged": int((~good).sum())}
     return block
 
 
-def _measures(
-    plant: Plant, layout: Layout, error: np.ndarray, chi: np.ndarray, groups: np.ndarray, rng: np.random.Generator
+def floor_block(
+    plant: Plant,
+    layout: Layout,
+    windows: dict[str, Windows],
+    whiteners: dict[str, tuple[np.ndarray, Whitener]],
+    variation: Variation,
+    sigma: np.ndarray,
+    step: float,
+    seed: int = 0,
 ) -> dict[str, Any]:
-    """Measures of errors (W, D) and whitened errors (W, D), with intervals over rollouts."""
+    """What sensor noise alone leaves of the errors, in the same form."""
+    rng = np.random.default_rng(seed)
+    block = {}
+    for name, every in windows.items():
+        keep, whitener = whiteners[name]
+        part = select(every, keep)
+        starts = perturbed_starts(plant, layout, part, sigma, rng)
+        some = rng.permutation(len(starts.qpos))[:_FLOOR_STARTS]
+        centre = residuals(plant, layout, part, [variation], step)[0]
+        moved = residuals(plant, layout, part, [variation], step, Starts(starts.qpos[some], starts.qvel[some]))
+        error = moved - centre + sigma * rng.standard_normal(moved.shape)
+        good = np.isfinite(error).all(axis=(2, 3))
+        chi = (whitener(error, centre=False) ** 2).mean(axis=2)[good]
+        groups = np.broadcast_to(part.rollout, good.shape)[good]
+        block[name] = _measures(plant, layout, error[good][:, 0], groups, chi, groups, rng)
+    return block
+
+
+def _measures(
+    plant: Plant,
+    layout: Layout,
+    error: np.ndarray,
+    groups: np.ndarray,
+    chi: np.ndarray,
+    chi_groups: np.ndarray,
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """Measures of errors (W, D) and of chi-squares (some of W), with intervals over rollouts."""
     out = {}
     for name in ("joint_pos", "joint_vel"):
         squares = error[:, layout.slices[name]] ** 2
@@ -77,7 +124,7 @@ def _measures(
     for name in ("base_pos", "base_rot"):
         if name in layout.slices:
             out[f"{name}_rmse"] = _with_interval((error[:, layout.slices[name]] ** 2).sum(axis=1), groups, rng)
-    out["chi2"] = _with_interval((chi**2).mean(axis=1), groups, rng, root=False)
+    out["chi2"] = _with_interval(chi, chi_groups, rng, root=False)
     return out
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from bumblebee.diagnosis.error_block import error_block, horizon_windows
+from bumblebee.diagnosis.error_block import error_block, horizon_whiteners, horizon_windows
 from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.variation import vary
 from bumblebee.errors import BadInput
@@ -24,7 +24,9 @@ def replay(session: Session, effects: Sequence[Effect] = (), budget: int = 120, 
     ids = list(range(len(session.rollouts)))
     windows = horizon_windows(session.plant, session.layout, session.rollouts, ids, budget)
     variation = vary(session.plant, effects)
-    return error_block(session.plant, session.layout, windows, variation, session.sigma, session.steps, seed)
+    common = (session.plant, session.layout, windows)
+    whiteners = horizon_whiteners(*common, variation, session.sigma, session.steps[1], seed)
+    return error_block(*common, whiteners, variation, session.steps[0], seed)
 
 
 def write_json(path: Path, document: dict[str, Any]) -> None:
