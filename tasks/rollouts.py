@@ -170,7 +170,7 @@ def start_stand_in(plan: dict[str, Any], clips: Path, out: Path, work: Path, thr
     file = work / "plan.json"
     file.write_text(json.dumps(plan))
     command = [sys.executable, "-m", "bumblebee.deploy.stand_in", "--sealed", str(SEALED), "--clips", str(clips)]
-    command += ["--plan", str(file), "--out", str(out), "--threads", str(threads)]
+    command += ["--plan", str(file), "--out", str(out), "--threads", str(threads), "--with-parent"]
     # The same code as ours, also where it is not installed and the workspace is elsewhere.
     code = os.pathsep.join(filter(None, (str(Path(bumblebee.__file__).parents[1]), os.environ.get("PYTHONPATH"))))
     ended = subprocess.run(

@@ -11,6 +11,7 @@ A plan is {"policies": {key: folder}, "episodes": [{"rollout_id", "policy", "mot
 
 import argparse
 import json
+import os
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -56,9 +57,16 @@ def run(options: argparse.Namespace) -> None:
         raise BadInput(options.out / f"{existing[0]}.parquet", "a new file", "one that exists", "Choose another --out.")
     total = sum(clips[e.motion].frames for e in episodes)
     recorded = {"recorded_at": datetime.now(UTC).isoformat(timespec="seconds"), "operator": options.operator}
+    parent = os.getppid()
     with progress(total, f"stand-in robot, {len(episodes)} rollouts", "ticks") as bar:
+
+        def tick(count: int) -> None:
+            if options.with_parent and os.getppid() != parent:
+                raise SystemExit(1)
+            bar.update(count)
+
         make = lambda count: SideBySide(lambda part: StandInRobots(part, effects), count, options.threads)  # noqa: E731
-        rollouts = run_episodes(make, episodes, policies, clips, SensorNoise(), start, bar.update)
+        rollouts = run_episodes(make, episodes, policies, clips, SensorNoise(), start, tick)
     for rollout in rollouts:
         rollout.meta.update({key: value for key, value in recorded.items() if key not in rollout.meta})
         rollout.meta["notes"] = _ending(rollout.frames, clips[rollout.meta["motion"]])
@@ -110,6 +118,7 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--prefix", default="", help="of the rollouts' names")
     parser.add_argument("--seed", type=int, default=0, help="of start states and sensor noise")
     parser.add_argument("--threads", type=int, default=2, help="of the simulation")
+    parser.add_argument("--with-parent", action="store_true", help="end when the process that started it is gone")
     parser.add_argument("--operator", default="stand-in", help="for the metadata")
     return parser.parse_args(argv)
 
