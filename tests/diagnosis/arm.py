@@ -1,0 +1,83 @@
+"""A three-joint arm whose truth is computed apart from the product: 1 ms steps, its own servo, its own effects."""
+
+import mujoco
+import numpy as np
+
+from bumblebee.diagnosis.diagnose import DiagnosisConfig
+from bumblebee.measured.rollout import Rollout
+
+SMALL = DiagnosisConfig(max_windows=50, max_holdout_windows=25, report_windows=10)
+JOINTS = ("j1", "j2", "j3")
+XML = """<mujoco model="arm"><compiler angle="radian"/><option timestep="0.005" integrator="implicitfast"/><worldbody>
+<body name="l1" pos="0 0 1"><joint name="j1" axis="0 0 1" armature="0.01"/>
+<inertial pos="0.02 0 .1" mass="1.2" diaginertia=".01 .01 .006"/>
+<body name="l2" pos="0 0 .2"><joint name="j2" axis="0 1 0" armature="0.01"/>
+<inertial pos="0 0 .15" mass="1" diaginertia=".009 .009 .002"/>
+<body name="l3" pos="0 0 .3"><joint name="j3" axis="0 1 0" armature="0.006"/>
+<inertial pos="0.01 0.02 .12" mass=".7" diaginertia=".005 .005 .001"/></body></body></body></worldbody>
+<actuator><position name="j1" joint="j1" kp="40" kv="3" forcerange="-40 40"/>
+<position name="j2" joint="j2" kp="60" kv="4" forcerange="-40 40"/>
+<position name="j3" joint="j3" kp="30" kv="2" forcerange="-20 20"/></actuator></mujoco>"""
+
+
+def simulate(
+    effects: dict[tuple[str, str], float], count: int = 3, seconds: float = 4.0, seed: int = 0, still: int | None = None
+) -> list[Rollout]:
+    """Rollouts at 50 Hz of the arm with `effects` {(id, place): value}; joint `still` is neither moved nor free."""
+    rng = np.random.default_rng(seed)
+    model = mujoco.MjModel.from_xml_string(XML)
+    kp, kd = model.actuator_gainprm[:, 0].copy(), -model.actuator_biasprm[:, 2]
+    limit = model.actuator_forcerange[:, 1]
+    model.opt.timestep, model.opt.integrator = 0.001, mujoco.mjtIntegrator.mjINT_EULER
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    table = {kind: np.full(3, start) for kind, start in _NEUTRAL.items()}
+    for (kind, place), value in effects.items():
+        if kind == "link_mass":
+            model.body_mass[model.body(place).id] = value
+        elif kind == "armature":
+            model.dof_armature[JOINTS.index(place)] = value
+        else:
+            table[kind][JOINTS.index(place)] = value
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return [_rollout(model, kp, kd, limit, table, seconds, rng, f"r{i:02d}", still) for i in range(count)]
+
+
+_NEUTRAL = {
+    "coulomb_friction": 0.0,
+    "viscous_friction": 0.0,
+    "motor_strength": 1.0,
+    "command_delay": 0.0,
+    "encoder_offset": 0.0,
+    "spring": 0.0,
+}
+
+
+def _rollout(model, kp, kd, limit, table, seconds, rng, name, still) -> Rollout:  # noqa: ANN001
+    data, ticks = mujoco.MjData(model), round(seconds * 50)
+    time = np.arange(ticks) / 50
+    amp, freq, phase = rng.uniform(0.2, 0.6, (3, 3)), rng.uniform(0.2, 1.5, (3, 3)), rng.uniform(0, 6.28, (3, 3))
+    target = (amp * np.sin(2 * np.pi * freq * time[:, None, None] + phase)).sum(axis=1)
+    data.qpos[:] = rng.uniform(-0.3, 0.3, 3)
+    if still is not None:
+        target[:, still] = data.qpos[still] = 0.0
+    position, velocity = [], []
+    for tick in range(ticks):
+        position.append(data.qpos + table["encoder_offset"])
+        velocity.append(data.qvel.copy())
+        for cycle in range(20):
+            sent = np.clip(np.floor((tick / 50 + cycle / 1000 - table["command_delay"]) * 50 + 1e-9), 0, None)
+            wanted = target[sent.astype(int), np.arange(3)]
+            error = wanted - data.qpos - table["encoder_offset"]
+            torque = np.clip(table["motor_strength"] * (kp * error - kd * data.qvel), -limit, limit)
+            torque -= table["viscous_friction"] * data.qvel + table["coulomb_friction"] * np.tanh(data.qvel / 0.002)
+            data.qfrc_applied[:] = torque + table["spring"] * np.sin(8 * data.qpos)
+            if still is not None:
+                data.qvel[still] = data.qfrc_applied[still] = 0.0
+                data.qpos[still] = 0.0
+            mujoco.mj_step(model, data)
+    noisy_q = np.array(position) + 5e-4 * rng.standard_normal((ticks, 3))
+    noisy_v = np.array(velocity) + 0.02 * rng.standard_normal((ticks, 3))
+    if still is not None:
+        noisy_q[:, still] -= np.array(position)[:, still]
+        noisy_v[:, still] -= np.array(velocity)[:, still]
+    return Rollout(name, JOINTS, 50.0, time + 3.0, noisy_q, noisy_v, joint_target=target)

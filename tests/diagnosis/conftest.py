@@ -1,0 +1,26 @@
+"""Small diagnoses of the arm, each made once."""
+
+import mujoco
+import pytest
+from tests.diagnosis.arm import SMALL, XML, simulate
+
+from bumblebee.diagnosis.diagnose import Diagnosis, diagnose
+from bumblebee.diagnosis.session import make_session
+
+_made: dict[tuple, Diagnosis] = {}
+
+
+@pytest.fixture(scope="session")
+def diagnosed():
+    """A function: effects of the truth and a seed -> Diagnosis."""
+
+    def make(
+        effects: dict[tuple[str, str], float], seed: int = 0, count: int = 3, still: int | None = None
+    ) -> Diagnosis:
+        key = (tuple(effects.items()), seed, count, still)
+        if key not in _made:
+            rollouts = simulate(effects, count=count, seed=seed, still=still)
+            _made[key] = diagnose(make_session(mujoco.MjSpec.from_string(XML), rollouts, "arm", "memory"), SMALL)
+        return _made[key]
+
+    return make

@@ -1,0 +1,68 @@
+"""The four files of the contract."""
+
+import copy
+import json
+from pathlib import Path
+
+import mujoco
+import pytest
+
+from bumblebee.diagnosis.output import write_diagnosis
+from bumblebee.diagnosis.report import render_report
+from bumblebee.errors import BadInput
+from bumblebee.sim.effects import read_effects
+
+CASE = {("motor_strength", "j3"): 0.85}
+
+
+def test_the_files_keep_the_contract(diagnosed, tmp_path: Path) -> None:
+    """Names, keys and ids as the contract has them; the corrected model loads in plain MuJoCo."""
+    write_diagnosis(diagnosed(CASE, seed=3), tmp_path / "out")
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {
+        "diagnosis.json",
+        "model.xml",
+        "effects.yaml",
+        "report.html",
+    }
+    document = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert document["schema"] == 1
+    assert sorted(document["train"] + document["holdout"]) == ["r00", "r01", "r02"]
+    assert set(document["effects"][0]) == {
+        "effect",
+        "where",
+        "parameters",
+        "equivalent",
+        "explains",
+        "evidence",
+        "native",
+    }
+    assert set(document["unexplained"]) == {"significant", "p", "where", "depends_on", "description"}
+    for part in ("before", "after", "floor"):
+        assert list(document["error"][part]) == ["0.02", "0.2", "1.0"]
+        assert set(document["error"][part]["0.2"]) >= {"joint_pos_rmse", "joint_vel_rmse", "chi2"}
+        assert set(document["error"][part]["0.2"]["joint_pos_rmse"]["per_joint"]) == {"j1", "j2", "j3"}
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "model.xml"))
+    assert model.actuator("j3").gainprm[0] == pytest.approx(0.85 * 30, rel=0.01)
+    (effect,) = read_effects(tmp_path / "out" / "effects.yaml")
+    assert (effect.effect, effect.where) == ("motor_strength", ("j3",))
+
+
+def test_an_existing_folder_is_left_alone_unless_told(diagnosed, tmp_path: Path) -> None:
+    """Refused in one line; with overwrite it is replaced whole."""
+    (tmp_path / "old.txt").write_text("mine")
+    with pytest.raises(BadInput, match="overwrite"):
+        write_diagnosis(diagnosed(CASE, seed=3), tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["old.txt"]
+    write_diagnosis(diagnosed(CASE, seed=3), tmp_path, overwrite=True)
+    assert not (tmp_path / "old.txt").exists()
+
+
+def test_text_from_files_cannot_become_markup(diagnosed) -> None:
+    """Joint and rollout names are escaped in the report."""
+    document = copy.deepcopy(diagnosed(CASE, seed=3).document)
+    document["effects"][0]["where"] = ["<script>alert(1)</script>"]
+    document["notes"] = ["<img src=x>"]
+    example = {"joint": "<b>", "rollout": "</svg><script>", "start": 0.0, "time": [0.0, 1.0]}
+    page = render_report(document, example | {name: [0.0, 1.0] for name in ("measured", "before", "after")})
+    assert "<script>" not in page
+    assert "<img" not in page

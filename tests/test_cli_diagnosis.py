@@ -1,0 +1,90 @@
+"""The command line: status 0 when done, status 2 and one line on standard error for unusable input."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bumblebee import cli
+from bumblebee.measured.rollout import Rollout, write_rollout
+
+XML = """<mujoco><compiler angle="radian"/><option timestep="0.005"/><worldbody><body name="l"><joint name="j" axis="0 1 0"
+ armature=".01"/><inertial pos="0 0 .1" mass="1" diaginertia=".01 .01 .01"/></body></worldbody>
+<actuator><position name="j" joint="j" kp="30" kv="2"/></actuator></mujoco>"""
+
+
+def run(*arguments: object) -> int:
+    """Exit status of `bumblebee ARGUMENTS`."""
+    before, sys.argv = sys.argv, ["bumblebee", *map(str, arguments)]
+    try:
+        cli.main()
+    except SystemExit as end:
+        return int(end.code or 0)
+    finally:
+        sys.argv = before
+    return 0
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A dataset of two short rollouts that hang still but for a swing."""
+    rng = np.random.default_rng(0)
+    time = np.arange(60) / 50
+    for name in ("a", "b"):
+        q = 0.2 * np.sin(3 * time)[:, None] + 5e-4 * rng.standard_normal((60, 1))
+        v = 0.6 * np.cos(3 * time)[:, None] + 0.02 * rng.standard_normal((60, 1))
+        rollout = Rollout(name, ("j",), 50.0, time, q, v, joint_target=0.2 * np.sin(3 * time + 0.2)[:, None])
+        write_rollout(tmp_path / "set" / "rollouts" / f"{name}.parquet", rollout)
+    (tmp_path / "model.xml").write_text(XML)
+    return tmp_path
+
+
+def test_replay_and_gap_end_well(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Both write the error block, by horizon."""
+    assert run("replay", data / "model.xml", data / "set", "--out", data / "errors.json") == 0
+    assert run("gap", data / "model.xml", data / "set", "--out", data / "gap.json") == 0
+    assert "joint_pos_rmse" in capsys.readouterr().out
+    assert set(json.loads((data / "errors.json").read_text())) == {"0.02", "0.2", "1.0"}
+    assert json.loads((data / "gap.json").read_text()) == json.loads((data / "errors.json").read_text())
+
+
+@pytest.mark.parametrize("command", ["diagnose", "replay"])
+def test_unusable_input_is_one_line_and_status_two(
+    data: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    """No such model, no such dataset, a model without the logged joint."""
+    (data / "other.xml").write_text(XML.replace('name="j"', 'name="k"').replace('joint="j"', 'joint="k"'))
+    for model, folder in (("none.xml", "set"), ("model.xml", "nowhere"), ("other.xml", "set")):
+        assert run(command, data / model, data / folder, "--out", data / "out") == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    assert not (data / "out").exists()
+
+
+def test_hostile_effects_are_refused(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """YAML that would build objects, and places that the model does not have."""
+    bad = [
+        "!!python/object/apply:os.system ['true']",
+        "schema: 1\neffects: [{effect: armature, where: [x], parameters: {armature: 1}}]",
+    ]
+    for text in bad:
+        (data / "effects.yaml").write_text(text)
+        assert (
+            run(
+                "replay", data / "model.xml", data / "set", "--effects", data / "effects.yaml", "--out", data / "e.json"
+            )
+            == 2
+        )
+        assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_cell_that_is_not_a_number_names_file_column_and_row(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """NaN in a log ends the diagnosis before it begins."""
+    q = np.zeros((60, 1))
+    q[7] = np.nan
+    rollout = Rollout("c", ("j",), 50.0, np.arange(60) / 50, q, np.zeros((60, 1)), joint_target=np.zeros((60, 1)))
+    write_rollout(data / "set" / "rollouts" / "c.parquet", rollout)
+    assert run("diagnose", data / "model.xml", data / "set", "--out", data / "out") == 2
+    line = capsys.readouterr().err
+    assert "c: column joint_pos: row 7" in line
