@@ -10,8 +10,9 @@ import pytest
 from bumblebee import cli
 from bumblebee.measured.rollout import Rollout, write_rollout
 
-XML = """<mujoco><compiler angle="radian"/><option timestep="0.005"/><worldbody><body name="l"><joint name="j" axis="0 1 0"
- armature=".01"/><inertial pos="0 0 .1" mass="1" diaginertia=".01 .01 .01"/></body></worldbody>
+XML = """<mujoco><compiler angle="radian"/><option timestep="0.005"/><worldbody>
+<body name="l"><joint name="j" axis="0 1 0" armature=".01"/>
+<inertial pos="0 0 .1" mass="1" diaginertia=".01 .01 .01"/></body></worldbody>
 <actuator><position name="j" joint="j" kp="30" kv="2"/></actuator></mujoco>"""
 
 

@@ -1,1 +1,1 @@
-"""Diagnosis: measured rollouts tell which effect the declared model lacks (paper, section 3.3, done by identification)."""
+"""Diagnosis: measured rollouts tell which effect the declared model lacks (paper, section 3.3)."""

@@ -1,4 +1,4 @@
-"""The candidates: every effect of the catalogue on every joint or body that it can sit on, and the size of a first step."""
+"""The candidates: every effect of the catalogue on every place it can sit on, and the size of a first step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.problem import Problem
 from bumblebee.sim.effects import Effect
 
 

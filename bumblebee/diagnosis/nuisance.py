@@ -34,7 +34,7 @@ def nuisance_columns(plant: Plant, layout: Layout, windows: Windows, variation: 
 
 
 def _late_loop(plant: Plant, variation: Variation, part: str) -> Variation:
-    """kp (u - q(t-e)) - kd qd(t-e), to first order in e: less damping by kp e, less inertia by kd e."""
+    """Torque kp (u - q(t-e)) - kd qd(t-e), to first order in e: less damping by kp e, less inertia by kd e."""
     model = copy.copy(variation.model)
     for column, a in enumerate(plant.actuator):
         if a >= 0:

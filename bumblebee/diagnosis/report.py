@@ -4,7 +4,8 @@ from html import escape
 from typing import Any
 
 _STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1d2430}
-table{border-collapse:collapse;margin:.5rem 0;width:100%}td,th{padding:.25rem .6rem;border-bottom:1px solid #dde;text-align:left}
+table{border-collapse:collapse;margin:.5rem 0;width:100%}
+td,th{padding:.25rem .6rem;border-bottom:1px solid #dde;text-align:left}
 td.n{text-align:right;font-variant-numeric:tabular-nums}.lead{font-size:1.15rem}.note{color:#667}svg{width:100%;height:auto}"""
 _COLOURS = {"measured": "#1d2430", "before": "#d1495b", "after": "#2a9d8f"}
 

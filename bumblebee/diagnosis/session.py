@@ -73,7 +73,7 @@ def make_session(spec: mujoco.MjSpec, rollouts: Sequence[Rollout], model: object
 
 
 def split(rollouts: Sequence[Rollout]) -> tuple[list[int], list[int]]:
-    """Indices to fit and to hold out: every fourth (third of three, second of two), spread over clusters and motions."""
+    """Indices to fit and to hold out: every fourth (third of three, second of two), over clusters and motions."""
     order = sorted(
         range(len(rollouts)),
         key=lambda i: (

@@ -74,7 +74,7 @@ def simulated_readings(
 def difference(
     layout: Layout, measured: np.ndarray, quat: np.ndarray | None, other: np.ndarray, other_quat: np.ndarray | None
 ) -> np.ndarray:
-    """measured - other, (..., D); rotations as the vector that turns `other` into `measured`."""
+    """Return measured - other, (..., D); rotations as the vector that turns `other` into `measured`."""
     out = measured - other
     if quat is not None and other_quat is not None:
         out[..., layout.slices["base_rot"]] = rotation_vector(multiply(conjugate(other_quat), quat))

@@ -37,7 +37,7 @@ def residuals(
     step: float,
     starts: Starts | None = None,
 ) -> np.ndarray:
-    """measured - simulated, (V, W, N, D); NaN where a simulation diverged.
+    """Return measured - simulated, (V, W, N, D); NaN where a simulation diverged.
 
     With `starts` of K start states, `variations` has one entry and the first axis is K.
     """

@@ -1,8 +1,8 @@
 """Does anything with structure remain? A test of the held-out residual against what it must not depend on.
 
-The residual of one control step, whitened by its own window's covariance, is noise where the model is complete. For every
-joint its velocity residual is regressed on simple functions of that joint's position, velocity, commanded torque and
-time; signs of a window's rows are flipped together to get the distribution of the largest correlation under no structure.
+The whitened residual of a window is noise where the model is complete. For every joint its sum is correlated with
+simple functions of that joint's position, velocity, torque and time. Flipping the sign of whole windows gives the distribution
+of the largest correlation where there is no structure.
 """
 
 from typing import Any

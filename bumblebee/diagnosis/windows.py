@@ -47,7 +47,7 @@ class Windows:
 def choose_starts(
     rollouts: Sequence[Rollout], ids: Sequence[int], horizon: float, budget: int
 ) -> list[tuple[int, int, int]]:
-    """At most `budget` windows (rollout, first tick, last tick) that do not overlap, spread evenly over the rollouts."""
+    """At most `budget` windows (rollout, first tick, last tick), apart from each other and spread over the rollouts."""
     every = []
     for i in ids:
         time = rollouts[i].time
@@ -93,7 +93,7 @@ def select(windows: Windows, keep: np.ndarray) -> Windows:
 
 
 def controls(windows: Windows, delay: np.ndarray, step: float, count: int) -> np.ndarray:
-    """Commands (W, count, nu) for simulation steps of `step` s: the mean over each step of the held, delayed command."""
+    """Commands (W, count, nu) for steps of `step` s: the mean over each step of the held, delayed command."""
     edges = np.arange(count + 1) * step
     out = np.empty((len(windows), count, len(delay)))
     groups = {value: np.flatnonzero(delay == value) for value in np.unique(delay)}

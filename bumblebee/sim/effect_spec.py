@@ -35,7 +35,7 @@ def add_to_spec(spec: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
             _ADD[effect.effect](spec, place, effect.value())
 
 
-def _joint(spec: mujoco.MjSpec, name: str) -> Any:  # noqa: ANN401 (MjsJoint)
+def _joint(spec: mujoco.MjSpec, name: str) -> Any:
     joint = spec.joint(name)
     if joint is None:
         raise BadInput(f"effect on joint {name!r}", "a joint of the model", "no joint of this name")

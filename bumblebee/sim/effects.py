@@ -58,14 +58,14 @@ def read_effects(path: Path) -> list[Effect]:
     return [_effect(f"{path}: effects[{i}]", entry) for i, entry in enumerate(entries)]
 
 
-def _only_keys(where: object, table: Any, keys: set[str]) -> None:  # noqa: ANN401 (whatever YAML holds)
+def _only_keys(where: object, table: Any, keys: set[str]) -> None:
     if not isinstance(table, dict):
         raise BadInput(where, f"a mapping with keys {sorted(keys)}", type(table).__name__)
     if unknown := sorted(str(key) for key in table if key not in keys):
         raise BadInput(where, f"only the keys {sorted(keys)}", f"unknown key {unknown[0]!r}")
 
 
-def _effect(where: str, entry: Any) -> Effect:  # noqa: ANN401 (whatever YAML holds)
+def _effect(where: str, entry: Any) -> Effect:
     _only_keys(where, entry, {"effect", "where", "parameters"})
     name = entry.get("effect")
     if not isinstance(name, str) or name not in CATALOGUE:

@@ -52,7 +52,7 @@ _NEUTRAL = {
 }
 
 
-def _rollout(model, kp, kd, limit, table, seconds, rng, name, still) -> Rollout:  # noqa: ANN001
+def _rollout(model, kp, kd, limit, table, seconds, rng, name, still) -> Rollout:
     data, ticks = mujoco.MjData(model), round(seconds * 50)
     time = np.arange(ticks) / 50
     amp, freq, phase = rng.uniform(0.2, 0.6, (3, 3)), rng.uniform(0.2, 1.5, (3, 3)), rng.uniform(0, 6.28, (3, 3))

@@ -2,10 +2,10 @@
 
 import mujoco
 import pytest
-from tests.diagnosis.arm import SMALL, XML, simulate
 
 from bumblebee.diagnosis.diagnose import Diagnosis, diagnose
 from bumblebee.diagnosis.session import make_session
+from tests.diagnosis.arm import SMALL, XML, simulate
 
 _made: dict[tuple, Diagnosis] = {}
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from tests.diagnosis.arm import SMALL
 
 from bumblebee.diagnosis.diagnose import diagnose
+from tests.diagnosis.arm import SMALL
 
 SINGLES = [
     ("coulomb_friction", "j2", 0.3, 0.05),

@@ -96,7 +96,7 @@ def test_an_encoder_offset_moves_where_the_servo_rests() -> None:
 
 
 def test_a_heavier_link_sags_by_its_weight() -> None:
-    """kp (u - q) balances m g l cos q."""
+    """The servo's kp (u - q) balances m g l cos q."""
     q = run(model_with(single("link_mass", "link", 1.2), gravity=True), 5.0)[0]
     assert KP * -q == pytest.approx(-1.2 * 9.81 * ARM * np.cos(q), abs=0.02)
 
