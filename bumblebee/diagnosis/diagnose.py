@@ -62,7 +62,6 @@ def diagnose(
     holdout = (
         _problem(session, session.holdout, config.max_holdout_windows, config.horizon, rng) if session.holdout else None
     )
-    _require_stable(session, problem)
     say(f"{len(problem.windows)} windows of {config.horizon:g} s; sensitivities of {len(candidates)} candidates")
     found = search(problem, holdout, candidates, config.search, say)
     say(f"{len(found.fit.chosen)} effects; error before and after")
@@ -99,18 +98,15 @@ def _problem(session: Session, ids: Sequence[int], budget: int, horizon: float, 
         names = ", ".join(session.ids(ids)[:3])
         raise BadInput(f"rollouts {names}", f"stretches of {horizon:g} s", "shorter ones", "Record longer runs.")
     windows = cut(session.plant, session.layout, session.rollouts, starts)
-    return make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
-
-
-def _require_stable(session: Session, problem: Problem) -> None:
-    """A model that blows up under the measured commands can tell nothing."""
-    if len(problem.windows) < 4:
+    problem = make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
+    if len(problem.windows) < 0.5 * len(windows):
         raise BadInput(
-            session.plant.model.names[: session.plant.model.names.find(b"\0")].decode() or "model",
-            "a model that stays finite for 0.2 s from the measured states",
+            f"declared model, {len(windows) - len(problem.windows)} of {len(windows)} windows",
+            f"simulations that stay finite for {horizon:g} s from the measured states under the measured commands",
             "simulations that diverge",
             "Look at gains, time step and units of the declared model.",
         )
+    return problem
 
 
 def _on(problem: Problem, fit: Fit) -> Fit:

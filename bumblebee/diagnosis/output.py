@@ -54,11 +54,15 @@ def fill(diagnosis: Diagnosis, folder: Path) -> None:
 def corrected_xml(diagnosis: Diagnosis) -> str:
     """The declared model with every native effect; checked by loading it in plain MuJoCo."""
     spec = diagnosis.session.spec.copy()
+    _find_assets_from_anywhere(spec)
     add_to_spec(spec, diagnosis.effects)
     spec.compile()
     return spec.to_xml()
 
 
-def load_check(path: Path) -> mujoco.MjModel:
-    """The written model, loaded as anyone would."""
-    return mujoco.MjModel.from_xml_path(str(path))
+def _find_assets_from_anywhere(spec: mujoco.MjSpec) -> None:
+    """Meshes and textures lie beside the declared model, not beside the corrected one: name their folders in full."""
+    if spec.meshes or spec.hfields or spec.textures or spec.skins:
+        home = Path(spec.modelfiledir or ".").resolve()
+        spec.compiler.meshdir = str(home / spec.compiler.meshdir)
+        spec.compiler.texturedir = str(home / spec.compiler.texturedir)

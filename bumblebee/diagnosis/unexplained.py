@@ -1,8 +1,8 @@
 """Does anything with structure remain? A test of the held-out residual against what it must not depend on.
 
 The whitened residual of a window is noise where the model is complete. For every joint its sum is correlated with
-simple functions of that joint's position, velocity, torque and time. Flipping the sign of whole windows gives the distribution
-of the largest correlation where there is no structure.
+simple functions of that joint's position, velocity, torque and time. Flipping the sign of whole windows gives the
+distribution of the largest correlation where there is no structure.
 """
 
 from typing import Any
