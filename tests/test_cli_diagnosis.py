@@ -93,7 +93,7 @@ def test_a_cell_that_is_not_a_number_names_file_column_and_row(data: Path, capsy
 
 def test_a_model_that_blows_up_is_unusable(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A servo of the wrong sign diverges from every measured state."""
-    (data / "bad.xml").write_text(XML.replace('kp="30" kv="2"', 'kp="-9000" kv="-50"'))
+    (data / "bad.xml").write_text(XML.replace('kp="30" kv="2"', 'kp="-9000" kv="0"'))
     assert run("diagnose", data / "bad.xml", data / "set", "--out", data / "out") == 2
     assert "diverge" in capsys.readouterr().err
     assert not (data / "out").exists()

@@ -31,7 +31,7 @@ def estimate_noise(rollouts: Sequence[Rollout], layout: Layout) -> np.ndarray:
     every = np.concatenate([p for p in powers if len(p)]) if any(len(p) for p in powers) else np.zeros((1, layout.size))
     dof = _BLOCK * _DOF_SHARE
     sigma = np.sqrt(np.quantile(every, 0.25, axis=0) * dof / chi2.ppf(0.25, dof))
-    sigma = np.maximum(sigma, np.min(steps, axis=0) / np.sqrt(12))
+    sigma = np.maximum(sigma, np.median(steps, axis=0) / np.sqrt(12))
     for name, part in layout.slices.items():
         # A channel far calmer than its kin was probably still: it is no better a sensor than the others.
         kin = np.median(sigma[part])
@@ -49,6 +49,9 @@ def _block_powers(readings: np.ndarray) -> np.ndarray:
 def _quantisation(readings: np.ndarray) -> np.ndarray:
     """Step of a quantised signal, (D,): its smallest move, where it often does not move at all; else 0."""
     moves = np.abs(np.diff(readings, axis=0))
-    still = (moves < 1e-12).mean(axis=0) > 0.05
-    smallest = np.where(moves < 1e-12, np.inf, moves).min(axis=0)
-    return np.where(still & np.isfinite(smallest), smallest, 0.0)
+    out = np.zeros(readings.shape[1])
+    for column, steps in enumerate(moves.T):
+        nonzero = steps[steps > 1e-7]
+        if len(nonzero) > 10 and len(nonzero) < 0.95 * len(steps):
+            out[column] = np.quantile(nonzero, 0.05)  # the smallest itself may be rounding
+    return out

@@ -13,6 +13,7 @@ from bumblebee.diagnosis.simulate import residuals
 from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.whiten import Whitener, fit_whitener
 from bumblebee.diagnosis.windows import Windows, select
+from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
 _OUTLIER = 8.0  # a window this many times worse than the median is weighted down
@@ -83,6 +84,13 @@ def make_problem(
     whitener = fit_whitener(plant, layout, windows, variation, sigma, coarse, rng)
     raw = nuisance_columns(plant, layout, windows, variation, fine)
     keep = whitener.valid & np.isfinite(raw).all(axis=(0, 2, 3))
+    if keep.mean() < 0.5:
+        raise BadInput(
+            f"declared model, {(~keep).sum()} of {len(keep)} windows",
+            f"simulations that stay finite for {windows.span:.2g} s from the measured states and commands",
+            "simulations that diverge",
+            "Look at gains, time step and units of the declared model.",
+        )
     windows, raw = select(windows, keep), raw[:, keep]
     whitener = Whitener(whitener.factor[keep], whitener.bias[keep], whitener.valid[keep])
     return Problem(plant, layout, windows, sigma, fine, coarse, whitener, whitener(raw, centre=False))
