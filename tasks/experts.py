@@ -1,10 +1,12 @@
 """Fine-tune an expert from base on its cluster's clips: -> models/experts/r0/<cluster> (paper, section 3.2)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.trial import World
 from bumblebee.sim.sensors import load_model
+from bumblebee.tracking.config import EnvConfig
 from tasks.stage import load, run_stage
 from tasks.training import Job, TrainingConfig, cluster_clips, train_policy
 
@@ -13,6 +15,10 @@ from tasks.training import Job, TrainingConfig, cluster_clips, train_policy
 class ExpertsConfig(TrainingConfig):
     """The fine-tuning of the experts."""
 
+    env: EnvConfig = field(default_factory=lambda: EnvConfig(threshold_start=0.4))
+    """The task."""
+    ppo: PpoConfig = field(default_factory=lambda: PpoConfig(iterations=80))
+    """The algorithm."""
     others: float = 0.1
     """Share of the draws that goes to other clusters' clips, so that an expert forgets nothing that it will need."""
 

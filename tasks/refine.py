@@ -3,7 +3,7 @@
 The simulator is the round's corrected model, the effects that MJCF cannot hold, and the delta action if it was kept.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from bumblebee.errors import BadInput
@@ -11,6 +11,7 @@ from bumblebee.learning.delta import action_adapter, load_delta
 from bumblebee.learning.trial import World
 from bumblebee.sim.effects import read_effects, runtime_hooks
 from bumblebee.sim.sensors import load_model
+from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import action_scale
 from tasks.experts import ExpertsConfig
 from tasks.sections import loop
@@ -21,6 +22,9 @@ from tasks.training import Job, cluster_clips, train_policy
 @dataclass(frozen=True)
 class RefineConfig(ExpertsConfig):
     """The refinement of the experts."""
+
+    env: EnvConfig = field(default_factory=lambda: EnvConfig(threshold_start=0.4, physics_hz=200.0))
+    """The task; at 200 Hz, so that a delay of a few milliseconds is one."""
 
 
 def main(round: int, cluster: str) -> None:

@@ -36,7 +36,7 @@ class PpoConfig:
     """Bounds of the adaptive rate: with 23 actions a small KL target would pin it to nothing."""
     desired_kl: float = 0.05
     """KL divergence of an update that the rate is adapted to, at first."""
-    desired_kl_end: float = 0.015
+    desired_kl_end: float = 0.05
     """The same at the end."""
     hidden: tuple[int, ...] = (256, 256, 128)
     """Widths of the actor's and the critic's layers, ELU."""

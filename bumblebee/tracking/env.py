@@ -133,11 +133,11 @@ class TrackingEnv(VecEnv):
         """Everything that training needs to go on from here exactly."""
         return {
             "engine": self.engine.state_dict(),
-            "clip": self._clip,
-            "frame": self._frame,
-            "actions": (self._action, self._action_before),
-            "episode_length": self.episode_length_buf,
-            "failure": self.sampler.failure,
+            "clip": self._clip.clone(),
+            "frame": self._frame.clone(),
+            "actions": (self._action.clone(), self._action_before.clone()),
+            "episode_length": self.episode_length_buf.clone(),
+            "failure": self.sampler.failure.clone(),
             "progress": self.progress,
             "generator": self._generator.get_state(),
             "observations": self._observations.to_dict(),

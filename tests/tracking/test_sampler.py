@@ -1,0 +1,82 @@
+"""Sampling, curriculum and terminations."""
+
+import pytest
+import torch
+
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.rotations import from_rotation_vector
+from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.sampler import ClipSampler
+from bumblebee.tracking.terminations import fallen, key_distance, success_threshold, threshold_at
+from tests.tracking.clips import waving
+
+LENGTH = torch.tensor([100, 100, 300])
+
+
+def test_success_never_takes_a_clip_away() -> None:
+    """After ten thousand successes a clip keeps its floor: 0.3 of its length against 1.3 of the untried ones'."""
+    sampler = ClipSampler(LENGTH, floor=0.3)
+    sampler.update(torch.zeros(10_000, dtype=torch.long), torch.zeros(10_000, dtype=torch.bool))
+    assert sampler.probabilities()[0].item() == pytest.approx(0.3 / (0.3 + 1.3 + 3 * 1.3), rel=1e-4)
+
+
+def test_longer_and_failing_clips_are_drawn_more() -> None:
+    """Chances follow length, and failure raises them."""
+    sampler = ClipSampler(LENGTH)
+    chance = sampler.probabilities()
+    assert chance[2] / chance[0] == pytest.approx(3.0)
+    for _ in range(30):
+        sampler.update(torch.tensor([0, 1]), torch.tensor([True, False]))
+    chance = sampler.probabilities()
+    assert chance[0] > 3 * chance[1]
+
+
+def test_updates_in_one_batch_count_each_episode() -> None:
+    """Two successes at once leave what two in turn leave."""
+    one, two = ClipSampler(LENGTH, memory=0.8), ClipSampler(LENGTH, memory=0.8)
+    one.update(torch.tensor([1, 1]), torch.tensor([False, False]))
+    for _ in range(2):
+        two.update(torch.tensor([1]), torch.tensor([False]))
+    assert one.failure[1].item() == pytest.approx(two.failure[1].item()) == pytest.approx(0.64)
+
+
+def test_draws_are_reproducible_within_the_clip_and_start_at_zero_as_often_as_asked() -> None:
+    """Same seed, same draws; frames leave half a second; a fifth of the episodes start at frame 0."""
+    sampler = ClipSampler(LENGTH, start_share=0.2)
+    clip, frame = sampler.draw(5000, torch.Generator().manual_seed(3))
+    again = sampler.draw(5000, torch.Generator().manual_seed(3))
+    assert torch.equal(clip, again[0]) and torch.equal(frame, again[1])
+    assert (frame <= LENGTH[clip] - 25).all() and (frame >= 0).all()
+    assert 0.18 < (frame == 0).float().mean() < 0.24
+
+
+def test_a_share_of_nought_silences_a_clip() -> None:
+    """The share multiplies the weight."""
+    sampler = ClipSampler(LENGTH, share=torch.tensor([1.0, 0.0, 1.0]))
+    assert sampler.probabilities()[1] == 0
+
+
+def test_the_curriculum_only_tightens() -> None:
+    """From 0.8 to 0.3 m over the first half, then constant."""
+    values = [threshold_at(p / 20, 0.8, 0.3, 0.5) for p in range(21)]
+    assert values[0] == 0.8 and values[10] == pytest.approx(0.3) == values[20]
+    assert all(a >= b for a, b in zip(values, values[1:], strict=False))
+
+
+def test_terminations() -> None:
+    """A key body 0.5 m off, a pelvis 0.4 m too low, a trunk tilted by 1.3 rad; on the reference, none."""
+    ref = MotionLibrary([waving()]).frames(torch.zeros(4, dtype=torch.long), torch.zeros(4))
+    pos, quat, keys = ref.root_pos_w.clone(), ref.root_quat_w.clone(), ref.key_pos_w.clone()
+    keys[1, 10, 1] += 0.5
+    pos[2, 2] -= 0.4
+    quat[3] = from_rotation_vector(torch.tensor([0.0, 1.3, 0.0]))
+    zero3, zero = torch.zeros(4, 3), torch.zeros(4, 23)
+    state = RobotState(pos, quat, zero3, zero3, zero, zero, keys)
+    assert key_distance(state, ref).tolist() == pytest.approx([0, 0.5, 0, 0], abs=1e-6)
+    assert fallen(state, ref).tolist() == [False, False, True, True]
+
+
+def test_travelling_families_may_drift_further() -> None:
+    """0.8 m for walking, 0.4 m for all others, unknown ones too."""
+    assert success_threshold("walk") == 0.8
+    assert success_threshold("squat") == success_threshold("") == 0.4
