@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from pathlib import Path
+from typing import Any
 
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from flows import workspace as workspaces
@@ -29,7 +30,8 @@ def main(argv: list[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return EXIT_BAD_INPUT
     except KeyboardInterrupt:
-        print("servers stopped", file=sys.stderr)
+        pass
+    print("servers stopped", file=sys.stderr)
     return 0
 
 
@@ -49,7 +51,8 @@ def serve(folder: Path, addresses: Addresses) -> None:
     from flows.loop import loop
 
     print("start a run on Prefect's page Deployments; Ctrl-C ends the servers", flush=True)
-    loop.serve(name=DEPLOYMENT, parameters={"workspace": str(folder)}, print_starting_message=False)
+    settings: dict[str, Any] = {"print_starting_message": False, "pause_on_shutdown": False}
+    loop.serve(name=DEPLOYMENT, parameters={"workspace": str(folder)}, **settings)
 
 
 def _as_interrupt(number: int, frame: object) -> None:
