@@ -6,16 +6,26 @@ import threading
 import time
 
 LOOK_EVERY = 0.5  # [s]
+SHELLS = {"sh", "dash", "bash", "zsh", "fish", "ksh"}
 
 
 def end_with_parent() -> None:
-    """Watch the parent from a thread and end this process, whatever it does, when the parent is gone."""
-    parent = os.getppid()
-    if parent == 1:
+    """Watch who started this process from a thread, and end it, whatever it does, when that one is gone.
+
+    Where a shell stands between (DVC runs commands in one, and some shells stay), the one before it counts too.
+    """
+    import psutil
+
+    parent = psutil.Process().parent()
+    if parent is None or parent.pid == 1:
         return
+    watched = [parent]
+    before = parent.parent()
+    if parent.name() in SHELLS and before is not None and before.pid != 1:
+        watched.append(before)
 
     def watch() -> None:
-        while os.getppid() == parent:
+        while os.getppid() == parent.pid and all(process.is_running() for process in watched):
             time.sleep(LOOK_EVERY)
         print("the process that started this one is gone: ending", file=sys.stderr, flush=True)
         os._exit(1)
