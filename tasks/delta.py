@@ -6,11 +6,9 @@ It is trained on the rollouts that the diagnosis fitted and judged on those that
 from dataclasses import asdict
 from pathlib import Path
 
-import pandas as pd
 import torch
 
-from bumblebee.errors import BadInput
-from bumblebee.learning.delta import DeltaConfig, magnitudes, save_delta
+from bumblebee.learning.delta import DeltaAction, DeltaConfig, magnitudes, make_network, save_delta
 from bumblebee.learning.delta_env import DeltaEnv
 from bumblebee.learning.delta_gain import Gain, compare, replay_error
 from bumblebee.learning.delta_train import train_delta
@@ -37,12 +35,17 @@ def main(round: int, cluster: str) -> None:
     offset = torch.as_tensor(hooks.encoder_offset, dtype=torch.float32)
     train, held_out = recordings(round, cluster)
     engine = MujocoCpu(model, config.num_envs, threads=config.threads, hooks=hooks)
+    steps = int(config.episode_seconds / engine.control_dt + 0.5)
+    if train is None or len(train.windows(steps, 1)) == 0:
+        leave_out(round, cluster, config, f"no rollout to train on that lasts {config.episode_seconds:g} s")
+        return
     env = DeltaEnv(engine, train, config, offset)
     total = config.iterations * config.steps_per_iteration * config.num_envs
     with progress(total, f"delta action, round {round}, {cluster}", "frames") as bar:
         delta, curve = train_delta(env, config, bar.update)
     judge = MujocoCpu(model, _WORLDS_TO_JUDGE, threads=config.threads, hooks=hooks)
-    gain = judged(judge, held_out, offset, delta) if held_out is not None else Gain(0, {}, False)
+    nothing = Gain(0, {}, False, "no held-out rollouts")
+    gain = judged(judge, held_out, offset, delta) if held_out is not None else nothing
     card = {
         "round": round,
         "cluster": cluster,
@@ -57,7 +60,7 @@ def main(round: int, cluster: str) -> None:
         save_delta(folder, delta, config.hidden, card)
         curve.to_csv(folder / "curve.csv", index=False)
     print(verdict(round, cluster, gain))
-    numbers = {f"held_out/{h}/{k}": v for h, values in gain.change.items() for k, v in values.items()}
+    numbers = {f"held_out/{h}/{k}": v for h, values in gain.change.items() for k, v in values.items() if v == v}
     tags = {"promoted": str(gain.promoted).lower()}
     log_run(
         "delta", cluster=cluster, round=round, params=config, metrics=numbers, curve=target / "curve.csv",
@@ -65,22 +68,29 @@ def main(round: int, cluster: str) -> None:
     )  # fmt: skip
 
 
-def recordings(round: int, cluster: str) -> tuple[Recordings, Recordings | None]:
-    """The cluster's rollouts of this round, as the diagnosis split them."""
+def leave_out(round: int, cluster: str, config: DeltaConfig, reason: str) -> None:
+    """A cluster without usable rollouts gets an untrained delta that is not kept; the other clusters go on."""
+    gain = Gain(0, {}, False, reason)
+    delta = DeltaAction(make_network(config.hidden, len(config.joints)), config.joints, config.limit)
+    card = {"round": round, "cluster": cluster, "promoted": False, "held_out": asdict(gain), "train_rollouts": []}
+    with output_folder(f"models/delta/r{round}/{cluster}") as folder:
+        save_delta(folder, delta, config.hidden, {**card, "magnitude_rad": {}, "config": asdict(config)})
+    print(verdict(round, cluster, gain))
+    log_run("delta", cluster=cluster, round=round, params=config, tags={"promoted": "false"})
+
+
+def recordings(round: int, cluster: str) -> tuple[Recordings | None, Recordings | None]:
+    """The cluster's rollouts of this round, as the diagnosis split them: to train on, to judge by; None without any."""
     folder = Path(f"data/measured/r{round}")
     declared = load_model(folder / "model.xml")
     train_ids, held_out_ids = split(round)
     own = [r for r in read_dataset(folder).rollouts if r.meta.get("cluster", cluster) == cluster]
     train = [r for r in own if r.rollout_id in train_ids]
     held_out = [r for r in own if r.rollout_id in held_out_ids]
-    if not train:
-        raise BadInput(
-            folder, f"rollouts of cluster {cluster} outside the held-out set", "none", "Collect more rollouts."
-        )
-    return stack(train, declared), stack(held_out, declared) if held_out else None
+    return stack(train, declared) if train else None, stack(held_out, declared) if held_out else None
 
 
-def judged(engine: MujocoCpu, held_out: Recordings, offset: torch.Tensor, delta) -> Gain:  # noqa: ANN001 (DeltaAction)
+def judged(engine: MujocoCpu, held_out: Recordings, offset: torch.Tensor, delta: DeltaAction) -> Gain:
     """The held-out comparison with and without the delta."""
     without = replay_error(engine, held_out, offset, None)
     return compare(without, replay_error(engine, held_out, offset, delta))
@@ -102,13 +112,12 @@ def recorded_state(recordings: Recordings) -> RobotState:
 
 def verdict(round: int, cluster: str, gain: Gain) -> str:
     """One line for the terminal."""
+    outcome = f"round {round}, {cluster}: delta action {'kept' if gain.promoted else 'not kept'}: {gain.reason}"
     if not gain.change:
-        return f"round {round}, {cluster}: no held-out rollouts, so no delta action is kept"
-    longest = pd.DataFrame(gain.change).T.iloc[-1]
-    outcome = "kept" if gain.promoted else "not kept: it does not beat no delta beyond its interval"
+        return outcome
+    longest = list(gain.change.values())[-1]
     change = f"{longest['relative']:+.1%} [{longest['low']:+.1%}, {longest['high']:+.1%}]"
-    where = f"round {round}, {cluster}"
-    return f"{where}: error after 1 s {change} on {gain.rollouts} held-out rollouts; delta action {outcome}"
+    return f"{outcome}; error after 1 s {change} on {gain.rollouts} held-out rollouts"
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import os
 import subprocess
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 
 def path_hash(path: Path) -> str:
@@ -54,6 +55,45 @@ def current_inputs() -> dict[str, str]:
     """The inputs of the stage that DVC runs in this process; empty when it was started by hand."""
     stage = os.environ.get("DVC_STAGE")
     return stage_inputs(stage) if stage else {}
+
+
+def upstream(output: Path, lock: Path = Path("dvc.lock")) -> dict[str, str]:
+    """Path -> hash of everything that `output` was made from, over all stages back to the first, by dvc.lock.
+
+    Parameters are `params:<section>` -> hash of their values. Empty where DVC has not made the output.
+    """
+    import yaml
+
+    if not lock.exists():
+        return {}
+    stages = yaml.safe_load(lock.read_text()).get("stages", {})
+    makers = {out["path"]: stage for stage in stages.values() for out in stage.get("outs", [])}
+    found: dict[str, str] = {}
+    waiting = [output.as_posix()]
+    while waiting:
+        path = waiting.pop()
+        stage = _maker(path, makers)
+        for dep in stage.get("deps", []):
+            if dep["path"] not in found:
+                found[dep["path"]] = str(dep.get("md5", "missing"))
+                waiting.append(dep["path"])
+        for section, values in stage.get("params", {}).get("params.yaml", {}).items():
+            text = json.dumps(values, sort_keys=True, default=str)
+            found[f"params:{section}"] = hashlib.md5(text.encode()).hexdigest()
+    return found
+
+
+def _maker(path: str, makers: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """The stage that makes `path`, a folder around it, or files in it."""
+    for made, stage in makers.items():
+        if made == path or path.startswith(made + "/"):
+            return stage
+    inside = [stage for made, stage in makers.items() if made.startswith(path + "/")]
+    if not inside:
+        return {}
+    merged: dict[str, Any] = {"deps": [dep for stage in inside for dep in stage.get("deps", [])]}
+    sections = {k: v for stage in inside for k, v in stage.get("params", {}).get("params.yaml", {}).items()}
+    return {**merged, "params": {"params.yaml": sections}}
 
 
 @cache

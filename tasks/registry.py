@@ -9,6 +9,7 @@ import fcntl
 import json
 import logging
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, is_dataclass
@@ -16,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tasks.lineage import current_inputs, git_sha
+from tasks.lineage import current_inputs, git_sha, upstream
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -103,8 +104,8 @@ def log_run(
     run_id, now = run.info.run_id, run.info.start_time
     labels = {"stage": stage, **run_tags(), **tags}
     labels |= {key: str(value) for key, value in (("cluster", cluster), ("round", round)) if value is not None}
-    points = [Metric(name, float(value), now, 0) for name, value in metrics.items()]
-    points += [Metric(name, value, now, step) for name, step, value in read_curve(curve)] if curve else []
+    points = [Metric(metric_name(name), float(value), now, 0) for name, value in metrics.items()]
+    points += [Metric(metric_name(name), value, now, step) for name, step, value in read_curve(curve)] if curve else []
     settings = [Param(key, value[:LONGEST]) for key, value in flatten(params).items()]
     written = [RunTag(key, str(value)[:LONGEST]) for key, value in labels.items()]
     for start in range(0, max(len(points), 1), 1000):
@@ -120,6 +121,12 @@ def log_run(
             client.log_artifact(run_id, str(artifact))
     client.set_terminated(run_id)
     return str(run_id)
+
+
+def metric_name(name: str) -> str:
+    """A name that MLflow accepts: no empty part between slashes, no sign it does not know."""
+    parts = (re.sub(r"[^\w.\- ]", "_", part).strip() or "unknown" for part in name.split("/"))
+    return "/".join(parts)
 
 
 def run_tags() -> dict[str, str]:
@@ -178,7 +185,8 @@ def register(name: str, folder: Path, tags: dict[str, str], metrics: dict[str, f
             if (folder / extra).exists():
                 mlflow.log_artifact(str(folder / extra), "policy")
     version = str(logged.registered_model_version)
-    for key, value in _short({**run_tags(), **tags}).items():
+    made_from = {f"dvc.{path.replace(':', '.')}": value for path, value in upstream(folder).items()}
+    for key, value in _short({**run_tags(), **made_from, **tags}).items():
         client.set_model_version_tag(name, version, key, value)
     return version
 

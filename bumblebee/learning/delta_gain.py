@@ -27,6 +27,8 @@ class Gain:
     """Horizon [s] -> {"without", "with" (errors), "relative", "low", "high" (95 %, t over rollouts)}."""
     promoted: bool
     """Whether the interval at the longest horizon lies below zero and no shorter one above."""
+    reason: str
+    """Why it was promoted or not, for a person."""
 
 
 def replay_error(
@@ -74,8 +76,15 @@ def compare(without: dict[str, np.ndarray], with_delta: dict[str, np.ndarray]) -
         change[horizon] = {"without": values[0], "with": values[1], "relative": mean, "low": low, "high": high}
     longest = change[str(max(HORIZONS))]
     worse = any(c["low"] > 0 for c in change.values())
-    enough = count >= MIN_ROLLOUTS
-    return Gain(count, change, bool(enough and longest["high"] < 0 and not worse))
+    if count < MIN_ROLLOUTS:
+        reason = f"too few held-out rollouts to judge ({count}, {MIN_ROLLOUTS} are needed)"
+    elif worse:
+        reason = "it makes the error worse at some horizon"
+    elif not longest["high"] < 0:
+        reason = "it does not beat no delta beyond its interval"
+    else:
+        return Gain(count, change, True, "its error is lower beyond the interval")
+    return Gain(count, change, False, reason)
 
 
 def _error(state: RobotState, qpos: Tensor) -> Tensor:

@@ -55,7 +55,7 @@ def stack(rollouts: Sequence[Rollout], model: mujoco.MjModel) -> Recordings:
         BadInput: if a column that the replay needs was not logged.
     """
     if not rollouts:
-        raise BadInput("delta", "at least one measured rollout", "none")
+        raise BadInput("replay", "at least one measured rollout", "none")
     parts = [_states(rollout, model) for rollout in rollouts]
     lengths = torch.tensor([len(qpos) for qpos, _, _ in parts])
     qpos, qvel, targets = (torch.as_tensor(np.concatenate(c), dtype=torch.float32) for c in zip(*parts, strict=True))

@@ -170,4 +170,6 @@ def test_promotion_needs_an_interval_below_zero() -> None:
     worse_soon = {"0.2": before * 1.2, "1.0": before * 1.5}
     assert not compare(base, worse_soon).promoted
     few = {h: v[:3] for h, v in base.items()}
-    assert not compare(few, {h: 0.5 * v for h, v in few.items()}).promoted
+    judged = compare(few, {h: 0.5 * v for h, v in few.items()})
+    assert not judged.promoted
+    assert "too few held-out rollouts to judge (3, 4 are needed)" in judged.reason

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from tasks import lineage, registry
 
@@ -103,3 +104,34 @@ def test_runs_and_models_can_be_found_again_even_when_the_workspace_has_moved(
 
     loaded = mlflow.pyfunc.load_model("models:/generalist@champion")
     assert np.allclose(loaded.predict(np.ones((1, 5), np.float32))["actions"], 10.0)
+
+
+def test_upstream_is_everything_back_to_the_first_stage(tmp_path: Path) -> None:
+    lock = tmp_path / "dvc.lock"
+    stages = {
+        "motions": {"deps": [{"path": "code", "md5": "a"}], "outs": [{"path": "data/motions", "md5": "b"}]},
+        "base": {
+            "deps": [{"path": "data/motions", "md5": "b"}],
+            "params": {"params.yaml": {"base": {"seed": 0}}},
+            "outs": [{"path": "models/base", "md5": "c"}],
+        },
+        "expert": {
+            "deps": [{"path": "models/base", "md5": "c"}],
+            "outs": [{"path": "models/experts/r0/c0", "md5": "d"}],
+        },
+        "generalist": {"deps": [{"path": "models/experts/r0", "md5": "e"}], "outs": [{"path": "models/generalist"}]},
+        "other": {"deps": [{"path": "elsewhere", "md5": "f"}], "outs": [{"path": "data/other"}]},
+    }
+    lock.write_text(yaml.safe_dump({"schema": "2.0", "stages": stages}))
+    found = lineage.upstream(Path("models/generalist"), lock)
+    expected = {"models/experts/r0": "e", "models/base": "c", "data/motions": "b", "code": "a"}
+    assert {k: v for k, v in found.items() if not k.startswith("params:")} == expected
+    assert "params:base" in found
+    assert lineage.upstream(Path("models/generalist"), tmp_path / "none") == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "kept"), [("before/", "before/unknown"), ("success/a b", "success/a b"), ("x/a:b/c", "x/a_b/c")]
+)
+def test_metric_names_are_such_that_mlflow_takes_them(name: str, kept: str) -> None:
+    assert registry.metric_name(name) == kept
