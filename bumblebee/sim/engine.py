@@ -15,7 +15,8 @@ class RobotState:
 
     `root_pos_w` (B, 3) m and `root_quat_w` (B, 4) wxyz are the pelvis in the world; `root_lin_vel_b` (B, 3) m/s and
     `root_ang_vel_b` (B, 3) rad/s its velocity in its own frame; `joint_pos` (B, J) rad and `joint_vel` (B, J) rad/s;
-    `key_pos_w` (B, 14, 3) m the key bodies' origins in the world.
+    `key_pos_w` (B, 14, 3) m the key bodies' origins in the world. Where encoders are off, `read_key_pos_w` (B, 14, 3) m
+    is where the readings put those bodies: all that a policy on the robot can know; None where they read the truth.
     """
 
     root_pos_w: Tensor
@@ -25,10 +26,12 @@ class RobotState:
     joint_pos: Tensor
     joint_vel: Tensor
     key_pos_w: Tensor
+    read_key_pos_w: Tensor | None = None
 
     def __getitem__(self, ids: Tensor) -> "RobotState":
         """The state of some of the robots."""
-        return RobotState(**{f.name: getattr(self, f.name)[ids] for f in fields(self)})
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return RobotState(**{name: None if value is None else value[ids] for name, value in values.items()})
 
 
 class Engine(Protocol):

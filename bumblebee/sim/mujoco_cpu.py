@@ -4,6 +4,7 @@ One `MjData` a world (`persistent`), so that the position and velocity stages co
 bodies current, are not computed again by the next one.
 """
 
+import copy
 from typing import Protocol
 
 import mujoco
@@ -18,7 +19,7 @@ from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.sim.sensors import sensor_name
 
-_VEL = int(mujoco.mjtStage.mjSTAGE_VEL)
+_POS, _VEL = int(mujoco.mjtStage.mjSTAGE_POS), int(mujoco.mjtStage.mjSTAGE_VEL)
 # MuJoCo resets a world by itself when its state blows up, and counts it in these warnings.
 _BAD = [int(w) for w in (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL)]
 _BAD.append(int(mujoco.mjtWarning.mjWARN_BADQACC))
@@ -56,9 +57,11 @@ class MujocoCpu:
             raise BadInput("physics rate", f"a multiple of the control rate {control_hz:g} Hz", came)
         self.substeps = round(steps)
         self.batch = Batch(model, num_worlds, threads, persistent=True)
-        self._offset = None
+        self._offset: np.ndarray | None = None
         if hooks is not None and np.any(hooks.encoder_offset):
-            self._offset = torch.as_tensor(hooks.encoder_offset, dtype=torch.float32)
+            self._offset = np.asarray(hooks.encoder_offset, dtype=np.float64)
+            self._believed = Batch(_kinematics_only(model), num_worlds, threads, persistent=True)
+            self._believed_xpos = self._believed.bind("xpos")
         self._keys = [model.body(name).id for name in KEY_BODIES]
         self._feet = [model.body(name).id for name in FEET]
         self._force = _foot_sensor_columns(model)
@@ -104,16 +107,25 @@ class MujocoCpu:
         qpos = _float(self.batch.qpos)
         qvel = _float(self.batch.qvel)
         quat = qpos[:, 3:7]
-        joint_pos = qpos[:, 7:]
+        read = None if self._offset is None else self._read_qpos()
         return RobotState(
             root_pos_w=qpos[:, :3],
             root_quat_w=quat,
             root_lin_vel_b=rotate_inverse(quat, qvel[:, :3]),
             root_ang_vel_b=qvel[:, 3:6],
-            joint_pos=joint_pos if self._offset is None else joint_pos + self._offset,
+            joint_pos=qpos[:, 7:] if read is None else _float(read[:, 7:]),
             joint_vel=qvel[:, 6:],
             key_pos_w=_float(self._xpos[:, self._keys]),
+            read_key_pos_w=None if read is None else _float(self._believed_xpos[:, self._keys]),
         )
+
+    def _read_qpos(self) -> np.ndarray:
+        """Positions as the encoders read them, (B, 7 + J); also puts the bodies of `_believed` there."""
+        read = np.array(self.batch.qpos)
+        read[:, 7:] += self._offset
+        self._believed.qpos[:] = read
+        self._believed.forward(stage=_POS)
+        return read
 
     def torque(self) -> Tensor:
         """See `Engine.torque`."""
@@ -148,6 +160,14 @@ class MujocoCpu:
 
 def _float(values: np.ndarray) -> Tensor:
     return torch.from_numpy(values.astype(np.float32))
+
+
+def _kinematics_only(model: mujoco.MjModel) -> mujoco.MjModel:
+    """The model for kinematics alone: nothing touches anything, nothing is felt."""
+    ghost = copy.copy(model)
+    off = mujoco.mjtDisableBit
+    ghost.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_SENSOR)
+    return ghost
 
 
 def _foot_sensor_columns(model: mujoco.MjModel) -> list[int]:

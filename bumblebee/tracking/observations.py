@@ -52,8 +52,9 @@ def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tens
     quat = state.root_quat_w
     inverse = conjugate(quat)
     to_base = matrix(inverse)  # (B, 3, 3)
-    keys_b = (state.key_pos_w - state.root_pos_w[:, None]) @ to_base.mT
-    error_b = (ref.key_pos_w - state.key_pos_w) @ to_base.mT
+    keys = state.key_pos_w if state.read_key_pos_w is None else state.read_key_pos_w
+    keys_b = (keys - state.root_pos_w[:, None]) @ to_base.mT
+    error_b = (ref.key_pos_w - keys) @ to_base.mT
     parts = [
         -to_base[:, :, 2],
         state.root_lin_vel_b,

@@ -42,6 +42,30 @@ def test_observation_and_motion_equal_the_engines_step_by_step(policy_folder: Ca
         engine.step(wanted)
 
 
+def test_with_encoders_that_are_off_the_engine_shows_what_the_robot_would_believe(
+    policy_folder: Callable[..., Path],
+) -> None:
+    """Readings with an offset: the runner's observation is the engine's, which keeps the true bodies beside it."""
+    clip, policy = nod(), ExportedPolicy.load(policy_folder())
+    library, ids = reference_library(policy, [clip]), torch.zeros(1, dtype=torch.long)
+
+    class Off:
+        encoder_offset = np.where(np.arange(23) == 3, 0.06, 0.0)
+
+    engine, robots = MujocoCpu(load_model(), 1, threads=1, hooks=Off()), NominalRobots(1, threads=1)
+    qpos = np.concatenate([clip.root_pos[:1], clip.root_quat[:1], clip.joint_pos[:1]], axis=1).astype(np.float64)
+    qvel = np.random.default_rng(0).normal(0, 0.1, (1, 29))
+    robots.reset(qpos, qvel, qpos[:, 7:])
+    engine.reset(ids, *(torch.as_tensor(a) for a in (qpos, qvel, qpos[:, 7:])))
+    true = robots.read()
+    off = Sensors(**{**vars(true), "joint_pos": true.joint_pos + Off.encoder_offset})
+    runner, state = PolicyRunner(policy, library, [clip.name]), engine.state()
+    expected = observe(state, library.frames(ids, torch.full((1,), 0.02)), torch.zeros(1, 23))
+    assert torch.allclose(runner.observe(np.array([0]), 0, off), expected, atol=1e-5)
+    assert torch.allclose(state.key_pos_w, robot_state(true).key_pos_w, atol=1e-5)
+    assert state.read_key_pos_w is not None and (state.read_key_pos_w - state.key_pos_w).norm(dim=-1).max() > 0.01
+
+
 def test_key_bodies_come_from_the_readings_alone() -> None:
     """An encoder that reads 0.1 rad more moves the foot where the policy believes it to be, and nothing else."""
     robots, clip = NominalRobots(1, threads=1), nod()
