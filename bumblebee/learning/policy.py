@@ -77,7 +77,7 @@ def load_policy(folder: Path) -> Policy:
     path = Path(folder) / FILE
     try:
         content = torch.load(path, weights_only=True, map_location="cpu")
-        shape = Shape(**{k: tuple(v) if isinstance(v, list) else v for k, v in content["shape"].items()})
+        shape = Shape(**content["shape"])
         actor = new_actor(shape)
         actor.load_state_dict(content["actor"])
     except FileNotFoundError:

@@ -89,7 +89,7 @@ class Trainer:
         torch.manual_seed(seed)
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
             self._runner = OnPolicyRunner(env, runner_config(config), log_dir=None, device="cpu")
-        self.algorithm: BoundedPpo = self._runner.alg  # type: ignore[assignment]
+        self.algorithm: BoundedPpo = self._runner.alg
         self.iteration, self._seconds = 0, 0.0
         if parent is not None:
             self._start_from(load_policy(parent))

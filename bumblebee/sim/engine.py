@@ -4,7 +4,7 @@ Everything is float32 torch, batch first; the order of joints is `joint_names()`
 """
 
 from dataclasses import dataclass, fields
-from typing import Protocol
+from typing import Any, Protocol
 
 from torch import Tensor
 
@@ -30,7 +30,7 @@ class RobotState:
 
     def __getitem__(self, ids: Tensor) -> "RobotState":
         """The state of some of the robots."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
         return RobotState(**{name: None if value is None else value[ids] for name, value in values.items()})
 
 

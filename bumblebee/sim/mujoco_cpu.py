@@ -28,7 +28,9 @@ _BAD.append(int(mujoco.mjtWarning.mjWARN_BADQACC))
 class Hooks(Protocol):
     """Effects that are no part of the model: so far, what the encoders add to the joint angles, (J,) [rad]."""
 
-    encoder_offset: np.ndarray
+    @property
+    def encoder_offset(self) -> np.ndarray:
+        """(J,) [rad]."""
 
 
 class MujocoCpu:

@@ -1,7 +1,7 @@
 """Gravity feed-forward: how far a servo's target must lead the reference for the motor to carry the reference pose.
 
-Quasi-static, from the clip and the declared model alone, so that the robot can compute it too: gravity's torque less that
-of the feet's support, which carries the weight under the centre of mass.
+Quasi-static, from the clip and the declared model alone, so that the robot can compute it too: gravity's torque less
+that of the feet's support, which carries the weight under the centre of mass.
 """
 
 from functools import cache
@@ -63,7 +63,7 @@ def supports(clip: Clip, com: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     line = centre[:, 1, :2] - centre[:, 0, :2]
     along = ((com[:, :2] - centre[:, 0, :2]) * line).sum(-1) / np.maximum((line**2).sum(-1), 1e-6)
     right = np.clip(along, 0.0, 1.0)
-    both = touching.all(axis=1)
+    both = touching[:, 0] & touching[:, 1]
     share = np.where(both[:, None], np.stack((1 - right, right), axis=1), touching.astype(float))
     share = _smoothed(share)
     carried = (share[..., None] * centre).sum(1) / np.maximum(share.sum(1), 1e-6)[:, None]

@@ -19,8 +19,8 @@ class ReferenceFrame:
     """One frame of the reference for each of B robots.
 
     `root_pos_w` (B, 3), `root_quat_w` (B, 4) wxyz, `root_lin_vel_w` (B, 3), `root_ang_vel_b` (B, 3), `joint_pos`
-    (B, J), `joint_vel` (B, J), `key_pos_w` (B, 14, 3), `lead` (B, J) [rad] of the gravity feed-forward, and A frames further ahead: `ahead_root_pos_w` (B, A, 3),
-    `ahead_root_quat_w` (B, A, 4), `ahead_joint_pos` (B, A, J).
+    (B, J), `joint_vel` (B, J), `key_pos_w` (B, 14, 3), `lead` (B, J) [rad] of the gravity feed-forward, and A frames
+    further ahead: `ahead_root_pos_w` (B, A, 3), `ahead_root_quat_w` (B, A, 4), `ahead_joint_pos` (B, A, J).
     """
 
     root_pos_w: Tensor

@@ -67,7 +67,7 @@ def test_the_contract_describes_the_file(policy: Policy, tmp_path: Path) -> None
 
 def test_a_missing_or_foreign_checkpoint_is_bad_input(tmp_path: Path) -> None:
     """One line that names the file."""
-    with pytest.raises(BadInput, match="policy.pt"):
+    with pytest.raises(BadInput, match=r"policy\.pt"):
         load_policy(tmp_path)
     torch.save({"something": 1}, tmp_path / "policy.pt")
     with pytest.raises(BadInput, match="checkpoint of a policy"):

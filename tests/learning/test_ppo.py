@@ -94,14 +94,15 @@ def test_a_child_starts_as_its_parent(model: mujoco.MjModel, tmp_path: Path) -> 
 
 
 def test_it_learns_what_is_rewarded(model: mujoco.MjModel, tmp_path: Path) -> None:
-    """If only calm actions are rewarded, the actions become calm: the penalty shrinks by a third within 12 updates."""
+    """If only calm actions are rewarded, they become calm: the penalty shrinks by a quarter within 16 updates."""
     only = dict.fromkeys([*PENALTIES, *ERRORS], 0.0) | {"action_rate": -1.0}
-    task = replace(ENV, num_worlds=32, reward=RewardConfig(weights=only))
-    config = replace(PPO_CONFIG, iterations=12, steps=8, epochs=3, mini_batches=4, learning_rate_range=(2e-3, 2e-3))
-    env = TrackingEnv(MotionLibrary([waving("a", 100)], ENV.ahead), MujocoCpu(model, 32, threads=1), task, 0)
+    task = replace(ENV, num_worlds=64, reward=RewardConfig(weights=only))
+    learner = dict(iterations=16, steps=8, epochs=5, mini_batches=4, gamma=0.5, learning_rate_range=(4e-3, 4e-3))
+    config = replace(PPO_CONFIG, **learner)
+    env = TrackingEnv(MotionLibrary([waving("a", 100)], ENV.ahead), MujocoCpu(model, 64, threads=1), task, 0)
     Trainer(env, config, tmp_path, seed=0).train()
     curve = pd.read_csv(tmp_path / CURVE)
-    assert curve["reward"].iloc[-1] > 0.67 * curve["reward"].iloc[0]
+    assert curve["reward"].iloc[-1] > 0.75 * curve["reward"].iloc[0]
     assert np.isfinite(curve.drop(columns=["episode_length", "success"])).all().all()
     assert (curve["threshold"].diff().dropna() <= 0).all()
 

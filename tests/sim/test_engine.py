@@ -111,8 +111,9 @@ def test_a_delayed_motor_first_holds_the_targets_of_the_reset() -> None:
     assert moved[1, 0] > 0.02
 
 
-def test_a_broken_world_is_reported_and_can_be_reset(model: mujoco.MjModel) -> None:
+def test_a_broken_world_is_reported_and_can_be_reset(model: mujoco.MjModel, tmp_path, monkeypatch) -> None:
     """A world that is no longer a number is named, alone, and a reset heals it."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo logs the warning into the working directory
     engine = MujocoCpu(model, 3, threads=1)
     engine.batch.qvel[1, 0] = np.nan
     engine.step(STAND.repeat(3, 1))

@@ -49,7 +49,7 @@ def part(observation: torch.Tensor, wanted: str) -> torch.Tensor:
 
 
 def test_parts_are_where_the_layout_says() -> None:
-    """Spot checks: joint angles, last action, what a zero action commands, the error of the pelvis in the base frame."""
+    """Joint angles, last action, what a zero action commands, the error of the pelvis in the base frame."""
     state, ref, action = randoms()
     seen = observe(state, ref, action)
     assert torch.equal(part(seen, "joint_pos"), state.joint_pos)

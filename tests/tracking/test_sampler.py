@@ -1,5 +1,7 @@
 """Sampling, curriculum and terminations."""
 
+from itertools import pairwise
+
 import pytest
 import torch
 
@@ -60,7 +62,7 @@ def test_the_curriculum_only_tightens() -> None:
     """From 0.8 to 0.3 m over the first half, then constant."""
     values = [threshold_at(p / 20, 0.8, 0.3, 0.5) for p in range(21)]
     assert values[0] == 0.8 and values[10] == pytest.approx(0.3) == values[20]
-    assert all(a >= b for a, b in zip(values, values[1:], strict=False))
+    assert all(a >= b for a, b in pairwise(values))
 
 
 def test_terminations() -> None:

@@ -1,0 +1,66 @@
+"""base and experts on a tiny library: what they write, and which clips an expert sees."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import yaml
+
+from bumblebee.errors import BadInput
+from bumblebee.motion.store import write_library
+from tasks import base, experts, training
+from tests.tracking.clips import waving
+
+TINY = {
+    "env": {"num_worlds": 4, "threads": 1},
+    "ppo": {"iterations": 2, "steps": 2, "hidden": [8], "epochs": 1, "mini_batches": 1},
+}
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Four clips in two clusters, one held out, and the parameters."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(training, "log_run", lambda *args, **kwargs: None)
+    clips = [waving(name, 20 + 10 * i) for i, name in enumerate("abcd")]
+    clips[3] = replace(clips[3], split="test")
+    write_library(Path("data/filtered"), clips, None)
+    Path("data/clusters").mkdir(parents=True)
+    labels = {"name": list("abcd"), "cluster": ["c0", "c1", "c0", "c1"]}
+    pd.DataFrame(labels).to_parquet("data/clusters/labels.parquet")
+    Path("params.yaml").write_text(yaml.safe_dump({"clusters": ["c0", "c1"], "base": TINY, "experts": TINY}))
+    return tmp_path
+
+
+def test_base_then_expert(workspace: Path) -> None:
+    """Both folders are complete; the card says what was tried; the held-out clip was not trained on."""
+    base.main()
+    experts.main("c1")
+    for folder in ("models/base", "models/experts/r0/c1"):
+        names = {path.name for path in Path(folder).iterdir()}
+        assert {"policy.pt", "policy.onnx", "contract.json", "curve.csv", "card.json"} <= names
+    card = json.loads(Path("models/base/card.json").read_text())
+    assert card["training_clips"] == ["a", "b", "c"]
+    assert set(card["before"]) == set(card["after"]) == {"stand", "all"}
+    assert card["frames"] == 2 * 2 * 4
+    expert = json.loads(Path("models/experts/r0/c1/card.json").read_text())
+    assert expert["parent"] == "models/base"
+    trials = pd.read_csv("models/experts/r0/c1/trials.csv")
+    assert set(trials["name"]) == {"b", "d"}
+
+
+def test_an_expert_gives_the_others_their_share(workspace: Path) -> None:
+    """A tenth of the draws, by length, goes to the other cluster; with 0 none of its clips is used."""
+    used, share, tried = training.cluster_clips("c0", others=0.1)
+    weight = {clip.name: float(s) * clip.frames for clip, s in zip(used, share, strict=True)}
+    assert weight["b"] / sum(weight.values()) == pytest.approx(0.1)
+    assert {clip.name for clip in tried} == {"a", "c"}
+    assert {clip.name for clip in training.cluster_clips("c0", others=0.0)[0]} == {"a", "c"}
+
+
+def test_a_cluster_without_motions_is_bad_input(workspace: Path) -> None:
+    """One line names the cluster."""
+    with pytest.raises(BadInput, match="c7"):
+        training.cluster_clips("c7", 0.1)
