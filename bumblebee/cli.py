@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -72,7 +73,7 @@ def gap(
         write_json(out, block)
 
 
-def _teller() -> "typer.models.CallbackType":
+def _teller() -> Callable[[str], None]:
     began = time.monotonic()
 
     def say(text: str) -> None:

@@ -10,6 +10,7 @@ from bumblebee.diagnosis.candidates import Candidate, all_candidates, still_join
 from bumblebee.diagnosis.classes import detectable, equivalents
 from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_whiteners, horizon_windows
 from bumblebee.diagnosis.fit import Fit, interval
+from bumblebee.diagnosis.nuisance import NAMES
 from bumblebee.diagnosis.problem import Problem, make_problem
 from bumblebee.diagnosis.search import Search, SearchConfig, search
 from bumblebee.diagnosis.session import Session
@@ -80,13 +81,7 @@ def diagnose(
         "windows": len(problem.windows),
         "horizon": config.horizon,
         "seed": config.seed,
-        "numerics": dict(
-            zip(
-                ("integrator", "position_loop", "velocity_loop", "velocity_clock"),
-                found.fit.nuisance.tolist(),
-                strict=True,
-            )
-        ),
+        "numerics": dict(zip(NAMES, found.fit.nuisance.tolist(), strict=False)),
         "noise": dict(zip(session.layout.labels(session.plant.joints), session.sigma.tolist(), strict=True)),
     }
     return Diagnosis(document, found.fit.effects, session, found, problem)

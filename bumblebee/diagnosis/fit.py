@@ -63,12 +63,12 @@ def cost_of(problem: Problem, residual: np.ndarray, weights: np.ndarray) -> tupl
 def gauss_newton(
     problem: Problem,
     chosen: Sequence[Candidate],
-    values: Sequence[float],
+    values: Sequence[float] | np.ndarray,
     weights: np.ndarray,
     iterations: int = 4,
 ) -> Fit:
     """Refit all chosen effects jointly, from `values`."""
-    values = np.array([c.clip(v) for c, v in zip(chosen, values, strict=True)])
+    values = np.array([c.clip(v) for c, v in zip(chosen, values, strict=True)], dtype=float)
     residual = problem.residual([_effects(chosen, values)])[0]
     cost, nuisance = cost_of(problem, residual, weights)
     columns = _columns(problem, chosen, values, residual)
@@ -91,7 +91,7 @@ def gauss_newton(
     return Fit(tuple(chosen), values, nuisance, residual, columns, cost)
 
 
-def _effects(chosen: Sequence[Candidate], values: Sequence[float]) -> list[Effect]:
+def _effects(chosen: Sequence[Candidate], values: Sequence[float] | np.ndarray) -> list[Effect]:
     return [c.at(v) for c, v in zip(chosen, values, strict=True)]
 
 

@@ -5,7 +5,8 @@ the step and the same for every joint, so each kind is one column with one coeff
 
 - integrator: this simulation at its step against itself at twice the step;
 - position loop and velocity loop: the servo acts on readings that are a little old, q(t - e) and qd(t - e);
-- velocity clock: velocities are read a little before positions.
+- velocity clock: velocities are read a little before positions;
+- height, only where the base's height is not measured but taken from stance: all heights shifted, 1 for a millimetre.
 
 A coefficient of 1 stands for one millisecond; that is also its prior's standard deviation.
 """
@@ -20,17 +21,24 @@ from bumblebee.diagnosis.simulate import Starts, residuals
 from bumblebee.diagnosis.variation import Variation
 from bumblebee.diagnosis.windows import Windows, select
 
-NAMES = ("integrator", "position_loop", "velocity_loop", "velocity_clock")
+NAMES = ("integrator", "position_loop", "velocity_loop", "velocity_clock", "height")
 _UNIT = 0.001  # [s]
+_HEIGHT = 0.001  # [m]
 
 
 def nuisance_columns(plant: Plant, layout: Layout, windows: Windows, variation: Variation, step: float) -> np.ndarray:
-    """Change of the prediction for coefficient 1 of each nuisance, (4, W, N, D); diverged windows are NaN."""
+    """Change of the prediction for coefficient 1 of each nuisance, (4 or 5, W, N, D); diverged windows are NaN."""
     base = residuals(plant, layout, windows, [variation], step)[0]
     double = residuals(plant, layout, windows, [variation], 2 * step)[0]
     late = residuals(plant, layout, windows, [_late_loop(plant, variation, part) for part in ("kp", "kd")], step)
     clock = _clock(plant, layout, windows, variation, step, base)
-    return np.stack([(base - double) * (_UNIT / step), base - late[0], base - late[1], clock])
+    columns = [(base - double) * (_UNIT / step), base - late[0], base - late[1], clock]
+    if plant.floating and "base_pos" not in layout.slices:
+        higher = windows.qpos.copy()
+        higher[:, plant.base_qpos + 2] += _HEIGHT
+        starts = Starts(higher[None], windows.qvel[None])
+        columns.append(base - residuals(plant, layout, windows, [variation], step, starts)[0])
+    return np.stack(columns)
 
 
 def _late_loop(plant: Plant, variation: Variation, part: str) -> Variation:

@@ -21,6 +21,8 @@ class SearchConfig:
     """Candidates a round that are tried in the simulator."""
     most: int = 12
     """Effects at most."""
+    patience: int = 8
+    """Rounds that may fail before the search ends."""
     holdout_z: float = 2.0
     """Held-out gain must exceed this many of its standard errors."""
     least_gain: float = 0.002
@@ -92,6 +94,7 @@ def search(
     steps: list[Step] = []
     rejected: list[str] = []
     closed: set[int] = set()
+    vain = 0
     while len(fit.chosen) < config.most:
         tests = score_tests(problem, columns, fit, weights)
         order = [c for c in np.argsort(-tests[:, 3]) if _open(c, candidates, fit, closed, tests, bound)]
@@ -101,6 +104,9 @@ def search(
         trials = [t for t in trials if t[1] < fit.cost - bound**2 / 2]
         if not trials:
             closed |= set(order[: config.trials])
+            vain += 1
+            if vain >= config.patience:
+                break
             continue
         candidate, _, value = min(trials, key=lambda t: t[1])
         fresh = gauss_newton(problem, (*fit.chosen, candidate), (*fit.values, value), weights)
@@ -108,6 +114,9 @@ def search(
         if step is None:
             rejected.append(f"{candidate.effect} on {candidate.where}")
             closed.add(candidates.index(candidate))
+            vain += 1
+            if vain >= config.patience:
+                break
             continue
         fit = fresh
         steps.append(step)
