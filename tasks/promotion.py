@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 CHAMPION = "champion"
+ALPHA = 0.05
 
 
 @dataclass(frozen=True)
@@ -20,38 +21,51 @@ class Verdict:
 def against_parent(comparison: Mapping[str, Any] | None) -> Verdict:
     """A policy against the one it was trained from, paired over motions of one evaluation.
 
-    It holds unless the child's success is lower by more than the interval of the difference allows.
+    It holds unless the child is shown to be worse: the interval of the difference lies below zero and the paired test
+    over motions agrees (p <= 0.05), since an interval from two motions can be as narrow as nought.
 
     Args:
-        comparison: `success` as `{"value", "ci95": [low, high]}`, child minus parent; None where there is no parent.
+        comparison: `success` as `{"value", "ci95": [low, high], "p"}`, child minus parent, or None.
     """
     if comparison is None:
         return Verdict(True, "no parent in this evaluation")
-    value, (low, high) = comparison["success"]["value"], comparison["success"]["ci95"]
+    value, (low, high), p = (comparison["success"][key] for key in ("value", "ci95", "p"))
     if value is None:
         return Verdict(True, "nothing to compare with")
     text = f"success {value:+.3f} against its parent"
-    text += "" if high is None else f", 95 % interval {low:+.3f} to {high:+.3f}"
-    worse = value < 0 if high is None else high < 0
-    return Verdict(not worse, f"{text}: {'worse' if worse else 'not worse'}")
+    text += ", one motion" if high is None else f", 95 % interval {low:+.3f} to {high:+.3f}, p = {p:.2g}"
+    worse = high is not None and high < 0 and p <= ALPHA
+    return Verdict(not worse, f"{text}: {'worse' if worse else 'not shown to be worse'}")
 
 
-def against_champion(now: Mapping[str, Any], champion: Mapping[str, str] | None, contract: str) -> Verdict:
+def against_champion(
+    now: Mapping[str, Any],
+    champion: Mapping[str, str] | None,
+    contract: str,
+    engine: str,
+    replace_incomparable: bool = False,
+) -> Verdict:
     """A policy against the registered champion, by the numbers that were kept with that version.
 
     Args:
         now: the success rate of the new policy as `{"value", "ci95": [low, high]}`.
         champion: tags of the champion's version, None where there is none.
         contract: sha256 of the evaluation's contract; numbers under another one cannot be compared.
+        engine: the robot of the evaluation; nor can numbers on another one.
+        replace_incomparable: whether a champion whose numbers cannot be compared gives way.
     """
     if champion is None:
         return Verdict(True, "the first version")
-    if champion.get("evaluation_contract") != contract or "success" not in champion:
-        return Verdict(True, "the champion was evaluated under another contract")
+    same = champion.get("evaluation_contract") == contract and champion.get("evaluation_engine") == engine
+    if not same or "success" not in champion:
+        reason = "the champion was evaluated under another contract"
+        if replace_incomparable:
+            return Verdict(True, f"{reason}, and publish.replace_incomparable lets the new version take its place")
+        return Verdict(False, f"{reason}, so it stays: to replace it, set publish.replace_incomparable: true")
     before, value, high = float(champion["success"]), now["value"], now["ci95"][1]
     worse = value < before if high is None else high < before
     text = f"success {value:.3f} (95 % interval up to {high:.3f}) against the champion's {before:.3f}"
-    return Verdict(not worse, f"{text}: {'worse' if worse else 'not worse'}")
+    return Verdict(not worse, f"{text}: {'worse' if worse else 'not shown to be worse'}")
 
 
 def both(*verdicts: Verdict) -> Verdict:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,6 +14,7 @@ from bumblebee.evaluation.summary import compare
 from tasks import registry
 from tasks.lineage import path_hash
 from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both
+from tasks.rollouts import RolloutsConfig
 from tasks.sections import Loop, loop
 from tasks.stage import load, output_file, run_stage
 
@@ -24,8 +25,12 @@ EVALUATION, OUT = Path("data/evaluation"), Path("data/published.json")
 class PublishConfig:
     """By which numbers policies are promoted."""
 
-    engine: Literal["stand_in", "nominal"] = "stand_in"
-    """The robot of the evaluation whose success decides."""
+    engine: Literal["auto", "stand_in", "nominal"] = "auto"
+    """The robot of the evaluation whose success decides; auto: the stand-in, or the declared model where the measured
+    rollouts are of a real robot (`rollouts.source`), which the stand-in is not."""
+    replace_incomparable: bool = False
+    """Whether a new version takes @champion from one that was evaluated under another contract, so unseen which is
+    better. The first version always becomes champion."""
 
 
 @dataclass(frozen=True)
@@ -42,26 +47,41 @@ class Candidate:
     """Name in the evaluation of the policy it was trained from, where both do the same task."""
 
 
+@dataclass(frozen=True)
+class Standard:
+    """What a version is measured by."""
+
+    contract: str
+    """sha256 of the frozen evaluation."""
+    engine: str
+    """Its robot."""
+    replace_incomparable: bool
+    """As configured."""
+
+
 def main() -> None:
     """Register, promote, and write down what is published."""
     config, shape = load("publish", PublishConfig), loop()
+    engine = deciding_engine(config.engine)
     summary = json.loads((EVALUATION / "summary.json").read_text())
     episodes = pd.read_parquet(EVALUATION / "episodes.parquet")
     contract = str(summary["contract_sha256"])
     models: dict[str, Any] = {}
     for candidate in candidates(shape):
-        result = result_of(summary, candidate.policy, config.engine)
-        related = (
-            compare(episodes, candidate.parent, candidate.policy, config.engine, "all") if candidate.parent else None
-        )
-        facts = publish(candidate, result, contract, against_parent(related))
+        result = result_of(summary, candidate.policy, engine)
+        if result is None:
+            print(f"{candidate.policy}: not published, it has no results in the evaluation (no motion of its cluster)")
+            continue
+        related = compare(episodes, candidate.parent, candidate.policy, engine, "all") if candidate.parent else None
+        standard = Standard(contract, engine, config.replace_incomparable)
+        facts = publish(candidate, result, standard, against_parent(related))
         facts["versions"] = [*models.get(candidate.model, {}).get("versions", []), facts["version"]]
         models[candidate.model] = facts
     for name in models:
         models[name]["champion"] = registry.champion_version(name)
         made, champion, reason = (models[name][key] for key in ("version", "champion", "reason"))
         print(f"{name}: version {made}, champion is {champion} ({reason})")
-    content = {"schema": 1, "evaluation_contract": contract, "engine": config.engine, "models": models}
+    content = {"schema": 1, "evaluation_contract": contract, "engine": engine, "models": models}
     with output_file(OUT) as file:
         file.write_text(json.dumps(content, indent=1) + "\n")
 
@@ -77,30 +97,40 @@ def candidates(shape: Loop) -> Iterator[Candidate]:
     yield Candidate("generalist", "generalist", Path("models/generalist"), None)
 
 
-def result_of(summary: dict[str, Any], policy: str, engine: str) -> dict[str, Any]:
-    """The policy's numbers over all its motions.
+def deciding_engine(asked: str) -> str:
+    """The engine whose success decides: as asked, or what fits the robot that was measured."""
+    if asked != "auto":
+        return asked
+    return "stand_in" if load("rollouts", RolloutsConfig).source is None else "nominal"
+
+
+def result_of(summary: dict[str, Any], policy: str, engine: str) -> dict[str, Any] | None:
+    """The policy's numbers over all its motions; None where it was run on none.
 
     Raises:
-        BadInput: when the evaluation does not hold them.
+        BadInput: when nothing was evaluated on the engine.
     """
-    for entry in summary["results"]:
-        if (entry["policy"], entry["engine"], entry["split"], entry["group_by"]) == (policy, engine, "all", "all"):
+    results = [entry for entry in summary["results"] if entry["engine"] == engine]
+    if not results:
+        raise BadInput(EVALUATION / "summary.json", f"results on {engine}", "none", "Add it to evaluate.engines.")
+    for entry in results:
+        if (entry["policy"], entry["split"], entry["group_by"]) == (policy, "all", "all"):
             return dict(entry)
-    where = EVALUATION / "summary.json"
-    raise BadInput(where, f"results of {policy} on {engine}", "none", "Add the engine to evaluate.engines.")
+    return None
 
 
-def publish(candidate: Candidate, result: dict[str, Any], contract: str, related: Verdict) -> dict[str, Any]:
+def publish(candidate: Candidate, result: dict[str, Any], standard: Standard, related: Verdict) -> dict[str, Any]:
     """One version of one model, with its alias if it earns it; its facts for published.json."""
     policy = ExportedPolicy.load(candidate.folder)
     champion = registry.champion_tags(candidate.model)
-    verdict = both(related, against_champion(result["success"], champion, contract))
+    verdict = both(related, against_champion(result["success"], champion, *astuple(standard)))
     metrics = {
         "success": result["success"]["value"],
         "mpjpe_rad": result["mpjpe_rad"]["value"],
         "mpkpe_mm": result["mpkpe_mm"]["value"],
     }
-    tags = {"policy": candidate.policy, "onnx_sha256": policy.sha256, "evaluation_contract": contract}
+    tags = {"policy": candidate.policy, "onnx_sha256": policy.sha256}
+    tags |= {"evaluation_contract": standard.contract, "evaluation_engine": standard.engine}
     tags |= {"dvc_policy": path_hash(candidate.folder), "promotion": verdict.reason}
     tags |= {name: f"{value:.6g}" for name, value in metrics.items() if value is not None}
     version = registry.register(candidate.model, candidate.folder, tags, metrics)

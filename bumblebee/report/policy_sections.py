@@ -91,9 +91,9 @@ def registry_section(results: LoopResults) -> Section:
     """Names, versions and aliases in the MLflow registry."""
     rows = []
     for name, model in results.published.get("models", {}).items():
-        earlier = ", ".join(str(v) for v in model.get("earlier", [])) or "–"
+        versions = ", ".join(str(version) for version in model["versions"])
         champion = "–" if model.get("champion") is None else f"version {model['champion']}"
-        rows.append((name, str(model["version"]), earlier, champion, model["reason"], str(model["onnx_sha256"])[:12]))
+        rows.append((name, str(model["version"]), versions, champion, model["reason"], str(model["onnx_sha256"])[:12]))
     blocks: tuple[Block, ...] = (
         table(("model", "newest", "in this run", "@champion", "why", "ONNX sha256"), rows),
         note("Look one up: mlflow.pyfunc.load_model('models:/generalist@champion'), with the server of `make serve`."),

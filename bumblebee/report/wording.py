@@ -2,6 +2,8 @@
 
 from typing import Any
 
+ALPHA = 0.05
+
 
 def percent(entry: dict[str, Any]) -> str:
     """`{"value", "ci95"}` of a share as `91 % [84, 95]`."""
@@ -29,14 +31,14 @@ def change(entry: dict[str, Any]) -> str:
     points = f"{100 * difference['value']:+.0f} points"
     if low is None or high is None:
         return f"{points}, too few motions for an interval"
-    return f"{points} [{100 * low:+.0f}, {100 * high:+.0f}], {shown(low, high)}"
+    return f"{points} [{100 * low:+.0f}, {100 * high:+.0f}], {shown(low, high, difference['p'])}"
 
 
-def shown(low: float, high: float) -> str:
-    """What an interval of a gain shows."""
-    if low > 0:
-        return "improved"
-    return "worse" if high < 0 else "no difference shown"
+def shown(low: float, high: float, p: float | None) -> str:
+    """What a gain's interval and the paired test over motions show together; few motions can fool either."""
+    if p is None or p > ALPHA or low <= 0 <= high:
+        return "no difference shown"
+    return "improved" if low > 0 else "worse"
 
 
 def effect_line(effect: dict[str, Any]) -> tuple[str, str, str]:

@@ -31,7 +31,8 @@ class RobotState:
     def __getitem__(self, ids: Tensor) -> "RobotState":
         """The state of some of the robots."""
         values: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
-        return RobotState(**{name: None if value is None else value[ids] for name, value in values.items()})
+        some: dict[str, Any] = {name: None if value is None else value[ids] for name, value in values.items()}
+        return RobotState(**some)
 
 
 class Engine(Protocol):

@@ -47,6 +47,13 @@ def diagnosis(effects: list[dict[str, Any]]) -> dict[str, Any]:
     return {"train": ["a"], "holdout": ["b", "c"], "effects": effects, "unexplained": left, "error": error}
 
 
+def published(name: str) -> dict[str, Any]:
+    versions = ["3", "4"] if name.startswith("expert") else ["2"]
+    why = "success +0.100 against its parent, 95 % interval -0.050 to +0.250, p = 0.2: not shown to be worse"
+    facts = {"version": versions[-1], "versions": versions, "champion": versions[-1]}
+    return {**facts, "promoted": True, "reason": why, "onnx_sha256": "f" * 64}
+
+
 def loop_results(effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | None) -> LoopResults:
     names = ["wave", "<b>walk</b>", "squat"]
     library = pd.DataFrame({"name": names, "family": ["stand", "walk", "squat"], "split": ["train", "test", "train"]})
@@ -103,11 +110,7 @@ def loop_results(effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | N
         curves={"base": curve, "expert-c0 r0": curve},
         evaluation={"results": entries, "comparisons": steps, "contract_sha256": "abc" * 20},
         contract={"motions": [{"name": n} for n in names], "seeds": [0]},
-        published={
-            "models": {
-                "generalist": {"version": 2, "earlier": [], "champion": 2, "reason": "first", "onnx_sha256": "f" * 64}
-            }
-        },
+        published={"models": {name: published(name) for name in ("base", "expert-c0", "expert-c1", "generalist")}},
         sealed=None if sealed is None else {"effects": sealed},
         rounds=(turn,),
     )

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+from bumblebee.evaluation.intervals import bootstrap_mean, sign_flip_test
 from bumblebee.measured.rollout import Rollout
 from bumblebee.report import filmstrip
 from bumblebee.report.data_sections import clusters_section, motions_section
@@ -15,7 +16,7 @@ from bumblebee.report.policy_sections import registry_section, success_section, 
 from bumblebee.report.round_sections import round_section
 from bumblebee.report.truth import match
 from bumblebee.report.verdict import verdict
-from bumblebee.report.wording import percent, shown
+from bumblebee.report.wording import change, percent, shown
 from bumblebee.robot.facts import joint_names, stand_pose
 from bumblebee.robot.model import build_spec
 from tests.report.made import TRUTH, estimate, found, loop_results
@@ -77,10 +78,23 @@ def test_a_real_robot_has_no_truth_to_show() -> None:
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "said"), [(0.1, 0.2, "improved"), (-0.2, -0.1, "worse"), (-0.1, 0.1, "no difference shown")]
-)
-def test_claims_follow_the_interval(low: float, high: float, said: str) -> None:
-    assert shown(low, high) == said
+    ("low", "high", "p", "said"),
+    [(0.1, 0.2, 0.01, "improved"), (-0.2, -0.1, 0.05, "worse"), (-0.1, 0.1, 0.01, "no difference shown"),
+     (0.1, 0.2, 0.06, "no difference shown"), (-0.2, -0.1, None, "no difference shown")],
+)  # fmt: skip
+def test_claims_need_the_interval_and_the_test(low: float, high: float, p: float | None, said: str) -> None:
+    assert shown(low, high, p) == said
+
+
+@pytest.mark.parametrize(("motions", "said"), [(2, "no difference shown"), (6, "improved")])
+def test_two_motions_prove_nothing_however_alike_they_are(motions: int, said: str) -> None:
+    gains = np.ones(motions)
+    success = {"value": 1.0, "ci95": list(bootstrap_mean(gains)), "p": sign_flip_test(gains)}
+    assert change({"success": success}).endswith(said)
+
+
+def test_every_version_of_this_run_is_listed() -> None:
+    assert "<td>3, 4</td>" in page([found()], [TRUTH])
 
 
 def test_an_interval_across_zero_is_no_gain_in_the_verdict() -> None:
