@@ -15,8 +15,8 @@ from tasks.training import Job, TrainingConfig, cluster_clips, train_policy
 class ExpertsConfig(TrainingConfig):
     """The fine-tuning of the experts."""
 
-    env: EnvConfig = field(default_factory=lambda: EnvConfig(threshold_start=0.4))
-    """The task."""
+    env: EnvConfig = field(default_factory=lambda: EnvConfig(num_worlds=256, threads=1, threshold_start=0.4))
+    """The task; one thread, since experts train side by side and threads that wait for each other lose then."""
     ppo: PpoConfig = field(default_factory=lambda: PpoConfig(iterations=80))
     """The algorithm."""
     others: float = 0.1

@@ -23,7 +23,9 @@ from tasks.training import Job, cluster_clips, train_policy
 class RefineConfig(ExpertsConfig):
     """The refinement of the experts."""
 
-    env: EnvConfig = field(default_factory=lambda: EnvConfig(threshold_start=0.4, physics_hz=200.0))
+    env: EnvConfig = field(
+        default_factory=lambda: EnvConfig(num_worlds=256, threads=1, threshold_start=0.4, physics_hz=200.0)
+    )
     """The task; at 200 Hz, so that a delay of a few milliseconds is one."""
 
 
