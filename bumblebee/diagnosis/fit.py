@@ -10,6 +10,8 @@ from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.sim.effects import Effect
 
+_ENOUGH_ROLLOUTS = 6  # fewer say little about how much rollouts differ
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -127,12 +129,21 @@ def covariance(problem: Problem, fit: Fit, weights: np.ndarray, clusters: np.nda
     return full[count:, count:] * np.outer(steps, steps)
 
 
+def standard_errors(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
+    """(k,) of the sizes: over windows, or over rollouts where these vary more and are enough to tell."""
+    windows = np.sqrt(np.diag(covariance(problem, fit, weights, np.arange(len(weights)))))
+    groups = problem.windows.rollout
+    if len(np.unique(groups)) < _ENOUGH_ROLLOUTS:
+        return windows
+    return np.maximum(windows, np.sqrt(np.diag(covariance(problem, fit, weights, groups))))
+
+
 def interval(problem: Problem, fit: Fit, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Standard errors (k,) and half-widths of 95 % intervals (k,): windows, or rollouts where they vary more."""
     windows = np.sqrt(np.diag(covariance(problem, fit, weights, np.arange(len(weights)))))
     half = student.ppf(0.975, max(len(weights) - len(fit.chosen) - 1, 2)) * windows
     groups = len(np.unique(problem.windows.rollout))
-    if groups >= 6:
+    if groups >= _ENOUGH_ROLLOUTS:
         rollouts = np.sqrt(np.diag(covariance(problem, fit, weights, problem.windows.rollout)))
         half = np.maximum(half, student.ppf(0.975, groups - 1) * rollouts)
     return windows, half

@@ -150,8 +150,3 @@ def _set_input(model: mujoco.MjModel, actuator: np.ndarray, torque: bool, rollou
             model.actuator_biastype[a] = int(mujoco.mjtBias.mjBIAS_AFFINE)
             model.actuator_biasprm[a, :3] = [0.0, -kp[column], -kd[column]]
             model.actuator_ctrllimited[a] = 0
-
-
-def base_body(model: mujoco.MjModel) -> int:
-    """Body of the free joint."""
-    return int(model.jnt_bodyid[np.flatnonzero(model.jnt_type.astype(int) == _FREE)[0]])

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import norm
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.fit import Fit, cost_of, covariance, gauss_newton, project, solve
+from bumblebee.diagnosis.fit import Fit, covariance, gauss_newton, project, solve, standard_errors
 from bumblebee.diagnosis.problem import Problem, window_weights
 
 
@@ -176,7 +176,7 @@ def _evidence(
 ) -> Step | None:
     """Test the newest effect in the joint fit and on held-out windows; None if it fails either."""
     newest, value = after.chosen[-1], after.values[-1]
-    error = np.sqrt(covariance(problem, after, weights, np.arange(len(weights)))[-1, -1])
+    error = standard_errors(problem, after, weights)[-1]
     z = abs(value - newest.nominal) / max(error, 1e-300)
     p = min(1.0, 2 * norm.sf(z) * count)
     if p > config.level:
@@ -207,8 +207,3 @@ def _prune(problem: Problem, fit: Fit, weights: np.ndarray, bound: float) -> tup
         keep = [i for i in range(len(fit.chosen)) if i != worst]
         fit = gauss_newton(problem, [fit.chosen[i] for i in keep], fit.values[keep], weights, iterations=2)
     return fit, weights
-
-
-def null_cost(problem: Problem, residual: np.ndarray, weights: np.ndarray) -> float:
-    """Cost at the best nuisances."""
-    return cost_of(problem, residual, weights)[0]

@@ -64,7 +64,9 @@ def make_session(spec: mujoco.MjSpec, rollouts: Sequence[Rollout], model: object
     if plant.floating and not has_pos:
         notes.append("no base_pos: the base's height comes from stance, its error is a nuisance")
     train, holdout = split(long)
-    if not holdout:
+    if holdout:
+        notes.append("the held-out rollouts decided which effects were accepted, never how large they are")
+    else:
         notes.append("a single rollout: nothing could be held out; errors are those of the fitted data")
     period = float(np.median(np.diff(long[0].time)))
     declared = float(spec.option.timestep)
@@ -73,20 +75,30 @@ def make_session(spec: mujoco.MjSpec, rollouts: Sequence[Rollout], model: object
 
 
 def split(rollouts: Sequence[Rollout]) -> tuple[list[int], list[int]]:
-    """Indices to fit and to hold out: every fourth (third of three, second of two), over clusters and motions."""
-    order = sorted(
-        range(len(rollouts)),
-        key=lambda i: (
-            str(rollouts[i].meta.get("cluster")),
-            str(rollouts[i].meta.get("motion")),
-            rollouts[i].rollout_id,
-        ),
-    )
-    if len(order) == 1:
-        return order, []
-    every = min(4, len(order))
-    holdout = [i for k, i in enumerate(order) if k % every == every - 1]
-    return [i for i in order if i not in holdout], holdout
+    """Indices to fit and to hold out: of each cluster's motions every fourth, with all their repeats.
+
+    A repeat of a fitted motion would be no test: the same policy goes the same way again. Where a cluster, or a dataset
+    that names no motions, has one motion only, every fourth of its rollouts is held out (the second of two).
+    """
+    clusters: dict[str, dict[str, list[int]]] = {}
+    for i in sorted(range(len(rollouts)), key=lambda i: rollouts[i].rollout_id):
+        meta = rollouts[i].meta
+        motions = clusters.setdefault(str(meta.get("cluster")), {})
+        motions.setdefault(str(meta.get("motion")), []).append(i)
+    holdout: list[int] = []
+    for _, motions in sorted(clusters.items()):
+        groups = [group for _, group in sorted(motions.items())]
+        if len(groups) == 1:
+            groups = [[i] for i in groups[0]]
+        every = min(4, len(groups))
+        if len(groups) > 1:
+            # Rounded up: 6 motions hold out 2, so that a delta action, too, has something to be judged by.
+            count = -(-len(groups) // every)
+            picked = np.unique(np.linspace(every - 1, len(groups) - 1, count).round().astype(int))
+            holdout += [i for k in picked for i in groups[k]]
+    if len(holdout) == len(rollouts):
+        holdout = holdout[:1]
+    return [i for i in range(len(rollouts)) if i not in holdout], sorted(holdout)
 
 
 def _finite(dataset: object, rollout: Rollout) -> None:

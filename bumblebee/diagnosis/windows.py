@@ -65,7 +65,7 @@ def cut(
 ) -> Windows:
     """Cut the windows; at most `outputs` ticks of each are compared, the last among them."""
     ticks = min(last - first for _, first, last in starts)
-    picks = np.unique(np.linspace(1, ticks, min(outputs, ticks)).round().astype(int))
+    picks = np.unique(np.linspace(ticks, 1, min(outputs, ticks)).round().astype(int))  # one output: the last tick
     cache = {i: measured_readings(rollouts[i], layout) for i in {s[0] for s in starts}}
     heights = stance_heights(plant, rollouts, {s[0] for s in starts}) if _needs_height(plant, layout) else {}
     rows = [_one(plant, rollouts[i], cache[i], heights.get(i), k, picks) for i, k, _ in starts]
