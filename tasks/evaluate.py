@@ -7,16 +7,18 @@ import json
 import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
+from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from bumblebee.deploy.episodes import FALL_RULE, Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.sensors import NO_NOISE, SensorNoise
+from bumblebee.deploy.stand_in_robots import StandInRobots
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.contract import (
     Contract,
@@ -27,32 +29,21 @@ from bumblebee.evaluation.contract import (
     require_same,
     write_contract,
 )
+from bumblebee.evaluation.engines import engine_settings
 from bumblebee.evaluation.episodes import rollout_metrics
 from bumblebee.evaluation.summary import COLUMNS, comparisons, results
+from bumblebee.evaluation.thinning import thin
 from bumblebee.evaluation.untrained import export_untrained
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
 from bumblebee.progress import progress
 from tasks.params import FILE, read
-from tasks.rollouts import cut, library_folder, start_stand_in
+from tasks.rollouts import FILTERED, SEALED, cut, start_stand_in
 from tasks.stage import load, log_run, output_folder, run_stage
 
 OUT = Path("data/evaluation")
-ENGINES = {
-    "nominal": {
-        "timestep": 0.005,
-        "integrator": "implicitfast",
-        "servo": "position, in the integrator",
-        "sensor_noise": None,
-    },
-    "stand_in": {
-        "timestep": 0.001,
-        "integrator": "euler",
-        "servo": "torque, 1 kHz",
-        "sensor_noise": asdict(SensorNoise()),
-    },
-}
+ENGINES = ("nominal", "stand_in")
 
 
 @dataclass(frozen=True)
@@ -66,7 +57,7 @@ class EvaluateConfig:
     max_seconds: float = 10.0
     """Longer motions are cut to their beginning [s]."""
     max_motions: int = 40
-    """A larger library is thinned evenly within each split."""
+    """A larger library is thinned: held-out motions first, at least one of each cluster, the rest evenly."""
     untrained: bool = True
     """Also a policy with fresh weights: what there is before training."""
     contract: str = ""
@@ -135,17 +126,11 @@ def main() -> None:
 
 def motions(config: EvaluateConfig) -> tuple[list[Clip], dict[str, str]]:
     """The kept clips, thinned and cut, and the cluster of each."""
-    index = read_index(Path("data/filtered"))
-    names: list[str] = []
-    for _, part in index.groupby("split", sort=True):
-        share = max(1, round(config.max_motions * len(part) / len(index)))
-        ordered = part.sort_values(["family", "name"])["name"].to_numpy()
-        names += list(
-            ordered[np.unique(np.linspace(0, len(ordered) - 1, min(share, len(ordered))).round().astype(int))]
-        )
     labels = pd.read_parquet("data/clusters/labels.parquet")
-    clips = [cut(clip, config.max_seconds) for clip in read_library(library_folder(), names)]
-    return clips, dict(zip(labels["name"], labels["cluster"], strict=True))
+    cluster_of = dict(zip(labels["name"], labels["cluster"], strict=True))
+    index = read_index(FILTERED)
+    names = thin(index.assign(cluster=index["name"].map(cluster_of).fillna("")), config.max_motions)
+    return [cut(clip, config.max_seconds) for clip in read_library(FILTERED, names)], cluster_of
 
 
 def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
@@ -155,7 +140,7 @@ def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
         raise BadInput(
             f"{FILE}: evaluate", f"seeds, and engines among {', '.join(ENGINES)}", ", ".join(unknown) or "none"
         )
-    engines = {name: ENGINES[name] for name in config.engines}
+    engines = {name: settings(name) for name in config.engines}
     contract = freeze(clips, config.seeds, config.thresholds, config.start_noise, engines, FALL_RULE)
     if config.contract and config.contract != contract.sha256:
         if (OUT / "contract.json").exists():
@@ -167,6 +152,16 @@ def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
             "Motions or settings have changed.",
         )
     return contract
+
+
+def settings(engine: str) -> dict[str, Any]:
+    """What the contract says about an engine, from the model that it runs; of the sealed robot only the file's hash."""
+    if engine == "nominal":
+        return {**engine_settings(NominalRobots(1, 1).model), "sensor_noise": None}
+    if not SEALED.exists():
+        raise BadInput(SEALED, "the sealed robot", "no such file", "Run the stage seal.")
+    told = {"sensor_noise": asdict(SensorNoise()), "sealed_file_sha256": sha256(SEALED.read_bytes()).hexdigest()}
+    return {**engine_settings(StandInRobots(1, []).model), **told}
 
 
 def candidates(scratch: Path | None) -> tuple[list[Candidate], list[str]]:

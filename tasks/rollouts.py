@@ -31,7 +31,7 @@ from bumblebee.robot.model import write_xml
 from tasks.params import FILE, read
 from tasks.stage import load, log_run, output_folder, run_stage
 
-SEALED = Path("data/sealed/robot.json")
+FILTERED, SEALED = Path("data/filtered"), Path("data/sealed/robot.json")
 
 
 @dataclass(frozen=True)
@@ -119,12 +119,12 @@ def followed(policy: Path, clips: list[Clip], threads: int) -> pd.DataFrame:
 def candidates(cluster: str, max_seconds: float) -> list[Clip]:
     """Kept clips of the cluster that were trained on, cut to their beginning where they are longer."""
     labels = pd.read_parquet("data/clusters/labels.parquet")
-    index = read_index(Path("data/filtered"))
+    index = read_index(FILTERED)
     usable = set(index["name"][index["split"] == "train"])
     names = [name for name in labels["name"][labels["cluster"] == cluster] if name in usable]
     if not names:
         raise BadInput("data/clusters/labels.parquet", f"motions of {cluster} in the train split", "none")
-    return [cut(clip, max_seconds) for clip in read_library(library_folder(), names)]
+    return [cut(clip, max_seconds) for clip in read_library(FILTERED, names)]
 
 
 def cut(clip: Clip, seconds: float) -> Clip:
@@ -132,12 +132,6 @@ def cut(clip: Clip, seconds: float) -> Clip:
     frames = min(clip.frames, int(seconds * clip.fps) + 1)
     arrays = {name: getattr(clip, name)[:frames] for name in ("root_pos", "root_quat", "joint_pos", "key_pos")}
     return replace(clip, **arrays)
-
-
-def library_folder() -> Path:
-    """Where the kept clips' arrays lie: in data/filtered if it holds them, else in data/motions."""
-    filtered = Path("data/filtered")
-    return filtered if (filtered / "clips").is_dir() else Path("data/motions")
 
 
 def run_stand_in(

@@ -62,7 +62,7 @@ class Contract:
     start_noise: StartNoise = field(default_factory=StartNoise)
     """Start state noise."""
     engines: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Engine name -> its settings (time step, integrator, sensor noise); the sealed effects are not part of it."""
+    """Engine name -> its settings (`engine_settings`, sensor noise); of a sealed robot only the file's hash."""
     fall: dict[str, float] = field(default_factory=dict)
     """When a robot counts as fallen, and how far a start may be lifted to stand on the floor."""
     alignment: str = ALIGNMENT

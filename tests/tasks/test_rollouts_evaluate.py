@@ -113,6 +113,19 @@ def test_evaluation_covers_policies_engines_and_splits(workspace: Path) -> None:
     assert all(c["success"]["value"] == 0.0 and c["success"]["p"] == 1.0 for c in same)
     contract = json.loads((workspace / "data/evaluation/contract.json").read_text())
     assert summary["contract_sha256"] == contract["sha256"]
+    assert contract["engines"]["nominal"]["timestep"] > contract["engines"]["stand_in"]["timestep"]
+
+
+def test_another_sealed_robot_is_another_contract(workspace: Path) -> None:
+    """Success on two different stand-ins is not comparable; on the declared model alone it is."""
+    clips, hashes = [nod("a", 10)], {}
+    for engines in (("nominal",), ("nominal", "stand_in")):
+        for seed in (3, 4):
+            (workspace / "params.yaml").write_text(PARAMS.replace("seed: 3", f"seed: {seed}"))
+            seal.main()
+            hashes[engines, seed] = evaluate.frozen(clips, evaluate.EvaluateConfig(engines=engines)).sha256
+    assert hashes[("nominal",), 3] == hashes[("nominal",), 4]
+    assert hashes[("nominal", "stand_in"), 3] != hashes[("nominal", "stand_in"), 4]
 
 
 def test_it_repeats_itself_and_refuses_another_contract_than_the_wanted_one(workspace: Path) -> None:
