@@ -1,6 +1,7 @@
 """Stage report: everything that the loop found, on one page that holds all it needs: reports/report.html."""
 
 import json
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -21,7 +22,7 @@ from bumblebee.report.round_sections import round_section
 from bumblebee.report.verdict import verdict
 from bumblebee.robot.model import build_spec
 from tasks.lineage import git_sha
-from tasks.rollouts import start_stand_in
+from tasks.rollouts import FILTERED, SEALED, RolloutsConfig, start_stand_in
 from tasks.sections import Loop, loop
 from tasks.stage import load, log_run, output_file, run_stage
 
@@ -49,7 +50,7 @@ def main() -> None:
     sections = [motions_section(results), clusters_section(results), training_section(results)]
     sections += [round_section(results, turn) for turn in results.rounds]
     sections.append(success_section(results))
-    if config.film and results.sealed is not None:
+    if config.film and not results.real_robot:
         sections.append(film_section(config))
     sections.append(registry_section(results))
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
@@ -77,7 +78,7 @@ def collect(shape: Loop) -> LoopResults:
         evaluation=_json(Path("data/evaluation/summary.json")),
         contract=_json(Path("data/evaluation/contract.json")),
         published=_json(Path("data/published.json")),
-        sealed=_json(Path("data/sealed/robot.json")) if Path("data/sealed/robot.json").exists() else None,
+        sealed=_json(SEALED) if load("rollouts", RolloutsConfig).source is None else None,
         rounds=tuple(round_results(turn.n, shape.clusters) for turn in shape.rounds if turn.n <= shape.final_round),
     )
 
@@ -169,12 +170,10 @@ def chosen_motion(config: ReportConfig) -> tuple[str, str]:
 
 def run_once(motion: str, seed: int) -> Rollout:
     """One rollout of the generalist on the stand-in robot."""
-    import tempfile
-
     episode = {"rollout_id": "film", "policy": "generalist", "motion": motion, "seed": seed}
     plan: dict[str, Any] = {"policies": {"generalist": str(Path("models/generalist").resolve())}, "episodes": [episode]}
     with tempfile.TemporaryDirectory() as folder:
-        start_stand_in(plan, Path("data/filtered"), Path(folder) / "rollouts", Path(folder), threads=1)
+        start_stand_in(plan, FILTERED, Path(folder) / "rollouts", Path(folder), threads=1)
         return read_rollout(Path(folder) / "rollouts" / "film.parquet")
 
 

@@ -8,6 +8,10 @@ from bumblebee.report.results import LoopResults
 from bumblebee.report.success_figure import pick, success_figure
 from bumblebee.report.wording import change, number, percent
 
+NOT_YOURS = (
+    "Policies were evaluated in simulation only: on the declared model and on a stand-in robot with made-up effects. "
+    "Neither is your robot, on which only the measured rollouts were taken."
+)
 ENGINES = {"stand_in": "on the stand-in robot", "nominal": "on the declared model"}
 
 
@@ -19,9 +23,9 @@ def ladder(results: LoopResults) -> list[str]:
 
 
 def engines(results: LoopResults) -> list[str]:
-    """Engines that were evaluated, the robot first."""
+    """Engines that were evaluated: the stand-in first where it is the robot, last where there is a real one."""
     there = {entry["engine"] for entry in results.evaluation["results"]}
-    return [engine for engine in ENGINES if engine in there]
+    return [engine for engine in (reversed(ENGINES) if results.real_robot else ENGINES) if engine in there]
 
 
 def training_section(results: LoopResults) -> Section:
@@ -57,6 +61,8 @@ def success_section(results: LoopResults) -> Section:
             "the unit of evidence."
         )
     ]
+    if results.real_robot:
+        blocks.append(text(NOT_YOURS))
     for engine in engines(results):
         blocks += [heading(f"{ENGINES[engine]}".capitalize()), _rates(entries, policies, engine)]
         for group in ("family", "cluster"):

@@ -1,6 +1,6 @@
 """What a finished loop left, as plain values: everything that the report's sections read."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
@@ -49,8 +49,11 @@ class LoopResults:
     published: Json
     """data/published.json."""
     sealed: Json | None
-    """data/sealed/robot.json, opened at the very end; None where a real robot ran."""
-    cards: dict[str, Json] = field(default_factory=dict)
-    """Policy -> card.json."""
+    """data/sealed/robot.json, opened at the very end; None where the measured rollouts are of the user's robot."""
     rounds: tuple[RoundResults, ...] = ()
     """The turns with the robot."""
+
+    @property
+    def real_robot(self) -> bool:
+        """Whether the measured rollouts came from the user's robot and not from the stand-in."""
+        return self.sealed is None

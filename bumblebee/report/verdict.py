@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from bumblebee.report.policy_sections import ENGINES, engines, ladder
+from bumblebee.report.policy_sections import ENGINES, NOT_YOURS, engines, ladder
 from bumblebee.report.residual_figure import value_and_interval
 from bumblebee.report.results import LoopResults, RoundResults
 from bumblebee.report.success_figure import pick
@@ -12,7 +12,7 @@ from bumblebee.report.wording import change, percent
 
 def verdict(results: LoopResults) -> list[str]:
     """Sentences."""
-    lines = [_headline(results), *_first_steps(results)]
+    lines = [_headline(results), NOT_YOURS if results.real_robot else "", *_first_steps(results)]
     for turn in results.rounds:
         lines += [_found(results, turn), _error(turn), _delta(turn)]
     return [line for line in lines if line] + _short(results)

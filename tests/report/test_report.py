@@ -75,6 +75,8 @@ def test_nothing_sealed_and_nothing_found_is_said() -> None:
 def test_a_real_robot_has_no_truth_to_show() -> None:
     html = page([found()], None)
     assert "sealed in the stand-in" not in html and "1 effects found" in html
+    assert html.count("Neither is your robot") == 2  # in the verdict and beside the rates
+    assert "Neither is your robot" not in page([found()], [TRUTH])
 
 
 @pytest.mark.parametrize(
