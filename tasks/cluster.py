@@ -4,11 +4,10 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-import torch
-
 from bumblebee.clustering.config import ClusterConfig
 from bumblebee.clustering.pipeline import Clustering, cluster_clips
 from bumblebee.errors import BadInput
+from bumblebee.files import save_tensors
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
 from bumblebee.progress import progress
@@ -52,7 +51,7 @@ def write_tables(folder: Path, result: Clustering) -> None:
 
 def write_model(folder: Path, result: Clustering, config: ClusterConfig) -> None:
     """Weights alone, to be read with `weights_only=True`, and what is needed to build the network and its features."""
-    torch.save(result.model.state_dict(), folder / "autoencoder.pt")
+    save_tensors(folder / "autoencoder.pt", result.model.state_dict())
     facts = {"autoencoder": result.model.config.as_dict(), "cluster": asdict(config)}
     (folder / "config.json").write_text(json.dumps(facts, indent=2) + "\n")
 

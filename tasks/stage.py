@@ -13,6 +13,7 @@ A stage's module reads:
 """
 
 import argparse
+import errno
 import hashlib
 import inspect
 import os
@@ -52,6 +53,11 @@ def run_stage(main: Callable[..., object], argv: list[str] | None = None) -> Non
             raise
         print(line, file=sys.stderr, flush=True)
         raise SystemExit(EXIT_BAD_INPUT) from None
+    except Exception as error:
+        if "database or disk is full" not in str(error):  # how SQLite says it, through whichever library
+            raise
+        print(disk_line(OSError(errno.ENOSPC, "", ".servers")), file=sys.stderr, flush=True)
+        raise SystemExit(EXIT_BAD_INPUT) from None
     for folder in _used_scratch:
         shutil.rmtree(folder, ignore_errors=True)
     _used_scratch.clear()
@@ -59,8 +65,6 @@ def run_stage(main: Callable[..., object], argv: list[str] | None = None) -> Non
 
 def disk_line(error: OSError) -> str | None:
     """The one line for a full disk or a folder without write access; None for any other error."""
-    import errno
-
     place = error.filename or Path.cwd()
     came = {errno.ENOSPC: "no space left", errno.EDQUOT: "quota used up", errno.EROFS: "a read-only disk"}
     came[errno.EACCES] = "no permission to write"

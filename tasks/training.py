@@ -109,10 +109,11 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     before = pd.read_parquet(folder / BEFORE)
     trainer.train(job.name)
     after = _try(trainer.policy(), job, config)
-    policy, kept = trainer.policy(), "child"
+    policy, kept = trainer.policy(), after
     if job.parent is not None and _score(after) < _score(before):
-        policy, kept = load_policy(job.parent), "parent"
-    card = _card(job, config, trainer, before, after, kept)
+        policy, kept = load_policy(job.parent), before
+    card = _card(job, config, trainer, before, after) | _outcome(before, kept)
+    card["kept"] = "child" if kept is after else "parent"
     with output_folder(job.out) as out:
         policy.save(out)
         export_policy(out, policy, config.env.physics_hz)
@@ -145,17 +146,16 @@ def _score(trials: pd.DataFrame) -> tuple[float, float]:
 
 
 def _card(
-    job: Job, config: TrainingConfig, trainer: Trainer, before: pd.DataFrame, after: pd.DataFrame, kept: str
+    job: Job, config: TrainingConfig, trainer: Trainer, before: pd.DataFrame, after: pd.DataFrame
 ) -> dict[str, Any]:
     curve = pd.read_csv(trainer.folder / CURVE)
     seconds = float(curve["seconds"].iloc[-1])
-    card: dict[str, Any] = {
+    return {
         "schema": 1,
         "stage": job.stage,
         "cluster": job.cluster,
         "round": job.round,
         "parent": str(job.parent) if job.parent else None,
-        "kept": kept,
         "iterations": trainer.iteration,
         "frames": trainer.frames,
         "seconds": round(seconds, 1),
@@ -163,20 +163,25 @@ def _card(
         "unstable_worlds": int(curve["unstable"].sum()),
         "training_clips": [clip.name for clip in job.clips],
         "rollouts_a_clip": config.trials.repeats,
+        "trained": {"success": success_by_family(after), "gained": _new(after, before), "lost": _new(before, after)},
+        "config": asdict(config),
     }
-    for when, trials in (("before", before), ("after", after)):
+
+
+def _outcome(before: pd.DataFrame, kept: pd.DataFrame) -> dict[str, Any]:
+    """Before, and after with the policy that is kept: the one in this folder, be it the parent's."""
+    card: dict[str, Any] = {}
+    for when, trials in (("before", before), ("after", kept)):
         card[when] = success_by_family(trials)
         held_out = trials[trials["split"] == "test"]
         card[f"{when}_held_out"] = success_by_family(held_out) if len(held_out) else {}
         card[f"{when}_key_error"] = round(float(trials["key_error"].mean()), 4)
-    card["gained"] = _names(after[after["success"] & ~before["success"]])
-    card["lost"] = _names(after[~after["success"] & before["success"]])
-    card["config"] = asdict(config)
     return card
 
 
-def _names(trials: pd.DataFrame) -> list[str]:
-    return sorted(set(trials["name"]))
+def _new(trials: pd.DataFrame, others: pd.DataFrame) -> list[str]:
+    """Clips that succeed in some trial where the other policy's did not."""
+    return sorted(set(trials["name"][trials["success"] & ~others["success"]]))
 
 
 def _tell(job: Job, card: dict[str, Any]) -> None:
@@ -184,4 +189,5 @@ def _tell(job: Job, card: dict[str, Any]) -> None:
     families = ", ".join(f"{f} {before.get(f, 0):.0%} -> {rate:.0%}" for f, rate in after.items())
     print(f"{job.name}: success {families}; key error {card['after_key_error'] * 100:.1f} cm")
     if card["kept"] == "parent":
-        print(f"{job.name}: training made it no better here: the parent's policy is kept")
+        rate = card["trained"]["success"]["all"]
+        print(f"{job.name}: training made it no better here ({rate:.0%}): the parent's policy is kept")

@@ -18,7 +18,7 @@ FLOORS = [
     {"report"},
 ]
 ONLY = {"clustering": {"motion"}, "tracking": {"motion", "sim"}, "diagnosis": {"sim", "measured"}}
-FREE = {"errors", "progress", "__init__"}  # below the ground floor: known to everybody
+FREE = {"errors", "files", "progress", "__init__"}  # below the ground floor: known to everybody
 
 
 def imports(path: Path) -> Iterator[tuple[int, str]]:

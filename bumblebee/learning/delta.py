@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from bumblebee.errors import BadInput
+from bumblebee.files import save_tensors
 from bumblebee.learning.delta_rewards import DeltaRewardConfig
 from bumblebee.robot.facts import ANKLE_JOINTS, joint_names
 from bumblebee.sim.engine import RobotState
@@ -111,7 +112,7 @@ def correction(raw: Tensor, limit: float) -> Tensor:
 
 def save_delta(folder: Path, delta: DeltaAction, hidden: tuple[int, ...], card: dict[str, object]) -> None:
     """Write weights (tensors only) and card into an existing folder."""
-    torch.save(delta.network.state_dict(), Path(folder) / WEIGHTS)
+    save_tensors(Path(folder) / WEIGHTS, delta.network.state_dict())
     shape = {"joints": list(delta.joints), "limit": delta.limit, "hidden": list(hidden)}
     (Path(folder) / CARD).write_text(json.dumps({"schema": 1, "network": shape, **card}, indent=2))
 

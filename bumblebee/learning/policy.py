@@ -10,6 +10,7 @@ from tensordict import TensorDict
 from torch import Tensor
 
 from bumblebee.errors import BadInput
+from bumblebee.files import save_tensors
 
 FILE = "policy.pt"
 
@@ -58,7 +59,7 @@ class Policy:
     def save(self, folder: Path) -> None:
         """Write `policy.pt` into an existing folder."""
         content = {"shape": asdict(self.shape), "actor": self.actor.state_dict(), "critic": self.critic_state}
-        torch.save(content, Path(folder) / FILE)
+        save_tensors(Path(folder) / FILE, content)
 
 
 def new_actor(shape: Shape, initial_std: float = 1.0) -> MLPModel:

@@ -6,7 +6,6 @@ its, unchanged.
 
 import contextlib
 import io
-import os
 import time
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ import torch
 from rsl_rl.algorithms import PPO
 from rsl_rl.runners import OnPolicyRunner
 
+from bumblebee.files import save_tensors
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.curve import CurveWriter
 from bumblebee.learning.policy import Policy, Shape, load_policy, model_config, new_actor
@@ -147,9 +147,7 @@ class Trainer:
             "env": self.env.state_dict(),
             "random": torch.get_rng_state(),
         }
-        fresh = self.folder / f".{CHECKPOINT}"
-        torch.save(content, fresh)
-        os.replace(fresh, self.folder / CHECKPOINT)
+        save_tensors(self.folder / CHECKPOINT, content)
 
     def _resume(self) -> None:
         path = self.folder / CHECKPOINT

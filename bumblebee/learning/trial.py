@@ -61,8 +61,8 @@ def try_policy(
 
 
 def success_by_family(trials: pd.DataFrame) -> dict[str, float]:
-    """Success rate of each family and of `all`, rounded to three digits."""
-    rates = {str(k): round(float(v), 3) for k, v in trials.groupby("family")["success"].mean().items()}
+    """Success rate of each family ("unknown" where a clip names none) and of `all`, rounded to three digits."""
+    rates = {str(k) or "unknown": round(float(v), 3) for k, v in trials.groupby("family")["success"].mean().items()}
     return rates | {"all": round(float(trials["success"].mean()), 3)}
 
 

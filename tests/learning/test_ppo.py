@@ -72,11 +72,10 @@ def test_a_checkpoint_appears_whole_or_not_at_all(model: mujoco.MjModel, tmp_pat
     trained.train()
     before = (tmp_path / CHECKPOINT).read_bytes()
 
-    def broken(content: object, path: Path) -> None:
-        path.write_bytes(b"half")
+    def broken(path: Path, content: object) -> None:
         raise OSError("no space left")
 
-    monkeypatch.setattr(torch, "save", broken)
+    monkeypatch.setattr(Path, "write_bytes", broken)
     with pytest.raises(OSError, match="no space"):
         trained.save_checkpoint()
     assert (tmp_path / CHECKPOINT).read_bytes() == before
