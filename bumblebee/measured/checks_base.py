@@ -73,7 +73,8 @@ def _check_turning(view: View, quat: np.ndarray) -> None:
         "degrees": ("degrees", "base_ang_vel", "rad/s", "deg/s"),
         "sign": ("gyro-sign", "base_ang_vel", "world from base", "the inverse rotation, or a reversed gyro"),
     }[best]
-    view.add(column, None, rule, expected, f"{what}: {came}", fatal=True)
+    apart = best != "world" or _robust(body - world) > limits.frame_apart * size
+    view.add(column, None, rule, expected, f"{what}: {came}", fatal=apart)
 
 
 def _check_loose(view: View, error: float, size: float, seconds: float) -> None:
@@ -104,7 +105,8 @@ def _check_travel(view: View, quat: np.ndarray) -> None:
         f"mismatch {errors['base']:.3g} m/s with the derivative of base_pos, {errors['world']:.3g} in the world frame"
     )
     if errors["world"] < limits.frame_gain**0.5 * errors["base"]:
-        view.add("base_lin_vel", None, "velocity-frame", "the base frame", f"the world frame: {came}", fatal=True)
+        apart = _robust(readings["base"] - speed) > limits.frame_apart * _robust(speed)
+        view.add("base_lin_vel", None, "velocity-frame", "the base frame", f"the world frame: {came}", fatal=apart)
     elif errors["base"] > 0.7 * _robust(moved / span) and errors["base"] > 4 * limits.drift_floor:
         view.add("base_lin_vel", None, "velocity-derivative", "the derivative of base_pos", came, fatal=False)
 

@@ -47,6 +47,8 @@ def _fits_only_as_degrees(values: np.ndarray, ranges: np.ndarray) -> bool:
     if not limited.any():
         return False
     values, ranges = values[:, limited], ranges[limited]
+    if np.abs(values).max() < 2 * np.pi:
+        return False  # 0.11 rad at most if these were degrees: rather a reversed joint or another zero
     outside = (_excess(values, ranges) > 1.0).any(axis=1).mean() > 0.2
     jumps = np.abs(np.diff(values, axis=0)).max()
     if abs(jumps - 2 * np.pi) < 0.3 and np.abs(values).max() < 4 * np.pi:

@@ -24,7 +24,8 @@ def check_stance(view: View, quat: np.ndarray) -> None:
         return
     given = view.values("base_lin_vel")[rows]
     as_world = rotate(conjugate(quat[rows]), given)
-    telling = np.linalg.norm(as_world - given, axis=1) > 2 * limits.drift_floor  # else both readings are one
+    apart = np.maximum(2 * limits.drift_floor, limits.frame_apart * np.linalg.norm(given, axis=1))
+    telling = np.linalg.norm(as_world - given, axis=1) > apart  # else both readings are one
     if telling.sum() < 10:
         return
     errors = [float(np.median(np.linalg.norm((reading - expected)[telling], axis=1))) for reading in (given, as_world)]

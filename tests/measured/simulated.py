@@ -6,8 +6,12 @@ import mujoco
 import numpy as np
 
 from bumblebee.measured.rollout import Rollout
+from bumblebee.motion.clip import Clip, velocities
+from bumblebee.motion.embedded import EmbeddedConfig, make
+from bumblebee.motion.embedded.kinds import kinds
 from bumblebee.robot.facts import joint_names
 from bumblebee.robot.model import build_model
+from bumblebee.tracking.feed_forward import lead_angles
 
 ARM = """
 <mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast"/><worldbody><body pos="0 0 1">
@@ -87,6 +91,70 @@ def g1_rollout(seed: int, size: float = 0.15, seconds: float = 4.0, heading: flo
         data.ctrl[:] = command[k]
         mujoco.mj_step(model, data, 4)
     return _floating(rng, np.array(states), time, command, f"g1-{seed}-{size:g}")
+
+
+@cache
+def clip_and_lead(name: str) -> tuple[Clip, np.ndarray]:
+    """An embedded clip and its gravity feed-forward (T, 23) [rad]."""
+    kind = next(kind for kind in kinds() if kind.name == name)
+    clip = make(kind, 0, EmbeddedConfig())
+    return clip, lead_angles(clip)
+
+
+@cache
+def tracked_rollout(name: str) -> Rollout:
+    """A clip that is tracked without error under feed-forward targets: position = clip, target = clip + lead."""
+    clip, lead = clip_and_lead(name)
+    speed = velocities(clip)
+    columns = (clip.root_pos, clip.root_quat, clip.joint_pos)
+    columns += (speed.root_lin_vel_w, speed.root_ang_vel_b, speed.joint_vel)
+    time = np.arange(clip.frames) * 0.02
+    states = np.concatenate(columns, axis=1)
+    return _floating(np.random.default_rng(0), states, time, clip.joint_pos + lead, f"tracked-{name}")
+
+
+@cache
+def clip_rollout(name: str, fault: str = "", held: bool = True, seconds: float = 4.0) -> Rollout:
+    """The G1 under a clip's feed-forward targets, its base held to the clip by a soft wrench or left to fall.
+
+    Args:
+        name: of the embedded clip.
+        fault: weak (gains x 0.5), friction (0.5 to 4 N m), delay (30 ms), offset (encoders, 0.08 rad) or none.
+        held: whether the wrench is there; without it the targets have no feedback and the robot falls.
+        seconds: at most so long.
+    """
+    rng = np.random.default_rng(0)
+    clip, lead = clip_and_lead(name)
+    model = build_model()
+    if fault == "weak":
+        model.actuator_gainprm[:, 0] *= 0.5
+        model.actuator_biasprm[:, 1:3] *= 0.5
+    if fault == "friction":
+        model.dof_frictionloss[6:] = rng.uniform(0.5, 4.0, 23)
+    offset = rng.uniform(-0.08, 0.08, 23) * (fault == "offset")
+    late = 6 * (fault == "delay")  # steps of 5 ms
+    frames = min(clip.frames - 1, round(50 * seconds))
+    target = (clip.joint_pos + lead)[1 : frames + 1] + rng.normal(0, 0.03, (frames, 23))
+    data, states, line = mujoco.MjData(model), [], [target[0]] * late
+    data.qpos[:] = np.concatenate([clip.root_pos[0], clip.root_quat[0], clip.joint_pos[0]])
+    for k in range(frames):
+        states.append(np.concatenate([data.qpos[:7], data.qpos[7:] + offset, data.qvel]))
+        for _ in range(4):
+            line.append(target[k])
+            data.ctrl[:] = line[-1 - late] - offset
+            if held:
+                _hold(data, clip.root_pos[k], clip.root_quat[k])
+            mujoco.mj_step(model, data)
+    return _floating(rng, np.array(states), np.arange(frames) * 0.02, target, f"{fault or 'good'}-{held}-{name}")
+
+
+def _hold(data: mujoco.MjData, place: np.ndarray, quat: np.ndarray) -> None:
+    """A soft wrench on the base towards a pose."""
+    tilt = np.zeros(3)
+    mujoco.mju_subQuat(tilt, quat, data.qpos[3:7])
+    torque = 150 * tilt - 15 * data.qvel[3:6]
+    data.xfrc_applied[1, :3] = 1500 * (place - data.qpos[:3]) - 150 * data.qvel[:3]
+    mujoco.mju_rotVecQuat(data.xfrc_applied[1, 3:], torque, data.qpos[3:7])
 
 
 def _floating(

@@ -240,11 +240,17 @@ def test_a_finding_is_one_line_that_names_file_column_row_and_rule() -> None:
     assert "\n" not in finding.message and finding.row == 9
 
 
-def test_a_joint_that_is_missing_from_the_log_is_a_warning() -> None:
+def test_a_joint_that_is_missing_from_the_log_is_fatal() -> None:
+    """No simulation can start from such a row."""
     rollout = arm_rollout(0)
     part = {column: getattr(rollout, column)[:, :2] for column in rollout.columns}
     found = findings(replace(rollout, joints=rollout.joints[:2], meta={}, **part))
-    assert [(finding.rule, finding.fatal) for finding in found] == [("joint-missing", False)]
+    assert [(finding.rule, finding.fatal) for finding in found] == [("joint-missing", True)]
+
+
+@pytest.mark.parametrize("column", ["base_quat", "base_ang_vel", "base_lin_vel"])
+def test_a_floating_base_needs_its_columns(column: str) -> None:
+    assert ("base-columns", column) in fatal_rules(replace(g1_rollout(0, 0.1), **{column: None}))
 
 
 @pytest.mark.parametrize("seed", range(4))
