@@ -78,9 +78,14 @@ def collect(shape: Loop) -> LoopResults:
         evaluation=_json(Path("data/evaluation/summary.json")),
         contract=_json(Path("data/evaluation/contract.json")),
         published=_json(Path("data/published.json")),
-        sealed=_json(SEALED) if load("rollouts", RolloutsConfig).source is None else None,
+        sealed=sealed_truth(),
         rounds=tuple(round_results(turn.n, shape.clusters) for turn in shape.rounds if turn.n <= shape.final_round),
     )
+
+
+def sealed_truth() -> dict[str, Any] | None:
+    """What was sealed in the stand-in; None where the measured rollouts are of the user's robot, which nobody sealed."""
+    return _json(SEALED) if load("rollouts", RolloutsConfig).source is None else None
 
 
 def curves(shape: Loop) -> Iterator[tuple[str, pd.DataFrame]]:
@@ -132,10 +137,10 @@ def picture(results: LoopResults) -> str:
         Box("gate", last.gate["status"], "person"),
         Box("diagnose", f"{effects} effect{'' if effects == 1 else 's'} found"),
         Box("delta", f"{kept_deltas} of {len(last.deltas)} kept", "learn"),
-        Box("refine", "in the corrected model", "learn"),
+        Box("refine", "corrected model", "learn"),
     ]
     rounds = len(results.rounds)
-    return loop_picture(top, bottom, f"{rounds} round{'' if rounds == 1 else 's'}")
+    return loop_picture(top, bottom, f"{rounds} round{'' if rounds == 1 else 's'}: measured, explained, refined")
 
 
 def film_section(config: ReportConfig) -> Section:

@@ -32,12 +32,12 @@ def clusters_figure(labels: pd.DataFrame, elbow: pd.DataFrame, k: int, suggested
     plane.legend(fontsize=7.5, ncols=1, loc="center left", bbox_to_anchor=(1.0, 0.5))
     plane.set(title="Motions in the latent plane (open: held out)", xticks=[], yticks=[])
     curve.plot(elbow["k"], elbow["within_ss"], "-o", color=INK, ms=4)
-    for value, text, shade in ((suggested, "elbow suggests", QUIET), (k, "used", colour(0))):
-        offset = -18 if text == "used" else 12
+    for value, said, shade, size in ((suggested, "the elbow's suggestion", QUIET, 13), (k, "used", colour(0), 9)):
         height = float(elbow.loc[elbow["k"] == value, "within_ss"].iloc[0]) if (elbow["k"] == value).any() else None
         if height is not None:
-            curve.plot([value], [height], "o", ms=9, mfc="none", mec=shade, mew=2)
-            label = f"{text} K = {value}"
-            curve.annotate(label, (value, height), xytext=(10, -offset), textcoords="offset points", color=shade)
+            label = f"K = {value}: {said}"
+            curve.plot([value], [height], "o", ms=size, mfc="none", mec=shade, mew=2, ls="none", label=label)
+    if curve.get_legend_handles_labels()[0]:
+        curve.legend(loc="upper right")
     curve.set(title="Elbow curve", xlabel="number of clusters K", ylabel="within-cluster sum of squares")
     return svg_uri(figure)

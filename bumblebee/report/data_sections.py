@@ -15,7 +15,7 @@ def motions_section(results: LoopResults) -> Section:
     minutes = library["duration"].sum() / 60
     blocks: list[Block] = [
         text(
-            f"{len(library)} motions were read ({minutes:.1f} minutes, {held_out} held out by the hash of their name); "
+            f"{len(library)} motions were read ({minutes:.1f} minutes, {held_out} held out from training); "
             f"the filter dropped {dropped}."
         )
     ]
@@ -29,13 +29,13 @@ def motions_section(results: LoopResults) -> Section:
     blocks.append(note("Licences: " + "; ".join(f"{name} ({count} motions)" for name, count in sources.items()) + "."))
     if len(drops):
         first = drops.drop_duplicates("motion")
-        rows = [(r["motion"], r["rule"], str(r["explanation"])) for _, r in first.head(_MOST_ROWS).iterrows()]
+        dropped_rows = [(r["motion"], r["rule"], str(r["explanation"])) for _, r in first.head(_MOST_ROWS).iterrows()]
         caption = f"{len(first) - _MOST_ROWS} more in data/filtered/drops.csv." if len(first) > _MOST_ROWS else ""
-        blocks += [heading("Dropped"), table(("motion", "rule", "why"), rows, caption)]
+        blocks += [heading("Dropped"), table(("motion", "rule", "why"), dropped_rows, caption)]
     if len(results.skipped):
         reasons = results.skipped.groupby("reason").size().sort_values(ascending=False)
-        rows = [(str(reason), str(count)) for reason, count in reasons.head(_MOST_ROWS).items()]
-        blocks += [heading("Files that cannot be read yet"), table(("reason", "files"), rows)]
+        unread = [(str(reason), str(count)) for reason, count in reasons.head(_MOST_ROWS).items()]
+        blocks += [heading("Files that cannot be read yet"), table(("reason", "files"), unread)]
     return Section("motions", "Motions", tuple(blocks))
 
 

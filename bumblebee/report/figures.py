@@ -2,6 +2,7 @@
 
 import base64
 import io
+from typing import Any
 
 import matplotlib
 
@@ -12,7 +13,7 @@ from matplotlib.figure import Figure
 INK, QUIET, GRID = "#22262b", "#6b7480", "#e3e7ec"
 PALETTE = ("#d9880f", "#2f6db5", "#3a8f5c", "#a4478f", "#7a6a52", "#c2423b", "#4aa3a8", "#85858f")
 
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 9.5,
     "axes.edgecolor": QUIET,
@@ -34,19 +35,17 @@ _STYLE = {
 }
 
 
-def canvas(columns: int = 1, width: float = 9.6, height: float = 3.2) -> tuple[Figure, list[Axes]]:
-    """A figure of `columns` axes side by side, in inches."""
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(width, height), layout="constrained")
-        axes = [figure.add_subplot(1, columns, i + 1) for i in range(columns)]
-    return figure, axes
+def canvas(columns: int = 1, width: float = 10.3, height: float = 3.2) -> tuple[Figure, list[Axes]]:
+    """A figure of `columns` axes side by side, in inches; by default as wide as the page."""
+    matplotlib.rcParams.update(_STYLE)  # legends and titles, which are made later, read it too
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, [figure.add_subplot(1, columns, i + 1) for i in range(columns)]
 
 
 def svg_uri(figure: Figure) -> str:
     """The figure as a `data:` URI of SVG; as an image it cannot run scripts or clash with other figures' ids."""
     buffer = io.BytesIO()
-    with matplotlib.rc_context(_STYLE):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 

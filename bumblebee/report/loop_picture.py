@@ -30,7 +30,7 @@ def loop_picture(first_row: list[Box], second_row: list[Box], caption: str) -> s
         caption: what the arrow back says.
     """
     columns = max(len(first_row), len(second_row))
-    width, height = columns * (_WIDTH + _GAP) + _GAP, 2 * _HEIGHT + 128
+    width, height = columns * (_WIDTH + _GAP) + _GAP, 2 * _HEIGHT + 100
     parts = [
         f'<svg viewBox="0 0 {width} {height}" xmlns="http://www.w3.org/2000/svg" role="img" '
         f'style="width:100%;font:12px system-ui,sans-serif"><defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" '
@@ -41,7 +41,7 @@ def loop_picture(first_row: list[Box], second_row: list[Box], caption: str) -> s
         parts.append(_box(x, 16, box))
         if i + 1 < len(first_row):
             parts.append(_arrow(x + _WIDTH, 16 + _HEIGHT / 2, x + _WIDTH + _GAP, 16 + _HEIGHT / 2))
-    low = _HEIGHT + 92
+    low = _HEIGHT + 84
     anchor = next((i for i, box in enumerate(first_row) if box.title == "experts"), 0)
     for i, box in enumerate(second_row):
         x = _GAP + (len(second_row) - 1 - i) * (_WIDTH + _GAP)
@@ -55,7 +55,7 @@ def loop_picture(first_row: list[Box], second_row: list[Box], caption: str) -> s
         middle = 16 + _HEIGHT + (low - 16 - _HEIGHT) / 2
         parts.append(_path(f"M{centre + 12} {16 + _HEIGHT} V{middle - 9} H{right} V{low}"))
         parts.append(_path(f"M{left} {low} V{middle + 9} H{centre - 12} V{16 + _HEIGHT}"))
-        parts.append(f'<text x="{left + 10}" y="{middle + 26}" fill="{PALETTE[0]}">{escape(caption)}</text>')
+        parts.append(f'<text x="{left + 10}" y="{middle + 1}" fill="{PALETTE[0]}">{escape(caption)}</text>')
     return "".join(parts) + "</svg>"
 
 

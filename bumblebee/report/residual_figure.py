@@ -24,7 +24,7 @@ def value_and_interval(entry: Any) -> tuple[float, float, float]:
 def joint_errors(block: dict[str, Any], horizon: str) -> dict[str, float]:
     """Joint -> RMS position error [rad] of one block (`before`, `after` or `floor`) at one horizon."""
     entry = block.get(horizon, {}).get("joint_pos_rmse", {})
-    per_joint = entry.get("per_joint", entry.get("joints", {})) if isinstance(entry, dict) else {}
+    per_joint = (entry.get("per_joint") or entry.get("joints") or {}) if isinstance(entry, dict) else {}
     return {name: value_and_interval(value)[0] for name, value in per_joint.items()}
 
 
@@ -42,7 +42,7 @@ def residual_figure(error: dict[str, dict[str, Any]], horizon: str = "0.2") -> s
     floor = [1e3 * values["floor"].get(joint, np.nan) for joint in joints]
     axis.hlines(floor, x - 0.42, x + 0.42, color=_SHADES["floor"], lw=1.2, label=_NAMES["floor"])
     axis.set_xticks(x, [short_joint(joint) for joint in joints], rotation=55, ha="right", fontsize=8)
-    axis.set(ylabel="mrad", title=f"Joint position error {horizon} s after a restart, held-out rollouts")
+    axis.set(ylabel="mrad", title=f"Joint position error after {horizon} s, held-out rollouts")
     axis.grid(axis="x", color=GRID, lw=0)
-    axis.legend(ncols=3, fontsize=8.5)
+    axis.legend(ncols=3, fontsize=8.5, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     return svg_uri(figure)

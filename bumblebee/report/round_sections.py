@@ -49,14 +49,14 @@ def _effects(sealed: Json | None, diagnosis: Json) -> list[Block]:
         rows = [(*effect_line(effect), _share(effect)) for effect in found]
         nothing = [] if rows else [text("No effect passed the tests: the declared model stands.")]
         return [*nothing, table(("effect", "estimate [95 %]", "declared", "explains"), rows)]
-    rows = [_truth_row(pair) for pair in match(sealed["effects"], found)]
-    if not rows:
+    compared = [_truth_row(pair) for pair in match(sealed["effects"], found)]
+    if not compared:
         return [text("Nothing was sealed and nothing was found: no false alarm.")]
     header = ("sealed in the stand-in", "sealed value", "found", "estimate [95 %]", "explains")
     caption = (
         "Explains: share of the held-out excess error that the effect removes. The diagnosis cannot read the seal."
     )
-    return [table(header, rows, caption)]
+    return [table(header, compared, caption)]
 
 
 def _truth_row(pair: Match) -> tuple[str | Cell, ...]:
@@ -86,12 +86,14 @@ def _share(effect: Json) -> str:
 def _error_table(error: Json) -> Block:
     rows = []
     for horizon in error["before"]:
+        shown = f"{horizon} s"  # once, in front of its measures
         for key, name, factor, unit in _MEASURES:
             cells = [
                 _cell(error.get(block, {}).get(horizon, {}).get(key), factor) for block in ("before", "after", "floor")
             ]
             if cells[0] != "–":
-                rows.append((f"{horizon} s", f"{name} [{unit}]" if unit else name, *cells))
+                rows.append((shown, f"{name} [{unit}]" if unit else name, *cells))
+                shown = ""
     return table(("after", "error", "declared model", "corrected model", "noise alone"), rows)
 
 

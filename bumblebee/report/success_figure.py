@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from bumblebee.report.figures import QUIET, canvas, colour, svg_uri
+from bumblebee.report.figures import INK, canvas, colour, svg_uri
 
 
 def pick(results: list[dict[str, Any]], **wanted: Any) -> list[dict[str, Any]]:
@@ -32,7 +32,7 @@ def success_figure(
             value, (low, high) = entry["success"]["value"], entry["success"]["ci95"]
             x = g - 0.41 + (i + 0.5) * width
             axis.bar(x, value, width * 0.9, color=colour(i), label=policy if g == 0 else None)
-            axis.plot([x, x], [low, high], color=QUIET, lw=1)
+            axis.plot([x, x], [low, high], color=INK, lw=1)
     counts = {group: entries[p, group]["success"]["motions"] for p, group in entries}
     axis.set_xticks(range(len(groups)), [f"{group}\n{counts[group]} motions" for group in groups])
     axis.set(ylim=(0, 1.04), ylabel="success rate")

@@ -27,7 +27,7 @@ class Match:
     @property
     def covered(self) -> bool | None:
         """Whether the 95 % interval holds the sealed value."""
-        if self.relative_error is None:
+        if self.sealed is None or self.found is None or self.relative_error is None:
             return None
         name, truth = next(iter(self.sealed["parameters"].items()))
         low, high = self.found["parameters"][name].get("ci95") or (None, None)

@@ -43,13 +43,14 @@ def _first_steps(results: LoopResults) -> list[str]:
         if c["engine"] == engine and c["split"] == "all"
     }
     wanted = [p for p in pairwise(names[1:]) if p in pairs]
-    return [f"{a} → {b} {ENGINES[engine]}: {change(pairs[a, b])}." for a, b in wanted]
+    return [f"Success {ENGINES[engine]}, {a} → {b}: {change(pairs[a, b])}." for a, b in wanted]
 
 
 def _found(results: LoopResults, turn: RoundResults) -> str:
     found = turn.diagnosis["effects"]
     if results.sealed is None:
-        return f"Round {turn.n}: {len(found)} effects found that the declared model lacks."
+        count = f"{len(found)} effect{'' if len(found) == 1 else 's'}"
+        return f"Round {turn.n}: {count} found that the declared model lacks."
     rows = match(results.sealed["effects"], found)
     hits = sum(1 for row in rows if row.sealed is not None and row.found is not None)
     false = sum(1 for row in rows if row.sealed is None)
@@ -84,8 +85,9 @@ def _short(results: LoopResults) -> list[str]:
     """Families in which the last policy fails more often than not."""
     engine, last = engines(results)[0], ladder(results)[-1]
     weak = [
-        f"{e['group']} {100 * e['success']['value']:.0f} %"
+        f"{e['group']} ({100 * e['success']['value']:.0f} %)"
         for e in pick(results.evaluation["results"], policy=last, engine=engine, split="all", group_by="family")
         if e["success"]["value"] is not None and e["success"]["value"] < 0.5
     ]
-    return [f"Falls short: {last} follows fewer than half of {', '.join(weak)} {ENGINES[engine]}."] if weak else []
+    where = f"{last} {ENGINES[engine]} follows fewer than half of the motions of"
+    return [f"Falls short: {where} {', '.join(weak)}."] if weak else []

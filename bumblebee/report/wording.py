@@ -31,12 +31,13 @@ def change(entry: dict[str, Any]) -> str:
     points = f"{100 * difference['value']:+.0f} points"
     if low is None or high is None:
         return f"{points}, too few motions for an interval"
-    return f"{points} [{100 * low:+.0f}, {100 * high:+.0f}], {shown(low, high, difference['p'])}"
+    p = difference["p"]
+    return f"{points} [{100 * low:+.0f}, {100 * high:+.0f}], p = {p:.2g}: {shown(low, high, p)}"
 
 
-def shown(low: float, high: float, p: float | None) -> str:
+def shown(low: float, high: float, p: float) -> str:
     """What a gain's interval and the paired test over motions show together; few motions can fool either."""
-    if p is None or p > ALPHA or low <= 0 <= high:
+    if p > ALPHA or low <= 0 <= high:
         return "no difference shown"
     return "improved" if low > 0 else "worse"
 
