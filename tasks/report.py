@@ -84,7 +84,7 @@ def collect(shape: Loop) -> LoopResults:
 
 
 def sealed_truth() -> dict[str, Any] | None:
-    """What was sealed in the stand-in; None where the measured rollouts are of the user's robot, which nobody sealed."""
+    """What was sealed in the stand-in; None where the measured rollouts are of the user's robot."""
     return _json(SEALED) if load("rollouts", RolloutsConfig).source is None else None
 
 
