@@ -24,12 +24,12 @@ def main(argv: list[str] | None = None) -> int:
         folder = workspaces.named(options.name)
         approval = folder / "data" / "approvals" / f"round-{options.round}.json"
         summary = folder / "data" / "measured" / f"r{options.round}" / "summary.json"
-        gate.request(approval, options.round, summary)
+        gate.require_seen(gate.request(approval, options.round, summary), options.seen)
         table = gate.answer(approval, options.answer == "approve", options.by, options.note)
     except BadInput as error:
         print(error, file=sys.stderr)
         return EXIT_BAD_INPUT
-    print(f"round {options.round}: {table['status']} by {table['by']}")
+    print(f"round {options.round}: {table['status']} by {table['by']}: {gate.what(table)}")
     addresses = servers.running(folder)
     resumed = resume(folder, addresses.prefect, options.round, table) if addresses else []
     if resumed:
@@ -45,6 +45,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("answer", choices=["approve", "reject"])
     made.add_argument("--round", type=int, required=True, help="the round that is meant")
     made.add_argument("--by", required=True, help="who answers")
+    made.add_argument("--seen", default="", help="the hash that `python -m tasks.gate --round N --show` printed")
     made.add_argument("--note", default="", help="why")
     made.add_argument("--name", default="", help="workspace under runs/; by default this folder, or the checkout")
     return made

@@ -51,9 +51,10 @@ def command(argv: list[str]) -> int:
         if options.approve or options.reject:
             if not options.by:
                 raise BadInput("tasks.gate", "--by NAME, who answers", "no name")
+            gate.require_seen(table, options.seen)
             table = gate.answer(path, options.approve, options.by, options.note)
             then = " Run `dvc repro` to go on." if options.approve else ""
-            print(f"round {options.round}: {table['status']} by {table['by']}.{then}")
+            print(f"round {options.round}: {table['status']} by {table['by']}: {gate.what(table)}.{then}")
         else:
             show(table, summary.parent)
     except BadInput as error:
@@ -72,6 +73,7 @@ def show(table: dict[str, Any], folder: Path) -> None:
     grid = Table(title=f"Round {table['round']}: {table['status']}", show_header=False)
     who = f"{table['by']} at {table['at']} {table['note']}" if "by" in table else "nobody yet"
     rows = {"files accepted": seen["accepted"], "files set aside": seen["quarantined"]}
+    rows |= {"hash of what is seen": gate.short(table)}
     rows |= {"seconds accepted": f"{seen['seconds']:.1f}", "answered by": who}
     for name, value in rows.items():
         grid.add_row(name, escape(str(value)))
@@ -83,6 +85,7 @@ def show(table: dict[str, Any], folder: Path) -> None:
     console.print(f"plots: {folder / 'overview.html'}\nfindings: {folder / 'findings.csv'}", soft_wrap=True)
     if table["status"] == "pending":
         console.print(gate.how_to_answer(table["round"]), soft_wrap=True, markup=False)
+        console.print(f"to answer this and nothing else, add: --seen {gate.short(table)}", soft_wrap=True)
 
 
 def _parse(argv: list[str]) -> argparse.Namespace:
@@ -93,6 +96,7 @@ def _parse(argv: list[str]) -> argparse.Namespace:
     choice.add_argument("--approve", action="store_true", help="let the round go on")
     choice.add_argument("--reject", action="store_true", help="stop the round")
     parser.add_argument("--by", default="", help="who answers")
+    parser.add_argument("--seen", default="", help="the hash that --show printed: refuse if something else lies there")
     parser.add_argument("--note", default="", help="why")
     return parser.parse_args(argv)
 

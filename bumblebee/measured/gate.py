@@ -15,6 +15,7 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.intake import file_hash
 
 AUTOMATIC = "automatic (gate.mode: auto)"
+SHORT = 12  # digits of a hash that a person copies
 STATUSES = ("pending", "approved", "rejected")
 
 
@@ -59,6 +60,27 @@ def answer(path: Path, approve: bool, by: str, note: str = "") -> dict[str, Any]
     table |= {"seen": old["seen"], "history": history}
     write_json(path, table)
     return table
+
+
+def short(table: dict[str, Any]) -> str:
+    """The short hash of what a request shows; `--seen` takes it, or more digits of the whole."""
+    return str(table["seen"].get("sha256", ""))[:SHORT]
+
+
+def require_seen(table: dict[str, Any], seen: str) -> None:
+    """Refuse an answer that was meant for something else than what the request shows now; "" leaves it open."""
+    given = seen.strip().lower()
+    if not seen or (len(given) >= SHORT and str(table["seen"].get("sha256", "")).startswith(given)):
+        return
+    expected = f"{short(table)}, what round {table['round']} shows now"
+    do = f"Look again: python -m tasks.gate --round {table['round']} --show."
+    raise BadInput("--seen", expected, repr(seen), do)
+
+
+def what(table: dict[str, Any]) -> str:
+    """What an answer is about, in a few words."""
+    seen = table["seen"]
+    return f"{short(table)} ({seen.get('accepted')} files accepted, {seen.get('quarantined')} set aside)"
 
 
 def read_approval(path: Path) -> dict[str, Any]:
