@@ -15,6 +15,7 @@ from bumblebee.measured.intake import IntakeSummary, file_hash, incoming_files, 
 from bumblebee.measured.overview import write_overview
 from bumblebee.measured.rollout import read_rollout
 from bumblebee.measured.summary import summary_table
+from bumblebee.measured.thresholds import Thresholds
 from bumblebee.progress import progress
 from bumblebee.robot.model import write_xml
 from tasks.stage import load, log_run, output_folder, run_stage
@@ -28,6 +29,13 @@ class IngestConfig:
     """Folder of a round: datasets in folders of their own, one a cluster, or one dataset. `{round}` is its number."""
     model: str = ""
     """The declared MJCF; empty: the model.xml beside the rollouts, or else this project's G1."""
+    gains_tolerance: float = Thresholds.gains_relative
+    """Largest relative difference between a file's kp or kd and the declared model's (and the deployed policy's);
+    a file beyond it is set aside. A lab that varies its gains on purpose allows more."""
+
+    def __post_init__(self) -> None:
+        if not self.gains_tolerance >= 0:
+            raise ValueError(f"gains_tolerance is {self.gains_tolerance:g}, and it is at least 0")
 
 
 def main(round: int) -> None:
@@ -36,10 +44,13 @@ def main(round: int) -> None:
     folders = dataset_folders(Path(config.incoming.format(round=round)))
     with output_folder(f"data/measured/r{round}") as out:
         write_model(folders, config.model, out / "model.xml")
-        batch = sort_rollouts(folders, out, policy_contracts(folders, round))
-        if not batch.accepted:
-            raise BadInput(folders[0].parent, "at least one rollout that can be used", _came(batch))
+        limits = Thresholds(gains_relative=config.gains_tolerance)
+        batch = sort_rollouts(folders, out, policy_contracts(folders, round), limits)
         table = write_results(batch, round, out)
+        if not batch.accepted:
+            kept = keep_rejected(out, round)
+            raise BadInput(folders[0].parent, "at least one rollout that can be used", _came(batch), f"See {kept}.")
+    shutil.rmtree(f"data/rejected/r{round}", ignore_errors=True)
     ask(round)
     counts = {key: float(table[key]) for key in ("accepted", "quarantined", "seconds")}
     log_run("ingest", round=round, params=config, metrics=counts)
@@ -82,24 +93,37 @@ def policy_contracts(folders: list[Path], round: int) -> dict[str, dict[str, Any
     return contracts
 
 
-def sort_rollouts(folders: list[Path], out: Path, contracts: dict[str, dict[str, Any]]) -> IntakeSummary:
+def sort_rollouts(
+    folders: list[Path], out: Path, contracts: dict[str, dict[str, Any]], limits: Thresholds | None = None
+) -> IntakeSummary:
     """Every folder through the intake, with progress."""
     model = mujoco.MjModel.from_xml_path(str(out / "model.xml"))
     total = sum(len(incoming_files(folder)) for folder in folders)
+    good, bad = out / "rollouts", out / "quarantine"
     with progress(total, "checking rollouts", "files") as bar:
         return merge(
-            intake(folder, out / "rollouts", out / "quarantine", model, contracts, lambda file: bar.update(1, file))
-            for folder in folders
+            intake(folder, good, bad, model, contracts, lambda file: bar.update(1, file), limits) for folder in folders
         )
 
 
 def write_results(batch: IntakeSummary, round: int, out: Path) -> dict[str, Any]:
     """findings.csv, summary.json and overview.html."""
     batch.findings.to_csv(out / "findings.csv", index=False)
-    table = summary_table(batch, round) | {"findings_sha256": file_hash(out / "findings.csv")}
+    hashes = {"findings_sha256": file_hash(out / "findings.csv"), "model_sha256": file_hash(out / "model.xml")}
+    table = summary_table(batch, round) | hashes
     (out / "summary.json").write_text(json.dumps(table, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     write_overview(out / "overview.html", table, batch.findings, _accepted(batch, out))
     return table
+
+
+def keep_rejected(out: Path, round: int) -> Path:
+    """Findings, plots and quarantine of a round of which nothing can be used, beside the pipeline: data/rejected/rN."""
+    target = Path(f"data/rejected/r{round}")
+    with output_folder(target) as folder:
+        for name in ("findings.csv", "overview.html", "quarantine"):
+            if (out / name).exists():
+                (out / name).rename(folder / name)
+    return target
 
 
 def ask(round: int) -> None:

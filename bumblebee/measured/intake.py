@@ -23,6 +23,7 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.checks import check_rollout
 from bumblebee.measured.finding import Finding
 from bumblebee.measured.rollout import BadRollout, Rollout, read_rollout
+from bumblebee.measured.thresholds import Thresholds
 
 FINDING_COLUMNS = ("file", "column", "row", "rule", "expected", "came", "fatal", "message")
 
@@ -66,6 +67,7 @@ def intake(
     model: mujoco.MjModel,
     contracts: Mapping[str, dict[str, Any]] | None = None,
     tick: Callable[[str], None] = lambda file: None,
+    limits: Thresholds | None = None,
 ) -> IntakeSummary:
     """Check every rollout of a folder and sort it.
 
@@ -76,10 +78,11 @@ def intake(
         model: the declared model.
         contracts: cluster -> contract.json of the policy that was deployed for it; "" holds for every cluster.
         tick: called with each file's name when it is done.
+        limits: what still passes.
     """
     items, findings = [], []
     for source in incoming_files(incoming):
-        item, found = _take(source, accepted, quarantine, model, contracts or {})
+        item, found = _take(source, accepted, quarantine, lambda path: _check(path, model, contracts or {}, limits))
         items.append(item)
         findings += found
         tick(source.name)
@@ -117,10 +120,13 @@ def file_hash(path: Path) -> str:
 
 
 def _take(
-    source: Path, accepted: Path, quarantine: Path, model: mujoco.MjModel, contracts: Mapping[str, dict[str, Any]]
+    source: Path,
+    accepted: Path,
+    quarantine: Path,
+    check: Callable[[Path], tuple[Rollout | None, list[Finding]]],
 ) -> tuple[Item, list[Finding]]:
     digest = file_hash(source)
-    rollout, findings = _check(source, model, contracts)
+    rollout, findings = check(source)
     fatal = any(finding.fatal for finding in findings)
     place = accepted / source.name
     if place.exists():
@@ -146,14 +152,14 @@ def _take(
 
 
 def _check(
-    source: Path, model: mujoco.MjModel, contracts: Mapping[str, dict[str, Any]]
+    source: Path, model: mujoco.MjModel, contracts: Mapping[str, dict[str, Any]], limits: Thresholds | None
 ) -> tuple[Rollout | None, list[Finding]]:
     try:
         rollout = read_rollout(source)
     except BadRollout as bad:
         return None, [Finding(source.name, bad.column, None, bad.rule, bad.expected, bad.came, fatal=True)]
     contract = contracts.get(str(rollout.meta.get("cluster", "")), contracts.get(""))
-    return rollout, check_rollout(rollout, model, contract, source.name)
+    return rollout, check_rollout(rollout, model, contract, source.name, limits)
 
 
 def _set_aside(source: Path, digest: str, quarantine: Path, findings: list[Finding]) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,6 +14,8 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import write_rollout
+from bumblebee.robot.facts import joints
+from bumblebee.robot.model import gains
 from tasks import gate as gate_task
 from tasks import ingest
 from tests.measured.simulated import g1_rollout
@@ -127,12 +130,69 @@ def test_the_automatic_gate_does_not_overrule_a_person(workspace: Setup) -> None
     assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_REJECTED
 
 
-def test_a_round_without_one_good_file_fails_and_leaves_nothing(workspace: Setup) -> None:
+def test_a_round_without_one_good_file_fails_and_keeps_what_was_found(workspace: Setup) -> None:
     workspace(bad=("c0", "c1"))
-    with pytest.raises(BadInput, match="2 files that all fail"):
+    with pytest.raises(BadInput, match=r"2 files that all fail.*data/rejected/r1") as failed:
         ingest.main(1)
+    assert "\n" not in str(failed.value)
     assert not Path("data/approvals").exists()
     assert not any(path.is_file() for path in Path("data/measured").rglob("*"))
+    kept = Path("data/rejected/r1")
+    assert {path.name for path in kept.iterdir()} == {"findings.csv", "overview.html", "quarantine"}
+    assert len(list((kept / "quarantine").glob("*.parquet"))) == 2
+    assert "finite" in (kept / "findings.csv").read_text()
+
+
+def test_an_accepted_round_takes_away_what_an_earlier_try_left(workspace: Setup) -> None:
+    workspace(bad=("c0", "c1"))
+    with pytest.raises(BadInput):
+        ingest.main(1)
+    shutil.rmtree("data/rollouts")
+    workspace()
+    ingest.main(1)
+    assert not Path("data/rejected/r1").exists()
+
+
+def test_an_answer_with_the_hash_of_other_data_is_refused(workspace: Setup, capsys: pytest.CaptureFixture[str]) -> None:
+    workspace(bad=("c1",))
+    ingest.main(1)
+    seen = approval()["seen"]["sha256"]
+    capsys.readouterr()
+    gate_task.command(["--round", "1", "--show"])
+    assert seen[:12] in capsys.readouterr().out
+    for wrong in ("0" * 12, seen[:3], "nonsense"):
+        assert gate_task.command(["--round", "1", "--approve", "--by", "Ann", "--seen", wrong]) == 2
+        line = capsys.readouterr().err
+        assert line.count("\n") == 1 and seen[:12] in line and approval()["status"] == "pending"
+    assert gate_task.command(["--round", "1", "--approve", "--by", "Ann", "--seen", seen[:12]]) == 0
+    said = capsys.readouterr().out
+    assert f"{seen[:12]} (1 files accepted, 1 set aside)" in said
+    assert approval()["status"] == "approved"
+
+
+def test_another_model_needs_another_answer(workspace: Setup) -> None:
+    """The same rollouts beside a declared model that passes them too are not what was approved."""
+    workspace()
+    ingest.main(1)
+    gate_task.command(["--round", "1", "--approve", "--by", "Ann"])
+    text = Path("data/measured/r1/model.xml").read_text()
+    Path("data/rollouts/r1/c0/model.xml").write_text(text + "<!-- another -->\n")
+    ingest.main(1)
+    assert approval()["status"] == "pending"
+
+
+@pytest.mark.parametrize(("tolerance", "fatal"), [("", True), ("gains_tolerance: 0.2", False)])
+def test_gains_that_vary_on_purpose_can_be_allowed(workspace: Setup, tolerance: str, fatal: bool) -> None:
+    folder = workspace()
+    (folder / "params.yaml").write_text(f"ingest: {{{tolerance}}}\ngate: {{mode: ask}}\n")
+    kd = [1.1 * gains(joint)[1] for joint in joints()]
+    rollout = g1_rollout(3, 0.1, seconds=2.0)
+    rollout = replace(rollout, rollout_id="kd", meta=rollout.meta | {"kd": kd})
+    write_rollout(Path("data/rollouts/r1/c0/rollouts/kd.parquet"), rollout)
+    ingest.main(1)
+    assert Path("data/measured/r1/quarantine/kd.parquet").exists() == fatal
+    rules = json.loads(Path("data/measured/r1/summary.json").read_text())["by_rule"]
+    assert set(rules) == ({"gains"} if fatal else set())
 
 
 def test_models_that_differ_between_clusters_are_named(workspace: Setup) -> None:
