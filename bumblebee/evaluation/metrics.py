@@ -19,7 +19,6 @@ import numpy as np
 from bumblebee.tracking.terminations import LOOSE_FAMILIES
 
 WALKING_FAMILIES = tuple(sorted(LOOSE_FAMILIES))
-END_REASONS = ("end", "keypoint", "fall")
 
 
 @dataclass(frozen=True)
