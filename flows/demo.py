@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import logging
 import os
 import re
 import subprocess
@@ -77,18 +78,20 @@ def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
 def walk(folder: Path, addresses: Addresses) -> int:
     """Run the flow in this process; only now is Prefect imported, since it reads its settings once."""
     os.environ["PREFECT_API_URL"] = f"{addresses.prefect}/api"
-    from flows.loop import StageFailed, WaitingForAnswer, loop, runner
+    from flows.loop import WAITING, loop, runner
 
     os.chdir(folder)
-    try:
-        loop.with_options(task_runner=runner(os.cpu_count() or 1))(str(folder))
-    except StageFailed as error:
-        print(f"{error}\nwhat completed is kept: the same command goes on from there", file=sys.stderr)
-        return EXIT_FAILED
-    except WaitingForAnswer as error:
-        print(error, file=sys.stderr)
+    state = loop.with_options(task_runner=runner(os.cpu_count() or 1))(str(folder), return_state=True)
+    for logger in ("prefect", "prefect.flow_runs", "prefect.task_runs"):
+        for handler in logging.getLogger(logger).handlers:
+            handler.flush()  # what is on its way to the server must arrive before that ends
+    if state.is_completed():
+        return 0
+    print(state.message, file=sys.stderr)
+    if state.name == WAITING:
         return EXIT_WAITING
-    return 0
+    print("what completed is kept: the same command goes on from there", file=sys.stderr)
+    return EXIT_FAILED
 
 
 def check_parameters(folder: Path) -> None:

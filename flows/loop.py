@@ -14,6 +14,7 @@ from typing import Any
 from prefect import flow, get_run_logger, task
 from prefect.cache_policies import NO_CACHE
 from prefect.futures import PrefectFuture
+from prefect.states import Completed, Failed, State
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from flows import gates
@@ -23,17 +24,15 @@ from flows.stages import Stage, changed_stages, downstream, read_stages, to_run
 KEPT = 5  # last lines of a failed stage that its error repeats
 
 
-class StageFailed(Exception):
-    """A stage ended with an error; the text says which and its last words."""
-
-
-class WaitingForAnswer(Exception):
-    """A gate has no answer yet; the text says how to give one."""
+WAITING = "WaitingForAnswer"  # name of the state of a run that ended at a gate
 
 
 @task(task_run_name="{title}", cache_policy=NO_CACHE, persist_result=False, retries=0)
-def run_stage(title: str, name: str, workspace: str) -> None:
-    """Bring one stage up to date in a process of its own; its output goes to the log line by line."""
+def run_stage(title: str, name: str, workspace: str) -> State[Any]:
+    """Bring one stage up to date in a process of its own; its output goes to the log line by line.
+
+    A failure is a state and no exception: the stage has said what is wrong, a traceback of ours would bury it.
+    """
     log = get_run_logger()
     command = [sys.executable, "-m", "flows.reproduce", name]
     last: deque[str] = deque(maxlen=KEPT)
@@ -53,7 +52,8 @@ def run_stage(title: str, name: str, workspace: str) -> None:
                 last.append(line.rstrip())
                 log.info(line.rstrip())
     if process.returncode:
-        raise StageFailed(f"{title}: " + " / ".join(last))
+        return Failed(message=f"{title}: " + " / ".join(last))
+    return Completed()
 
 
 def is_chatter(line: str) -> bool:
@@ -63,8 +63,8 @@ def is_chatter(line: str) -> bool:
 
 
 @flow(name="loop", log_prints=False, persist_result=False, validate_parameters=False)
-def loop(workspace: str = "") -> list[str]:
-    """Walk the stages; returns the names of those that had work to do.
+def loop(workspace: str = "") -> State[Any]:
+    """Walk the stages; ends completed, failed, or named WaitingForAnswer where a gate has no answer yet.
 
     Args:
         workspace: the folder with dvc.yaml and params.yaml; by default what BUMBLEBEE_WORKSPACE says, or this one.
@@ -89,8 +89,7 @@ def loop(workspace: str = "") -> list[str]:
                 log.warning(question)
                 continue
         running[stage.name] = run_stage.submit(stage.title, stage.name, str(folder.resolve()), wait_for=before)
-    report(running, stages, waiting)
-    return sorted(busy)
+    return outcome(running, stages, waiting)
 
 
 def failed(future: PrefectFuture[Any]) -> bool:
@@ -99,19 +98,20 @@ def failed(future: PrefectFuture[Any]) -> bool:
     return not future.state.is_completed()
 
 
-def report(running: dict[str, PrefectFuture[Any]], stages: list[Stage], waiting: str | None) -> None:
-    """Wait for everything; raise when a stage failed or a gate waits, after all the others have saved their work."""
+def outcome(running: dict[str, PrefectFuture[Any]], stages: list[Stage], waiting: str | None) -> State[Any]:
+    """Wait for everything, so that all that can finish is saved; then how the run ended."""
     titles = {stage.name: stage.title for stage in stages}
     bad = [name for name, future in running.items() if failed(future)]
     causes = [name for name in bad if running[name].state.is_failed() or running[name].state.is_crashed()]
     if bad:
-        first = [running[name].state.message or "" for name in causes]
         kept = len(running) - len(bad)
         skipped = ", ".join(titles[name] for name in bad if name not in causes)
-        text = f"{len(causes)} stage(s) failed, {kept} completed and are kept; not started: {skipped or 'none'}. "
-        raise StageFailed(text + " | ".join(first))
+        text = f"{len(causes)} stage(s) failed, {kept} completed and are kept; not started: {skipped or 'none'}"
+        return Failed(message="\n".join([text, *(running[name].state.message or name for name in causes)]))
     if waiting is not None:
-        raise WaitingForAnswer(f"{titles[waiting]} waits for an answer; what came before it is kept")
+        text = f"{titles[waiting]} waits for an answer; what came before it is kept"
+        return Failed(name=WAITING, message=text)
+    return Completed(message=f"{len(running)} stage(s) brought up to date")
 
 
 def gates_last(stages: list[Stage]) -> list[Stage]:
