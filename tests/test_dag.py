@@ -5,7 +5,10 @@ Renew with: python -m tests.test_dag
 
 from pathlib import Path
 
+import yaml
+
 from flows.stages import read_stages
+from tests.test_imports import imports
 
 HOME = Path(__file__).parent.parent
 SNAPSHOT = Path(__file__).parent / "dag.txt"
@@ -39,6 +42,26 @@ def test_the_sealed_effects_are_read_by_the_stand_in_and_the_report_only():
     text = {stage.name: stage for stage in read_stages(HOME)}
     readers = {stage.kind for stage in text.values() if "seal" in stage.needs}
     assert readers == {"rollouts", "evaluate", "report"}
+
+
+# Shared by all stages, and changed without changing what any of them finds.
+NO_RESULT = ("bumblebee/errors", "bumblebee/files", "bumblebee/progress", "bumblebee/motion/store")
+
+
+def test_a_stage_depends_on_the_code_that_it_calls():
+    """Every library module that a stage's own module imports is among its dependencies: a change there makes it stale."""
+    described = yaml.safe_load((HOME / "dvc.yaml").read_text())["stages"]
+    missing = []
+    for name, stage in described.items():
+        code = [dep for dep in stage["deps"] if dep.startswith(("bumblebee", "tasks"))]
+        for _, module in imports(HOME / "tasks" / f"{name}.py"):
+            path = "/".join(module.split(".")[:3])
+            found = next((p for p in (f"{path}.py", path) if (HOME / p).exists()), None)
+            if not module.startswith("bumblebee.") or found is None or found.startswith(NO_RESULT):
+                continue
+            if not any(found == dep or found.startswith(f"{dep}/") for dep in code):
+                missing.append(f"{name}: {found}")
+    assert missing == []
 
 
 if __name__ == "__main__":
