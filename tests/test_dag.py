@@ -49,7 +49,7 @@ NO_RESULT = ("bumblebee/errors", "bumblebee/files", "bumblebee/progress", "bumbl
 
 
 def test_a_stage_depends_on_the_code_that_it_calls():
-    """Every library module that a stage's own module imports is among its dependencies: a change there makes it stale."""
+    """Every library module that a stage imports itself is among its dependencies: a change there makes it stale."""
     described = yaml.safe_load((HOME / "dvc.yaml").read_text())["stages"]
     missing = []
     for name, stage in described.items():
