@@ -15,6 +15,7 @@ from tasks import params
 
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")
+GENERATED = ".params.generated.yaml"  # what params.yaml was when it was last made here
 
 
 def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
@@ -29,6 +30,8 @@ def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
 def create(folder: Path, profile: str | None = None, motions: Path | None = None, **over: Any) -> Path:
     """Make `folder` a workspace, or bring an existing one up to date; its data, models and history stay.
 
+    A params.yaml that was edited here stays as it is, but for what the call itself asks for.
+
     Args:
         folder: where; made if it is not there.
         profile: the name of a file in profiles/ whose values replace those of params.yaml.
@@ -38,9 +41,7 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
     Raises:
         BadInput: for an unknown profile or a missing folder of motions.
     """
-    content = params.read(HOME / "params.yaml")
-    if profile:
-        content = merge(content, params.read(profile_path(profile)))
+    content, edited = settings_of(folder, profile)
     if motions is not None:
         source = motions.expanduser().resolve()
         if not source.is_dir():
@@ -51,14 +52,31 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
     for name in CODE:
         _link(folder / name, HOME / name)
     _write(folder / ".dvcignore", (HOME / ".dvcignore").read_text())
-    _write(folder / "dvc.yaml", stages_with(motions))
-    _write(folder / "params.yaml", yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
+    read_from = (content.get("motions") or {}).get("source", "embedded")
+    _write(folder / "dvc.yaml", stages_with(None if read_from == "embedded" else Path(read_from)))
+    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    if edited is None or content != edited:
+        _write(folder / "params.yaml", text)
+    if edited is None:
+        _write(folder / GENERATED, text)
+    (folder / "data" / "incoming").mkdir(parents=True, exist_ok=True)
     if not (folder / ".dvc" / "config").exists():
         init = [sys.executable, "-m", "dvc", "init", "--no-scm", "-q"]
         subprocess.run(init, cwd=folder, env=environment(folder), check=True)
         settings = (HOME / ".dvc" / "config").read_text()
         _write(folder / ".dvc" / "config", settings.replace("[core]\n", "[core]\n    no_scm = True\n"))
     return folder
+
+
+def settings_of(folder: Path, profile: str | None) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """What params.yaml starts from: (settings, the edited ones in `folder` if somebody edited them there)."""
+    here, generated = folder / "params.yaml", folder / GENERATED
+    if here.exists() and (not generated.exists() or here.read_text() != generated.read_text()):
+        edited = params.read(here)
+        print(f"{here} was edited: it is kept (remove it to start from the checkout's again)", file=sys.stderr)
+        return edited, edited
+    content = params.read(HOME / "params.yaml")
+    return (merge(content, params.read(profile_path(profile))) if profile else content), None
 
 
 def stages_with(motions: Path | None) -> str:

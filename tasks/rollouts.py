@@ -45,7 +45,8 @@ class RolloutsConfig:
     seed: int = 11
     """Of the choice of motions, the start states and the sensor noise."""
     source: Path | None = None
-    """Folder of the user's own measured rollouts; nothing: the stand-in robot runs."""
+    """Folder of the user's own measured rollouts; nothing: the stand-in robot runs. New files in data/incoming are seen
+    by themselves; with another folder, run `dvc repro -f` for this stage."""
     threads: int = 2
     """CPU threads of the stand-in."""
     max_seconds: float = 10.0

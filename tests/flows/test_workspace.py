@@ -34,11 +34,24 @@ def test_a_workspace_has_the_checkouts_graph_and_its_own_parameters(tmp_path: Pa
 
 def test_making_it_again_changes_nothing_and_keeps_data(tmp_path: Path):
     folder = workspaces.create(tmp_path / "lab")
-    (folder / "data").mkdir()
     (folder / "data" / "x").touch()
     before = {p: p.lstat().st_mtime_ns for p in folder.rglob("*") if ".dvc/tmp" not in str(p)}
     workspaces.create(folder)
     assert {p: p.lstat().st_mtime_ns for p in folder.rglob("*") if ".dvc/tmp" not in str(p)} == before
+
+
+def test_settings_that_were_edited_in_the_workspace_are_kept(tmp_path: Path):
+    """Also when it is brought up to date with other motions; what nobody edited follows the checkout."""
+    folder = workspaces.create(tmp_path / "lab", profile="smoke")
+    edited = (folder / "params.yaml").read_text().replace("mode: auto", "mode: ask")
+    assert "mode: ask" in edited
+    (folder / "params.yaml").write_text(edited)
+    workspaces.create(folder, profile="smoke")
+    assert (folder / "params.yaml").read_text() == edited
+    (tmp_path / "mocap").mkdir()
+    workspaces.create(folder, motions=tmp_path / "mocap")
+    now = read(folder / "params.yaml")
+    assert now["gate"] == {"mode": "ask"} and now["motions"]["source"] == str(tmp_path / "mocap")
 
 
 def test_the_users_motions_are_a_dependency_of_the_stage_that_reads_them(tmp_path: Path):
