@@ -14,6 +14,7 @@ from flows import workspace as workspaces
 from flows.environment import environment
 from flows.servers import Addresses, servers
 from flows.stages import changed_stages, read_stages, to_run
+from tasks import params, sections
 
 EXIT_FAILED, EXIT_WAITING = 1, 3
 
@@ -62,11 +63,13 @@ def choose(name: str, profile: str, motions: Path | None) -> Path:
 def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
     """Bring the workspace up to date through the flow."""
     os.environ.update(environment(folder))
-    check_parameters(folder)
+    sections.check_names(params.read(folder / "params.yaml"), folder / "params.yaml")
+    sections.loop(folder / "params.yaml")
     if not to_run(read_stages(folder), changed_stages(folder)):
         print(f"everything in {shown(folder)} is up to date")
         summarise(folder)
         return 0
+    check_parameters(folder)
     with servers(folder, prefect_port, mlflow_port) as addresses:
         announce(folder, addresses)
         status = walk(folder, addresses)

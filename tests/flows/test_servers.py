@@ -32,6 +32,7 @@ def test_the_demo_ends_with_status_2_on_a_taken_port(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.setattr(demo, "choose", lambda *_: tmp_path)
+    (tmp_path / "params.yaml").write_text("clusters: [c0]\nrounds: []\nfinal_round: 0\n")
     monkeypatch.setattr(demo, "check_parameters", lambda _: None)
     monkeypatch.setattr(demo, "read_stages", lambda _: [])
     monkeypatch.setattr(demo, "changed_stages", lambda _: set())
