@@ -62,11 +62,9 @@ def upstream(output: Path, lock: Path = Path("dvc.lock")) -> dict[str, str]:
 
     Parameters are `params:<section>` -> hash of their values. Empty where DVC has not made the output.
     """
-    import yaml
-
     if not lock.exists():
         return {}
-    stages = yaml.safe_load(lock.read_text()).get("stages", {})
+    stages = _locked_stages(lock.read_text())
     makers = {out["path"]: stage for stage in stages.values() for out in stage.get("outs", [])}
     found: dict[str, str] = {}
     waiting = [output.as_posix()]
@@ -81,6 +79,14 @@ def upstream(output: Path, lock: Path = Path("dvc.lock")) -> dict[str, str]:
             text = json.dumps(values, sort_keys=True, default=str)
             found[f"params:{section}"] = hashlib.md5(text.encode()).hexdigest()
     return found
+
+
+@cache
+def _locked_stages(text: str) -> dict[str, Any]:
+    """The stages of a dvc.lock; read once, since a policy's history is asked for again and again."""
+    import yaml
+
+    return dict(yaml.safe_load(text).get("stages", {}))
 
 
 def _maker(path: str, makers: dict[str, dict[str, Any]]) -> dict[str, Any]:
