@@ -34,10 +34,8 @@ class SealConfig:
 
     seed: int = 7
     """Of the draw."""
-    null: bool = False
-    """True: a robot without undeclared effects, the diagnosis' null test."""
     n_effects: int = 2
-    """Number of effects, each of another kind on another joint or body."""
+    """Number of effects, each of another kind on another joint or body; 0: the diagnosis' null test."""
     kinds: tuple[str, ...] = tuple(PARAMETERS)
     """Kinds to draw from."""
     joints: tuple[str, ...] = tuple(
@@ -58,7 +56,6 @@ def main() -> None:
         "schema": 1,
         "sealed": "Undeclared effects of the stand-in robot, for its process and the final report only.",
         "seed": config.seed,
-        "null": config.null,
         "effects": effects,
         "sha256": seal(effects),
     }
@@ -70,8 +67,6 @@ def main() -> None:
 def draw(config: SealConfig) -> list[dict[str, Any]]:
     """The effects as they stand in the file; the same configuration gives the same effects."""
     _check(config)
-    if config.null:
-        return []
     rng = np.random.default_rng(config.seed)
     kinds = rng.permutation(config.kinds)[: config.n_effects]
     places = iter(rng.permutation(config.joints))
