@@ -26,8 +26,8 @@ class SearchConfig:
     holdout_z: float = 2.0
     """Held-out gain must exceed this many of its standard errors."""
     least_gain: float = 0.02
-    """Held-out gain must exceed this share of the held-out chi-square that is left: with enough data the difference of two
-    integrators is significant too, and was named armature on three light joints at a gain of 0.008."""
+    """Held-out gain must exceed this share of the held-out chi-square that is left: with enough data the difference of
+    two integrators is significant too, and was named armature on three light joints at a gain of 0.008."""
 
 
 @dataclass(eq=False)
