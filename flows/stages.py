@@ -90,10 +90,16 @@ def to_run(stages: list[Stage], changed: set[str]) -> set[str]:
 
 def changed_stages(workspace: Path) -> set[str]:
     """Names of the stages whose inputs, outputs, command or parameters differ from dvc.lock."""
+    from dvc.lock import LockError
     from dvc.repo import Repo
 
-    with Repo(str(workspace)) as repo:
-        return {_name(address) for address in repo.status()}
+    try:
+        with Repo(str(workspace)) as repo:
+            return {_name(address) for address in repo.status()}
+    except LockError as error:
+        lines = [line.strip() for line in str(error).splitlines() if "PID" in line] or [str(error)]
+        remedy = "Wait for it or stop it, then run again."
+        raise BadInput(workspace, "no other run at work in it", lines[0], remedy) from None
 
 
 def downstream(stages: list[Stage], name: str) -> set[str]:

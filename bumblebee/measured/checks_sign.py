@@ -1,5 +1,6 @@
 """Checks of sign: the velocity against the derivative of the position, the response against the command."""
 
+import mujoco
 import numpy as np
 
 from bumblebee.measured.checks_units import servo_gains
@@ -7,6 +8,8 @@ from bumblebee.measured.view import View, integral
 
 # Window [s] -> the factor of `moving_speed` that suffices: over a longer time, noise and coarse steps average out.
 WINDOWS = {0.04: 1.0, 0.2: 0.4, 0.5: 0.2, 1.0: 0.13}
+CLEARLY_MIRRORED = -0.75  # the same, for joints that a floating robot's weight may move against their command
+CARRIED = 0.15  # share of the robot's mass beyond a joint from which on that is so
 MIRRORED = -0.9  # correlation of the changes of a position that follows its target's negative
 NOT_ALONG = 2.0  # standard errors: from here on a joint's acceleration is seen to go along with its command
 
@@ -103,7 +106,16 @@ def check_response(view: View) -> None:
         if against or mirrored:
             came = f"motion against it ({-z:.0f} standard errors, correlation of the changes {together:.2f})"
             column = view.label(name, joint)
-            view.add(column, None, "response-sign", "a joint that follows its command", came, fatal=against)
+            clear = together < CLEARLY_MIRRORED or not _carries_weight(view, joint)
+            view.add(column, None, "response-sign", "a joint that follows its command", came, fatal=against and clear)
+
+
+def _carries_weight(view: View, joint: int) -> bool:
+    """Whether a floating robot's weight may move the joint against its command for seconds: hips, knees, a waist."""
+    model, number = view.model, view.joint_ids()[joint]
+    if number < 0 or not (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE).any():
+        return False
+    return bool(model.body_subtreemass[model.jnt_bodyid[number]] > CARRIED * model.body_subtreemass[0])
 
 
 def _declared_effects(view: View, by_target: bool) -> np.ndarray:

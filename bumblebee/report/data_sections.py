@@ -50,7 +50,7 @@ def clusters_section(results: LoopResults) -> Section:
             f"{row['clips']} + {row['held_out_clips']}",
             f"{row['speed']:.2f}",
             f"{row['displacement']:.2f}",
-            f"{1e3 * row['z_move']:.1f}" if "z_move" in row else "–",
+            f"{row['z_move']:.1f}" if "z_move" in row else "–",
             str(row["keywords"]),
         )
         for name, row in summary["clusters"].items()
