@@ -60,6 +60,7 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
     if edited is None:
         _write(folder / GENERATED, text)
     (folder / "data" / "incoming").mkdir(parents=True, exist_ok=True)
+    _write(folder / "data" / "incoming" / "README.md", (HOME / "data" / "incoming" / "README.md").read_text())
     if not (folder / ".dvc" / "config").exists():
         init = [sys.executable, "-m", "dvc", "init", "--no-scm", "-q"]
         subprocess.run(init, cwd=folder, env=environment(folder), check=True)
