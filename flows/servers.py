@@ -94,10 +94,11 @@ def servers(workspace: Path, prefect_port: int = 0, mlflow_port: int = 0) -> Ite
     ports = {"prefect": free_port(prefect_port), "mlflow": free_port(mlflow_port)}
     folder = workspace / SERVERS
     (folder / "artifacts").mkdir(parents=True, exist_ok=True)
-    _create_database(workspace)
     started: dict[str, subprocess.Popen[bytes]] = {}
     try:
         for name, command in commands(workspace, ports).items():
+            if name == "mlflow":
+                _create_database(workspace)
             started[name] = _start(name, command, workspace)
         urls = {name: f"http://{HOST}:{port}" for name, port in ports.items()}
         addresses = Addresses(**urls, keeper=os.getpid(), pids=tuple(each.pid for each in started.values()))

@@ -104,4 +104,4 @@ def _parse(argv: list[str]) -> argparse.Namespace:
 if __name__ == "__main__":
     if {"--show", "--approve", "--reject", "--help", "-h"} & set(sys.argv[1:]):
         raise SystemExit(command(sys.argv[1:]))
-    run_stage(main)
+    run_stage(main, logs=False)

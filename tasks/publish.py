@@ -141,4 +141,4 @@ def publish(candidate: Candidate, result: dict[str, Any], standard: Standard, re
 
 
 if __name__ == "__main__":
-    run_stage(main)
+    run_stage(main, logs=False)

@@ -115,4 +115,4 @@ def _check(config: SealConfig) -> None:
 
 
 if __name__ == "__main__":
-    run_stage(main)
+    run_stage(main, logs=False)

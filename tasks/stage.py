@@ -24,6 +24,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from tasks import recorder
 from tasks.params import load
 from tasks.parent import end_with_parent
 
@@ -33,15 +34,18 @@ SCRATCH = Path(".scratch")
 _used_scratch: set[Path] = set()
 
 
-def run_stage(main: Callable[..., object], argv: list[str] | None = None) -> None:
+def run_stage(main: Callable[..., object], argv: list[str] | None = None, *, logs: bool = True) -> None:
     """Run a stage's `main` from the command line and leave the process with its status.
 
     The parameters of `main` become options (`cluster: str` is `--cluster`, `round: int` is `--round`). Bad input
-    and a full disk end in one line on standard error and status 2; any other exception keeps its traceback.
+    and a full disk end in one line on standard error and status 2; any other exception keeps its traceback. When DVC
+    runs a stage that `logs` a run, MLflow is made ready beside it.
     """
     options = _parser(main).parse_args(argv)
     if "DVC_STAGE" in os.environ:
         end_with_parent()
+        if logs:
+            recorder.start()
     try:
         main(**vars(options))
     except BadInput as error:
@@ -177,6 +181,9 @@ def log_run(
         artifacts: files or folders to keep beside the run.
         tags: anything else worth searching for.
     """
-    from tasks import registry
-
-    registry.log_run(stage, cluster, round, params, metrics or {}, curve, list(artifacts), tags or {})
+    recorder.record(
+        {
+            **{"stage": stage, "cluster": cluster, "round": round, "params": params, "metrics": metrics or {}},
+            **{"curve": curve, "artifacts": list(artifacts), "tags": tags or {}},
+        }
+    )

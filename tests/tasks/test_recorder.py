@@ -1,0 +1,51 @@
+"""The process that writes a stage's run to MLflow beside it."""
+
+from pathlib import Path
+
+import pytest
+
+from tasks import recorder, registry
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(Path(recorder.__file__).parent.parent))
+    (tmp_path / "dvc.yaml").write_text("stages: {}\n")
+    return tmp_path
+
+
+def run(**over: object) -> dict[str, object]:
+    empty = {"cluster": None, "round": None, "params": None, "metrics": {}, "curve": None, "artifacts": [], "tags": {}}
+    return {"stage": "base", **empty, **over}
+
+
+def test_the_run_is_written_with_everything_in_it(workspace: Path) -> None:
+    curve = workspace / "curve.csv"
+    curve.write_text("frames,reward\n10,0.5\n20,0.75\n")
+    recorder.start()
+    recorder.record(
+        run(cluster="c0", round=1, params={"a": {"b": 2}}, metrics={"x": 0.5}, curve=curve, artifacts=[curve])
+    )
+    client = registry.prepare()
+    experiment = client.get_experiment_by_name(workspace.name)
+    (found,) = client.search_runs([experiment.experiment_id])
+    assert found.data.params == {"a.b": "2"}
+    assert found.data.metrics == {"x": 0.5, "reward": 0.75}
+    assert (found.data.tags["cluster"], found.data.tags["round"]) == ("c0", "1")
+    assert [item.path for item in client.list_artifacts(found.info.run_id)] == ["curve.csv"]
+
+
+def test_a_failure_is_the_stages(workspace: Path) -> None:
+    recorder.start()
+    with pytest.raises(RuntimeError, match="curve"):
+        recorder.record(run(curve=workspace / "no-curve.csv"))
+
+
+def test_a_stage_that_ends_without_a_run_leaves_none(workspace: Path) -> None:
+    recorder.start()
+    process = recorder._started.pop()
+    process.communicate("")
+    assert process.returncode == 0
+    client = registry.prepare()
+    assert client.search_runs([client.get_experiment_by_name(workspace.name).experiment_id]) == []
