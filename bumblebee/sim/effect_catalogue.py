@@ -1,7 +1,7 @@
 """The catalogue: which effects a model may lack, by the names of the diagnosis contract, and one effect as a value."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 # MuJoCo's default dry friction creeps where a real joint sticks; a joint with `coulomb_friction` gets it stiff.
 STICTION_SOLREF = (0.004, 1.0)
@@ -11,47 +11,130 @@ STICTION_ITERATIONS = 20
 
 
 @dataclass(frozen=True)
-class Kind:
-    """One id of the catalogue: what it sits on and its parameter."""
+class Parameter:
+    """One number of an effect."""
 
-    on: str
-    """"joint" or "body"."""
-    parameter: str
-    """Name of its parameter in `Effect.parameters`."""
+    name: str
     unit: str
-    """Unit of the parameter; "" for a factor."""
+    """"" for a factor or a share."""
     lower: float
     """Smallest value that is physical."""
     upper: float
     """Largest value that is sensible; infinite where only the data can tell."""
 
 
+@dataclass(frozen=True)
+class Kind:
+    """One id of the catalogue: what it sits on and its parameters."""
+
+    on: str
+    """"joint", "body", "geom" or "whole"."""
+    parameters: tuple[Parameter, ...]
+    """In the order of their arrays; at least one."""
+    whole: bool = False
+    """Whether `where: []` means all joints at once."""
+    native: bool = True
+    """Whether plain MJCF carries it; else (or in part) a runtime hook does."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its parameters."""
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def parameter(self) -> str:
+        """Name of its first parameter."""
+        return self.parameters[0].name
+
+    @property
+    def unit(self) -> str:
+        """Unit of its first parameter."""
+        return self.parameters[0].unit
+
+    @property
+    def lower(self) -> float:
+        """Smallest physical value of its first parameter."""
+        return self.parameters[0].lower
+
+    @property
+    def upper(self) -> float:
+        """Largest sensible value of its first parameter."""
+        return self.parameters[0].upper
+
+
+def _joint(*parameters: tuple[str, str, float, float], whole: bool = False, native: bool = True) -> Kind:
+    return Kind("joint", tuple(Parameter(*p) for p in parameters), whole, native)
+
+
+def _body(*parameters: tuple[str, str, float, float], native: bool = True) -> Kind:
+    return Kind("body", tuple(Parameter(*p) for p in parameters), False, native)
+
+
+_INF = math.inf
+_AXES = ("x", "y", "z")
+
 CATALOGUE: dict[str, Kind] = {
-    "coulomb_friction": Kind("joint", "frictionloss", "N m", 0.0, math.inf),
-    "viscous_friction": Kind("joint", "damping", "N m s/rad", 0.0, math.inf),
-    "armature": Kind("joint", "armature", "kg m^2", 0.0, math.inf),
-    "motor_strength": Kind("joint", "factor", "", 0.05, 5.0),
-    "kp": Kind("joint", "factor", "", 0.05, 5.0),
-    "kd": Kind("joint", "factor", "", 0.0, 20.0),
-    "command_delay": Kind("joint", "delay", "s", 0.0, 0.1),
-    "encoder_offset": Kind("joint", "offset", "rad", -1.0, 1.0),
-    "link_mass": Kind("body", "mass", "kg", 1e-3, math.inf),
+    "coulomb_friction": _joint(("frictionloss", "N m", 0.0, _INF)),
+    "viscous_friction": _joint(("damping", "N m s/rad", 0.0, _INF)),
+    "stribeck_friction": _joint(("stiction", "N m", 0.0, _INF), ("velocity", "rad/s", 1e-3, 100.0), native=False),
+    "load_dependent_friction": _joint(("coefficient", "", 0.0, 2.0), native=False),
+    "armature": _joint(("armature", "kg m^2", 0.0, _INF)),
+    "motor_strength": _joint(("factor", "", 1e-3, 20.0)),
+    "kp": _joint(("factor", "", 1e-3, 20.0)),
+    "kd": _joint(("factor", "", 0.0, 50.0)),
+    "torque_limit": _joint(("limit", "N m", 1e-3, _INF)),
+    "torque_speed_limit": _joint(("speed", "rad/s", 0.05, _INF), native=False),
+    "command_delay": _joint(("delay", "s", 0.0, 0.1), whole=True),
+    "torque_lag": _joint(("time", "s", 0.0, 0.1), whole=True, native=False),
+    "encoder_delay": _joint(("delay", "s", 0.0, 0.05), whole=True, native=False),
+    "dropped_commands": _joint(("share", "", 0.0, 0.9), whole=True, native=False),
+    "encoder_offset": _joint(("offset", "rad", -1.0, 1.0), native=False),
+    "imu_offset": _body(("roll", "rad", -0.5, 0.5), ("pitch", "rad", -0.5, 0.5), native=False),
+    "encoder_quantisation": _joint(("step", "rad", 0.0, 0.2), native=False),
+    "joint_spring": _joint(("stiffness", "N m/rad", -_INF, _INF), ("preload", "N m", -_INF, _INF)),
+    "asymmetric_friction": _joint(("difference", "N m", -_INF, _INF)),
+    "hysteresis": _joint(("amplitude", "N m", 0.0, _INF), ("width", "rad", 1e-5, 3.0)),
+    "cogging": _joint(
+        ("sine", "N m", -_INF, _INF), ("cosine", "N m", -_INF, _INF), ("periods", "1/turn", 0.1, 500.0), native=False
+    ),
+    "backlash": _joint(("gap", "rad", 0.0, 0.5)),
+    "series_elasticity": _joint(("stiffness", "N m/rad", 1e-2, _INF)),
+    "link_mass": _body(("mass", "kg", 1e-3, _INF)),
+    "link_com": _body(*((axis, "m", -2.0, 2.0) for axis in _AXES)),
+    "link_inertia": _body(*((axis + axis, "kg m^2", 1e-9, _INF) for axis in _AXES)),
+    "ground_friction": Kind("geom", (Parameter("friction", "", 0.0, 5.0),)),
+    "ground_compliance": Kind("geom", (Parameter("time", "s", 2e-3, 0.5),)),
+    "ground_slope": Kind("whole", tuple(Parameter(axis, "rad", -0.5, 0.5) for axis in ("x", "y"))),
+    "thermal_fade": _joint(("rate", "1/s", -1.0, 1.0), native=False),
+    "strength_drift": _joint(("rate", "1/s", -1.0, 1.0), native=False),
+    "external_wrench": _body(
+        *((f"f{axis}", "N", -_INF, _INF) for axis in _AXES),
+        *((f"t{axis}", "N m", -_INF, _INF) for axis in _AXES),
+        native=False,
+    ),
 }
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect: catalogue id, the joints or bodies it sits on, parameters by name (absolute, SI units)."""
+    """One effect: catalogue id, the joints, bodies or geoms it sits on, parameters by name (absolute, SI units)."""
 
     effect: str
     where: tuple[str, ...]
-    parameters: dict[str, float]
+    parameters: dict[str, float] = field(default_factory=dict)
 
     def value(self) -> float:
-        """The effect's only parameter."""
+        """The effect's first parameter."""
         return self.parameters[CATALOGUE[self.effect].parameter]
 
+    def values(self) -> tuple[float, ...]:
+        """All its parameters, in the catalogue's order."""
+        return tuple(self.parameters[name] for name in CATALOGUE[self.effect].names)
 
-def single(effect: str, where: str, value: float) -> Effect:
-    """The effect `effect` on the one joint or body `where`, its parameter at `value`."""
-    return Effect(effect, (where,), {CATALOGUE[effect].parameter: float(value)})
+
+def single(effect: str, where: str, *values: float) -> Effect:
+    """The effect `effect` on the one place `where` ("" for the whole robot), its parameters at `values` in order."""
+    names = CATALOGUE[effect].names
+    if len(values) != len(names):
+        raise ValueError(f"{effect} has the parameters {names}, got {len(values)} values")
+    return Effect(effect, (where,) if where else (), dict(zip(names, map(float, values), strict=True)))

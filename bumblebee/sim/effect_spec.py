@@ -3,10 +3,18 @@
 | effect | MJCF |
 |---|---|
 | coulomb_friction, viscous_friction, armature | joint frictionloss (stiff), damping, armature |
+| asymmetric_friction | a constant torque, as a weak spring with a far reference, beside the dry friction |
 | motor_strength, kp, kd | the servo's gainprm and biasprm |
+| torque_limit | the servo's forcerange |
 | command_delay | actuator delay, nsample, interp="linear": the mean of the held, delayed command over each step |
 | encoder_offset | biasprm[0] = biasprm[1] * offset: the servo's part; the reading's part is a runtime hook |
-| link_mass | body inertial mass; centre of mass and inertia stay as declared |
+| joint_spring, hysteresis | joint stiffness with springref; with springyield |
+| backlash, series_elasticity | a second hinge on the same axis, with a range; with a stiffness. nq grows |
+| link_mass, link_com, link_inertia | the body's inertial, one of the three at a time |
+| ground_friction, ground_compliance | friction, solref of the geometry and of what can touch it |
+| ground_slope | gravity |
+
+The others need `sim.effect_hooks` at run time.
 """
 
 import math
@@ -14,8 +22,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.sim import effect_native as native
 from bumblebee.sim.effect_catalogue import (
     CATALOGUE,
     STICTION_ITERATIONS,
@@ -31,8 +41,20 @@ _ORDER = tuple(CATALOGUE)
 def add_to_spec(spec: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
     """Add every effect that MuJoCo can express to `spec`, in place."""
     for effect in sorted(effects, key=lambda e: _ORDER.index(e.effect)):
-        for place in effect.where:
-            _ADD[effect.effect](spec, place, effect.value())
+        if effect.effect not in _ADD:
+            continue
+        for place in effect.where or _everywhere(spec, effect.effect):
+            _ADD[effect.effect](spec, place, *effect.values())
+
+
+def _everywhere(spec: mujoco.MjSpec, kind: str) -> tuple[str, ...]:
+    """The places that `where: []` stands for."""
+    if not CATALOGUE[kind].whole:
+        return ("",)
+    return tuple(dict.fromkeys(a.target for a in spec.actuators if a.trntype in _ON_JOINT))
+
+
+_ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 
 def _joint(spec: mujoco.MjSpec, name: str) -> Any:
@@ -42,19 +64,29 @@ def _joint(spec: mujoco.MjSpec, name: str) -> Any:
     return joint
 
 
+def _angle(spec: mujoco.MjSpec, joint: Any) -> float:
+    """A radian in the unit that the spec counts this joint's angles in; 1 for slides."""
+    hinge = joint.type == mujoco.mjtJoint.mjJNT_HINGE
+    return math.degrees(1.0) if hinge and spec.compiler.degree else 1.0
+
+
 def _servos(spec: mujoco.MjSpec, joint: str) -> list[Any]:
     """Every actuator that drives `joint`."""
     _joint(spec, joint)
-    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    servos = [a for a in spec.actuators if a.trntype in kinds and a.target == joint]
+    servos = [a for a in spec.actuators if a.trntype in _ON_JOINT and a.target == joint]
     if not servos:
         raise BadInput(f"effect on joint {joint!r}", "a joint with an actuator", "a passive joint")
     return servos
 
 
 def _frictionloss(spec: mujoco.MjSpec, name: str, value: float) -> None:
+    _stiff_friction(spec, name)
+    _joint(spec, name).frictionloss = value
+
+
+def _stiff_friction(spec: mujoco.MjSpec, name: str, *values: float) -> None:
+    """Dry friction that sticks, for friction that a hook writes at run time, too."""
     joint = _joint(spec, name)
-    joint.frictionloss = value
     joint.solref_friction = STICTION_SOLREF
     joint.solimp_friction = [STICTION_SOLIMP, STICTION_SOLIMP, *joint.solimp_friction[2:]]
     spec.option.iterations = max(spec.option.iterations, STICTION_ITERATIONS)
@@ -70,12 +102,43 @@ def _armature(spec: mujoco.MjSpec, name: str, value: float) -> None:
     _joint(spec, name).armature = value
 
 
+def _set_spring(spec: mujoco.MjSpec, joint: Any, stiffness: float, preload: float) -> None:
+    stiffness, reference = native.spring_of(stiffness, preload)
+    joint.stiffness = [stiffness, *joint.stiffness[1:]]
+    joint.springref = reference * _angle(spec, joint)
+
+
+def _asymmetry(spec: mujoco.MjSpec, name: str, difference: float) -> None:
+    joint = _joint(spec, name)
+    stiffness = float(joint.stiffness[0])
+    preload = stiffness * joint.springref / _angle(spec, joint)
+    _set_spring(spec, joint, stiffness, preload - 0.5 * difference)
+
+
+def _spring(spec: mujoco.MjSpec, name: str, stiffness: float, preload: float) -> None:
+    _set_spring(spec, _joint(spec, name), stiffness, preload)
+
+
+def _hysteresis(spec: mujoco.MjSpec, name: str, amplitude: float, width: float) -> None:
+    joint = _joint(spec, name)
+    if joint.stiffness[0]:
+        raise BadInput(f"hysteresis on joint {name!r}", "a joint without a spring", "one with a stiffness")
+    joint.stiffness = [amplitude / width, *joint.stiffness[1:]]
+    joint.springyield = width * _angle(spec, joint)
+
+
 def _scale_gains(spec: mujoco.MjSpec, name: str, kp: float, kd: float) -> None:
     for servo in _servos(spec, name):
         gain, bias = servo.gainprm.copy(), servo.biasprm.copy()
         gain[0] *= kp
         bias[:3] *= [kp, kp, kd]
         servo.gainprm, servo.biasprm = gain, bias
+
+
+def _limit(spec: mujoco.MjSpec, name: str, limit: float) -> None:
+    for servo in _servos(spec, name):
+        force = limit / abs(servo.gear[0])
+        servo.forcerange, servo.forcelimited = [-force, force], mujoco.mjtLimited.mjLIMITED_TRUE
 
 
 def _delay(spec: mujoco.MjSpec, name: str, value: float) -> None:
@@ -92,26 +155,115 @@ def _offset(spec: mujoco.MjSpec, name: str, value: float) -> None:
         servo.biasprm = bias
 
 
-def _mass(spec: mujoco.MjSpec, name: str, value: float) -> None:
+def _second_hinge(spec: mujoco.MjSpec, name: str, kind: str) -> Any:
+    """A joint on the same axis, after `name` in the same body; keyframes get a zero for it."""
+    joint, body = _joint(spec, name), _joint(spec, name).parent
+    if body.joints[-1].name != name:
+        raise BadInput(f"{kind} on joint {name!r}", "the last joint of its body", "another joint after it")
+    declared = spec.compile()
+    index = declared.joint(name).id
+    at_q, at_v = int(declared.jnt_qposadr[index]) + 1, int(declared.jnt_dofadr[index]) + 1
+    keys = [(np.insert(k.qpos, at_q, 0.0), np.insert(k.qvel, at_v, 0.0)) for k in _filled_keys(spec, declared)]
+    hinge = body.add_joint(name=name + native.SUFFIX[kind], type=joint.type, axis=joint.axis, pos=joint.pos)
+    hinge.armature = native.HIDDEN_ARMATURE
+    for key, (qpos, qvel) in zip(spec.keys, keys, strict=True):
+        key.qpos, key.qvel = qpos, qvel
+    return hinge
+
+
+def _filled_keys(spec: mujoco.MjSpec, declared: mujoco.MjModel) -> list[Any]:
+    return [declared.key(i) for i in range(len(spec.keys))]
+
+
+def _backlash(spec: mujoco.MjSpec, name: str, gap: float) -> None:
+    play = _second_hinge(spec, name, "backlash")
+    half = 0.5 * gap * _angle(spec, play)
+    play.range, play.limited = [-half, half], mujoco.mjtLimited.mjLIMITED_TRUE
+    play.solref_limit = native.PLAY_SOLREF
+    play.solimp_limit = [*native.PLAY_SOLIMP, *play.solimp_limit[3:]]
+
+
+def _elasticity(spec: mujoco.MjSpec, name: str, stiffness: float) -> None:
+    flex = _second_hinge(spec, name, "series_elasticity")
+    flex.stiffness = [stiffness, *flex.stiffness[1:]]
+    flex.damping = [native.FLEX_LOSS * stiffness, *flex.damping[1:]]
+
+
+def _body(spec: mujoco.MjSpec, name: str) -> Any:
+    """A body whose mass, centre and principal moments stand in the spec itself."""
     body = spec.body(name)
     if body is None:
         raise BadInput(f"effect on body {name!r}", "a body of the model", "no body of this name")
-    if not body.explicitinertial:
+    if not body.explicitinertial or np.isfinite(body.fullinertia[0]):
         declared = spec.compile()
         index = declared.body(name).id
+        body.mass = declared.body_mass[index]
         body.ipos, body.iquat = declared.body_ipos[index].copy(), declared.body_iquat[index].copy()
+        body.fullinertia = np.full(6, np.nan)
         body.inertia, body.explicitinertial = declared.body_inertia[index].copy(), True
-    body.mass = value
+    return body
+
+
+def _mass(spec: mujoco.MjSpec, name: str, value: float) -> None:
+    _body(spec, name).mass = value
+
+
+def _com(spec: mujoco.MjSpec, name: str, *centre: float) -> None:
+    _body(spec, name).ipos = centre
+
+
+def _inertia(spec: mujoco.MjSpec, name: str, *moments: float) -> None:
+    _body(spec, name).inertia = native.physical_inertia(moments)
+
+
+def _ground(spec: mujoco.MjSpec, name: str) -> tuple[Any, list[Any]]:
+    """The geometry and all that can touch it."""
+    ground = next((g for g in spec.geoms if g.name == name), None)
+    if ground is None:
+        raise BadInput(f"effect on geom {name!r}", "a geometry of the model", "no geometry of this name")
+    masks = (ground.contype, ground.conaffinity)
+    others = [g for g in spec.geoms if g is not ground and native.touch(*masks, g.contype, g.conaffinity)]
+    return ground, others
+
+
+def _ground_friction(spec: mujoco.MjSpec, name: str, value: float) -> None:
+    ground, others = _ground(spec, name)
+    ground.friction = [value, *ground.friction[1:]]
+    for geom in others:  # of two geometries the larger friction counts
+        geom.friction = [min(value, geom.friction[0]), *geom.friction[1:]]
+
+
+def _ground_compliance(spec: mujoco.MjSpec, name: str, time: float) -> None:
+    ground, others = _ground(spec, name)
+    for geom in (ground, *others):
+        geom.solref = [time, *geom.solref[1:]]
+
+
+def _slope(spec: mujoco.MjSpec, name: str, x: float, y: float) -> None:
+    spec.option.gravity = native.sloped(spec.option.gravity, x, y)
 
 
 _ADD = {
     "coulomb_friction": _frictionloss,
     "viscous_friction": _damping,
+    "stribeck_friction": _stiff_friction,
+    "load_dependent_friction": _stiff_friction,
     "armature": _armature,
+    "asymmetric_friction": _asymmetry,
     "motor_strength": lambda spec, name, value: _scale_gains(spec, name, value, value),
     "kp": lambda spec, name, value: _scale_gains(spec, name, value, 1.0),
     "kd": lambda spec, name, value: _scale_gains(spec, name, 1.0, value),
+    "torque_limit": _limit,
     "command_delay": _delay,
     "encoder_offset": _offset,
+    "joint_spring": _spring,
+    "hysteresis": _hysteresis,
+    "backlash": _backlash,
+    "series_elasticity": _elasticity,
     "link_mass": _mass,
+    "link_com": _com,
+    "link_inertia": _inertia,
+    "ground_friction": _ground_friction,
+    "ground_compliance": _ground_compliance,
+    "ground_slope": _slope,
 }

@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from bumblebee.errors import BadInput
-from bumblebee.sim.effect_catalogue import CATALOGUE, Effect, Kind, single
+from bumblebee.sim.effect_catalogue import CATALOGUE, Effect, Kind, Parameter, single
 from bumblebee.sim.effect_hooks import RuntimeHooks, runtime_hooks
 from bumblebee.sim.effect_spec import add_to_spec
 
@@ -70,14 +70,19 @@ def _effect(where: str, entry: Any) -> Effect:
     name = entry.get("effect")
     if not isinstance(name, str) or name not in CATALOGUE:
         raise BadInput(f"{where}: effect", f"one of {sorted(CATALOGUE)}", repr(name)[:80])
-    places = entry.get("where")
-    if not isinstance(places, list) or not places or not all(isinstance(place, str) for place in places):
-        raise BadInput(f"{where}: where", f"a list of {CATALOGUE[name].on} names", repr(places)[:80])
-    kind = CATALOGUE[name]
-    _only_keys(f"{where}: parameters", entry.get("parameters"), {kind.parameter})
-    value = entry["parameters"].get(kind.parameter)
+    kind, places = CATALOGUE[name], entry.get("where")
+    every = kind.whole or kind.on == "whole"
+    if not isinstance(places, list) or (not places and not every) or not all(isinstance(p, str) for p in places):
+        raise BadInput(f"{where}: where", f"a list of {kind.on} names", repr(places)[:80])
+    _only_keys(f"{where}: parameters", entry.get("parameters"), set(kind.names))
+    values = {p.name: _value(where, entry["parameters"].get(p.name), p) for p in kind.parameters}
+    return Effect(name, tuple(places), values)
+
+
+def _value(where: str, value: Any, parameter: Parameter) -> float:
+    """A finite number within the parameter's bounds."""
     number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    if not number or not kind.lower <= value <= kind.upper:
-        expected = f"a number from {kind.lower:g} to {kind.upper:g} {kind.unit}".strip()
-        raise BadInput(f"{where}: parameters.{kind.parameter}", expected, repr(value)[:80])
-    return Effect(name, tuple(places), {kind.parameter: float(value)})
+    if not number or not parameter.lower <= value <= parameter.upper:
+        expected = f"a number from {parameter.lower:g} to {parameter.upper:g} {parameter.unit}".strip()
+        raise BadInput(f"{where}: parameters.{parameter.name}", expected, repr(value)[:80])
+    return float(value)

@@ -1,0 +1,176 @@
+"""The equations of effects that act at every physics step, for many worlds at once, beside `mujoco.batch`.
+
+Dry friction that depends on speed or load is a friction loss written anew each step, and strength that fades is a gain
+written anew, so that MuJoCo's implicit treatment of both stays. The others are torques added to `qfrc_applied`:
+
+| effect | what is written before a step |
+|---|---|
+| stribeck_friction | frictionloss + stiction exp(-(v / velocity)^2) |
+| load_dependent_friction | frictionloss + coefficient abs(servo torque) |
+| torque_speed_limit | forcerange: limit (1 - v / speed) in the direction of motion |
+| thermal_fade, strength_drift | gains times 1 - rate int (torque / limit)^2 dt - rate t |
+| encoder_delay, encoder_quantisation | the servo's torque at the old, rounded reading instead of the present one |
+| torque_lag | the servo's torque after dx/dt = (torque - x) / time, instead of the present one |
+| cogging | sine sin(periods q) + cosine cos(periods q) |
+| external_wrench | xfrc_applied |
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from bumblebee.sim.effect_hooks import RuntimeHooks, hook_joints
+from bumblebee.sim.servo import servos_of
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What n worlds remember at their start, where it is not what a world at rest would remember."""
+
+    time: np.ndarray
+    """(n,) [s] since the rollout began."""
+    heat: np.ndarray
+    """(n, J) [s]: integral of (torque / limit)^2."""
+    torque: np.ndarray | None = None
+    """(n, J) [N m]: state of the torque's lag."""
+    position: np.ndarray | None = None
+    """(n, L, J): readings at the steps before, the newest last."""
+    velocity: np.ndarray | None = None
+    """(n, L, J)."""
+
+
+def history_length(hooks: RuntimeHooks, step: float) -> int:
+    """L: how many steps of readings the longest encoder delay looks back."""
+    longest = float(hooks.encoder_delay.max(initial=0.0))
+    return int(np.ceil(longest / step - 1e-9)) + 1 if longest > 0 else 0
+
+
+class StepHooks:
+    """Hooks that run beside one batch; call `reset` after its worlds were reset and `apply` before each step."""
+
+    def __init__(self, hooks: RuntimeHooks, model: mujoco.MjModel, batch: Batch) -> None:
+        self._h, self._batch = hooks, batch
+        self.servos = servos_of(model, hook_joints(model))
+        self._step = float(model.opt.timestep)
+        count, joints = batch.nsim, len(hooks.joints)
+        self._time, self._heat = np.zeros(count), np.zeros((count, joints))
+        self._lagged = np.zeros((count, joints))
+        self._fresh = np.ones(count, dtype=bool)
+        self._back = history_length(hooks, self._step)
+        self._past_q = np.zeros((count, self._back, joints))
+        self._past_v = np.zeros((count, self._back, joints))
+        self._fading = bool(hooks.thermal.any() or hooks.drift.any())
+        self._rubbing = bool(hooks.stiction[:, 0].any() or hooks.load_friction.any())
+        self._running_out = bool(np.isfinite(hooks.speed_limit).any())
+        self._late = bool(hooks.encoder_delay.any() or hooks.encoder_step.any() or hooks.torque_lag.any())
+        self._pushing = self._late or bool(hooks.cogging)
+        if self._fading:
+            self._gain, self._bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
+        if self._rubbing:
+            self._loss = batch.expand("dof_frictionloss")
+            self._loss0 = model.dof_frictionloss[self.servos.dof].copy()
+        if self._running_out:
+            self._range = batch.expand("actuator_forcerange")
+        self._model = model
+
+    def reset(self, ids: np.ndarray, memory: Memory | None = None) -> None:
+        """Worlds `ids` (n,) begin anew, with a memory (n worlds) or at rest."""
+        self._time[ids] = 0.0 if memory is None else memory.time
+        self._heat[ids] = 0.0 if memory is None else memory.heat
+        q, v = self._readings()
+        known = memory is not None and memory.position is not None and self._back > 0
+        self._past_q[ids] = memory.position if known else q[ids][:, None]
+        self._past_v[ids] = memory.velocity if known else v[ids][:, None]
+        self._fresh[ids] = memory is None or memory.torque is None
+        if memory is not None and memory.torque is not None:
+            self._lagged[ids] = memory.torque
+        for body, wrench in self._h.wrench:
+            self._batch.bind("xfrc_applied")[ids, body] = wrench
+
+    def _readings(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._batch.bind("qpos")[:, self.servos.qpos], self._batch.bind("qvel")[:, self.servos.dof]
+
+    def apply(self) -> None:
+        """Write everything that the next physics step needs."""
+        h, servos = self._h, self.servos
+        q, v = self._readings()
+        u = servos.controls(self._batch.bind("ctrl"))
+        strength = self._fade() if self._fading else 1.0
+        limit = self._torque_limit(v) if self._running_out else servos.limit
+        now = strength * servos.torque(q, v, u, limit / np.maximum(strength, 1e-9))
+        torque = self._delayed(q, v, u, strength, limit, now) if self._late else now
+        if self._rubbing:
+            extra = h.stiction[:, 0] * np.exp(-((v / h.stiction[:, 1]) ** 2)) + h.load_friction * np.abs(torque)
+            self._loss[:, servos.dof] = self._loss0 + extra
+        if self._pushing:
+            applied = torque - now
+            for column, sine, cosine, periods in h.cogging:
+                angle = periods * q[:, column]
+                applied[:, column] += sine * np.sin(angle) + cosine * np.cos(angle)
+            self._batch.bind("qfrc_applied")[:, servos.dof] = applied
+        self._time += self._step
+        self._heat += self._step * (torque / np.where(np.isfinite(servos.limit), servos.limit, 1.0)) ** 2
+
+    def _fade(self) -> np.ndarray:
+        h, servos = self._h, self.servos
+        strength = np.maximum(1.0 - h.drift * self._time[:, None] - h.thermal * self._heat, 0.0)
+        has = servos.actuator >= 0
+        a = servos.actuator[has]
+        self._gain[:, a, 0] = strength[:, has] * self._model.actuator_gainprm[a, 0]
+        self._bias[:, a, :3] = strength[:, has, None] * self._model.actuator_biasprm[a, :3]
+        return strength
+
+    def _torque_limit(self, v: np.ndarray) -> np.ndarray:
+        """Limits (n, J) of torques that drive the motion; those that brake keep the full one."""
+        servos, speed = self.servos, self._h.speed_limit
+        some = np.isfinite(speed) & np.isfinite(servos.limit) & (servos.actuator >= 0)
+        left = np.clip(1.0 - np.abs(v) / speed, 0.0, 1.0)
+        forward, backward = np.where(v > 0, left, 1.0), np.where(v < 0, left, 1.0)
+        a, force = servos.actuator[some], (servos.limit / np.maximum(np.abs(servos.gear), 1e-12))[some]
+        self._range[:, a, 0], self._range[:, a, 1] = -force * backward[:, some], force * forward[:, some]
+        return np.where(some, servos.limit * left, servos.limit)
+
+    def _delayed(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        u: np.ndarray,
+        strength: np.ndarray | float,
+        limit: np.ndarray,
+        now: np.ndarray,
+    ) -> np.ndarray:
+        """The servo's torque from old and rounded readings, after its lag, (n, J)."""
+        h = self._h
+        seen_q, seen_v = self._feedback(q, v)
+        rounded = h.encoder_step > 0
+        if rounded.any():
+            size = np.where(rounded, h.encoder_step, 1.0)
+            seen_q = np.where(rounded, np.round((seen_q + h.encoder_offset) / size) * size - h.encoder_offset, seen_q)
+        wanted = now
+        if rounded.any() or self._back:
+            wanted = strength * self.servos.torque(seen_q, seen_v, u, limit / np.maximum(strength, 1e-9))
+        if not h.torque_lag.any():
+            return wanted
+        self._lagged[self._fresh] = wanted[self._fresh]
+        self._fresh[:] = False
+        keep = np.exp(-self._step / np.maximum(h.torque_lag, 1e-9))
+        self._lagged = keep * self._lagged + (1.0 - keep) * wanted
+        return np.where(h.torque_lag > 0, self._lagged, wanted)
+
+    def _feedback(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and velocities (n, J) as old as the encoders' delay; linear between steps."""
+        if not self._back:
+            return q, v
+        at = self._h.encoder_delay / self._step
+        low, share = np.floor(at).astype(int), at - np.floor(at)
+        columns = np.arange(len(at))
+        out = []
+        for past, present in ((self._past_q, q), (self._past_v, v)):
+            path = np.concatenate((past, present[:, None]), axis=1)
+            newer = path[:, self._back - low, columns]
+            older = path[:, np.maximum(self._back - low - 1, 0), columns]
+            out.append(newer + share * (older - newer))
+            past[:] = path[:, 1:]
+        return out[0], out[1]

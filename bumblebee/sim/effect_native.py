@@ -1,0 +1,50 @@
+"""What an effect means in MuJoCo's own numbers, shared by the spec (compiled anew) and by models varied in place."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+# A constant joint torque is a spring so weak and so long that its torque hardly depends on the angle.
+_WEAK = 1e-4
+# Second, coaxial hinges: how hard the ends of the play are, and how fast a shaft's own swing dies.
+PLAY_SOLREF, PLAY_SOLIMP = (0.004, 1.0), (0.95, 0.99, 1e-3)
+HIDDEN_ARMATURE = 1e-5  # [kg m^2] keeps the mass matrix regular where the rotor has no armature
+FLEX_LOSS = 1e-3  # [s] damping of a shaft over its stiffness
+SUFFIX = {"backlash": "_play", "series_elasticity": "_flex"}
+
+
+def spring_of(stiffness: float, preload: float) -> tuple[float, float]:
+    """MuJoCo's (stiffness, reference) of the torque -stiffness q + preload."""
+    if abs(stiffness) < _WEAK * abs(preload):
+        stiffness = math.copysign(_WEAK * abs(preload), stiffness)
+    return (stiffness, preload / stiffness) if stiffness else (0.0, 0.0)
+
+
+def physical_inertia(moments: Sequence[float]) -> np.ndarray:
+    """Principal moments (3,) [kg m^2] that a body can have: none above the sum of the other two."""
+    out = np.array(moments, dtype=float)
+    largest = int(np.argmax(out))
+    out[largest] = min(out[largest], 0.9999 * (out.sum() - out[largest]))
+    return out
+
+
+def sloped(gravity: Sequence[float], x: float, y: float) -> np.ndarray:
+    """Gravity (3,) turned by the rotation vector (x, y, 0) [rad]."""
+    axis = np.array([x, y, 0.0])
+    angle = float(np.linalg.norm(axis))
+    g = np.array(gravity, dtype=float)
+    if angle < 1e-12:
+        return g
+    k = axis / angle
+    return g * math.cos(angle) + np.cross(k, g) * math.sin(angle) + k * (k @ g) * (1 - math.cos(angle))
+
+
+def touch(a_type: int, a_affinity: int, b_type: int, b_affinity: int) -> bool:
+    """Whether two geometries' masks let them touch."""
+    return bool((a_type & b_affinity) | (b_type & a_affinity))
+
+
+def is_hidden(joint: str) -> bool:
+    """Whether a joint's name says that it stands for play or a flexible shaft, which no encoder reads."""
+    return joint.endswith(tuple(SUFFIX.values()))

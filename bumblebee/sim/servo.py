@@ -1,0 +1,75 @@
+"""The position servos of a model as arrays over its joints: the torque that they give, computed beside MuJoCo."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+_ON_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+
+
+@dataclass(frozen=True, eq=False)
+class Servos:
+    """J joints; a joint without an actuator has zeros and the actuator -1."""
+
+    actuator: np.ndarray
+    """(J,) index, -1 for none."""
+    qpos: np.ndarray
+    """(J,) addresses in qpos."""
+    dof: np.ndarray
+    """(J,) addresses in qvel."""
+    gear: np.ndarray
+    gain: np.ndarray
+    """(J,) torque for a unit of control [N m]."""
+    bias: np.ndarray
+    """(J, 3) torque: constant, for a unit of position, for a unit of velocity."""
+    limit: np.ndarray
+    """(J,) largest torque [N m]; infinite for none."""
+
+    def torque(
+        self, position: np.ndarray, velocity: np.ndarray, control: np.ndarray, limit: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Torque (..., J) [N m] at positions, velocities and controls (..., J) of the servos."""
+        bias = self.bias
+        raw = self.gain * control + bias[:, 0] + bias[:, 1] * position + bias[:, 2] * velocity
+        bound = self.limit if limit is None else limit
+        return np.clip(raw, -bound, bound)
+
+    def controls(self, ctrl: np.ndarray) -> np.ndarray:
+        """Columns (..., J) of the actuators' controls (..., nu)."""
+        return (
+            ctrl[..., np.maximum(self.actuator, 0)] if ctrl.shape[-1] else np.zeros((*ctrl.shape[:-1], len(self.dof)))
+        )
+
+
+def servos_of(model: mujoco.MjModel, joints: list[int]) -> Servos:
+    """The servos of the joints with these ids."""
+    actuator = np.array([_actuator_of(model, j) for j in joints], dtype=int)
+    has, a = actuator >= 0, np.maximum(actuator, 0)
+    if not model.nu:
+        zeros = np.zeros(len(joints))
+        gear, gain, bias, limit = zeros, zeros, np.zeros((len(joints), 3)), np.full(len(joints), np.inf)
+    else:
+        gear = model.actuator_gear[a, 0] * has
+        gain = gear * model.actuator_gainprm[a, 0]
+        bias = gear[:, None] * model.actuator_biasprm[a, :3]
+        bias[:, 1:] *= gear[:, None]
+        limited = has & (model.actuator_forcelimited[a] != 0)
+        limit = np.where(limited, np.abs(gear) * model.actuator_forcerange[a, 1], np.inf)
+    return Servos(
+        actuator=actuator,
+        qpos=model.jnt_qposadr[joints].astype(int),
+        dof=model.jnt_dofadr[joints].astype(int),
+        gear=gear,
+        gain=gain,
+        bias=bias,
+        limit=limit,
+    )
+
+
+def _actuator_of(model: mujoco.MjModel, joint: int) -> int:
+    """The first actuator on a joint, -1 if none."""
+    for a in range(model.nu):
+        if int(model.actuator_trntype[a]) in _ON_JOINT and model.actuator_trnid[a, 0] == joint:
+            return a
+    return -1

@@ -1,0 +1,305 @@
+"""Every other effect of the catalogue, in MJCF or as a hook, against the same equation integrated in NumPy.
+
+One hinge about y with inertia INERTIA + MASS ARM^2, a position servo, steps of 1 ms; NumPy takes steps of 0.1 ms.
+"""
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.batch import Batch
+
+from bumblebee.errors import BadInput
+from bumblebee.sim.effect_forces import StepHooks
+from bumblebee.sim.effects import CATALOGUE, Effect, add_to_spec, runtime_hooks, single
+
+INERTIA, KP, KD, MASS, ARM, LIMIT = 0.05, 20.0, 1.0, 0.8, 0.3, 15.0
+TOTAL = INERTIA + MASS * ARM**2
+FINE = 1e-4
+
+
+def model_with(
+    *effects: Effect, gravity: float = 0.0, kp: float = KP, kd: float = KD, degrees: bool = False
+) -> mujoco.MjModel:
+    """The hinge with the effects, through XML and back."""
+    unit = "degree" if degrees else "radian"
+    text = f"""<mujoco><compiler angle="{unit}"/><option timestep="0.001" gravity="0 0 {-gravity}"/>
+    <worldbody><body name="link"><joint name="j" axis="0 1 0" armature="{INERTIA}"/>
+    <inertial pos="{ARM} 0 0" mass="{MASS}" diaginertia="1e-6 1e-6 1e-6"/></body></worldbody><actuator>
+    <position name="j" joint="j" kp="{kp}" kv="{kd}" forcerange="-{LIMIT} {LIMIT}"/></actuator>
+    <keyframe><key name="up" qpos="0.1"/></keyframe></mujoco>"""
+    spec = mujoco.MjSpec.from_string(text)
+    add_to_spec(spec, effects)
+    spec.compile()
+    return mujoco.MjModel.from_xml_string(spec.to_xml())
+
+
+def path(
+    effects: list[Effect], target: Callable[[float], float], seconds: float = 0.4, speed: float = 0.0, **options: float
+) -> np.ndarray:
+    """Positions of the encoder's joint (T, 2) with velocities, one a millisecond, with hooks running."""
+    model = model_with(*effects, **options)
+    batch = Batch(model, 1, 1)
+    batch.qvel[0, 0] = speed
+    hooks = StepHooks(runtime_hooks(effects, model), model, batch)
+    hooks.reset(np.array([0]))
+    out = []
+    for k in range(round(seconds * 1000)):
+        batch.ctrl[0, 0] = target(k * 0.001)
+        hooks.apply()
+        batch.step()
+        out.append((batch.qpos[0, 0], batch.qvel[0, 0]))
+    return np.array(out)
+
+
+def reference(
+    torque: Callable[[float, float, float], float], seconds: float = 0.4, speed: float = 0.0, inertia: float = TOTAL
+) -> np.ndarray:
+    """The same by semi-implicit Euler in fine steps; `torque(t, q, v)` is all that acts."""
+    q, v, out = 0.0, speed, []
+    every = round(0.001 / FINE)
+    for k in range(round(seconds / FINE)):
+        v += FINE * torque(k * FINE, q, v) / inertia
+        q += FINE * v
+        if (k + 1) % every == 0:
+            out.append((q, v))
+    return np.array(out)
+
+
+def close(mine: np.ndarray, plain: np.ndarray, other: np.ndarray, without: np.ndarray, share: float = 0.06) -> None:
+    """The effect changes something, and both simulations by the same, to a share of the change."""
+    change = other - without
+    size = np.abs(change).max(axis=0)
+    assert (size > [2e-3, 2e-2]).all()
+    assert (np.abs(mine - plain - change).max(axis=0) < share * size).all()
+
+
+def check(effects: list[Effect], other: np.ndarray, share: float = 0.06, target: Callable | None = None) -> None:
+    """A path with hooks against a reference, both less their own without the effect."""
+    target = target or swing
+    plain, without = both(target)
+    close(path(effects, target), plain, other, without, share)
+
+
+def swing(t: float) -> float:
+    return 0.5 * np.sin(2 * np.pi * 3 * t)
+
+
+def servo(t: float, q: float, v: float) -> float:
+    return float(np.clip(KP * (swing(t) - q) - KD * v, -LIMIT, LIMIT))
+
+
+def both(target: Callable[[float], float] = swing) -> tuple[np.ndarray, np.ndarray]:
+    """The servo without an effect, in MuJoCo and in NumPy."""
+    torque = lambda t, q, v: float(np.clip(KP * (target(t) - q) - KD * v, -LIMIT, LIMIT))  # noqa: E731
+    return path([], target), reference(torque)
+
+
+def sign(v: float) -> float:
+    return float(np.tanh(v / 1e-3))
+
+
+TORQUES = {
+    "stribeck_friction": ((0.8, 1.0), lambda t, q, v: servo(t, q, v) - 0.8 * np.exp(-(v**2)) * sign(v)),
+    "load_dependent_friction": ((0.2,), lambda t, q, v: servo(t, q, v) - 0.2 * abs(servo(t, q, v)) * sign(v)),
+    "asymmetric_friction": ((0.6,), lambda t, q, v: servo(t, q, v) - 0.3),
+    "torque_limit": ((2.0,), lambda t, q, v: float(np.clip(KP * (swing(t) - q) - KD * v, -2.0, 2.0))),
+    "joint_spring": ((3.0, 0.7), lambda t, q, v: servo(t, q, v) - 3.0 * q + 0.7),
+    "cogging": (
+        (0.5, -0.3, 12.0),
+        lambda t, q, v: servo(t, q, v) + 0.5 * np.sin(12 * q) - 0.3 * np.cos(12 * q),
+    ),
+    "strength_drift": ((0.9,), lambda t, q, v: (1 - 0.9 * t) * servo(t, q, v)),
+}
+
+
+@pytest.mark.parametrize("kind", TORQUES)
+def test_a_torque_follows_its_equation(kind: str) -> None:
+    """I a = servo + effect."""
+    values, torque = TORQUES[kind]
+    check([single(kind, "j", *values)], reference(torque), share=0.25 if kind == "stribeck_friction" else 0.15)
+
+
+def test_friction_of_two_directions_holds_between_its_bounds() -> None:
+    """Coulomb 1.0 with a difference of 0.8: a standing joint takes up to 1.4 N m one way and 0.6 the other."""
+    effects = [single("coulomb_friction", "j", 1.0), single("asymmetric_friction", "j", 0.8)]
+    for torque, moves in ((1.3, False), (1.5, True), (-0.5, False), (-0.7, True)):
+        end = path(effects, lambda t, u=torque: u / KP, seconds=0.2)[-1, 0]
+        assert (abs(end) > 2e-3) == moves
+
+
+def test_torque_falls_with_speed_while_it_drives_the_motion() -> None:
+    def torque(t: float, q: float, v: float) -> float:
+        raw = KP * (1.0 - q) - KD * v
+        return float(np.clip(raw, -LIMIT * (1 - max(-v, 0) / 4.0), LIMIT * (1 - max(v, 0) / 4.0)))
+
+    check([single("torque_speed_limit", "j", 4.0)], reference(torque), target=lambda t: 1.0)
+
+
+def test_a_lag_filters_the_servos_torque() -> None:
+    state = [0.0]
+
+    def torque(t: float, q: float, v: float) -> float:
+        state[0] += FINE * (servo(t, q, v) - state[0]) / 0.02
+        return state[0]
+
+    check([single("torque_lag", "j", 0.02)], reference(torque), share=0.08)
+
+
+def test_an_old_reading_reaches_the_servo() -> None:
+    seen: list[tuple[float, float]] = []
+
+    def torque(t: float, q: float, v: float) -> float:
+        seen.append((q, v))
+        return servo(t, *seen[max(0, len(seen) - 1 - round(0.0125 / FINE))])
+
+    check([single("encoder_delay", "", 0.0125)], reference(torque), share=0.08)
+
+
+def test_a_rounded_reading_reaches_the_servo() -> None:
+    def torque(t: float, q: float, v: float) -> float:
+        return servo(t, round(q / 0.1) * 0.1, v)
+
+    check([single("encoder_quantisation", "j", 0.1)], reference(torque), share=0.35)
+
+
+def test_hysteresis_is_a_spring_that_yields() -> None:
+    centre = [0.0]
+
+    def torque(t: float, q: float, v: float) -> float:
+        centre[0] = min(max(centre[0], q - 0.05), q + 0.05)
+        return servo(t, q, v) - 1.2 * (q - centre[0]) / 0.05
+
+    check([single("hysteresis", "j", 1.2, 0.05)], reference(torque))
+
+
+def test_heat_takes_strength() -> None:
+    heat = [0.0]
+
+    def torque(t: float, q: float, v: float) -> float:
+        strength = 1 - 0.9 * heat[0]
+        force = float(np.clip(strength * (KP * (4 * swing(t) - q) - KD * v), -LIMIT, LIMIT))
+        heat[0] += FINE * (force / LIMIT) ** 2
+        return force
+
+    check([single("thermal_fade", "j", 0.9)], reference(torque), share=0.1, target=lambda t: 4 * swing(t))
+
+
+def two_masses(between: Callable[[float, float], float], seconds: float = 0.4) -> np.ndarray:
+    """Rotor (INERTIA) under the servo, link (MASS ARM^2), `between(angle, speed)` pulls the rotor to the link."""
+    q, v, out = np.zeros(2), np.zeros(2), []
+    step = FINE / 5
+    for k in range(round(seconds / step)):
+        pull = between(q[1] - q[0], v[1] - v[0])
+        v += step * np.array([(servo(k * step, q[0], v[0]) + pull) / INERTIA, -pull / (MASS * ARM**2)])
+        q += step * v
+        if (k + 1) % round(0.001 / step) == 0:
+            out.append((q[0], v[0]))
+    return np.array(out)
+
+
+def test_a_flexible_shaft_is_a_second_mass_on_a_spring() -> None:
+    model = model_with(single("series_elasticity", "j", 60.0))
+    assert model.nq == 2 and model.key("up").qpos.tolist() == [0.1, 0.0]
+    check([single("series_elasticity", "j", 60.0)], two_masses(lambda d, w: 60.0 * d + 0.06 * w), share=0.1)
+
+
+@pytest.mark.parametrize("degrees", [False, True])
+def test_play_leaves_the_link_free_between_its_ends(degrees: bool) -> None:
+    """A hard spring outside the gap stands for the ends in the reference."""
+
+    def between(d: float, w: float) -> float:
+        over = d - np.clip(d, -0.05, 0.05)
+        return 2e4 * over + (20.0 * w if over else 0.0)
+
+    model = model_with(single("backlash", "j", 0.1), degrees=degrees)
+    np.testing.assert_allclose(model.joint("j_play").range, [-0.05, 0.05], atol=1e-9)
+    mine = path([single("backlash", "j", 0.1)], swing, degrees=degrees)
+    plain, without = both()
+    change = (two_masses(between) - without)[:150, 0]  # impacts are as sharp as their solver: positions only
+    assert np.abs((mine - plain)[:150, 0] - change).max() < 0.1 * np.abs(change).max()
+
+
+@pytest.mark.parametrize(
+    ("effect", "arm", "inertia"),
+    [
+        (single("link_com", "link", 0.36, 0.0, 0.0), 0.36, INERTIA + MASS * 0.36**2),
+        (single("link_inertia", "link", 0.02, 0.03, 0.02), ARM, TOTAL + 0.03),
+    ],
+)
+def test_a_shifted_centre_of_mass_and_another_inertia_swing_as_a_pendulum(
+    effect: Effect, arm: float, inertia: float
+) -> None:
+    """I a = m g l cos q - d v."""
+    options = {"gravity": 9.81, "kp": 0.0, "kd": 0.1}
+
+    def fall(arm: float, inertia: float) -> np.ndarray:
+        return reference(lambda t, q, v: MASS * 9.81 * arm * np.cos(q) - 0.1 * v, inertia=inertia)
+
+    mine, plain = path([effect], lambda t: 0.0, **options), path([], lambda t: 0.0, **options)
+    close(mine, plain, fall(arm, inertia), fall(ARM, TOTAL))
+
+
+def test_a_slope_turns_gravity() -> None:
+    model = model_with(single("ground_slope", "", 0.0, 0.2), gravity=9.81)
+    np.testing.assert_allclose(model.opt.gravity, [-9.81 * np.sin(0.2), 0.0, -9.81 * np.cos(0.2)], atol=1e-4)
+
+
+def test_a_wrench_pushes_the_link() -> None:
+    """40 N downwards at the centre of mass and 2 N m about y."""
+    effect = single("external_wrench", "link", 0.0, 0.0, -40.0, 0.0, 2.0, 0.0)
+    pushed = reference(lambda t, q, v: np.clip(-KP * q - KD * v, -LIMIT, LIMIT) + 40 * ARM * np.cos(q) + 2.0)
+    check([effect], pushed, target=lambda t: 0.0)
+
+
+BOX = """<mujoco><option timestep="0.001"/><worldbody><geom name="floor" type="plane" size="2 2 1"/>
+<body name="box" pos="0 0 0.03"><freejoint/><geom name="box" type="box" size=".1 .1 .03" mass="1"/></body>
+</worldbody></mujoco>"""
+
+
+def box_with(effect: Effect, push: float) -> mujoco.MjData:
+    spec = mujoco.MjSpec.from_string(BOX)
+    add_to_spec(spec, [effect])
+    spec.compile()
+    model = mujoco.MjModel.from_xml_string(spec.to_xml())
+    data = mujoco.MjData(model)
+    data.xfrc_applied[1, 0] = push
+    mujoco.mj_step(model, data, 1000)
+    return data
+
+
+@pytest.mark.parametrize("friction", [0.3, 1.5])
+def test_a_box_slides_when_it_is_pushed_harder_than_friction(friction: float) -> None:
+    """Coulomb's law on both sides of the declared coefficient 1."""
+    weight = 9.81
+    assert abs(box_with(single("ground_friction", "floor", friction), 0.8 * friction * weight).qvel[0]) < 0.05
+    sliding = box_with(single("ground_friction", "floor", friction), 1.4 * friction * weight).qvel[0]
+    assert sliding == pytest.approx(0.4 * friction * weight, rel=0.15)
+
+
+def test_a_soft_floor_gives_way() -> None:
+    """Penetration grows with the square of the contact's time constant."""
+    sunk = [0.03 - box_with(single("ground_compliance", "floor", time), 0.0).qpos[2] for time in (0.02, 0.06)]
+    assert 4 < sunk[1] / sunk[0] < 12
+
+
+def test_places_that_are_not_there_are_named() -> None:
+    for kind, value in (
+        ("link_com", (0, 0, 0)),
+        ("ground_friction", (1,)),
+        ("backlash", (0.1,)),
+        ("cogging", (1, 1, 1)),
+    ):
+        with pytest.raises(BadInput, match="nobody"):
+            effect = single(kind, "nobody", *value)
+            runtime_hooks([effect], model_with(effect))
+
+
+def test_every_id_says_truly_whether_mjcf_carries_it() -> None:
+    """A native effect needs no hook; the hook of another does something."""
+    places = {"joint": "j", "body": "link", "geom": "floor", "whole": ""}
+    for name, kind in CATALOGUE.items():
+        model = model_with() if kind.on != "geom" else mujoco.MjModel.from_xml_string(BOX)
+        values = [max(p.lower, 0.03) for p in kind.parameters]
+        assert runtime_hooks([single(name, places[kind.on], *values)], model).empty == kind.native, name
