@@ -69,8 +69,9 @@ def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
         print(f"everything in {shown(folder)} is up to date")
         summarise(folder)
         return 0
-    check_parameters(folder)
+    check = start_check(folder)
     with servers(folder, prefect_port, mlflow_port) as addresses:
+        finish_check(check)
         announce(folder, addresses)
         status = walk(folder, addresses)
         if status == 0:
@@ -97,15 +98,24 @@ def walk(folder: Path, addresses: Addresses) -> int:
     return EXIT_FAILED
 
 
-def check_parameters(folder: Path) -> None:
-    """Every section of params.yaml, before the first stage: a slip in the last one must not cost the others' time."""
+def start_check(folder: Path) -> "subprocess.Popen[str]":
+    """Begin to check every section of params.yaml while the servers start, before the first stage.
+
+    A slip in the last section must not cost the time of the stages before it.
+    """
     command = [sys.executable, "-m", "tasks.sections"]
-    checked = subprocess.run(command, cwd=folder, env=environment(folder), capture_output=True, text=True)
-    if checked.returncode == EXIT_BAD_INPUT:
-        print(checked.stderr.strip(), file=sys.stderr)
+    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command, cwd=folder, env=environment(folder), text=True, **pipes)
+
+
+def finish_check(check: "subprocess.Popen[str]") -> None:
+    """Wait for the check; what it found ends the program."""
+    _, said = check.communicate()
+    if check.returncode == EXIT_BAD_INPUT:
+        print(said.strip(), file=sys.stderr)
         raise SystemExit(EXIT_BAD_INPUT)
-    if checked.returncode:
-        raise RuntimeError(checked.stderr)
+    if check.returncode:
+        raise RuntimeError(said)
 
 
 def announce(folder: Path, addresses: Addresses) -> None:

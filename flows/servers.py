@@ -97,8 +97,6 @@ def servers(workspace: Path, prefect_port: int = 0, mlflow_port: int = 0) -> Ite
     started: dict[str, subprocess.Popen[bytes]] = {}
     try:
         for name, command in commands(workspace, ports).items():
-            if name == "mlflow":
-                _create_database(workspace)
             started[name] = _start(name, command, workspace)
         urls = {name: f"http://{HOST}:{port}" for name, port in ports.items()}
         addresses = Addresses(**urls, keeper=os.getpid(), pids=tuple(each.pid for each in started.values()))
@@ -119,17 +117,6 @@ def commands(workspace: Path, ports: dict[str, int]) -> dict[str, list[str]]:
     mlflow += ["--backend-store-uri", f"sqlite:///{folder / 'mlflow.db'}", "--workers", "1"]
     mlflow += ["--serve-artifacts", "--artifacts-destination", str(folder / "artifacts")]
     return {"prefect": prefect, "mlflow": mlflow}
-
-
-def _create_database(workspace: Path) -> None:
-    """MLflow's database, made by one process before several write: they race on a new one."""
-    code = "from tasks import registry; registry.prepare()"
-    made = subprocess.run(
-        [sys.executable, "-c", code], cwd=workspace, env=environment(workspace), capture_output=True, text=True
-    )
-    if made.returncode:
-        last = (made.stderr.strip().splitlines() or ["no message"])[-1]
-        raise BadInput(workspace / SERVERS / "mlflow.db", "a database that MLflow can open", last)
 
 
 def _start(name: str, command: list[str], workspace: Path) -> subprocess.Popen[bytes]:

@@ -33,7 +33,7 @@ def test_the_demo_ends_with_status_2_on_a_taken_port(
 ):
     monkeypatch.setattr(demo, "choose", lambda *_: tmp_path)
     (tmp_path / "params.yaml").write_text("clusters: [c0]\nrounds: []\nfinal_round: 0\n")
-    monkeypatch.setattr(demo, "check_parameters", lambda _: None)
+    monkeypatch.setattr(demo, "start_check", lambda _: None)
     monkeypatch.setattr(demo, "read_stages", lambda _: [])
     monkeypatch.setattr(demo, "changed_stages", lambda _: set())
     monkeypatch.setattr(demo, "to_run", lambda *_: {"seal"})
