@@ -1,0 +1,154 @@
+"""Terms of a discovered effect: small formulas in a joint's own quantities, read from text and evaluated on arrays.
+
+`coefficient * term` is a torque [N m] (a force [N] on a slide) that the joint gets beside what the model has. A term may
+use these names, each an array (n,) over worlds:
+
+| name | meaning |
+|---|---|
+| `q`, `v` | the joint's position [rad], velocity [rad/s] |
+| `q[name]`, `v[name]` | those of another joint; a name that is no word goes in quotes |
+| `u` | the servo's target [rad], or the commanded torque [N m] |
+| `tau` | the servo's torque [N m] |
+| `t` | time since the rollout began [s] |
+
+and `+ - * / ^`, numbers, `sin cos exp tanh sign abs relu`, and `curve(x, x0, y0, x1, y1, ...)`: straight lines between
+points, constant beyond them. `friction(term)` alone is dry friction: not a torque but a loss, `coefficient * term` of it
+(nothing where negative), that the solver opposes to the motion and that can hold the joint still.
+"""
+
+import ast
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bumblebee.errors import BadInput
+
+OWN = ("q", "v", "u", "tau", "t")
+_LONGEST = 2000  # characters
+_FUNCTIONS: dict[str, Callable[[Any], Any]] = {
+    "sin": np.sin,
+    "cos": np.cos,
+    "exp": lambda x: np.exp(np.minimum(x, 50.0)),
+    "tanh": np.tanh,
+    "sign": np.sign,
+    "abs": np.abs,
+    "relu": lambda x: np.maximum(x, 0.0),
+}
+_BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: lambda a, b: a + b,
+    ast.Sub: lambda a, b: a - b,
+    ast.Mult: lambda a, b: a * b,
+    ast.Div: lambda a, b: a / np.where(np.abs(b) > 1e-12, b, 1e-12),
+    ast.Pow: lambda a, b: a**b,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """One formula, ready to be evaluated."""
+
+    text: str
+    rubs: bool
+    """Whether it is dry friction, a loss instead of a torque."""
+    others: tuple[str, ...]
+    """Names of the other joints that it uses."""
+    _tree: ast.expr
+
+    def __call__(self, values: Mapping[str, np.ndarray]) -> np.ndarray:
+        """The term's value (n,); `values` has q, v, u, tau, t and, for other joints, `q[name]` and `v[name]`."""
+        return np.asarray(_value(self._tree, values))
+
+
+def read_term(text: str) -> Term:
+    """Parse a term; a formula that uses anything but the names, functions and signs above is a `BadInput`."""
+    try:
+        if len(text) > _LONGEST:
+            raise ValueError(f"{len(text)} characters")
+        tree = ast.parse(text.replace("^", "**"), mode="eval").body
+        rubs = isinstance(tree, ast.Call) and isinstance(tree.func, ast.Name) and tree.func.id == "friction"
+        if rubs:
+            (tree,) = tree.args
+        others: list[str] = []
+        _check(tree, others)
+    except (ValueError, SyntaxError, RecursionError, MemoryError) as error:
+        names = ", ".join((*OWN, *_FUNCTIONS, "curve", "friction"))
+        raise BadInput(f"term {text[:60]!r}", f"a formula of {names}", str(error)[:80]) from None
+    return Term(text, rubs, tuple(dict.fromkeys(others)), tree)
+
+
+def _check(node: ast.expr, others: list[str]) -> None:
+    """Raise ValueError on anything that is not in the language; collect other joints' names."""
+    if isinstance(node, ast.Constant):
+        if isinstance(node.value, bool) or not isinstance(node.value, int | float) or abs(node.value) > 1e9:
+            raise ValueError(f"the constant {node.value!r}")
+    elif isinstance(node, ast.Name):
+        if node.id not in OWN:
+            raise ValueError(f"the name {node.id}")
+    elif isinstance(node, ast.Subscript):
+        others.append(_other(node))
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+        _check(node.operand, others)
+    elif isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+        _check(node.left, others)
+        _check(node.right, others)
+        if isinstance(node.op, ast.Pow) and not (isinstance(node.right, ast.Constant) and node.right.value in range(9)):
+            raise ValueError("a power that is no whole number from 0 to 8")
+    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+        _check_call(node.func.id, node.args, others)
+    else:
+        raise ValueError(type(node).__name__)
+
+
+def _check_call(name: str, arguments: list[ast.expr], others: list[str]) -> None:
+    if name == "curve":
+        if len(arguments) < 5 or len(arguments) % 2 == 0:
+            raise ValueError("curve without x and at least two points")
+        points = [_number(a) for a in arguments[1:]]
+        if any(b <= a for a, b in zip(points[::2], points[2::2], strict=False)):
+            raise ValueError("curve whose points do not ascend")
+        arguments = arguments[:1]
+    elif name not in _FUNCTIONS or len(arguments) != 1:
+        raise ValueError(f"the function {name} of {len(arguments)}")
+    for argument in arguments:
+        _check(argument, others)
+
+
+def _number(node: ast.expr) -> float:
+    sign = 1.0
+    while isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        sign, node = -sign, node.operand
+    if not isinstance(node, ast.Constant) or not isinstance(node.value, int | float):
+        raise ValueError("a point that is no number")
+    return sign * float(node.value)
+
+
+def _other(node: ast.Subscript) -> str:
+    name = node.slice
+    if not isinstance(node.value, ast.Name) or node.value.id not in ("q", "v"):
+        raise ValueError("brackets behind anything but q and v")
+    if isinstance(name, ast.Name):
+        return name.id
+    if isinstance(name, ast.Constant) and isinstance(name.value, str):
+        return name.value
+    raise ValueError("brackets around anything but a joint's name")
+
+
+def _value(node: ast.expr, values: Mapping[str, np.ndarray]) -> Any:
+    if isinstance(node, ast.Constant):
+        return float(node.value)  # type: ignore[arg-type]
+    if isinstance(node, ast.Name):
+        return values[node.id]
+    if isinstance(node, ast.Subscript):
+        return values[f"{node.value.id}[{_other(node)}]"]  # type: ignore[attr-defined]
+    if isinstance(node, ast.UnaryOp):
+        inner = _value(node.operand, values)
+        return -inner if isinstance(node.op, ast.USub) else inner
+    if isinstance(node, ast.BinOp):
+        return _BINARY[type(node.op)](_value(node.left, values), _value(node.right, values))
+    assert isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    if node.func.id == "curve":
+        points = [_number(a) for a in node.args[1:]]
+        return np.interp(_value(node.args[0], values), points[::2], points[1::2])
+    return _FUNCTIONS[node.func.id](_value(node.args[0], values))
