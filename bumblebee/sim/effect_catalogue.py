@@ -112,6 +112,8 @@ CATALOGUE: dict[str, Kind] = {
         *((f"t{axis}", "N m", -_INF, _INF) for axis in _AXES),
         native=False,
     ),
+    # Its parameters are terms of `sim.effect_terms` and their coefficients, not names of this catalogue.
+    "discovered": Kind("joint", (), native=False),
 }
 
 

@@ -13,6 +13,7 @@ written anew, so that MuJoCo's implicit treatment of both stays. The others are 
 | torque_lag | the servo's torque after dx/dt = (torque - x) / time, instead of the present one |
 | cogging | sine sin(periods q) + cosine cos(periods q) |
 | external_wrench | xfrc_applied |
+| discovered | the terms' sum, as torque or, for `friction(...)`, as frictionloss |
 """
 
 from dataclasses import dataclass
@@ -63,9 +64,10 @@ class StepHooks:
         self._past_v = np.zeros((count, self._back, joints))
         self._fading = bool(hooks.thermal.any() or hooks.drift.any())
         self._rubbing = bool(hooks.stiction[:, 0].any() or hooks.load_friction.any())
+        self._rubbing |= any(term.rubs for _, _, term in hooks.terms)
         self._running_out = bool(np.isfinite(hooks.speed_limit).any())
         self._late = bool(hooks.encoder_delay.any() or hooks.encoder_step.any() or hooks.torque_lag.any())
-        self._pushing = self._late or bool(hooks.cogging)
+        self._pushing = self._late or bool(hooks.cogging) or any(not term.rubs for _, _, term in hooks.terms)
         if self._fading:
             self._gain, self._bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
         if self._rubbing:
@@ -103,15 +105,31 @@ class StepHooks:
         torque = self._delayed(q, v, u, strength, limit, now) if self._late else now
         if self._rubbing:
             extra = h.stiction[:, 0] * np.exp(-((v / h.stiction[:, 1]) ** 2)) + h.load_friction * np.abs(torque)
-            self._loss[:, servos.dof] = self._loss0 + extra
+            self._loss[:, servos.dof] = self._loss0 + extra + self._discovered(q, v, u, torque, rubs=True)
         if self._pushing:
-            applied = torque - now
+            applied = torque - now + self._discovered(q, v, u, torque, rubs=False)
             for column, sine, cosine, periods in h.cogging:
                 angle = periods * q[:, column]
                 applied[:, column] += sine * np.sin(angle) + cosine * np.cos(angle)
             self._batch.bind("qfrc_applied")[:, servos.dof] = applied
         self._time += self._step
         self._heat += self._step * (torque / np.where(np.isfinite(servos.limit), servos.limit, 1.0)) ** 2
+
+    def _discovered(self, q: np.ndarray, v: np.ndarray, u: np.ndarray, torque: np.ndarray, rubs: bool) -> np.ndarray:
+        """Sum (n, J) of the discovered terms that are losses, or of those that are torques."""
+        out = np.zeros_like(q)
+        given = self.servos.given(u)
+        names = self._h.joints
+        for column, coefficient, term in self._h.terms:
+            if term.rubs != rubs:
+                continue
+            values = {"q": q[:, column], "v": v[:, column], "u": given[:, column], "tau": torque[:, column]}
+            values["t"] = self._time
+            for other in term.others:
+                values[f"q[{other}]"], values[f"v[{other}]"] = q[:, names.index(other)], v[:, names.index(other)]
+            part = coefficient * term(values)
+            out[:, column] += np.maximum(part, 0.0) if rubs else part
+        return out
 
     def _fade(self) -> np.ndarray:
         h, servos = self._h, self.servos

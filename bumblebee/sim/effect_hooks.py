@@ -13,6 +13,7 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.sim.effect_catalogue import CATALOGUE, Effect
 from bumblebee.sim.effect_native import is_hidden
+from bumblebee.sim.effect_terms import Term, read_term
 
 
 def _none() -> np.ndarray:
@@ -49,6 +50,8 @@ class RuntimeHooks:
     """(J,) [1/s]: loss of strength a second."""
     cogging: tuple[tuple[int, float, float, float], ...] = ()
     """(joint, sine, cosine [N m], periods a turn)."""
+    terms: tuple[tuple[int, float, Term], ...] = ()
+    """(joint, coefficient, term) of discovered effects."""
     wrench: tuple[tuple[int, np.ndarray], ...] = ()
     """(body id, (6,) force [N] and torque [N m] in the world, at the body's centre of mass)."""
     imu: np.ndarray = field(default_factory=lambda: np.zeros(3))
@@ -57,14 +60,20 @@ class RuntimeHooks:
     @property
     def empty(self) -> bool:
         """Whether the model alone carries every effect."""
-        return not (self.encoder_offset.any() or self.steps or self.encoder_step.any() or self.imu.any())
+        read = self.encoder_offset.any() or self.encoder_step.any() or self.imu.any()
+        return not (read or self.dropped.any() or self.steps)
 
     @property
     def steps(self) -> bool:
-        """Whether something must be done at every physics step."""
+        """Whether `effect_forces.StepHooks` has something to do."""
+        return bool(self.each_step or self.wrench)
+
+    @property
+    def each_step(self) -> bool:
+        """Whether something must be written before every physics step."""
         arrays = (self.encoder_step, self.encoder_delay, self.torque_lag, self.load_friction, self.thermal, self.drift)
-        some = any(a.any() for a in arrays) or self.stiction[:, 0].any() or self.dropped.any()
-        return bool(some or np.isfinite(self.speed_limit).any() or self.cogging or self.wrench)
+        some = any(a.any() for a in arrays) or self.stiction[:, 0].any()
+        return bool(some or np.isfinite(self.speed_limit).any() or self.cogging or self.terms)
 
 
 _COLUMN = {
@@ -93,7 +102,7 @@ def runtime_hooks(effects: Sequence[Effect], model: mujoco.MjModel) -> RuntimeHo
     table["speed_limit"] = np.full(len(names), np.inf)
     stiction, imu = np.zeros((len(names), 2)), np.zeros(3)
     stiction[:, 1] = 1.0
-    cogging, wrench, together = [], [], True
+    cogging, wrench, terms, together = [], [], [], True
     for effect in effects:
         kind = CATALOGUE[effect.effect]
         if kind.on == "body" and effect.effect in ("imu_offset", "external_wrench"):
@@ -103,6 +112,8 @@ def runtime_hooks(effects: Sequence[Effect], model: mujoco.MjModel) -> RuntimeHo
             else:
                 wrench += [(body, np.array(effect.values())) for body in bodies]
             continue
+        if effect.effect == "discovered":
+            terms += _terms(names, effect)
         if effect.effect not in (*_COLUMN, "stribeck_friction", "cogging"):
             continue
         together = together and not (effect.effect == "dropped_commands" and effect.where)
@@ -117,11 +128,22 @@ def runtime_hooks(effects: Sequence[Effect], model: mujoco.MjModel) -> RuntimeHo
         joints=names,
         stiction=stiction,
         cogging=tuple(cogging),
+        terms=tuple(terms),
         wrench=tuple(wrench),
         imu=imu,
         dropped_together=together,
         **table,
     )
+
+
+def _terms(names: tuple[str, ...], effect: Effect) -> list[tuple[int, float, Term]]:
+    found = []
+    for text, coefficient in effect.parameters.items():
+        term = read_term(text)
+        for other in term.others:
+            _column(names, f"term {text!r}", other)
+        found += [(_column(names, "discovered", place), coefficient, term) for place in effect.where]
+    return found
 
 
 def _column(names: tuple[str, ...], kind: str, place: str) -> int:

@@ -248,6 +248,7 @@ _ADD = {
     "viscous_friction": _damping,
     "stribeck_friction": _stiff_friction,
     "load_dependent_friction": _stiff_friction,
+    "discovered": _stiff_friction,
     "armature": _armature,
     "asymmetric_friction": _asymmetry,
     "motor_strength": lambda spec, name, value: _scale_gains(spec, name, value, value),

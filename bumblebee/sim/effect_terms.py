@@ -1,7 +1,7 @@
 """Terms of a discovered effect: small formulas in a joint's own quantities, read from text and evaluated on arrays.
 
-`coefficient * term` is a torque [N m] (a force [N] on a slide) that the joint gets beside what the model has. A term may
-use these names, each an array (n,) over worlds:
+`coefficient * term` is a torque [N m] (a force [N] on a slide) that the joint gets beside what the model has. A term
+may use these names, each an array (n,) over worlds:
 
 | name | meaning |
 |---|---|
@@ -12,8 +12,8 @@ use these names, each an array (n,) over worlds:
 | `t` | time since the rollout began [s] |
 
 and `+ - * / ^`, numbers, `sin cos exp tanh sign abs relu`, and `curve(x, x0, y0, x1, y1, ...)`: straight lines between
-points, constant beyond them. `friction(term)` alone is dry friction: not a torque but a loss, `coefficient * term` of it
-(nothing where negative), that the solver opposes to the motion and that can hold the joint still.
+points, constant beyond them. `friction(term)` alone is dry friction: not a torque but a loss, `coefficient * term` of
+it (nothing where negative), that the solver opposes to the motion and that can hold the joint still.
 """
 
 import ast

@@ -16,6 +16,7 @@ from bumblebee.errors import BadInput
 from bumblebee.sim.effect_catalogue import CATALOGUE, Effect, Kind, Parameter, single
 from bumblebee.sim.effect_hooks import RuntimeHooks, runtime_hooks
 from bumblebee.sim.effect_spec import add_to_spec
+from bumblebee.sim.effect_terms import read_term
 
 __all__ = [
     "CATALOGUE",
@@ -33,7 +34,7 @@ __all__ = [
 def write_effects(path: Path, effects: Sequence[Effect]) -> None:
     """Write `effects.yaml`; it appears whole or not at all."""
     path = Path(path)
-    entries = [{"effect": e.effect, "where": list(e.where), "parameters": dict(e.parameters)} for e in effects]
+    entries = [{"effect": e.effect, "where": list(e.where), "parameters": _written(e)} for e in effects]
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     temporary.write_text(yaml.safe_dump({"schema": 1, "effects": entries}, sort_keys=False))
     os.replace(temporary, path)
@@ -58,6 +59,12 @@ def read_effects(path: Path) -> list[Effect]:
     return [_effect(f"{path}: effects[{i}]", entry) for i, entry in enumerate(entries)]
 
 
+def _written(effect: Effect) -> dict[str, Any]:
+    if effect.effect != "discovered":
+        return dict(effect.parameters)
+    return {"terms": [{"term": term, "coefficient": value} for term, value in effect.parameters.items()]}
+
+
 def _only_keys(where: object, table: Any, keys: set[str]) -> None:
     if not isinstance(table, dict):
         raise BadInput(where, f"a mapping with keys {sorted(keys)}", type(table).__name__)
@@ -74,9 +81,27 @@ def _effect(where: str, entry: Any) -> Effect:
     every = kind.whole or kind.on == "whole"
     if not isinstance(places, list) or (not places and not every) or not all(isinstance(p, str) for p in places):
         raise BadInput(f"{where}: where", f"a list of {kind.on} names", repr(places)[:80])
+    if name == "discovered":
+        return Effect(name, tuple(places), _terms(f"{where}: parameters", entry.get("parameters")))
     _only_keys(f"{where}: parameters", entry.get("parameters"), set(kind.names))
     values = {p.name: _value(where, entry["parameters"].get(p.name), p) for p in kind.parameters}
     return Effect(name, tuple(places), values)
+
+
+def _terms(where: str, table: Any) -> dict[str, float]:
+    """Term -> coefficient of a discovered effect; a formula that cannot be read is a `BadInput`."""
+    _only_keys(where, table, {"terms"})
+    terms = table.get("terms")
+    if not isinstance(terms, list) or not terms:
+        raise BadInput(f"{where}.terms", "a list of term and coefficient", repr(terms)[:80])
+    out = {}
+    for i, entry in enumerate(terms):
+        _only_keys(f"{where}.terms[{i}]", entry, {"term", "coefficient"})
+        value = entry.get("coefficient")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise BadInput(f"{where}.terms[{i}].coefficient", "a finite number", repr(value)[:80])
+        out[read_term(str(entry.get("term"))).text] = float(value)
+    return out
 
 
 def _value(where: str, value: Any, parameter: Parameter) -> float:

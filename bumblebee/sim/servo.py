@@ -35,6 +35,11 @@ class Servos:
         bound = self.limit if limit is None else limit
         return np.clip(raw, -bound, bound)
 
+    def given(self, control: np.ndarray) -> np.ndarray:
+        """What was asked for (..., J), from the servos' controls: a position [rad], or a torque [N m] of a motor."""
+        follows = self.bias[:, 1] != 0
+        return np.where(follows, control / np.where(self.gear != 0, self.gear, 1.0), self.gain * control)
+
     def controls(self, ctrl: np.ndarray) -> np.ndarray:
         """Columns (..., J) of the actuators' controls (..., nu)."""
         return (

@@ -104,6 +104,7 @@ def test_a_heavier_link_sags_by_its_weight() -> None:
 def test_effects_survive_their_file(tmp_path: Path) -> None:
     """Write and read back every kind."""
     effects = [single(kind, "a: [b", *(max(p.lower, 0.03) for p in c.parameters)) for kind, c in CATALOGUE.items()]
+    effects[-1] = Effect("discovered", ("a: [b",), {"sin(12*q)": 0.3, "friction(q[b]^2)": -1e-3})
     write_effects(tmp_path / "effects.yaml", effects)
     assert read_effects(tmp_path / "effects.yaml") == effects
 
