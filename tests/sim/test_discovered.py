@@ -50,5 +50,5 @@ def test_a_term_of_a_joint_that_is_not_there_is_refused() -> None:
 def test_a_wrong_discovered_entry_is_named(tmp_path: Path, parameters: str) -> None:
     file = tmp_path / "effects.yaml"
     file.write_text(f"schema: 1\neffects: [{{effect: discovered, where: [j], parameters: {parameters}}}]")
-    with pytest.raises(BadInput, match="effects|term"):
+    with pytest.raises(BadInput, match=r"effects|term"):
         read_effects(file)
