@@ -59,7 +59,8 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
 def is_chatter(line: str) -> bool:
     """Lines of DVC that help nobody who watches the whole loop."""
     chatter = ("Running stage", "> python", "Updating lock file", "Generating lock file", "Use `dvc push`")
-    return line.startswith(chatter) or "To track the changes with git" in line or "git add dvc.lock" in line
+    advice = ("To track the changes with git", "git add dvc.lock", "To enable auto staging", "core.autostage")
+    return line.startswith(chatter) or any(words in line for words in advice)
 
 
 @flow(name="loop", log_prints=False, persist_result=False, validate_parameters=False)
