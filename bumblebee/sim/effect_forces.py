@@ -42,6 +42,9 @@ class Memory:
     """(n, L, J)."""
 
 
+_REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v")
+
+
 def history_length(hooks: RuntimeHooks, step: float) -> int:
     """L: how many steps of readings the longest encoder delay looks back."""
     longest = float(hooks.encoder_delay.max(initial=0.0))
@@ -90,6 +93,33 @@ class StepHooks:
             self._lagged[ids] = memory.torque
         for body, wrench in self._h.wrench:
             self._batch.bind("xfrc_applied")[ids, body] = wrench
+
+    def read(self) -> np.ndarray:
+        """Positions (n, J) as the encoders read them now: late, off and rounded."""
+        h, back = self._h, self._back
+        q = self._readings()[0]
+        if back:
+            path, at = np.concatenate((self._past_q, q[:, None]), axis=1), h.encoder_delay / self._step
+            low, share, columns = np.floor(at).astype(int), at - np.floor(at), np.arange(q.shape[1])
+            newer, older = path[:, back - low, columns], path[:, np.maximum(back - low - 1, 0), columns]
+            q = newer + share * (older - newer)
+        q = q + h.encoder_offset
+        size = np.where(h.encoder_step > 0, h.encoder_step, 1.0)
+        return np.where(h.encoder_step > 0, np.round(q / size) * size, q)
+
+    @property
+    def applied(self) -> np.ndarray:
+        """Torque (n, J) [N m] beside MuJoCo's own servo in the last step."""
+        return self._batch.bind("qfrc_applied")[:, self.servos.dof]
+
+    def state_dict(self) -> dict[str, np.ndarray]:
+        """All that it remembers."""
+        return {name: np.copy(getattr(self, f"_{name}")) for name in _REMEMBERED}
+
+    def load_state_dict(self, saved: dict[str, np.ndarray]) -> None:
+        """Go on from what `state_dict` gave."""
+        for name in _REMEMBERED:
+            getattr(self, f"_{name}")[:] = saved[name]
 
     def _readings(self) -> tuple[np.ndarray, np.ndarray]:
         return self._batch.bind("qpos")[:, self.servos.qpos], self._batch.bind("qvel")[:, self.servos.dof]
