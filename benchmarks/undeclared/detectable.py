@@ -1,0 +1,208 @@
+"""How small an effect can be and still be seen: its minimal detectable size in given data.
+
+Windows of 0.1 s of the true robot's noise-free readings are compared with the robot without the effect, restarted from
+the same readings and given the same commands. The difference is whitened by the covariance that sensor noise leaves in
+such a comparison, starts included (noisy restarts of the robot without effects, pooled over windows). What the declared
+model at 5 ms does otherwise than the same robot at 1 ms is taken out, joint by joint, with a free amplitude: an effect
+that looks like another integrator cannot be told from it. The summed square that is left is the chi-square of a perfect
+test of this one effect; the minimal detectable size is where it is 25: five standard errors, enough to be seen four
+times in five by a test that shares a false-alarm rate of 0.5 % among some hundred candidates.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from benchmarks.undeclared.excite import HZ
+from benchmarks.undeclared.flight import NOISE, Flight
+from benchmarks.undeclared.robots import Declared
+from benchmarks.undeclared.truth.simulation import TrueRobots
+
+CHI2 = 25.0
+_HORIZON, _TICKS = 5, (2, 5)  # control periods
+_COVARIANCE_WINDOWS, _STARTS, _MOST_WINDOWS = 16, 40, 160
+
+
+@dataclass(frozen=True, eq=False)
+class Eye:
+    """What sensor noise leaves of a restarted comparison on one robot."""
+
+    robot: Declared
+    model: mujoco.MjModel
+    noise: float
+    root: np.ndarray
+    """(E, E): whitens the differences."""
+
+
+def make_eye(robot: Declared, null: Flight, noise: float, rng: np.random.Generator) -> Eye:
+    """From the motion of the robot without effects."""
+    model = robot.spec.compile()
+    picks = _windows(null, _COVARIANCE_WINDOWS)
+    qpos, qvel, target, after = _gather(null, picks)
+    qpos, qvel, target = (np.repeat(x, _STARTS, axis=0) for x in (qpos, qvel, target))
+    sigma = noise * _sigma(robot, model)
+    nv = model.nv
+    draws = sigma * rng.standard_normal((len(qpos), 2 * nv))
+    started = _moved(model, qpos, draws[:, :nv])
+    error = _compare(
+        robot, model, started, qvel + draws[:, nv:], target, [np.repeat(a, _STARTS, axis=0) for a in after]
+    )
+    error = error + np.tile(sigma, len(_TICKS)) * rng.standard_normal(error.shape)
+    error = error[np.isfinite(error).all(axis=1)]
+    covariance = error.T @ error / len(error)
+    covariance = 0.9 * covariance + 0.1 * np.diag(np.diag(covariance))
+    return Eye(robot, model, noise, np.linalg.inv(np.linalg.cholesky(covariance)))
+
+
+def chi_square(eye: Eye, flight: Flight) -> float:
+    """Noise-free whitened square of a flight against the robot without effects, for all its ticks."""
+    picks = _windows(flight, _MOST_WINDOWS)
+    if not len(picks):
+        return np.inf
+    parts = _gather(flight, picks)
+    error = _compare(eye.robot, eye.model, *parts)
+    numeric = error - _compare_declared(eye.model, eye.robot, *parts)
+    good = np.isfinite(error).all(axis=1) & np.isfinite(numeric).all(axis=1)
+    white = (error[good] @ eye.root.T).ravel()
+    basis = []
+    for rows in _groups(eye):
+        part = np.zeros_like(numeric[good])
+        part[:, rows] = numeric[good][:, rows]
+        basis.append((part @ eye.root.T).ravel())
+    span = np.linalg.svd(np.array(basis), full_matrices=False)[2]
+    left = float(white @ white - ((span @ white) ** 2).sum())
+    total = int(np.minimum(flight.alive, len(flight.qpos)).sum()) / _HORIZON
+    return max(left, 0.0) * total / max(good.sum(), 1)
+
+
+def minimal_size(
+    eye: Eye, run: Callable[[float], Flight], first: float, most: float, least: float = 0.0, tries: int = 7
+) -> float:
+    """Size at which chi-square is `CHI2`: infinite if `most` is not seen, by its square law if `least` is."""
+    size, low, high = min(first, most), None, None
+    tried: list[tuple[float, float]] = []
+    for _ in range(tries):
+        value = max(chi_square(eye, run(size)), 1e-3)
+        if size <= least or 0.5 * CHI2 < value < 2 * CHI2:
+            return float(size * np.sqrt(CHI2 / value))
+        if value < CHI2:
+            low = size if low is None else max(low, size)
+            if size >= most:
+                return np.inf
+        else:
+            high = size if high is None else min(high, size)
+        tried.append((size, value))
+        size = max(_next(tried, low, high, most), least)
+    return float(np.sqrt((low or high) * (high or low)))
+
+
+def _next(tried: list[tuple[float, float]], low: float | None, high: float | None, most: float) -> float:
+    """The next size to try: by the power law through the last two, inside what is known."""
+    (size, value), power = tried[-1], 2.0
+    if len(tried) > 1 and tried[-2][0] != size:
+        slope = np.log(value / tried[-2][1]) / np.log(size / tried[-2][0])
+        power = float(np.clip(slope, 0.7, 8.0)) if np.isfinite(slope) else 2.0
+    wanted = size * float(np.clip((CHI2 / value) ** (1 / power), 0.02, 20.0))
+    if low is not None and high is not None:
+        reach = (high / low) ** 0.2
+        wanted = float(np.clip(wanted, low * reach, high / reach))
+    return min(wanted, most)
+
+
+def _sigma(robot: Declared, model: mujoco.MjModel) -> np.ndarray:
+    """(2 nv,) noise of positions and velocities at noise 1."""
+    joints = len(robot.joints)
+    q, v = np.full(joints, NOISE["q"]), np.full(joints, NOISE["v"])
+    if robot.floating:
+        q = np.concatenate((np.full(3, NOISE["place"]), np.full(3, NOISE["quat"]), q))
+        v = np.concatenate((np.full(3, NOISE["odometry"]), np.full(3, NOISE["gyro"]), v))
+    return np.concatenate((q, v))
+
+
+def _windows(flight: Flight, most: int) -> np.ndarray:
+    """(W, 2) robot and first tick."""
+    every = [
+        (r, k)
+        for r in range(flight.qpos.shape[1])
+        for k in range(10, int(min(flight.alive[r], len(flight.qpos))) - _HORIZON - 1, _HORIZON)
+    ]
+    if len(every) > most:
+        every = [every[i] for i in np.linspace(0, len(every) - 1, most).round().astype(int)]
+    return np.array(every, dtype=int).reshape(-1, 2)
+
+
+def _gather(flight: Flight, picks: np.ndarray) -> tuple:
+    r, k = picks.T
+    target = np.stack([flight.target[k + h, r] for h in range(_HORIZON)])
+    after = [np.concatenate((flight.qpos[k + h, r], flight.qvel[k + h, r]), axis=1) for h in _TICKS]
+    return flight.qpos[k, r], flight.qvel[k, r], np.moveaxis(target, 0, 1), after
+
+
+def _groups(eye: Eye) -> list[list[int]]:
+    """Columns of the comparison that belong to one joint, and those of the base."""
+    nv, ticks = eye.model.nv, 2 * len(_TICKS)
+    joints = len(eye.robot.joints)
+    groups = [[part * nv + dof for part in range(ticks)] for dof in range(nv - joints, nv)]
+    if eye.robot.floating:
+        groups.append([part * nv + dof for part in range(ticks) for dof in range(6)])
+    return groups
+
+
+def _compare(
+    robot: Declared, model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray, target: np.ndarray, after: list
+) -> np.ndarray:
+    """Read minus restarted, (W, E)."""
+    twin = TrueRobots(robot, [], len(qpos), np.random.default_rng(0))
+    twin.reset(qpos, qvel, target[:, 0])
+    errors = []
+    for tick in range(_HORIZON):
+        twin.step(target[:, tick])
+        if tick + 1 in _TICKS:
+            q, v = twin.state()
+            wanted = after[_TICKS.index(tick + 1)]
+            errors.append(
+                np.concatenate((_difference(model, q, wanted[:, : model.nq]), wanted[:, model.nq :] - v), axis=1)
+            )
+    return np.concatenate(errors, axis=1)
+
+
+def _compare_declared(
+    model: mujoco.MjModel, robot: Declared, qpos: np.ndarray, qvel: np.ndarray, target: np.ndarray, after: list
+) -> np.ndarray:
+    """Read minus the declared model at its own step and integrator, (W, E)."""
+    batch = Batch(model, len(qpos), 1)
+    batch.bind("qpos")[:], batch.bind("qvel")[:] = qpos, qvel
+    rows = [model.actuator(name).id for name in robot.joints]
+    control, steps = batch.bind("ctrl"), round(1 / HZ / model.opt.timestep)
+    errors = []
+    for tick in range(_HORIZON):
+        control[:, rows] = target[:, tick]
+        batch.step(nstep=steps)
+        if tick + 1 in _TICKS:
+            wanted = after[_TICKS.index(tick + 1)]
+            q, v = batch.bind("qpos"), batch.bind("qvel")
+            errors.append(
+                np.concatenate((_difference(model, q, wanted[:, : model.nq]), wanted[:, model.nq :] - v), axis=1)
+            )
+    return np.concatenate(errors, axis=1)
+
+
+def _difference(model: mujoco.MjModel, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Tangent from `one` to `other`, (W, nv)."""
+    out = np.zeros((len(one), model.nv))
+    for row in range(len(one)):
+        if np.isfinite(one[row]).all():
+            mujoco.mj_differentiatePos(model, out[row], 1.0, one[row], other[row])
+        else:
+            out[row] = np.nan
+    return out
+
+
+def _moved(model: mujoco.MjModel, qpos: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+    out = qpos.copy()
+    for row in range(len(out)):
+        mujoco.mj_integratePos(model, out[row], tangent[row], 1.0)
+    return out

@@ -1,0 +1,260 @@
+"""Every kind of effect in the lottery: how a size becomes a law, what the contract calls it, how far it may go.
+
+A size is a number >= 0 that grows with the effect; 0 is the declared robot. A draw fixes what a size leaves open
+(signs, axes, harmonics).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from benchmarks.undeclared.robots import Declared
+from benchmarks.undeclared.truth import bodies, drives, rubbing, signals, strange
+from benchmarks.undeclared.truth.law import Law
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where one effect sits, and what its law needs to know of the declared robot there."""
+
+    robot: Declared
+    name: str
+    """Joint or body; "" for the whole robot."""
+    draw: dict[str, Any]
+    """sign (1 or -1), axis (0 to 2), number (harmonic), other (another joint)."""
+    peak_torque: float = 0.0
+    """Largest torque of this joint's drive in the declared robot's motion [N m]."""
+    peak_speed: float = 0.0
+    """Largest speed there [rad/s]."""
+    peak_rate: float = 0.0
+    """Largest change of its command, per second [rad/s]."""
+
+    @property
+    def j(self) -> int:
+        """Column of the joint."""
+        return self.robot.joints.index(self.name)
+
+    def of(self, table: np.ndarray) -> float:
+        """This joint's entry in (J,)."""
+        return float(table[self.j])
+
+
+Made = tuple[Law, dict[str, float]]
+"""A law, and its parameters by the contract's names (absolute values)."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of effect."""
+
+    name: str
+    on: str
+    """joint, body, base, hand, whole."""
+    make: Callable[[Place, float], Made]
+    first: Callable[[Place], float]
+    """A small size to begin the search for the detectable one with."""
+    most: Callable[[Place], float]
+    """The largest size that is still this robot."""
+    least: Callable[[Place], float] = lambda p: 0.0
+    """The smallest size that a simulation of 1 ms can hold."""
+    robots: str = "both"
+    """both, arm or g1."""
+    group: str = "joint"
+    """joint, mass, contact, sensor: for the table."""
+    parts: tuple[str, ...] = field(default=())
+    """Other names of the catalogue under which a part of it is rightly found at the same place."""
+    depends: tuple[str, ...] = field(default=())
+    """Outside the catalogue: what it depends on, in the diagnosis's words; any of them is right."""
+
+    @property
+    def outside(self) -> bool:
+        """Whether the contract's catalogue has no name for it."""
+        return bool(self.depends)
+
+
+def _scaled(field_name: str, share: float) -> Callable[[Place], float]:
+    return lambda p: share * p.of(getattr(p.robot, field_name))
+
+
+def _fixed(value: float) -> Callable[[Place], float]:
+    return lambda p: value
+
+
+def _gain(kp: bool, kd: bool) -> Callable[[Place, float], Made]:
+    def make(p: Place, s: float) -> Made:
+        factor = 1 + p.draw["sign"] * s if not (kp and kd) else 1 - s
+        return drives.Gains(p.j, factor if kp else 1.0, factor if kd else 1.0), {"factor": factor}
+
+    return make
+
+
+def _mass(p: Place, s: float) -> Made:
+    mass = p.robot.mass[p.name] * (1 + s)
+    return bodies.Mass(p.name, mass), {"mass": mass}
+
+
+def _wrench(p: Place, s: float) -> Made:
+    force = np.zeros(3)
+    force[p.draw["axis"]] = p.draw["sign"] * s
+    body = int(p.robot.spec.compile().body(p.name).id)
+    return bodies.Wrench(body, force), dict.fromkeys(_WRENCH, 0.0) | {f"f{'xyz'[p.draw['axis']]}": p.draw["sign"] * s}
+
+
+_WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
+
+
+def _two(one: str, other: str, which: int, value: float) -> dict[str, float]:
+    return {one: value * (which == 0), other: value * (which == 1)}
+
+
+def _turned(axis: int, angle: float) -> dict[str, float]:
+    """Gravity's turn about the world's x and y for a floor that rises by `angle` ahead (axis 0) or to the left (1)."""
+    return {"x": -angle, "y": 0.0} if axis else {"y": angle, "x": 0.0}
+
+
+def _shifted(p: Place, s: float) -> dict[str, float]:
+    com = p.robot.spec.compile().body(p.name).ipos.copy()
+    com[p.draw["axis"]] += p.draw["sign"] * s
+    return dict(zip("xyz", com.tolist(), strict=True))
+
+
+def _moments(p: Place, factor: float) -> dict[str, float]:
+    moments = p.robot.spec.compile().body(p.name).inertia * factor
+    return dict(zip(("xx", "yy", "zz"), moments.tolist(), strict=True))
+
+
+def _signed(law: Callable[[Place, float], Law], parameter: str) -> Callable[[Place, float], Made]:
+    return lambda p, s: (law(p, p.draw["sign"] * s), {parameter: p.draw["sign"] * s})
+
+
+def _plain(law: Callable[[Place, float], Law], parameter: str) -> Callable[[Place, float], Made]:
+    return lambda p, s: (law(p, s), {parameter: s})
+
+
+_L, _KP, _KD = (lambda x: _scaled("limit", x)), (lambda x: _scaled("kp", x)), (lambda x: _scaled("kd", x))
+
+CATALOGUE: tuple[Kind, ...] = (
+    Kind("coulomb_friction", "joint",
+         lambda p, s: (rubbing.Coulomb(p.name, p.of(p.robot.friction) + s),
+                       {"frictionloss": p.of(p.robot.friction) + s}), _L(0.01), _L(0.2)),
+    Kind("viscous_friction", "joint",
+         lambda p, s: (rubbing.Viscous(p.name, s), {"damping": p.of(p.robot.damping) + s}), _KD(0.03), _KD(1.0)),
+    Kind("stribeck_friction", "joint",
+         lambda p, s: (rubbing.Stribeck(p.name, s), {"stiction": 0.6 * s, "velocity": rubbing.STRIBECK_SPEED}),
+         _L(0.01), _L(0.2), parts=("coulomb_friction",)),
+    Kind("load_dependent_friction", "joint", _plain(lambda p, s: rubbing.LoadFriction(p.name, s), "coefficient"),
+         _fixed(0.05), _fixed(0.6)),
+    Kind("asymmetric_friction", "joint",
+         lambda p, s: (rubbing.AsymmetricFriction(p.name, s, 0.25 * s) if p.draw["sign"] > 0
+                       else rubbing.AsymmetricFriction(p.name, 0.25 * s, s),
+                       {"difference": 0.75 * s * p.draw["sign"]}), _L(0.01), _L(0.2), parts=("coulomb_friction",)),
+    Kind("armature", "joint",
+         lambda p, s: (rubbing.Armature(p.name, p.of(p.robot.armature) * (1 + s)),
+                       {"armature": p.of(p.robot.armature) * (1 + s)}), _fixed(0.2), _fixed(4.0)),
+    Kind("motor_strength", "joint", _gain(True, True), _fixed(0.03), _fixed(0.6)),
+    Kind("kp", "joint", _gain(True, False), _fixed(0.03), _fixed(0.5)),
+    Kind("kd", "joint", _gain(False, True), _fixed(0.05), _fixed(0.6)),
+    Kind("torque_limit", "joint",
+         lambda p, s: (drives.TorqueLimit(p.name, 1.05 * p.peak_torque / (1 + s)),
+                       {"limit": 1.05 * p.peak_torque / (1 + s)}),
+         _fixed(0.3), _fixed(4.0)),
+    Kind("torque_speed_limit", "joint",
+         lambda p, s: (drives.TorqueSpeed(p.name, p.of(p.robot.limit), p.peak_speed * (0.7 + 1 / s)),
+                       {"speed": p.peak_speed * (0.7 + 1 / s)}), _fixed(2.0), _fixed(60.0)),
+    Kind("command_delay", "joint", _plain(lambda p, s: signals.CommandDelay(p.name, s), "delay"),
+         _fixed(0.002), _fixed(0.04)),
+    Kind("torque_lag", "joint", _plain(lambda p, s: drives.TorqueLag(p.name, s), "time"),
+         _fixed(0.002), _fixed(0.03)),
+    Kind("encoder_delay", "joint", _plain(lambda p, s: signals.EncoderDelay(p.name, s), "delay"),
+         _fixed(0.002), _fixed(0.03), group="sensor"),
+    Kind("dropped_commands", "whole", _plain(lambda p, s: signals.DroppedCommands(s), "share"),
+         _fixed(0.05), _fixed(0.5)),
+    Kind("encoder_offset", "joint", _signed(lambda p, s: signals.EncoderOffset(p.name, s), "offset"),
+         _fixed(0.01), _fixed(0.12), group="sensor"),
+    Kind("imu_offset", "base", lambda p, s: (signals.ImuOffset(p.draw["axis"] % 2, p.draw["sign"] * s),
+                       _two("roll", "pitch", p.draw["axis"] % 2, p.draw["sign"] * s)),
+         _fixed(0.01), _fixed(0.12), robots="g1", group="sensor"),
+    Kind("encoder_quantisation", "joint", _plain(lambda p, s: signals.EncoderQuantisation(p.name, s), "step"),
+         _fixed(0.003), _fixed(0.05), group="sensor"),
+    Kind("backlash", "joint",
+         lambda p, s: (rubbing.Backlash(p.name, p.of(p.robot.armature), s), {"gap": s}), _fixed(0.01), _fixed(0.12)),
+    Kind("series_elasticity", "joint",
+         lambda p, s: (rubbing.Elastic(p.name, p.of(p.robot.armature), 1 / s), {"stiffness": 1 / s}),
+         lambda p: 0.1 / p.of(p.robot.kp), lambda p: 1.0 / p.of(p.robot.kp),
+         least=lambda p: 0.04 / p.of(p.robot.kp)),
+    Kind("cogging", "joint", lambda p, s: (rubbing.Cogging(p.name, s, p.draw["number"]),
+                       {"sine": s, "cosine": 0.0, "periods": float(p.draw["number"])}),
+         _L(0.01), _L(0.15)),
+    Kind("joint_spring", "joint", 
+         lambda p, s: (rubbing.Spring(p.name, s), {"stiffness": s, "preload": 0.0}), _KP(0.03), _KP(0.6)),
+    Kind("hysteresis", "joint", 
+         lambda p, s: (rubbing.Hysteresis(p.name, s), {"amplitude": s, "width": rubbing.REACH}), _L(0.01), _L(0.15)),
+    Kind("link_mass", "body", _mass, _fixed(0.1), _fixed(1.5), group="mass"),
+    Kind("link_com", "body",
+         lambda p, s: (bodies.Com(p.name, p.draw["axis"], p.draw["sign"] * s),
+                       _shifted(p, s)), _fixed(0.01), _fixed(0.08), group="mass"),
+    Kind("link_inertia", "body", lambda p, s: (bodies.Inertia(p.name, 1 + s), _moments(p, 1 + s)),
+         _fixed(0.3), _fixed(4.0), group="mass"),
+    Kind("ground_friction", "whole",
+         lambda p, s: (bodies.GroundFriction(1 / (1 + s)), {"friction": 1 / (1 + s)}),
+         _fixed(1.0), _fixed(6.0), robots="g1", group="contact"),
+    Kind("ground_compliance", "whole",
+         lambda p, s: (bodies.GroundCompliance(0.02 * (1 + s)), {"time": 0.02 * (1 + s)}),
+         _fixed(0.3), _fixed(4.0), robots="g1", group="contact"),
+    Kind("ground_slope", "whole", lambda p, s: (bodies.Slope(p.draw["axis"] % 2, p.draw["sign"] * s),
+                       _turned(p.draw["axis"] % 2, p.draw["sign"] * s)),
+         _fixed(0.01), _fixed(0.08), robots="g1", group="contact"),
+    Kind("thermal_fade", "joint", _plain(lambda p, s: drives.Fade(p.name, p.of(p.robot.limit), s), "rate"),
+         _fixed(0.3), _fixed(1.0)),
+    Kind("strength_drift", "joint", _plain(lambda p, s: drives.Drift(p.name, s), "rate"), _fixed(0.01), _fixed(0.1)),
+    Kind("external_wrench", "body", _wrench, _fixed(0.5), lambda p: 0.25 * 9.81 * sum(p.robot.mass.values()),
+         group="contact"),
+)  # fmt: skip
+
+OUTSIDE: tuple[Kind, ...] = (
+    Kind("position_friction", "joint", lambda p, s: (strange.PositionFriction(p.name, s), {"level": s}),
+         _L(0.01), _L(0.15), depends=("position",)),
+    Kind("odd_cogging", "joint", lambda p, s: (strange.OddCogging(p.name, s), {"amplitude": s}),
+         _L(0.01), _L(0.12), depends=("position",)),
+    Kind("gain_cycle", "joint", lambda p, s: (strange.GainCycle(p.name, s), {"share": s}),
+         _fixed(0.03), _fixed(0.5), depends=("time",)),
+    Kind("cross_coupling", "joint",
+         lambda p, s: (strange.CrossCoupling(p.name, p.draw["other"], s), {"stiffness": s}),
+         _KP(0.03), _KP(0.3), depends=("another joint", "other")),
+    Kind("tendon", "joint", lambda p, s: (strange.Tendon(p.name, s, 0.1), {"stiffness": s}),
+         _KP(0.03), _KP(0.5), depends=("position",)),
+    Kind("dwell_friction", "joint", lambda p, s: (strange.DwellFriction(p.name, s), {"level": s}),
+         _L(0.01), _L(0.2), depends=("history", "velocity", "time")),
+    Kind("rate_limit", "joint", lambda p, s: (strange.RateLimit(p.name, p.peak_rate / (1 + s)),
+                                              {"rate": p.peak_rate / (1 + s)}),
+         _fixed(0.2), _fixed(5.0), depends=("command", "history", "velocity", "target")),
+    Kind("quantised_command", "joint", lambda p, s: (strange.QuantisedCommand(p.name, s), {"step": s}),
+         _fixed(0.01), _fixed(0.2), depends=("command", "target")),
+    Kind("loose_mount", "base", lambda p, s: (strange.LooseMount(1 / s), {"stiffness": 1 / s}),
+         _fixed(1e-4), _fixed(1 / 300), least=_fixed(1e-5), robots="arm",
+         depends=("another joint", "other", "history", "torque")),
+    Kind("drag", "joint", lambda p, s: (strange.Drag(p.name, s), {"drag": s}),
+         _KD(0.01), _KD(0.5), depends=("velocity",)),
+    Kind("dead_band", "joint", lambda p, s: (strange.DeadBand(p.name, p.of(p.robot.kp), s), {"band": s}),
+         _fixed(0.005), _fixed(0.08), depends=("torque", "command", "target", "error")),
+    Kind("ripple", "joint", lambda p, s: (strange.Ripple(p.name, s), {"amplitude": s}),
+         _L(0.01), _L(0.15), depends=("time",)),
+)  # fmt: skip
+
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (*CATALOGUE, *OUTSIDE)}
+
+
+def fits(kind: Kind, robot: str) -> bool:
+    """Whether a kind can sit on a robot (`arm`, or a G1)."""
+    return kind.robots == "both" or (kind.robots == "arm") == (robot == "arm")
+
+
+def places(kind: Kind, robot: Declared) -> tuple[str, ...]:
+    """Names where a kind can sit; ("",) where it has the whole robot or its base."""
+    if kind.on == "joint":
+        return robot.joints
+    if kind.on == "body":
+        return tuple(b for b in robot.bodies if robot.mass[b] >= 0.25)
+    return ("pelvis",) if kind.name == "imu_offset" else ("",)

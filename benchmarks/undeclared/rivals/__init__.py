@@ -1,0 +1,1 @@
+"""Other methods on the same rollouts, one module each: `run(robot, problem, rng) -> Answer`."""

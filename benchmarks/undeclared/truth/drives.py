@@ -1,0 +1,110 @@
+"""Laws of the drives: strength, gains, limits, lag, heat and time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.undeclared.truth.law import Law, World
+
+
+@dataclass
+class Gains(Law):
+    """Servo gains times `kp` and `kd`; both together are the motor's strength."""
+
+    joint: int
+    kp: float = 1.0
+    kd: float = 1.0
+
+    def gains(self, kp: np.ndarray, kd: np.ndarray) -> None:
+        """Before the limit, as a weak motor constant does."""
+        kp[self.joint] *= self.kp
+        kd[self.joint] *= self.kd
+
+
+@dataclass
+class TorqueLimit(Law):
+    """The drive gives at most `limit` [N m]."""
+
+    joint: str
+    limit: float
+
+    def saturate(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """Clip."""
+        j = world.column(self.joint)
+        torque[:, j] = np.clip(torque[:, j], -self.limit, self.limit)
+        return torque
+
+
+@dataclass
+class TorqueSpeed(Law):
+    """What the drive can give along the motion falls linearly to 0 at `speed` [rad/s]; `limit` is that at rest."""
+
+    joint: str
+    limit: float
+    speed: float
+
+    def saturate(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """Clip on the driving side only."""
+        j = world.column(self.joint)
+        v = world.v[:, j]
+        left = self.limit * np.clip(1 - np.abs(v) / self.speed, 0, 1)
+        torque[:, j] = np.where(v > 0, np.minimum(torque[:, j], left), np.maximum(torque[:, j], -left))
+        return torque
+
+
+@dataclass
+class TorqueLag(Law):
+    """The torque follows the one asked with the time constant `constant` [s]."""
+
+    joint: str
+    constant: float
+
+    def start(self, world: World, target: np.ndarray) -> None:
+        """Begin with the first torque asked."""
+        self._now = None
+
+    def drive(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """Exact first-order filter."""
+        j = world.column(self.joint)
+        if self._now is None:
+            self._now = torque[:, j].copy()
+        self._now = self._now + (torque[:, j] - self._now) * (1 - np.exp(-world.dt / self.constant))
+        torque = torque.copy()
+        torque[:, j] = self._now
+        return torque
+
+
+@dataclass
+class Fade(Law):
+    """Strength 1 - `rate` h, never below 0.2; h is the integral of (torque / limit)^2 over time [s]."""
+
+    joint: str
+    limit: float
+    rate: float
+
+    def start(self, world: World, target: np.ndarray) -> None:
+        """Cold."""
+        self._heat = np.zeros(world.count)
+
+    def drive(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """Weaker the hotter."""
+        j = world.column(self.joint)
+        torque = torque.copy()
+        torque[:, j] *= np.maximum(0.2, 1 - self.rate * self._heat)
+        self._heat = self._heat + np.clip(torque[:, j] / self.limit, -1, 1) ** 2 * world.dt
+        return torque
+
+
+@dataclass
+class Drift(Law):
+    """Strength 1 - `rate` t, never below 0.2."""
+
+    joint: str
+    rate: float
+
+    def drive(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """Weaker the later."""
+        j = world.column(self.joint)
+        torque = torque.copy()
+        torque[:, j] *= max(0.2, 1 - self.rate * world.time)
+        return torque

@@ -1,0 +1,93 @@
+"""A law: one undeclared effect as the places where it acts on a simulated millisecond; neutral unless overridden."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+
+@dataclass
+class World:
+    """What laws see; R robots, J joints. Arrays are those of the millisecond that begins."""
+
+    joints: tuple[str, ...]
+    count: int
+    """R."""
+    dt: float
+    """[s]."""
+    rng: np.random.Generator
+    """Of what is random in the truth itself, such as which commands are lost."""
+    time: float = 0.0
+    """[s] since the start."""
+    q: np.ndarray | None = None
+    """(R, J) true joint positions [rad]."""
+    v: np.ndarray | None = None
+    """(R, J) true joint velocities [rad/s]."""
+    torque: np.ndarray | None = None
+    """(R, J) torque of the drives in the last millisecond [N m]."""
+    error: np.ndarray | None = None
+    """(R, J) command minus reading [rad]."""
+
+    def column(self, joint: str) -> int:
+        """Index of a joint."""
+        return self.joints.index(joint)
+
+
+class Law:
+    """One undeclared effect."""
+
+    def spec(self, spec: mujoco.MjSpec) -> None:
+        """Change the structure before it is compiled."""
+
+    def model(self, model: mujoco.MjModel) -> None:
+        """Change the compiled model."""
+
+    def gains(self, kp: np.ndarray, kd: np.ndarray) -> None:
+        """Change the servo's gains (J,) in place."""
+
+    def start(self, world: World, target: np.ndarray) -> None:
+        """Begin at rest under `target` (R, J), which has long been held."""
+
+    def tick(self, world: World, target: np.ndarray) -> np.ndarray:
+        """What becomes of a command (R, J) when it is issued, once a control period."""
+        return target
+
+    def command(self, world: World, target: np.ndarray) -> np.ndarray:
+        """What becomes of a command on its way to the servo, every millisecond."""
+        return target
+
+    def sense(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the encoders say; called once a millisecond and may keep memory."""
+        return q, v
+
+    def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same for the log, without changing the memory; by default as the servo senses."""
+        return q, v
+
+    def base(self, quat: np.ndarray) -> np.ndarray:
+        """What the IMU says of the base's orientation, (R, 4) wxyz."""
+        return quat
+
+    def drive(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """Torque (R, J) that the drive makes of the one asked."""
+        return torque
+
+    def saturate(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """Limits beyond the declared ones."""
+        return torque
+
+    def transmit(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """Torque that reaches the joint."""
+        return torque
+
+    def passive(self, world: World, push: np.ndarray) -> None:
+        """Add torques on the joints to `push` (R, J)."""
+
+    def friction(self, world: World, level: np.ndarray) -> None:
+        """Change the level of dry friction (R, J) [N m] in place."""
+
+    def inertia(self, world: World, armature: np.ndarray) -> None:
+        """Change the rotor inertia that the joints carry, (R, J) [kg m^2], in place."""
+
+    def push(self, world: World, wrench: np.ndarray) -> None:
+        """Add forces and torques (R, bodies, 6) on bodies, world frame."""

@@ -1,0 +1,221 @@
+"""Laws of friction, springs and gears: torques on one joint beyond those of its drive."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from benchmarks.undeclared.truth.law import Law, World
+
+STRIBECK_SPEED = 0.15  # [rad/s]
+REACH = 0.05  # travel after which hysteresis has turned round [rad]
+
+
+@dataclass
+class Coulomb(Law):
+    """Dry friction of `level` [N m]."""
+
+    joint: str
+    level: float
+
+    def friction(self, world: World, level: np.ndarray) -> None:
+        """Absolute, in place of the declared one."""
+        level[:, world.column(self.joint)] = self.level
+
+
+@dataclass
+class Stribeck(Law):
+    """Dry friction `level` (0.4 + 0.6 exp(-(v / speed)^2)) [N m]: the breakaway is 2.5 times the sliding friction."""
+
+    joint: str
+    level: float
+    speed: float = STRIBECK_SPEED
+
+    def friction(self, world: World, level: np.ndarray) -> None:
+        """By the speed now."""
+        j = world.column(self.joint)
+        level[:, j] += self.level * (0.4 + 0.6 * np.exp(-((world.v[:, j] / self.speed) ** 2)))
+
+
+@dataclass
+class LoadFriction(Law):
+    """Dry friction `share` |drive torque|, as in a loaded gear."""
+
+    joint: str
+    share: float
+
+    def friction(self, world: World, level: np.ndarray) -> None:
+        """By the torque now."""
+        j = world.column(self.joint)
+        level[:, j] += self.share * np.abs(world.torque[:, j])
+
+
+@dataclass
+class AsymmetricFriction(Law):
+    """Dry friction `forward` [N m] while the joint moves forward, `backward` while it moves back."""
+
+    joint: str
+    forward: float
+    backward: float
+
+    def friction(self, world: World, level: np.ndarray) -> None:
+        """By the direction of motion; at rest by the direction of the drive."""
+        j = world.column(self.joint)
+        way = np.where(np.abs(world.v[:, j]) > 1e-3, world.v[:, j], world.torque[:, j])
+        level[:, j] += np.where(way > 0, self.forward, self.backward)
+
+
+@dataclass
+class Viscous(Law):
+    """Torque -`damping` v [N m s/rad]."""
+
+    joint: str
+    damping: float
+
+    def passive(self, world: World, push: np.ndarray) -> None:
+        """Linear in speed."""
+        j = world.column(self.joint)
+        push[:, j] -= self.damping * world.v[:, j]
+
+
+@dataclass
+class Armature(Law):
+    """Rotor inertia `rotor` [kg m^2] in place of the declared one."""
+
+    joint: str
+    rotor: float
+
+    def model(self, model: mujoco.MjModel) -> None:
+        """The joint's own field."""
+        model.dof_armature[model.joint(self.joint).dofadr[0]] = self.rotor
+
+
+@dataclass
+class Spring(Law):
+    """Torque -`stiffness` q [N m/rad]."""
+
+    joint: str
+    stiffness: float
+
+    def passive(self, world: World, push: np.ndarray) -> None:
+        """Linear in position."""
+        j = world.column(self.joint)
+        push[:, j] -= self.stiffness * world.q[:, j]
+
+
+@dataclass
+class Cogging(Law):
+    """Torque `amplitude` sin(`number` q) [N m]."""
+
+    joint: str
+    amplitude: float
+    number: int
+
+    def passive(self, world: World, push: np.ndarray) -> None:
+        """Periodic in position."""
+        j = world.column(self.joint)
+        push[:, j] += self.amplitude * np.sin(self.number * world.q[:, j])
+
+
+@dataclass
+class Hysteresis(Law):
+    """Dahl's friction: torque -`level` z, dz/dt = v/`reach` (1 - sgn(v) z), z in [-1, 1]."""
+
+    joint: str
+    level: float
+    reach: float = REACH
+    """Travel after which the torque has turned round [rad]."""
+
+    def start(self, world: World, target: np.ndarray) -> None:
+        """At rest without torque."""
+        self._z = np.zeros(world.count)
+
+    def passive(self, world: World, push: np.ndarray) -> None:
+        """By the path."""
+        j = world.column(self.joint)
+        turn = world.v[:, j] * world.dt / self.reach
+        self._z = np.clip(self._z + turn * (1 - np.sign(turn) * self._z), -1, 1)
+        push[:, j] -= self.level * self._z
+
+
+@dataclass
+class Backlash(Law):
+    """A rotor that turns freely within `gap` [rad] of the joint; where they touch they move as one.
+
+    While they touch, the joint carries the declared armature and gets the drive's torque. When the rotor would have to
+    pull it lets go; when it has crossed the gap it takes the joint along without bouncing. The encoder is the joint's.
+    """
+
+    joint: str
+    armature: float
+    gap: float
+
+    def start(self, world: World, target: np.ndarray) -> None:
+        """Touching on the forward side."""
+        j = world.column(self.joint)
+        self._side, self._play = np.ones(world.count), np.full(world.count, self.gap / 2)
+        self._speed, self._last = world.v[:, j].copy(), world.v[:, j].copy()
+        self._rotor = 0.9 * self.armature
+
+    def transmit(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """Nothing, the torque, or the torque and the rotor's blow."""
+        j, v = world.column(self.joint), world.v[:, world.column(self.joint)]
+        drive = torque[:, j]
+        through = drive - self._rotor * (v - self._last) / world.dt
+        leaves = (self._side != 0) & (through * self._side < 0)
+        self._speed = np.where(leaves | (self._side != 0), v, self._speed)
+        self._side = np.where(leaves, 0.0, self._side)
+        free = self._side == 0
+        self._speed = np.where(free, self._speed + world.dt * drive / self._rotor, self._speed)
+        self._play = np.where(free, self._play + world.dt * (self._speed - v), self._play)
+        lands = free & (np.abs(self._play) >= self.gap / 2)
+        self._side = np.where(lands, np.sign(self._play), self._side)
+        self._play = np.clip(self._play, -self.gap / 2, self.gap / 2)
+        torque = torque.copy()
+        blow = self._rotor * (self._speed - v) / world.dt
+        torque[:, j] = np.where(lands, blow, np.where(free, 0.0, drive))
+        self._last = v.copy()
+        return torque
+
+    def inertia(self, world: World, armature: np.ndarray) -> None:
+        """A tenth stays with the joint when the rotor lets go."""
+        j = world.column(self.joint)
+        armature[:, j] = np.where(self._side == 0, 0.1, 1.0) * self.armature
+
+
+@dataclass
+class Elastic(Law):
+    """A rotor of its own behind a spring of `stiffness` [N m/rad], damped by a tenth of critical.
+
+    The rotor carries the declared armature but for a tenth; the encoder is the joint's. Integrated in 16 parts of a
+    millisecond.
+    """
+
+    joint: str
+    armature: float
+    stiffness: float
+
+    def model(self, model: mujoco.MjModel) -> None:
+        """The armature moves to the rotor."""
+        model.dof_armature[model.joint(self.joint).dofadr[0]] = 0.1 * self.armature
+
+    def start(self, world: World, target: np.ndarray) -> None:
+        """With the joint."""
+        j = world.column(self.joint)
+        self._angle, self._speed = world.q[:, j].copy(), world.v[:, j].copy()
+        self._rotor = 0.9 * self.armature
+        self._damping = 0.2 * np.sqrt(self.stiffness * self._rotor)
+
+    def transmit(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """The drive turns the rotor, the joint gets what the spring gives."""
+        j, parts = world.column(self.joint), 16
+        dt, given = world.dt / parts, np.zeros(world.count)
+        for part in range(parts):
+            twist = self._angle - world.q[:, j] - world.v[:, j] * dt * part
+            coupling = self.stiffness * twist + self._damping * (self._speed - world.v[:, j])
+            self._speed = self._speed + dt * (torque[:, j] - coupling) / self._rotor
+            self._angle = self._angle + dt * self._speed
+            given += coupling / parts
+        torque = torque.copy()
+        torque[:, j] = given
+        return torque

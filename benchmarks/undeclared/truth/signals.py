@@ -1,0 +1,149 @@
+"""Laws of commands on their way to the drives, and of what encoders and IMU say."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.undeclared.truth.law import Law, World
+
+
+class Line:
+    """A delay line of (R,) values, one a millisecond; delays need not be whole milliseconds."""
+
+    def __init__(self, delay: float, dt: float, first: np.ndarray) -> None:
+        self._whole, self._share = int(delay / dt), delay / dt - int(delay / dt)
+        self._past = [first.copy() for _ in range(self._whole + 2)]
+
+    def push(self, value: np.ndarray) -> np.ndarray:
+        """Put the newest value in; what comes out is the mean over this millisecond of the late signal."""
+        self._past = [value.copy(), *self._past[:-1]]
+        return self.peek()
+
+    def ahead(self, value: np.ndarray) -> np.ndarray:
+        """What would come out if `value` were put in now."""
+        past = [value, *self._past]
+        return (1 - self._share) * past[self._whole] + self._share * past[self._whole + 1]
+
+    def peek(self) -> np.ndarray:
+        """What came out last."""
+        return (1 - self._share) * self._past[self._whole] + self._share * self._past[self._whole + 1]
+
+
+@dataclass
+class CommandDelay(Law):
+    """Commands arrive `delay` [s] late."""
+
+    joint: str
+    delay: float
+
+    def start(self, world: World, target: np.ndarray) -> None:
+        """The first command has long been under way."""
+        self._line = Line(self.delay, world.dt, target[:, world.column(self.joint)])
+
+    def command(self, world: World, target: np.ndarray) -> np.ndarray:
+        """As it was."""
+        j = world.column(self.joint)
+        target = target.copy()
+        target[:, j] = self._line.push(target[:, j])
+        return target
+
+
+@dataclass
+class DroppedCommands(Law):
+    """Each command of the whole robot is lost with probability `share`; the one before goes on."""
+
+    share: float
+
+    def start(self, world: World, target: np.ndarray) -> None:
+        """The first is there."""
+        self._last = target.copy()
+
+    def tick(self, world: World, target: np.ndarray) -> np.ndarray:
+        """Lost for a robot as a whole."""
+        lost = world.rng.random(world.count) < self.share
+        self._last = np.where(lost[:, None], self._last, target)
+        return self._last
+
+
+@dataclass
+class EncoderDelay(Law):
+    """Servo and log get the encoder's position and velocity `delay` [s] late."""
+
+    joint: str
+    delay: float
+
+    def start(self, world: World, target: np.ndarray) -> None:
+        """Nothing has moved yet."""
+        j = world.column(self.joint)
+        self._q = Line(self.delay, world.dt, world.q[:, j] - 0.0)
+        self._v = Line(self.delay, world.dt, world.v[:, j] - 0.0)
+
+    def sense(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Goes into the line, comes out late."""
+        j = world.column(self.joint)
+        q, v = q.copy(), v.copy()
+        q[:, j], v[:, j] = self._q.push(q[:, j]), self._v.push(v[:, j])
+        return q, v
+
+    def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As the servo would get it now."""
+        j = world.column(self.joint)
+        q, v = q.copy(), v.copy()
+        q[:, j], v[:, j] = self._q.ahead(q[:, j]), self._v.ahead(v[:, j])
+        return q, v
+
+
+@dataclass
+class EncoderOffset(Law):
+    """The encoder says `offset` [rad] too much, to servo and log."""
+
+    joint: str
+    offset: float
+
+    def sense(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Added."""
+        q = q.copy()
+        q[:, world.column(self.joint)] += self.offset
+        return q, v
+
+    def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same."""
+        return self.sense(world, q, v)
+
+
+@dataclass
+class EncoderQuantisation(Law):
+    """The encoder has steps of `step` [rad], for servo and log; velocities are not touched."""
+
+    joint: str
+    step: float
+
+    def sense(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rounded."""
+        j = world.column(self.joint)
+        q = q.copy()
+        q[:, j] = np.round(q[:, j] / self.step) * self.step
+        return q, v
+
+    def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same."""
+        return self.sense(world, q, v)
+
+
+@dataclass
+class ImuOffset(Law):
+    """The IMU is mounted turned by `angle` [rad] about the base's `axis` (0 roll, 1 pitch)."""
+
+    axis: int
+    angle: float
+
+    def base(self, quat: np.ndarray) -> np.ndarray:
+        """True orientation times the small turn."""
+        turn = np.zeros(4)
+        turn[0], turn[1 + self.axis] = np.cos(self.angle / 2), np.sin(self.angle / 2)
+        w, x, y, z = quat.T
+        a, b, c, d = turn
+        return np.stack(
+            (w * a - x * b - y * c - z * d, w * b + x * a + y * d - z * c,
+             w * c - x * d + y * a + z * b, w * d + x * c - y * b + z * a), axis=1,
+        )  # fmt: skip

@@ -1,0 +1,108 @@
+"""The suite: frozen by its seed, complete, and its sizes mean what they say."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from benchmarks.undeclared.detectable import CHI2, chi_square, make_eye, minimal_size
+from benchmarks.undeclared.excite import make_plan
+from benchmarks.undeclared.flight import fly
+from benchmarks.undeclared.kinds import CATALOGUE, OUTSIDE
+from benchmarks.undeclared.lottery import Suite
+from benchmarks.undeclared.robots import declared
+from benchmarks.undeclared.truth.rubbing import Viscous
+
+CONTRACT = {
+    "viscous_friction",
+    "coulomb_friction",
+    "stribeck_friction",
+    "load_dependent_friction",
+    "asymmetric_friction",
+    "armature",
+    "motor_strength",
+    "kp",
+    "kd",
+    "torque_limit",
+    "torque_speed_limit",
+    "command_delay",
+    "torque_lag",
+    "encoder_delay",
+    "dropped_commands",
+    "encoder_offset",
+    "imu_offset",
+    "encoder_quantisation",
+    "backlash",
+    "series_elasticity",
+    "cogging",
+    "joint_spring",
+    "hysteresis",
+    "link_mass",
+    "link_com",
+    "link_inertia",
+    "ground_friction",
+    "ground_compliance",
+    "ground_slope",
+    "thermal_fade",
+    "strength_drift",
+    "external_wrench",
+}
+
+
+def test_the_lottery_has_every_name_of_the_contract_and_no_other():
+    assert {kind.name for kind in CATALOGUE} == CONTRACT
+    assert len(OUTSIDE) >= 8 and not {kind.name for kind in OUTSIDE} & CONTRACT
+
+
+def test_the_list_is_a_function_of_the_seed():
+    assert Suite(1).digest() == Suite(1).digest() != Suite(2).digest()
+    assert [case.number for case in Suite(1).cases()] == list(range(len(Suite(1).cases())))
+
+
+def test_the_suite_holds_all_sizes_noises_and_counts_for_every_kind():
+    cases = Suite(1).cases()
+    groups = Counter(case.group for case in cases)
+    assert groups["null"] >= 60 and groups["pair"] >= 20 and groups["triple"] >= 10
+    for kind in CATALOGUE:
+        own = [case for case in cases if case.kinds == (kind.name,)]
+        assert {2.0, 5.0, 20.0} <= {case.ratio for case in own}, kind.name
+        assert {1.0, 3.0} <= {case.noise for case in own}
+        assert {1, 4, 8} <= {case.rollouts for case in own}
+
+
+def test_every_beginning_of_the_suite_is_mixed():
+    first = Suite(1).cases()[:120]
+    assert {case.group for case in first} == {"single", "pair", "triple", "null", "outside"}
+    assert {case.robot for case in first} == {"arm", "stand", "track"}
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """The arm's eye, and a function: damping of the elbow -> flight."""
+    robot = declared("arm")
+
+    def run(damping, seconds=2.0):
+        plan = make_plan(robot, 2, seconds, np.random.default_rng(0))
+        return fly(robot, [Viscous("elbow", damping)] if damping else [], plan, np.random.default_rng(1))
+
+    return robot, run
+
+
+def test_chi_square_is_that_of_a_linear_effect_and_none_without_one(seen):
+    robot, run = seen
+    eye = make_eye(robot, run(0.0), 1.0, np.random.default_rng(2))
+    assert chi_square(eye, run(0.0)) < 1e-6
+    small, twice = chi_square(eye, run(0.05)), chi_square(eye, run(0.1))
+    assert twice / small == pytest.approx(4.0, rel=0.1)
+
+
+def test_the_minimal_size_has_the_stated_chi_square_and_grows_with_the_noise(seen):
+    robot, run = seen
+    sizes = []
+    for noise in (1.0, 3.0):
+        eye = make_eye(robot, run(0.0), noise, np.random.default_rng(2))
+        size = minimal_size(eye, run, 0.1, 3.0)
+        assert chi_square(eye, run(size)) == pytest.approx(CHI2, rel=0.2)
+        sizes.append(size)
+    assert sizes[1] / sizes[0] == pytest.approx(3.0, rel=0.25)
+    assert minimal_size(eye, run, 1e-5, 1e-4) == np.inf
