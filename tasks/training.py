@@ -11,6 +11,7 @@ import pandas as pd
 import torch
 
 from bumblebee.errors import BadInput
+from bumblebee.learning import pretrained
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import Policy, load_policy
@@ -18,7 +19,7 @@ from bumblebee.learning.ppo import CURVE, Trainer
 from bumblebee.learning.trial import Trials, World, success_by_family, try_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
-from bumblebee.sim.mujoco_cpu import MujocoCpu
+from bumblebee.sim.engines import make_engine
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
@@ -100,8 +101,9 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     """Train, try before and after on the same starts, write the policy's folder; returns its card."""
     torch.set_num_threads(config.env.threads)
     folder = scratch(f"{job.stage}-{job.name}", job.parent or FILTERED, config)
-    library = MotionLibrary(job.clips, config.env.ahead)
-    engine = MujocoCpu(job.world.model, config.env.num_worlds, threads=config.env.threads, hooks=job.world.hooks)
+    own = config.env
+    engine = make_engine(own.engine, job.world.model, own.num_worlds, own.threads, job.world.hooks, own.buffers)
+    library = MotionLibrary(job.clips, own.ahead, device=engine.device)
     env = TrackingEnv(library, engine, config.env, config.seed, job.world.action_adapter, job.share)
     trainer = Trainer(env, config.ppo, folder, config.seed, job.parent)
     if trainer.iteration == 0:
@@ -155,7 +157,7 @@ def _card(
         "stage": job.stage,
         "cluster": job.cluster,
         "round": job.round,
-        "parent": str(job.parent) if job.parent else None,
+        "parent": _named(job.parent) if job.parent else None,
         "iterations": trainer.iteration,
         "frames": trainer.frames,
         "seconds": round(seconds, 1),
@@ -166,6 +168,11 @@ def _card(
         "trained": {"success": success_by_family(after), "gained": _new(after, before), "lost": _new(before, after)},
         "config": asdict(config),
     }
+
+
+def _named(parent: Path) -> str:
+    """The parent's folder, or that it is the policy that comes with the code, wherever that lies."""
+    return "pretrained" if parent == pretrained.FOLDER else str(parent)
 
 
 def _outcome(before: pd.DataFrame, kept: pd.DataFrame) -> dict[str, Any]:

@@ -7,6 +7,8 @@ its, unchanged.
 import contextlib
 import io
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ import torch
 from rsl_rl.algorithms import PPO
 from rsl_rl.runners import OnPolicyRunner
 
+from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.curve import CurveWriter
@@ -79,20 +82,25 @@ class Trainer:
         config: the algorithm.
         folder: for the checkpoint and the curve; a checkpoint found there is continued.
         seed: of the network and of the actions' noise.
-        parent: folder of a policy to start from, if any.
+        parent: folder of a policy to start from, if any; a child has its parent's layers, whatever `config` says.
     """
 
     def __init__(
         self, env: TrackingEnv, config: PpoConfig, folder: Path, seed: int = 0, parent: Path | None = None
     ) -> None:
+        origin = None if parent is None else load_policy(parent)
+        if origin is not None:
+            config = replace(config, hidden=origin.shape.hidden)
         self.env, self.config, self.folder = env, config, Path(folder)
         torch.manual_seed(seed)
+        if torch.device(env.device).type == "cuda":
+            torch.set_float32_matmul_precision("high")
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
-            self._runner = OnPolicyRunner(env, runner_config(config), log_dir=None, device="cpu")
+            self._runner = OnPolicyRunner(env, runner_config(config), log_dir=None, device=env.device)
         self.algorithm: BoundedPpo = self._runner.alg
         self.iteration, self._seconds = 0, 0.0
-        if parent is not None:
-            self._start_from(load_policy(parent))
+        if origin is not None:
+            self._start_from(origin, str(parent))
         self._resume()
 
     @property
@@ -100,14 +108,14 @@ class Trainer:
         """Control steps seen so far, of all worlds."""
         return self.iteration * self.config.steps * self.env.num_envs
 
-    def train(self, what: str = "policy") -> None:
-        """Train up to the configured iterations; a line of `curve.csv` each."""
+    def train(self, what: str = "policy", enough: Callable[[], bool] = lambda: False) -> None:
+        """Train up to the configured iterations, or until it is `enough`; a line of `curve.csv` each."""
         config, per_iteration = self.config, self.config.steps * self.env.num_envs
         curve = CurveWriter(self.folder / CURVE, self.iteration)
         self.algorithm.train_mode()
         total = config.iterations * per_iteration
         with progress(total, f"train {what}", "frames", start=self.frames) as bar:
-            while self.iteration < config.iterations:
+            while self.iteration < config.iterations and not enough():
                 began = time.monotonic()
                 scalars = self._iterate()
                 self._seconds += time.monotonic() - began
@@ -133,7 +141,7 @@ class Trainer:
         )
         actor = new_actor(shape)
         actor.load_state_dict(self.algorithm.actor.state_dict())
-        critic = {name: tensor.clone() for name, tensor in self.algorithm.critic.state_dict().items()}
+        critic = {name: tensor.cpu().clone() for name, tensor in self.algorithm.critic.state_dict().items()}
         return Policy(actor, critic, shape)
 
     def save_checkpoint(self) -> None:
@@ -145,7 +153,7 @@ class Trainer:
             "iteration": self.iteration,
             "seconds": self._seconds,
             "env": self.env.state_dict(),
-            "random": torch.get_rng_state(),
+            "random": _random_state(),
         }
         save_tensors(self.folder / CHECKPOINT, content)
 
@@ -159,9 +167,13 @@ class Trainer:
         self.algorithm.learning_rate = content["learning_rate"]
         self.iteration, self._seconds = content["iteration"], content["seconds"]
         self.env.load_state_dict(content["env"])
-        torch.set_rng_state(content["random"])
+        _set_random_state(content["random"])
 
-    def _start_from(self, parent: Policy) -> None:
+    def _start_from(self, parent: Policy, name: str) -> None:
+        here = tuple(self.env.library.ahead)
+        if tuple(parent.shape.ahead) != here:
+            wanted = f"a policy that looks ahead {list(here)} s, as `env.ahead` says"
+            raise BadInput(name, wanted, f"one that looks ahead {list(parent.shape.ahead)} s")
         self.algorithm.actor.load_state_dict(parent.actor.state_dict())
         self.algorithm.critic.load_state_dict(parent.critic_state)
 
@@ -178,9 +190,22 @@ class Trainer:
                 algorithm.process_env_step(observations, rewards, dones, extras)
             algorithm.compute_returns(observations)
             std = float(algorithm.actor.output_std.mean())
+        env.engine.check()
         losses = algorithm.update()
         scalars = env.statistics.take() | {f"loss_{name}": float(value) for name, value in losses.items()}
         scalars |= {"learning_rate": algorithm.learning_rate, "action_std": std, "threshold": env.threshold}
         if not np.isfinite(scalars["loss_value"]):
             raise FloatingPointError(f"the critic's loss is no number at iteration {self.iteration}")
         return scalars
+
+
+def _random_state() -> dict[str, torch.Tensor]:
+    """The state of torch's own generators."""
+    state = {"cpu": torch.get_rng_state()}
+    return state | {"cuda": torch.cuda.get_rng_state()} if torch.cuda.is_available() else state
+
+
+def _set_random_state(state: dict[str, torch.Tensor]) -> None:
+    torch.set_rng_state(state["cpu"])
+    if "cuda" in state and torch.cuda.is_available():
+        torch.cuda.set_rng_state(state["cuda"])

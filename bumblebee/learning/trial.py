@@ -9,7 +9,8 @@ import torch
 from torch import Tensor
 
 from bumblebee.motion.clip import Clip
-from bumblebee.sim.mujoco_cpu import Hooks, MujocoCpu
+from bumblebee.sim.effect_hooks import RuntimeHooks
+from bumblebee.sim.engines import make_engine
 from bumblebee.tracking.env import ActionAdapter, action_scale, start_state
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.noise import noise_levels
@@ -36,7 +37,7 @@ class World:
     """What the policy is tried on: a model with foot sensors, and what is no part of the model."""
 
     model: mujoco.MjModel
-    hooks: Hooks | None = None
+    hooks: RuntimeHooks | None = None
     action_adapter: ActionAdapter | None = None
     threads: int = 2
 
@@ -73,13 +74,14 @@ def _try_some(
     n = len(clips)
     generator = torch.Generator().manual_seed(trials.seed)
     library = MotionLibrary(clips, ahead)
-    engine = MujocoCpu(world.model, n, threads=min(world.threads, n), hooks=world.hooks)
+    engine = make_engine("mujoco", world.model, n, min(world.threads, n), world.hooks)
     ids, scale, dt = torch.arange(n), action_scale(), engine.control_dt
     levels = trials.noise * noise_levels(layout(library.num_joints, len(library.ahead)))
     limit = torch.tensor([success_threshold(clip.family) for clip in clips])
     first = library.frames(ids, torch.zeros(n))
     qpos, qvel = start_state(first, trials.noise, generator)
     engine.reset(ids, qpos, qvel, first.hold_pos)
+    engine.settle()
     action = torch.zeros(n, library.num_joints)
     alive = torch.ones(n, dtype=torch.bool)
     survived, key_sum, joint_sum = torch.zeros(n), torch.zeros(n), torch.zeros(n)

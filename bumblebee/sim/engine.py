@@ -1,11 +1,16 @@
 """The simulator as the rest of the code sees it: many robots, stepped together at the control rate.
 
-Everything is float32 torch, batch first; the order of joints is `joint_names()`, of key bodies `KEY_BODIES`.
+Everything is float32 torch on the engine's device, batch first; the order of joints is `joint_names()`, of key bodies
+`KEY_BODIES`.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
+import mujoco
+import numpy as np
+import torch
 from torch import Tensor
 
 
@@ -38,15 +43,32 @@ class RobotState:
 class Engine(Protocol):
     """B independent robots on a floor; `num_worlds` of them, stepped by `control_dt` seconds a call."""
 
+    model: mujoco.MjModel
     num_worlds: int
     control_dt: float
+    device: torch.device
+    by_mask: bool
+    """Whether `reset` is fastest with a mask: work of a fixed size, without a look at the values."""
 
-    def reset(self, ids: Tensor, qpos: Tensor, qvel: Tensor, targets: Tensor) -> None:
-        """Put the robots `ids` (n,) at qpos (n, 7 + J), qvel (n, 6 + J), as if `targets` (n, J) had long been held.
+    def set_fields(self, fields: Mapping[str, np.ndarray]) -> None:
+        """Give each world its own values of some fields of the model: name -> (B, ...) as in `MjModel`.
 
-        qpos is root position, orientation wxyz, joints; qvel is root velocity in the world, angular velocity in the
-        base frame, joints (MuJoCo's convention).
+        Constants that follow from masses and inertias are computed anew.
         """
+
+    def reset(self, rows: Tensor, qpos: Tensor, qvel: Tensor, targets: Tensor) -> None:
+        """Put some robots at qpos (n, 7 + J), qvel (n, 6 + J), as if `targets` (n, J) had long been held.
+
+        `rows` are their indices (n,) in ascending order, or a mask (B,) bool; then the values are (B, ...) and only
+        the chosen rows count. Call `settle` before the next `state`. qpos is root position, orientation wxyz, joints;
+        qvel is root velocity in the world, angular velocity in the base frame, joints (MuJoCo's convention).
+        """
+
+    def settle(self) -> None:
+        """Make the bodies' places of the robots that were reset current."""
+
+    def check(self) -> None:
+        """Raise `BadInput` if the engine had to drop contacts or constraints; may wait for the device."""
 
     def step(self, targets: Tensor) -> None:
         """Hold the joint targets (B, J) [rad] for one control period."""
@@ -68,3 +90,9 @@ class Engine(Protocol):
 
     def unstable(self) -> Tensor:
         """Worlds (B,) bool whose state stopped being a number in the last step; they must be reset."""
+
+    def state_dict(self) -> dict[str, Any]:
+        """All that the next step depends on, to go on later from here."""
+
+    def load_state_dict(self, saved: dict[str, Any]) -> None:
+        """Go on from what `state_dict` gave."""

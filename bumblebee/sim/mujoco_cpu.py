@@ -5,6 +5,7 @@ bodies current, are not computed again by the next one.
 """
 
 import copy
+from collections.abc import Mapping
 from typing import Protocol
 
 import mujoco
@@ -18,6 +19,7 @@ from bumblebee.robot.facts import FEET, KEY_BODIES
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.sim.sensors import sensor_name
+from bumblebee.sim.world_fields import MASSES
 
 _POS, _VEL = int(mujoco.mjtStage.mjSTAGE_POS), int(mujoco.mjtStage.mjSTAGE_VEL)
 # MuJoCo resets a world by itself when its state blows up, and counts it in these warnings.
@@ -44,6 +46,8 @@ class MujocoCpu:
         hooks: effects outside the model, see `bumblebee.sim.effects.runtime_hooks`.
     """
 
+    by_mask = False
+
     def __init__(
         self,
         model: mujoco.MjModel,
@@ -53,11 +57,8 @@ class MujocoCpu:
         hooks: Hooks | None = None,
     ) -> None:
         self.model, self.num_worlds, self.control_dt = model, num_worlds, 1.0 / control_hz
-        steps = self.control_dt / model.opt.timestep
-        if abs(steps - round(steps)) > 1e-6:
-            came = f"{1 / model.opt.timestep:g} Hz"
-            raise BadInput("physics rate", f"a multiple of the control rate {control_hz:g} Hz", came)
-        self.substeps = round(steps)
+        self.device = torch.device("cpu")
+        self.substeps = substeps_of(model, control_hz)
         self.batch = Batch(model, num_worlds, threads, persistent=True)
         self._offset: np.ndarray | None = None
         if hooks is not None and np.any(hooks.encoder_offset):
@@ -66,16 +67,28 @@ class MujocoCpu:
             self._believed_xpos = self._believed.bind("xpos")
         self._keys = [model.body(name).id for name in KEY_BODIES]
         self._feet = [model.body(name).id for name in FEET]
-        self._force = _foot_sensor_columns(model)
+        self._force = foot_sensor_columns(model)
         self._xpos, self._xquat = self.batch.bind("xpos"), self.batch.bind("xquat")
         self._actuator_force, self._sensordata = self.batch.bind("actuator_force"), self.batch.bind("sensordata")
-        self._history, self._held = _history_template(model)
+        self._history, self._held = history_template(model)
         self._warnings = np.zeros(num_worlds, dtype=np.int64)
         self._unstable = torch.zeros(num_worlds, dtype=torch.bool)
         self.batch.reset(keyframe=0 if model.nkey else -1, stage=_VEL)
 
-    def reset(self, ids: Tensor, qpos: Tensor, qvel: Tensor, targets: Tensor) -> None:
-        """See `Engine.reset`; `ids` ascending."""
+    def set_fields(self, fields: Mapping[str, np.ndarray]) -> None:
+        """See `Engine.set_fields`."""
+        for name, values in fields.items():
+            self.batch.expand(name)[:] = values
+        if MASSES & set(fields):
+            self.batch.set_const()
+
+    def reset(self, rows: Tensor, qpos: Tensor, qvel: Tensor, targets: Tensor) -> None:
+        """See `Engine.reset`; makes the bodies' places current at once, of the chosen worlds only."""
+        if rows.dtype == torch.bool:
+            ids = rows.nonzero()[:, 0]
+            qpos, qvel, targets = qpos[ids], qvel[ids], targets[ids]
+        else:
+            ids = rows
         if len(ids) == 0:
             return
         i, held = ids.numpy(), targets.numpy()
@@ -94,6 +107,12 @@ class MujocoCpu:
             batch.history[i] = filled
         batch.forward(ids=i, stage=_VEL)
         self._unstable[ids] = False
+
+    def settle(self) -> None:
+        """See `Engine.settle`: nothing is left to do."""
+
+    def check(self) -> None:
+        """See `Engine.check`: MuJoCo's buffers grow."""
 
     def step(self, targets: Tensor) -> None:
         """See `Engine.step`."""
@@ -160,6 +179,19 @@ class MujocoCpu:
         self.batch.forward(stage=_VEL)
 
 
+def substeps_of(model: mujoco.MjModel, control_hz: float) -> int:
+    """Physics steps in a control period.
+
+    Raises:
+        BadInput: if that is no whole number.
+    """
+    steps = 1.0 / control_hz / model.opt.timestep
+    if abs(steps - round(steps)) > 1e-6:
+        came = f"{1 / model.opt.timestep:g} Hz"
+        raise BadInput("physics rate", f"a multiple of the control rate {control_hz:g} Hz", came)
+    return round(steps)
+
+
 def _float(values: np.ndarray) -> Tensor:
     return torch.from_numpy(values.astype(np.float32))
 
@@ -172,7 +204,8 @@ def _kinematics_only(model: mujoco.MjModel) -> mujoco.MjModel:
     return ghost
 
 
-def _foot_sensor_columns(model: mujoco.MjModel) -> list[int]:
+def foot_sensor_columns(model: mujoco.MjModel) -> list[int]:
+    """Columns of the sensor data that hold the feet's forces, x y z, left then right."""
     names = {model.sensor(i).name for i in range(model.nsensor)}
     if missing := [sensor_name(foot) for foot in FEET if sensor_name(foot) not in names]:
         raise BadInput("model", "contact sensors under the feet", f"no {missing[0]}", "Load it with sim.load_model.")
@@ -180,7 +213,7 @@ def _foot_sensor_columns(model: mujoco.MjModel) -> list[int]:
     return [a + k for a in first for k in range(3)]
 
 
-def _history_template(model: mujoco.MjModel) -> tuple[np.ndarray, list[tuple[slice, list[int]]]]:
+def history_template(model: mujoco.MjModel) -> tuple[np.ndarray, list[tuple[slice, list[int]]]]:
     """The delay buffers of a fresh world, and for each delayed actuator the columns that hold its past commands."""
     template = mujoco.MjData(model).history.copy()
     held = []

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from bumblebee.sim.engines import Name
+from bumblebee.sim.warp_limits import Buffers
 from bumblebee.tracking.library import AHEAD
 
 
@@ -44,6 +46,10 @@ class Randomisation:
 class EnvConfig:
     """The environment that policies learn in."""
 
+    engine: Name = "mujoco"
+    """`mujoco` on CPU threads, or `mujoco_warp` on an NVIDIA GPU (the extra `gpu`), which wants thousands of worlds."""
+    buffers: Buffers = field(default_factory=Buffers)
+    """Room for contacts on a GPU."""
     num_worlds: int = 512
     """Copies of the robot."""
     threads: int = 2

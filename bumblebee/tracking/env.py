@@ -5,6 +5,7 @@ computable on the robot) and "critic" (exact, with forces and the time left in t
 """
 
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 import torch
@@ -14,8 +15,8 @@ from torch import Tensor
 
 from bumblebee.robot.facts import joints
 from bumblebee.robot.model import gains
-from bumblebee.sim.engine import RobotState
-from bumblebee.sim.mujoco_cpu import MujocoCpu
+from bumblebee.sim.cuda_graph import Captured
+from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.sim.rotations import from_rotation_vector, multiply
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
@@ -23,6 +24,7 @@ from bumblebee.tracking.noise import noise_levels
 from bumblebee.tracking.observations import joint_targets, layout, observe
 from bumblebee.tracking.randomisation import draw_push, randomise_worlds
 from bumblebee.tracking.rewards import Limits, Reward, Step
+from bumblebee.tracking.rows import Rows
 from bumblebee.tracking.sampler import ClipSampler
 from bumblebee.tracking.statistics import Statistics
 from bumblebee.tracking.terminations import fallen, key_distance, threshold_at
@@ -40,8 +42,11 @@ def action_scale() -> Tensor:
 class TrackingEnv(VecEnv):
     """Follow the clips of `library` with `engine`'s robots.
 
+    What a step leaves for the next lies in tensors that stay where they are and are written in place, so that on a GPU
+    the work around the physics is recorded once and replayed without the host.
+
     Args:
-        library: the reference motions.
+        library: the reference motions, on the engine's device.
         engine: the robots; its worlds are randomised here.
         config: the task.
         seed: of every draw in here.
@@ -52,7 +57,7 @@ class TrackingEnv(VecEnv):
     def __init__(
         self,
         library: MotionLibrary,
-        engine: MujocoCpu,
+        engine: Engine,
         config: EnvConfig,
         seed: int = 0,
         action_adapter: ActionAdapter | None = None,
@@ -60,27 +65,46 @@ class TrackingEnv(VecEnv):
     ) -> None:
         self.library, self.engine, self.action_adapter = library, engine, action_adapter
         self.cfg = config
-        self.num_envs, self.num_actions, self.device = engine.num_worlds, library.num_joints, "cpu"
+        device = engine.device
+        self.num_envs, self.num_actions, self.device = engine.num_worlds, library.num_joints, str(device)
         self.dt = engine.control_dt
         self.max_episode_length = round(config.episode_seconds / self.dt)
-        self.episode_length_buf = torch.zeros(self.num_envs, dtype=torch.long)
-        self.scale = action_scale()
+        self.scale = action_scale().to(device)
         self.reward = Reward(config.reward, self.dt)
-        self.limits = Limits.of_robot(config.reward.soft_limit)
+        self.limits = Limits.of_robot(config.reward.soft_limit, device)
         self.sampler = ClipSampler(
             library.length, config.sampler_floor, config.sampler_memory, config.start_share, clip_share
         )
-        self.statistics = Statistics()
-        self.progress = 0.0
-        self._noise = config.observation_noise * noise_levels(layout(self.num_actions, len(library.ahead)))
-        self._generator = torch.Generator().manual_seed(seed)
+        self.statistics = Statistics(device)
+        self._noise = config.observation_noise * noise_levels(layout(self.num_actions, len(library.ahead))).to(device)
+        self._generator = torch.Generator(device).manual_seed(seed)
         randomise_worlds(engine, config.randomisation, seed)
+        self._threshold = torch.zeros((), device=device)
+        self.progress = 0.0
         n, j = self.num_envs, self.num_actions
-        self._clip = torch.zeros(n, dtype=torch.long)
-        self._frame = torch.zeros(n, dtype=torch.long)
-        self._action, self._action_before = torch.zeros(n, j), torch.zeros(n, j)
-        self._restart(torch.arange(n))
-        self._look()
+        self.episode_length_buf = torch.zeros(n, dtype=torch.long, device=device)
+        self._clip, self._frame = torch.zeros_like(self.episode_length_buf), torch.zeros_like(self.episode_length_buf)
+        self._command = torch.zeros(n, j, device=device)
+        self._action, self._action_before = torch.zeros_like(self._command), torch.zeros_like(self._command)
+        self._rewards = torch.zeros(n, device=device)
+        self._dones = torch.zeros(n, dtype=torch.bool, device=device)
+        self._time_outs = torch.zeros_like(self._dones)
+        self._restart(torch.ones_like(self._dones))
+        engine.settle()
+        self._state, self._ref = engine.state(), self._coming()
+        self._exact, self._noisy, self._privileged = self._observe(self._state, self._ref)
+        self._judge_recorded = Captured(self._judge, device, [self._generator])
+        self._look_recorded = Captured(self._look, device, [self._generator])
+
+    @property
+    def progress(self) -> float:
+        """Share of the training that is done, 0 to 1: the curriculum follows it."""
+        return self._progress
+
+    @progress.setter
+    def progress(self, value: float) -> None:
+        self._progress = value
+        self._threshold.fill_(self.threshold)
 
     @property
     def threshold(self) -> float:
@@ -94,104 +118,126 @@ class TrackingEnv(VecEnv):
         return self._clip
 
     def get_observations(self) -> TensorDict:
-        """Groups "policy" (B, D) and "critic" (B, D + extras)."""
-        return self._observations
+        """Groups "policy" (B, D) and "critic" (B, D + extras); the tensors are the caller's to keep."""
+        groups = {"policy": self._noisy.clone(), "critic": self._privileged.clone()}
+        return TensorDict(groups, batch_size=[self.num_envs])
 
     def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
         """One control period: observations, rewards (B,), dones (B,) and `extras["time_outs"]` (B,)."""
         motor = actions if self.action_adapter is None else self.action_adapter(self._state, self._exact, actions)
-        speed_before = self._state.joint_vel
+        self._command.copy_(actions)
         self.engine.step(joint_targets(self._ref, motor, self.scale))
-        self._frame += 1
-        self.episode_length_buf += 1
-        state = self.engine.state()
-        outcome = Step(
-            state=state,
-            ref=self._ref,
-            torque=self.engine.torque(),
-            joint_acc=(state.joint_vel - speed_before) / self.dt,
-            actions=(actions, self._action, self._action_before),
-            foot_force_w=self.engine.foot_force_w(),
-            foot_quat_w=self.engine.foot_quat_w(),
-            limits=self.limits,
-        )
-        rewards = self.reward(outcome)
-        distance = key_distance(state, self._ref)
-        unstable = self.engine.unstable()
-        lost = fallen(state, self._ref) | (distance > self.threshold) | unstable
-        # A world that blew up holds no meaningful numbers: it neither earns nor is averaged.
-        rewards = torch.where(unstable, torch.zeros_like(rewards), rewards)
-        ended = self._frame >= self.library.length[self._clip] - 1
-        time_outs = (ended | (self.episode_length_buf >= self.max_episode_length)) & ~lost
-        dones = lost | time_outs
-        self._action_before, self._action = self._action, actions.clone()
-        self.statistics.add(outcome, rewards, dones, lost, unstable, self.episode_length_buf)
-        self._begin_next(dones, lost)
-        return self._observations, rewards, dones, {"time_outs": time_outs.float()}
+        self._judge_recorded()
+        self.engine.settle()
+        self._look_recorded()
+        extras = {"time_outs": self._time_outs.float()}
+        return self.get_observations(), self._rewards.clone(), self._dones.clone(), extras
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that training needs to go on from here exactly."""
         return {
             "engine": self.engine.state_dict(),
-            "clip": self._clip.clone(),
-            "frame": self._frame.clone(),
-            "actions": (self._action.clone(), self._action_before.clone()),
-            "episode_length": self.episode_length_buf.clone(),
-            "failure": self.sampler.failure.clone(),
+            **{name: tensor.clone() for name, tensor in self._kept().items()},
             "progress": self.progress,
             "generator": self._generator.get_state(),
-            "observations": self._observations.to_dict(),
         }
 
     def load_state_dict(self, saved: dict[str, Any]) -> None:
         """Go on from what `state_dict` gave."""
         self.engine.load_state_dict(saved["engine"])
-        self._clip, self._frame = saved["clip"], saved["frame"]
-        self._action, self._action_before = saved["actions"]
-        self.episode_length_buf = saved["episode_length"]
-        self.sampler.failure = saved["failure"]
         self.progress = saved["progress"]
-        self._look()
-        self._generator.set_state(saved["generator"])
-        self._observations = TensorDict(saved["observations"], batch_size=[self.num_envs])
+        for name, tensor in self._kept().items():
+            tensor.copy_(saved[name])
+        _copy(self.engine.state(), self._state)
+        _copy(self._coming(), self._ref)
+        self._generator.set_state(saved["generator"].cpu())
 
-    def _begin_next(self, dones: Tensor, lost: Tensor) -> None:
-        """Restart what has ended, push, and look again."""
-        over = dones.nonzero()[:, 0]
-        self.sampler.update(self._clip[over], lost[over])
-        self._restart(over)
+    def _kept(self) -> dict[str, Tensor]:
+        """What a step leaves for the next, beside state and reference, which follow from it."""
+        names = ("clip", "frame", "action", "action_before", "exact", "noisy", "privileged")
+        kept = {name: getattr(self, f"_{name}") for name in names}
+        return kept | {"episode_length": self.episode_length_buf, "failure": self.sampler.failure}
+
+    def _judge(self) -> None:
+        """What the step earned, who has failed or come to an end, and new starts for these."""
+        state = self.engine.state()
+        self._frame += 1
+        self.episode_length_buf += 1
+        outcome = Step(
+            state=state,
+            ref=self._ref,
+            torque=self.engine.torque(),
+            joint_acc=(state.joint_vel - self._state.joint_vel) / self.dt,
+            actions=(self._command, self._action, self._action_before),
+            foot_force_w=self.engine.foot_force_w(),
+            foot_quat_w=self.engine.foot_quat_w(),
+            limits=self.limits,
+        )
+        unstable = self.engine.unstable()
+        # A world that blew up holds no meaningful numbers: it neither earns nor is averaged.
+        self._rewards.copy_(self.reward(outcome).masked_fill(unstable, 0.0))
+        lost = fallen(state, self._ref) | (key_distance(state, self._ref) > self._threshold) | unstable
+        ended = self._frame >= self.library.length[self._clip] - 1
+        self._time_outs.copy_((ended | (self.episode_length_buf >= self.max_episode_length)) & ~lost)
+        self._dones.copy_(lost | self._time_outs)
+        self._action_before.copy_(self._action)
+        self._action.copy_(self._command)
+        self.statistics.add(outcome, self._rewards, self._dones, lost, unstable, self.episode_length_buf)
+        over = Rows(self._dones, self.engine.by_mask)
+        self.sampler.update(over.of(self._clip), over.of(lost), over.of(self._dones))
+        self._restart(self._dones)
         push = draw_push(self.cfg.randomisation, self.num_envs, self.dt, self._generator)
         if push is not None:
             self.engine.push(push)
-        self._look()
 
-    def _restart(self, ids: Tensor) -> None:
-        n, g = len(ids), self._generator
-        if n == 0:
+    def _restart(self, over: Tensor) -> None:
+        """Put the robots `over` (B,) bool at new starts."""
+        rows, g = Rows(over, self.engine.by_mask), self._generator
+        if len(rows) == 0:
             return
-        self._clip[ids], self._frame[ids] = self.sampler.draw(n, g)
-        ref = self.library.frames(self._clip[ids], self._frame[ids] * self.dt)
+        clip, frame = self.sampler.draw(len(rows), g)
+        ref = self.library.frames(clip, frame * self.dt)
         qpos, qvel = start_state(ref, self.cfg.reset_noise, g)
-        self.engine.reset(ids, qpos, qvel, ref.hold_pos)
-        self._action[ids] = 0.0
-        self._action_before[ids] = 0.0
-        self.episode_length_buf[ids] = 0
+        self.engine.reset(rows.chosen, qpos, qvel, ref.hold_pos)
+        rows.put(self._clip, clip)
+        rows.put(self._frame, frame)
+        for tensor in (self._action, self._action_before, self.episode_length_buf):
+            rows.put(tensor, 0)
 
     def _look(self) -> None:
         """The state, the reference of the coming step, and the observations of both."""
-        self._state = self.engine.state()
-        self._ref = self.library.frames(self._clip, (self._frame + 1) * self.dt)
-        self._exact = observe(self._state, self._ref, self._action)
-        noise = self._noise * (2 * torch.rand(self._exact.shape, generator=self._generator) - 1)
+        _copy(self.engine.state(), self._state)
+        _copy(self._coming(), self._ref)
+        into = (self._exact, self._noisy, self._privileged)
+        for old, new in zip(into, self._observe(self._state, self._ref), strict=True):
+            old.copy_(new)
+
+    def _coming(self) -> ReferenceFrame:
+        """The reference at the end of the coming control period."""
+        return self.library.frames(self._clip, (self._frame + 1) * self.dt)
+
+    def _observe(self, state: RobotState, ref: ReferenceFrame) -> tuple[Tensor, Tensor, Tensor]:
+        """The observation (B, D) as it is, as the policy sees it, and as the critic does (B, D + extras)."""
+        exact = observe(state, ref, self._action)
+        draws = torch.rand(exact.shape, generator=self._generator, device=exact.device)
         left = (self.library.length[self._clip] - self._frame).float() * self.dt
+        # What the sensors of a robot that was put anew say belongs to the time before.
+        fresh = (self.episode_length_buf == 0)[:, None]
         extras = (
-            self.engine.foot_force_w().flatten(1) / 300.0,
-            self.engine.torque() / self.limits.torque,
+            (self.engine.foot_force_w().flatten(1) / 300.0).masked_fill(fresh, 0.0),
+            (self.engine.torque() / self.limits.torque).masked_fill(fresh, 0.0),
             left[:, None].clamp(max=2.0),
-            torch.full((self.num_envs, 1), self.threshold),
+            self._threshold.expand(self.num_envs, 1),
         )
-        groups = {"policy": self._exact + noise, "critic": torch.cat((self._exact, *extras), dim=-1)}
-        self._observations = TensorDict(groups, batch_size=[self.num_envs])
+        return exact, exact + self._noise * (2 * draws - 1), torch.cat((exact, *extras), dim=-1)
+
+
+def _copy(source: RobotState | ReferenceFrame, into: RobotState | ReferenceFrame) -> None:
+    """Write every tensor of `source` into the tensor of the same name."""
+    for item in fields(source):
+        value = getattr(source, item.name)
+        if value is not None:
+            getattr(into, item.name).copy_(value)
 
 
 def start_state(ref: ReferenceFrame, noise: float, generator: torch.Generator) -> tuple[Tensor, Tensor]:
@@ -199,7 +245,7 @@ def start_state(ref: ReferenceFrame, noise: float, generator: torch.Generator) -
     n, j = ref.joint_pos.shape
 
     def uniform(columns: int, size: float) -> Tensor:
-        return noise * size * (2 * torch.rand(n, columns, generator=generator) - 1)
+        return noise * size * (2 * torch.rand(n, columns, generator=generator, device=generator.device) - 1)
 
     shift = uniform(3, 0.02)
     shift[:, 2] = 0.0  # never into the floor

@@ -13,7 +13,6 @@ from bumblebee.sim.rotations import conjugate, matrix, multiply, rotate_inverse
 from bumblebee.tracking.library import ReferenceFrame
 
 _PELVIS = KEY_BODIES.index("pelvis")
-_OTHERS = [i for i in range(len(KEY_BODIES)) if i != _PELVIS]
 
 
 def layout(joints: int = 23, ahead: int = 0) -> list[tuple[str, int]]:
@@ -63,7 +62,7 @@ def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tens
         state.joint_pos,
         state.joint_vel,
         last_action,
-        keys_b[:, _OTHERS].flatten(1),
+        torch.cat((keys_b[:, :_PELVIS], keys_b[:, _PELVIS + 1 :]), dim=1).flatten(1),
         error_b.flatten(1),
         _six(multiply(inverse, ref.root_quat_w)),
         rotate_inverse(quat, ref.root_lin_vel_w),

@@ -27,13 +27,13 @@ class Limits:
     speed: Tensor
 
     @classmethod
-    def of_robot(cls, soft: float = 1.0) -> "Limits":
+    def of_robot(cls, soft: float = 1.0, device: torch.device | str = "cpu") -> "Limits":
         """The G1's, with torque, speed and half range times `soft`."""
         table = joints()
-        low, high = (torch.tensor([j.range[i] for j in table]) for i in (0, 1))
+        low, high = (torch.tensor([j.range[i] for j in table], device=device) for i in (0, 1))
         middle, half = (low + high) / 2, (high - low) / 2 * soft
-        torque = torch.tensor([float(j.effort_limit) for j in table]) * soft
-        speed = torch.tensor([float(j.velocity_limit) for j in table]) * soft
+        torque = torch.tensor([float(j.effort_limit) for j in table], device=device) * soft
+        speed = torch.tensor([float(j.velocity_limit) for j in table], device=device) * soft
         return cls(torque, middle - half, middle + half, speed)
 
 
@@ -134,7 +134,7 @@ def dof_velocity(step: Step) -> Tensor:
 
 def alive(step: Step) -> Tensor:
     """Not in the table: 1 for each step that does not end the episode."""
-    return torch.ones(len(step.torque))
+    return torch.ones_like(step.torque[:, 0])
 
 
 PENALTIES: dict[str, Callable[[Step], Tensor]] = {

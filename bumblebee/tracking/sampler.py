@@ -25,9 +25,10 @@ class ClipSampler:
         start_share: float = 0.2,
         share: Tensor | None = None,
     ) -> None:
-        self.length, self.floor, self.memory, self.start_share = length, floor, memory, start_share
-        self.share = torch.ones(len(length)) if share is None else share
-        self.failure = torch.ones(len(length))
+        self.floor, self.memory, self.start_share = floor, memory, start_share
+        self.length = length
+        self.share = torch.ones_like(length, dtype=torch.float32) if share is None else share.to(length.device)
+        self.failure = torch.ones_like(self.share)
 
     def probabilities(self) -> Tensor:
         """Chance of each clip, (N,)."""
@@ -36,18 +37,23 @@ class ClipSampler:
 
     def draw(self, n: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """Clips (n,) and frames (n,) to start from."""
-        clip = torch.multinomial(self.probabilities(), n, replacement=True, generator=generator)
+        device = self.length.device
+        # The first clip whose share of the line from 0 to 1 ends beyond the number drawn.
+        ends = torch.cumsum(self.probabilities(), 0)
+        place = torch.rand(n, generator=generator, device=device) * ends[-1]
+        clip = torch.searchsorted(ends, place, right=True).clamp(max=len(ends) - 1)
         room = (self.length[clip] - _LAST_START).clamp(min=1)
-        frame = (torch.rand(n, generator=generator) * room).long()
-        from_start = torch.rand(n, generator=generator) < self.start_share
+        frame = (torch.rand(n, generator=generator, device=device) * room).long()
+        from_start = torch.rand(n, generator=generator, device=device) < self.start_share
         return clip, torch.where(from_start, torch.zeros_like(frame), frame)
 
-    def update(self, clip: Tensor, failed: Tensor) -> None:
-        """Count ended episodes: clips (n,) and whether each failed (n,) bool."""
+    def update(self, clip: Tensor, failed: Tensor, ended: Tensor | None = None) -> None:
+        """Count ended episodes: clips (n,), whether each failed (n,) bool and, if not all did, ended (n,) bool."""
         if len(clip) == 0:
             return
+        counted = torch.ones_like(clip, dtype=torch.float32) if ended is None else ended.float()
         zeros = torch.zeros_like(self.failure)
-        count = zeros.index_add(0, clip, torch.ones(len(clip)))
-        fails = zeros.index_add(0, clip, failed.float())
+        count = zeros.index_add(0, clip, counted)
+        fails = zeros.index_add(0, clip, failed.float() * counted)
         keep = self.memory**count
-        self.failure = keep * self.failure + (1 - keep) * fails / count.clamp(min=1)
+        self.failure.copy_(keep * self.failure + (1 - keep) * fails / count.clamp(min=1))

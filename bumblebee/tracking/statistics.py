@@ -5,44 +5,40 @@ from torch import Tensor
 
 from bumblebee.tracking.rewards import Step, body_position, dof_position, root_velocity
 
+_MEANS = ("reward", "key_error", "joint_error", "velocity_error")
+
 
 class Statistics:
-    """Means over steps, and over the episodes that ended."""
+    """Means over steps, and over the episodes that ended; summed on the device, and read by `take` alone.
 
-    def __init__(self) -> None:
-        self._clear()
+    Args:
+        device: where the steps' tensors are.
+    """
 
-    def _clear(self) -> None:
-        self._sums: dict[str, float] = {}
-        self._steps = 0
-        self._ended = 0
-        self._lost = 0
-        self._unstable = 0
-        self._length = 0.0
+    def __init__(self, device: torch.device | str = "cpu") -> None:
+        # The means, steps, episodes ended, lost, unstable, and their lengths.
+        self._sums = torch.zeros(len(_MEANS) + 5, dtype=torch.float64, device=device)
 
     def add(self, step: Step, rewards: Tensor, dones: Tensor, lost: Tensor, unstable: Tensor, length: Tensor) -> None:
-        """Count one control step of all worlds."""
-        means = {
-            "reward": rewards.mean(),
-            "key_error": torch.nan_to_num(body_position(step)).mean(),
-            "joint_error": torch.nan_to_num(dof_position(step)).mean(),
-            "velocity_error": torch.nan_to_num(root_velocity(step)).mean(),
-        }
-        for name, value in means.items():
-            self._sums[name] = self._sums.get(name, 0.0) + float(value)
-        self._steps += 1
-        ended = int(dones.sum())
-        self._ended += ended
-        self._lost += int(lost.sum())
-        self._unstable += int(unstable.sum())
-        self._length += float(length[dones].sum())
+        """Count one control step of all worlds; those that blew up have no errors that mean anything."""
+        errors = (body_position(step), dof_position(step), root_velocity(step))
+        counted = (
+            rewards.mean(),
+            *(error.masked_fill(unstable, 0.0).mean() for error in errors),
+            torch.ones_like(rewards[0]),
+            dones.sum(),
+            lost.sum(),
+            unstable.sum(),
+            (length * dones).sum(),
+        )
+        self._sums += torch.stack([value.double() for value in counted])
 
     def take(self) -> dict[str, float]:
         """The means since the last call: reward a step, episode length [steps], success, errors [m, rad, m/s]."""
-        steps, ended = max(self._steps, 1), self._ended
-        taken = {name: total / steps for name, total in self._sums.items()}
-        taken["episode_length"] = self._length / ended if ended else float("nan")
-        taken["success"] = 1 - self._lost / ended if ended else float("nan")
-        taken["unstable"] = float(self._unstable)
-        self._clear()
+        *means, steps, ended, lost, unstable, length = self._sums.tolist()
+        self._sums.zero_()
+        taken = {name: total / max(steps, 1.0) for name, total in zip(_MEANS, means, strict=True)}
+        taken["episode_length"] = length / ended if ended else float("nan")
+        taken["success"] = 1 - lost / ended if ended else float("nan")
+        taken["unstable"] = unstable
         return taken

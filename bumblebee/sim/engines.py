@@ -1,0 +1,34 @@
+"""The engines by name."""
+
+from typing import Literal
+
+import mujoco
+
+from bumblebee.sim.effect_engine import EffectsCpu, needs_effects
+from bumblebee.sim.effect_hooks import RuntimeHooks
+from bumblebee.sim.engine import Engine
+from bumblebee.sim.mujoco_cpu import MujocoCpu
+from bumblebee.sim.warp_limits import Buffers
+
+Name = Literal["mujoco", "mujoco_warp"]
+
+
+def make_engine(
+    name: Name,
+    model: mujoco.MjModel,
+    num_worlds: int,
+    threads: int = 2,
+    hooks: RuntimeHooks | None = None,
+    buffers: Buffers | None = None,
+) -> Engine:
+    """An engine with `num_worlds` copies of `model`: MuJoCo on `threads` CPU threads, or MuJoCo Warp on a GPU.
+
+    Raises:
+        BadInput: for a model or a machine that the engine cannot use.
+    """
+    if name == "mujoco":
+        kind = EffectsCpu if needs_effects(model, hooks) else MujocoCpu
+        return kind(model, num_worlds, threads=threads, hooks=hooks)
+    from bumblebee.sim.mujoco_warp import MujocoWarp
+
+    return MujocoWarp(model, num_worlds, hooks=hooks, buffers=buffers)

@@ -1,0 +1,114 @@
+"""What stops MuJoCo Warp: missing packages, device or memory, and buffers that are too small; a clear line for each."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+import torch
+
+from bumblebee.errors import BadInput
+from bumblebee.sim.effect_engine import needs_effects
+from bumblebee.sim.effect_hooks import RuntimeHooks
+
+_SHARE = 0.9  # of the free memory that the worlds may fill
+_SAMPLE = 64  # worlds from which the memory a world is measured
+
+
+@dataclass(frozen=True)
+class Buffers:
+    """Room for contacts; Warp drops what does not fit, and `MujocoWarp.check` says so."""
+
+    contacts: int = 32
+    """Contacts a world, on average over all worlds."""
+    constraints: int = 192
+    """Rows of constraints in any one world: 4 a contact, 1 a joint at its limit or with dry friction."""
+
+
+def warp_modules(device: str) -> tuple[Any, Any]:
+    """The modules `warp` and `mujoco_warp`, checked to work on `device`.
+
+    Raises:
+        BadInput: if a package, the device or a driver that records conditional graphs is missing.
+    """
+    try:
+        import mujoco_warp
+        import warp
+    except ImportError as error:
+        came = f"no module {error.name!r}"
+        raise BadInput("engine mujoco_warp", "the packages of the extra `gpu`", came, _INSTALL) from None
+    warp.config.quiet = True
+    warp.init()
+    if torch.device(device).type == "cuda":
+        if not torch.cuda.is_available() or not warp.is_cuda_available():
+            blind = "torch" if not torch.cuda.is_available() else "warp"
+            do = "Use the engine `mujoco`, or install a CUDA build of torch and NVIDIA's driver."
+            raise BadInput("engine mujoco_warp", "an NVIDIA GPU", f"none that {blind} can use", do)
+        if not warp.is_conditional_graph_supported():
+            came = ".".join(map(str, warp.get_cuda_driver_version() or ("none",)))
+            raise BadInput("NVIDIA driver", "CUDA 12.4 or later, for graphs", f"CUDA {came}", "Update the driver.")
+    return warp, mujoco_warp
+
+
+_INSTALL = "Install them with `pip install 'bumblebee[gpu]'`."
+
+
+def refuse_hooks(model: mujoco.MjModel, hooks: RuntimeHooks | None) -> None:
+    """Effects that only the CPU engine can add: those written before each physics step, play, flexible shafts.
+
+    Raises:
+        BadInput: if there are any.
+    """
+    if needs_effects(model, hooks):
+        came, do = "others", "Train with the engine `mujoco`, or without them."
+        raise BadInput("effects.yaml", "effects that MJCF carries, and encoder offsets", came, do)
+
+
+def fitting(model: mujoco.MjModel, num_worlds: int, buffers: Buffers, device: str) -> Any:
+    """Warp's data of `num_worlds` worlds.
+
+    Raises:
+        BadInput: if they do not fit into the device's free memory; it names how many would.
+    """
+    import mujoco_warp
+
+    def make(n: int) -> Any:
+        return mujoco_warp.make_data(model, n, nconmax=buffers.contacts, njmax=buffers.constraints)
+
+    if torch.device(device).type == "cuda":
+        each = bytes_of(make(_SAMPLE)) / _SAMPLE
+        free = torch.cuda.mem_get_info(torch.device(device))[0] * _SHARE
+        if num_worlds * each > free:
+            came = f"{num_worlds} worlds of {each / 2**20:.2f} MiB, {num_worlds * each / 2**30:.1f} GiB"
+            wanted = f"worlds that fit into {free / 2**30:.1f} GiB"
+            raise BadInput("num_worlds", wanted, came, f"At most {int(free / each)} fit.")
+    return make(num_worlds)
+
+
+def bytes_of(data: Any) -> int:
+    """Memory of all arrays in Warp's data [B]."""
+    total = 0
+    for value in vars(data).values():
+        if hasattr(value, "capacity"):
+            total += int(value.capacity)
+        elif hasattr(value, "__dataclass_fields__"):
+            total += bytes_of(value)
+    return total
+
+
+def overflow_line(overflow: np.ndarray, buffers: Buffers) -> BadInput | None:
+    """The line for worlds (B,) whose overflow bits are set; None if nothing that matters was dropped."""
+    from mujoco_warp import OverflowType
+
+    rows = int(((overflow & int(OverflowType.NEFC)) != 0).sum())
+    pooled = int(OverflowType.BROADPHASE) | int(OverflowType.NARROWPHASE) | int(OverflowType.CONTACT_MATCH)
+    contacts = int(((overflow & pooled) != 0).sum())
+    if rows:
+        came = f"more in {rows} of {len(overflow)} worlds"
+        do = "Raise `env.buffers.constraints`."
+        return BadInput("constraints of a world", f"at most {buffers.constraints} rows", came, do)
+    if contacts:
+        came = f"more, dropped in {contacts} of {len(overflow)} worlds"
+        do = "Raise `env.buffers.contacts`."
+        return BadInput("contacts of a world", f"at most {buffers.contacts} on average", came, do)
+    return None
