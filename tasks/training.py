@@ -108,6 +108,8 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     trainer = Trainer(env, config.ppo, folder, config.seed, job.parent)
     if trainer.iteration == 0:
         _try(trainer.policy(), job, config).to_parquet(folder / BEFORE)
+    else:
+        print(f"{job.name}: goes on after iteration {trainer.iteration} of {config.ppo.iterations}", flush=True)
     before = pd.read_parquet(folder / BEFORE)
     trainer.train(job.name)
     after = _try(trainer.policy(), job, config)

@@ -7,6 +7,7 @@ so that both ways are taken and meet in the same files.
 import hashlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ import psutil
 import pytest
 import yaml
 
+from bumblebee.learning.ppo import CHECKPOINT
 from flows import demo, servers
 from flows import workspace as workspaces
 from flows.environment import environment
@@ -55,7 +57,7 @@ def call(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 def run_until_base_and_kill(folder: Path) -> tuple[str, list[str]]:
-    """Start the flow, kill it with -9 when base has begun to train; its output, and what of it still runs later."""
+    """Start the flow, kill it with -9 when base has saved a checkpoint; its output, and what of it still runs later."""
     log = folder / "killed.log"
     with log.open("w") as out:
         flow = subprocess.Popen(
@@ -66,8 +68,9 @@ def run_until_base_and_kill(folder: Path) -> tuple[str, list[str]]:
             stderr=subprocess.STDOUT,
         )
     end = time.monotonic() + LIMIT
-    while not list((folder / ".scratch").glob("base*")) and flow.poll() is None and time.monotonic() < end:
-        time.sleep(0.1)
+    checkpoint = folder / ".scratch" / "base-base" / CHECKPOINT
+    while not checkpoint.exists() and flow.poll() is None and time.monotonic() < end:
+        time.sleep(0.05)
     assert flow.poll() is None, log.read_text()
     below = [p for p in psutil.Process(flow.pid).children(recursive=True) if "server" not in p.cmdline()]
     below = [p for p in below if any(word.startswith(("tasks.", "flows.")) for word in p.cmdline())]
@@ -80,7 +83,9 @@ def run_until_base_and_kill(folder: Path) -> tuple[str, list[str]]:
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Loop:
-    folder = workspaces.create(tmp_path_factory.mktemp("e2e") / "smoke", "smoke", gate={"mode": "ask"})
+    # Base trains long enough for the kill to come before its end.
+    over = {"gate": {"mode": "ask"}, "base": {"ppo": {"iterations": 24}}}
+    folder = workspaces.create(tmp_path_factory.mktemp("e2e") / "smoke", "smoke", **over)
     killed, left = run_until_base_and_kill(folder)
     waiting = call(folder, "flows.demo", "--workspace", str(folder))
     stopped = call(folder, "dvc", "repro")
@@ -128,6 +133,7 @@ def test_a_second_run_does_nothing(loop: Loop):
 
 
 def test_a_training_that_was_killed_and_resumed_ends_in_the_same_policy(loop: Loop):
+    assert re.search(r"base: goes on after iteration [1-9]\d* of 24", loop.waiting.stderr), "it began anew"
     policy = loop.folder / "models" / "base" / "policy.onnx"
     resumed = hashlib.sha256(policy.read_bytes()).hexdigest()
     again = call(loop.folder, "dvc", "repro", "--force", "--single-item", "base")
