@@ -1,4 +1,4 @@
-"""Checks of time: order, duplicates, gaps, jitter, and a rate that is not `control_hz`."""
+"""Checks of time: order, duplicates, gaps, jitter, a clock that drifts, and a rate that is not `control_hz`."""
 
 import numpy as np
 
@@ -22,6 +22,7 @@ def check_time(view: View) -> None:
     _check_rate(view, period)
     _check_gaps(view, np.diff(view.rollout.time), period)
     _check_jitter(view, steps[steps < view.limits.gap_warn * period], period)
+    _check_drift(view, steps[steps < view.limits.gap_warn * period])
 
 
 def _check_rate(view: View, period: float) -> None:
@@ -56,3 +57,17 @@ def _check_jitter(view: View, steps: np.ndarray, period: float) -> None:
         came = f"a spread of {100 * spread:.0f} % of the period"
         expected = f"periods within {100 * view.limits.jitter_warn:.0f} %"
         view.add("time", None, "time-jitter", expected, came, fatal=spread > view.limits.jitter_fatal)
+
+
+def _check_drift(view: View, steps: np.ndarray) -> None:
+    """The period at the file's end against that at its beginning: a clock that runs ever slower or faster."""
+    part = len(steps) // 4
+    if part < 20:
+        return
+    first, last = float(np.mean(steps[:part])), float(np.mean(steps[-part:]))
+    doubt = 3.0 * float(steps.std()) * np.sqrt(2.0 / part)
+    change = last / first - 1
+    if abs(last - first) > doubt and abs(change) > view.limits.drift_warn:
+        came = f"{1e3 * first:.4g} ms in the first quarter, {1e3 * last:.4g} ms in the last ({100 * change:+.1f} %)"
+        fatal = abs(change) > view.limits.drift_fatal
+        view.add("time", len(steps) - part, "time-drift", "one period throughout", came, fatal=fatal)

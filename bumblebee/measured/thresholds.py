@@ -21,6 +21,10 @@ class Thresholds:
     """Relative error of the rate: a real arm's logger ran at 49.85 Hz for 50 Hz, 0.3 %."""
     rate_fatal: float = 0.1
     """Relative error of the rate from which the metadata are wrong rather than rounded."""
+    drift_warn: float = 0.01
+    """Change of the mean period from the first to the last quarter: crystals keep within 0.01 %."""
+    drift_fatal: float = 0.2
+    """Change from which velocities and delays of one file cannot both be right."""
     freeze_seconds: float = 0.4
     """An exactly constant reading for this long, at least 10 rows, is a dead channel if its command moves."""
     freeze_command: float = 0.15

@@ -10,6 +10,7 @@ import pytest
 from bumblebee.measured.checks import check_rollout
 from bumblebee.measured.finding import Finding
 from bumblebee.measured.rollout import Rollout
+from bumblebee.measured.usable import review
 from tests.measured.simulated import arm_model, arm_rollout, g1_model, g1_rollout
 
 Change = Callable[[Rollout], Rollout]
@@ -278,3 +279,21 @@ def test_a_robot_that_answers_late_or_weakly_is_no_bad_file(seed: int, ticks: in
         early[-ticks:] = early[-ticks - 1]
         late = replace(rollout, **{command: early}, joint_pos=rollout.joint_pos + 0.04)
         assert [finding.message for finding in findings(late)] == []
+
+
+@pytest.mark.parametrize(("drift", "fatal"), [(0.03, False), (0.5, True)])
+def test_a_clock_that_drifts_is_found(drift: float, fatal: bool) -> None:
+    rollout = arm_rollout(0, size=0.8)
+    slower = rollout.time + 0.5 * drift * (rollout.time - rollout.time[0]) ** 2 / rollout.duration
+    found = [f for f in findings(replace(rollout, time=slower)) if f.rule == "time-drift"]
+    assert [(f.column, f.fatal) for f in found] == [("time", fatal)]
+
+
+def test_a_review_names_file_column_row_and_rule() -> None:
+    rollout = arm_rollout(0, size=0.8)
+    place = rollout.joint_pos.copy()
+    place[7, 0] = np.inf
+    refused, _ = review(replace(rollout, joint_pos=place), model_of(rollout), "run7.parquet")
+    assert str(refused).startswith(f"run7.parquet: column joint_pos[{rollout.joints[0]}], row 7: rule finite")
+    accepted, warnings = review(rollout, model_of(rollout))
+    assert accepted is None and warnings == []

@@ -1,0 +1,150 @@
+"""The form of a missing torque: sparse regression over a dictionary of formulas, or a measured curve where none fits.
+
+Terms are added one by one (forward stepwise) while the best of them is significant over half-second blocks and the
+held-out windows agree. Of terms that explain nearly the same the simplest is taken. Where the formulas reach much less
+of the held-out structure than boosted trees do, a curve over the one quantity that says most stands in for them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bumblebee.diagnosis.dictionary import Entry, dictionary, torque_of
+from bumblebee.diagnosis.structure import clipped, gain_test
+from bumblebee.diagnosis.torque_residual import TorqueResidual
+from bumblebee.sim.effect_terms import read_term
+
+MOST_TERMS = 3
+_Z = 4.5  # of a term over blocks; a hundred terms are looked at
+_NEARLY = 0.95  # share of the best term's gain that a simpler one must reach
+_ENOUGH = 0.6  # share of the trees' held-out gain that counts as the form being found
+_KNOTS = 9
+
+
+@dataclass(frozen=True)
+class Form:
+    """What was found for one joint."""
+
+    joint: str
+    terms: dict[str, float]
+    """Term -> coefficient, first estimates [N m a unit of the term]; empty where nothing was found."""
+    share: float
+    """Share of the held-out residual's variance that the terms predict."""
+    kind: str
+    """"formula", "curve" or ""."""
+
+
+def find_form(train: TorqueResidual, held: TorqueResidual, joint: int, reachable: float) -> Form:
+    """The form of what is missing on a joint; `reachable` is the held-out share that boosted trees predict."""
+    y, target = clipped(train.missing[:, joint]), clipped(held.missing[:, joint])
+    formula = _stepwise(train, held, joint, y, target)
+    share = _share(formula, train, held, joint, target, y)
+    if formula and share >= _ENOUGH * reachable:
+        return Form(held.joints[joint], _coefficients(formula, train, joint, y), share, "formula")
+    curve = _curve(train, held, joint, y, target)
+    if curve and curve[1] > max(1.1 * share, 0.2 * reachable):
+        return Form(held.joints[joint], {curve[0]: 1.0}, curve[1], "curve")
+    if formula and share > 0:
+        return Form(held.joints[joint], _coefficients(formula, train, joint, y), share, "formula")
+    return Form(held.joints[joint], {}, 0.0, "")
+
+
+def _stepwise(
+    train: TorqueResidual, held: TorqueResidual, joint: int, y: np.ndarray, target: np.ndarray
+) -> list[Entry]:
+    entries = dictionary(train, joint)
+    x = np.stack([torque_of(e.term, train, joint) for e in entries])
+    chosen: list[int] = []
+    before = target.copy()
+    while len(chosen) < MOST_TERMS:
+        left = y - _fitted(x[chosen], y)
+        scores = _scores(x, x[chosen], left, train.block)
+        gains = np.where(np.abs(scores[:, 1]) > _Z, scores[:, 0], 0.0)
+        gains[chosen] = 0.0
+        if gains.max() <= 0:
+            break
+        near = np.flatnonzero(gains > _NEARLY * gains.max())
+        best = int(min(near, key=lambda k: (entries[k].cost, -gains[k])))
+        trial = [entries[k] for k in (*chosen, best)]
+        after = target - _predicted(trial, train, held, joint, y)
+        p, gain = gain_test(before, after, held.block)
+        if p > 0.01 or gain <= 0:
+            break
+        chosen.append(best)
+        before = after
+    return [entries[k] for k in chosen]
+
+
+def _scores(x: np.ndarray, given: np.ndarray, left: np.ndarray, block: np.ndarray) -> np.ndarray:
+    """Of every term given the chosen ones: fall of the squared sum, and z with variance over blocks; (E, 2)."""
+    if len(given):
+        basis, _ = np.linalg.qr(given.T)
+        x = x - (x @ basis) @ basis.T
+    power = (x**2).sum(axis=1)
+    scale = np.maximum(power, 1e-12 * max(power.max(), 1e-30))
+    along = x @ left
+    blocks = np.stack([np.bincount(block, row * left) for row in x])
+    spread = np.sqrt((blocks**2).sum(axis=1)) + 1e-30
+    return np.stack((along**2 / scale, along / spread), axis=1)
+
+
+def _fitted(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return np.linalg.lstsq(x.T, y, rcond=None)[0] @ x if len(x) else np.zeros_like(y)
+
+
+def _coefficients(entries: list[Entry], train: TorqueResidual, joint: int, y: np.ndarray) -> dict[str, float]:
+    x = np.stack([torque_of(e.term, train, joint) for e in entries])
+    values = np.linalg.lstsq(x.T, y, rcond=None)[0]
+    return {e.text: float(v) for e, v in zip(entries, values, strict=True)}
+
+
+def _predicted(
+    entries: list[Entry], train: TorqueResidual, held: TorqueResidual, joint: int, y: np.ndarray
+) -> np.ndarray:
+    values = _coefficients(entries, train, joint, y)
+    return np.sum([values[e.text] * torque_of(e.term, held, joint) for e in entries], axis=0)
+
+
+def _share(
+    entries: list[Entry],
+    train: TorqueResidual,
+    held: TorqueResidual,
+    joint: int,
+    target: np.ndarray,
+    y: np.ndarray,
+) -> float:
+    if not entries:
+        return 0.0
+    left = target - _predicted(entries, train, held, joint, y)
+    return float(1.0 - (left**2).mean() / max(((target - y.mean()) ** 2).mean(), 1e-30))
+
+
+def _curve(
+    train: TorqueResidual, held: TorqueResidual, joint: int, y: np.ndarray, target: np.ndarray
+) -> tuple[str, float] | None:
+    """The best curve over one quantity as a term of coefficient 1, and its held-out share; None if none holds."""
+    best: tuple[str, float] | None = None
+    names = ["q", "v", "u - q", "tau", "t"]
+    for name in train.joints:
+        if name != train.joints[joint]:
+            other = name if name.isidentifier() else repr(name)
+            names += [f"q[{other}]", f"v[{other}]"]
+    for name in names:
+        x = read_term(name)(train.values(joint))
+        knots = np.unique(np.quantile(x, np.linspace(0.02, 0.98, _KNOTS)))
+        if len(knots) < 3:
+            continue
+        heights = np.linalg.lstsq(_hats(x, knots), y, rcond=None)[0]
+        points = ", ".join(f"{k:.5g}, {h:.5g}" for k, h in zip(knots, heights, strict=True))
+        text = f"curve({name}, {points})"
+        left = target - read_term(text)(held.values(joint))
+        share = float(1.0 - (left**2).mean() / max(((target - y.mean()) ** 2).mean(), 1e-30))
+        p, _ = gain_test(target - y.mean(), left, held.block)
+        if p < 0.01 / len(names) and (best is None or share > best[1]):
+            best = text, share
+    return best
+
+
+def _hats(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Weights (N, K) of the knots in straight lines between them, constant beyond."""
+    return np.stack([np.interp(x, knots, row) for row in np.eye(len(knots))], axis=1)

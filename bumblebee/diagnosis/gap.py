@@ -1,0 +1,108 @@
+"""The gap report: where a model errs before anything is fitted, by horizon, joint, motion, and in torque."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates import still_joints
+from bumblebee.diagnosis.discover import missing_torques
+from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_whiteners, horizon_windows
+from bumblebee.diagnosis.example import examples
+from bumblebee.diagnosis.reported import reported_torque
+from bumblebee.diagnosis.session import Session
+from bumblebee.diagnosis.simulate import residuals
+from bumblebee.diagnosis.structure import JointStructure, joint_structure
+from bumblebee.diagnosis.torque_residual import TorqueResidual
+from bumblebee.diagnosis.variation import vary
+from bumblebee.diagnosis.windows import Windows
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """The report's numbers, and what its pictures are drawn from."""
+
+    document: dict[str, Any]
+    examples: list[dict[str, Any]]
+    torque: TorqueResidual | None
+
+
+def gap(session: Session, budget: int = 120, seed: int = 0) -> Gap:
+    """Compare the declared model of `session` with all its rollouts; nothing is fitted."""
+    ids, model = list(range(len(session.rollouts))), vary(session.plant, [])
+    windows = horizon_windows(session.plant, session.layout, session.rollouts, ids, budget)
+    common = (session.plant, session.layout, windows)
+    whiteners = horizon_whiteners(*common, model, session.sigma, session.steps[1], seed)
+    still = still_joints(session.plant, session.rollouts, session.sigma)
+    train, held = missing_torques(session, [], np.zeros(1))
+    found = []
+    if train is not None and held is not None:
+        found = [joint_structure(train, held, j) for j, n in enumerate(train.joints) if n not in still]
+    document = {
+        "schema": 1,
+        "rollouts": session.ids(ids),
+        "seconds": float(sum(r.time[-1] - r.time[0] for r in session.rollouts)),
+        "commands": "torques" if session.plant.torque_input else "position targets",
+        "error": error_block(*common, whiteners, model, session.steps[0], seed),
+        "floor": floor_block(*common, whiteners, model, session.sigma, session.steps[0], seed),
+        "missing_torque": _torques(found, train, held),
+        "reported_torque": reported_torque(session.plant, session.rollouts),
+        "motions": _by_motion(session, windows),
+        "unidentifiable": [
+            {"where": [name], "why": "the joint moves no more than its sensor's noise"} for name in still
+        ],
+        "notes": [note for note in session.notes if "held-out" not in note and "held out" not in note],
+        "set_aside": session.set_aside,
+        "noise": dict(zip(session.layout.labels(session.plant.joints), session.sigma.tolist(), strict=True)),
+    }
+    return Gap(document, examples(session), train)
+
+
+def _torques(
+    found: Sequence[JointStructure], train: TorqueResidual | None, held: TorqueResidual | None
+) -> dict[str, Any]:
+    """Joint -> mean and structured part of the torque that it lacks, and what that goes with; largest share first."""
+    if train is None or held is None:
+        return {}
+    out = {}
+    for s in sorted(found, key=lambda s: -(s.rms / s.typical if s.significant else 0.0)):
+        j = train.joints.index(s.joint)
+        lacks = np.concatenate((train.missing[:, j], held.missing[:, j]))
+        out[s.joint] = {
+            "mean": float(np.mean(lacks)),
+            "structured_rms": s.rms,
+            "drive_rms": s.typical,
+            "significant": s.significant,
+            "p": s.p,
+            "depends_on": list(s.depends_on),
+        }
+    return out
+
+
+def _by_motion(session: Session, windows: dict[str, Windows]) -> list[dict[str, Any]]:
+    """Joint error after 0.2 s by motion and cluster, worst first."""
+    name = "0.2" if "0.2" in windows else next(iter(windows), None)
+    if name is None:
+        return []
+    part = windows[name]
+    left = residuals(session.plant, session.layout, part, [vary(session.plant, [])], session.steps[0])[0, :, -1]
+    square = (left[:, session.layout.slices["joint_pos"]] ** 2).mean(axis=1)
+    groups: dict[tuple[str, str], list[float]] = {}
+    for i, value in zip(part.rollout, square, strict=True):
+        meta = session.rollouts[i].meta
+        key = str(meta.get("cluster") or ""), str(meta.get("motion") or session.rollouts[i].rollout_id)
+        groups.setdefault(key, []).append(float(value))
+    rows = [
+        {
+            "cluster": cluster,
+            "motion": motion,
+            "horizon": name,
+            "windows": len(values),
+            "joint_pos_rmse": float(np.sqrt(np.mean(good)))
+            if (good := [v for v in values if np.isfinite(v)])
+            else None,
+        }
+        for (cluster, motion), values in groups.items()
+    ]
+    return sorted(rows, key=lambda row: -(row["joint_pos_rmse"] or np.inf))
