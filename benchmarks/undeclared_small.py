@@ -51,18 +51,18 @@ def run(effects: dict[tuple[str, str], float], seed: int) -> tuple[int, int, lis
     document = diagnose(make_session(mujoco.MjSpec.from_string(XML), rollouts, "arm", "lottery"), SMALL).document
     hits, covered, errors = set(), 0, []
     for entry in document["effects"]:
-        names = [(entry["effect"], entry["where"][0]), *((e["effect"], e["where"][0]) for e in entry["equivalent"])]
+        names = [(e["effect"], "".join(e["where"])) for e in (entry, *entry["equivalent"])]
         key = next((k for k in effects if k in names), None)
         if key is None:
             continue
         hits.add(key)
         if key == names[0]:
-            (p,) = entry["parameters"].values()
+            p = next(iter(entry["parameters"].values()))
             # Relative to what was changed: a mass of 1.1 found as 1.09 is off by a tenth of its change.
             errors.append(abs(p["value"] - effects[key]) / abs(effects[key] - p["nominal"]))
             covered += p["ci95"][0] <= effects[key] <= p["ci95"][1]
     spurious = len(document["effects"]) - len(hits)
-    text = ", ".join(f"{e['effect']} {e['where'][0]}" for e in document["effects"]) or "nothing"
+    text = ", ".join(f"{e['effect']} {''.join(e['where'])}" for e in document["effects"]) or "nothing"
     truth = ", ".join(f"{k} {p} {v:.3g}" for (k, p), v in effects.items()) or "null"
     print(f"{truth} -> {text} [{time.monotonic() - began:.0f} s]", flush=True)
     return len(hits), spurious, errors, covered

@@ -45,10 +45,14 @@ def data(tmp_path: Path) -> Path:
 def test_replay_and_gap_end_well(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Both write the error block, by horizon."""
     assert run("replay", data / "model.xml", data / "set", "--out", data / "errors.json") == 0
-    assert run("gap", data / "model.xml", data / "set", "--out", data / "gap.json") == 0
-    assert "joint_pos_rmse" in capsys.readouterr().out
-    assert set(json.loads((data / "errors.json").read_text())) == {"0.02", "0.2", "1.0"}
-    assert json.loads((data / "gap.json").read_text()) == json.loads((data / "errors.json").read_text())
+    assert run("gap", data / "model.xml", data / "set", "--out", data / "gap") == 0
+    assert "joint position [mrad]" in capsys.readouterr().out
+    errors = json.loads((data / "errors.json").read_text())
+    assert set(errors) == {"0.02", "0.2", "1.0"}
+    assert json.loads((data / "gap" / "gap.json").read_text())["error"] == errors
+    page = (data / "gap" / "gap.html").read_text()
+    assert "<svg" in page and "http" not in page
+    assert run("gap", data / "model.xml", data / "set", "--out", data / "gap") == 2
 
 
 @pytest.mark.parametrize("command", ["diagnose", "replay"])
@@ -80,15 +84,34 @@ def test_hostile_effects_are_refused(data: Path, capsys: pytest.CaptureFixture[s
         assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_a_cell_that_is_not_a_number_names_file_column_and_row(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """NaN in a log ends the diagnosis before it begins."""
+def broken(data: Path, name: str) -> None:
+    """A rollout with a NaN in row 7."""
     q = np.zeros((60, 1))
     q[7] = np.nan
-    rollout = Rollout("c", ("j",), 50.0, np.arange(60) / 50, q, np.zeros((60, 1)), joint_target=np.zeros((60, 1)))
-    write_rollout(data / "set" / "rollouts" / "c.parquet", rollout)
+    rollout = Rollout(name, ("j",), 50.0, np.arange(60) / 50, q, np.zeros((60, 1)), joint_target=np.zeros((60, 1)))
+    place = data / "set" / "rollouts" / f"{name}.parquet"
+    place.unlink(missing_ok=True)
+    write_rollout(place, rollout)
+
+
+def test_a_cell_that_is_not_a_number_names_file_column_and_row(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Where no rollout is usable the diagnosis ends before it begins."""
+    for name in ("a", "b"):
+        broken(data, name)
     assert run("diagnose", data / "model.xml", data / "set", "--out", data / "out") == 2
     line = capsys.readouterr().err
-    assert "c: column joint_pos: row 7" in line
+    assert "a.parquet: column joint_pos[j], row 7: rule finite" in line and line.count("\n") == 1
+
+
+def test_one_bad_file_is_set_aside_with_its_reason(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A NaN and a file that is no Parquet: the others are diagnosed, both are named."""
+    broken(data, "c")
+    (data / "set" / "rollouts" / "d.parquet").write_text("not Parquet")
+    assert run("diagnose", data / "model.xml", data / "set", "--out", data / "out") == 0
+    aside = json.loads((data / "out" / "diagnosis.json").read_text())["set_aside"]
+    assert {entry["rollout"] for entry in aside} == {"c", "d"}
+    assert "row 7" in next(entry["reason"] for entry in aside if entry["rollout"] == "c")
+    assert "set aside" in capsys.readouterr().out
 
 
 def test_a_model_that_blows_up_is_unusable(data: Path, capsys: pytest.CaptureFixture[str]) -> None:

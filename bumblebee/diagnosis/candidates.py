@@ -1,49 +1,107 @@
 """The candidates: every effect of the catalogue on every place it can sit on, and the size of a first step."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.plant import Plant
-from bumblebee.diagnosis.variation import declared_value
+from bumblebee.diagnosis.variation import declared_values, touching
 from bumblebee.diagnosis.windows import command_inputs
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import CATALOGUE, Effect, single
+from bumblebee.sim.servo import servos_of
 
-# `kp` and `kd` are not searched: they are reported as what `motor_strength` and `viscous_friction` may also be.
-SEARCHED = (
-    "coulomb_friction",
-    "viscous_friction",
-    "armature",
-    "motor_strength",
-    "command_delay",
-    "encoder_offset",
-    "link_mass",
-)
+# Of these the fit moves the inverse: where the effect is absent the parameter is infinite.
+INVERSE = ("torque_speed_limit", "series_elasticity")
+# What no torque on the robot's joints can stand for: always simulated, never screened.
+SIMULATED = (
+    "encoder_offset", "imu_offset", "ground_friction", "ground_compliance", "backlash", "series_elasticity",
+    "torque_lag", "encoder_delay",
+)  # fmt: skip
+_STRUCTURAL = ("backlash", "series_elasticity")
+_SLOW = ("torque_lag", "encoder_delay")
+_FEW_JOINTS = 8
+_HARMONICS = (*range(1, 25), 28, 30, 32, 36, 40, 42, 48, 50, 56, 60, 64, 72, 80, 84, 96, 100, 120, 128, 144)
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect on one place."""
+    """One effect on one place, with its parameters as the fit moves them (P,)."""
 
     effect: str
     where: str
-    nominal: float
-    """Its parameter in the declared model."""
-    step: float
-    """A change that matters, in the parameter's unit; negative where the effect makes it smaller."""
+    """A joint, body or geom; "" for the whole robot."""
+    nominal: tuple[float, ...]
+    """Where the effect is absent."""
+    step: tuple[float, ...]
+    """Changes that matter, in the parameters' units; of the sign that the effect usually has."""
+    free: tuple[int, ...] = (0,)
+    """Parameters that the effect is tested in; of the others those with a step shape it, from `nominal + step` on."""
+    shape_scale: float = 0.0
+    """A change of its shape that matters; 0: the shape is not fitted."""
 
-    def at(self, value: float) -> Effect:
-        """The effect with its parameter at `value`, brought within its bounds."""
-        kind = CATALOGUE[self.effect]
-        return single(self.effect, self.where, float(np.clip(value, kind.lower, kind.upper)))
+    @property
+    def start(self) -> np.ndarray:
+        """Parameters (P,) of a first trial."""
+        return np.array(self.nominal) + np.array(self.step)
 
-    def clip(self, value: float) -> float:
-        """`value` within physical bounds."""
-        kind = CATALOGUE[self.effect]
-        return float(np.clip(value, kind.lower, kind.upper))
+    @property
+    def scales(self) -> np.ndarray:
+        """Changes (P,) of the parameters that matter, all positive; 0 for those that are not fitted."""
+        out = np.full(len(self.step), self.shape_scale) * (np.array(self.step) != 0)
+        out[list(self.free)] = np.abs(np.array(self.step)[list(self.free)])
+        return out
+
+    def at(self, values: Sequence[float] | np.ndarray) -> Effect:
+        """The effect with its parameters at `values` (P,), brought within bounds."""
+        values = self.clip(values)
+        if self.effect in INVERSE:
+            values = 1.0 / values
+        return single(self.effect, self.where, *values)
+
+    def clip(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
+        """`values` within physical bounds."""
+        kinds = CATALOGUE[self.effect].parameters
+        low, high = (np.array([getattr(p, side) for p in kinds]) for side in ("lower", "upper"))
+        if self.effect in INVERSE:
+            # An infinitely stiff shaft cannot be simulated: a fiftieth of the first step is as good as absent.
+            low, high = np.maximum(1.0 / high, 0.02 * np.abs(self.step)), 1.0 / low
+        return np.clip(np.asarray(values, dtype=float), low, high)
+
+    def moved(self, index: int, steps: float) -> np.ndarray:
+        """First-trial parameters with only the free one number `index` away from nominal, by so many steps."""
+        values = np.array(self.nominal)
+        shape = [i for i in range(len(values)) if i not in self.free]
+        values[shape] = self.start[shape]
+        values[self.free[index]] += steps * self.step[self.free[index]]
+        return values
+
+
+def shortlisted(c: Candidate, joints: int) -> bool:
+    """Whether a candidate costs too much to be simulated on every joint: only those worst explained are tried."""
+    return c.effect in _STRUCTURAL or (c.effect in _SLOW and bool(c.where) and joints > _FEW_JOINTS)
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """Typical sizes of the data, from which first steps follow; J joints."""
+
+    torque: np.ndarray
+    """(J,) RMS servo torque [N m]."""
+    peak: np.ndarray
+    """(J,) largest servo torque [N m]."""
+    speed: np.ndarray
+    """(J,) RMS speed [rad/s]."""
+    fastest: np.ndarray
+    """(J,) largest speed [rad/s]."""
+    travel: np.ndarray
+    """(J,) range of positions [rad]."""
+    inertia: np.ndarray
+    """(J,) diagonal of the joint-space inertia [kg m^2]."""
+    duration: float
+    """Longest rollout [s]."""
 
 
 def still_joints(plant: Plant, rollouts: Sequence[Rollout], sigma: np.ndarray) -> list[str]:
@@ -55,31 +113,118 @@ def still_joints(plant: Plant, rollouts: Sequence[Rollout], sigma: np.ndarray) -
     return [name for name, s in zip(plant.joints, still, strict=True) if s]
 
 
-def all_candidates(plant: Plant, rollouts: Sequence[Rollout], still: Sequence[str]) -> list[Candidate]:
-    """Every candidate on joints that move and on bodies that they carry."""
-    torque, speed = _typical_torque(plant, rollouts), _typical_speed(rollouts)
-    inertia = _inertia(plant)
-    found = []
+def all_candidates(
+    plant: Plant, rollouts: Sequence[Rollout], still: Sequence[str], model: mujoco.MjModel | None = None
+) -> list[Candidate]:
+    """Every candidate on joints that move, on bodies that they carry, on the ground and on the whole robot.
+
+    The first steps follow from the servos of `model`, the declared one if none is given.
+    """
+    scales = scales_of(plant, rollouts, model)
+    found: list[Candidate] = []
     for j, name in enumerate(plant.joints):
-        if name in still:
-            continue
-        steps = {
-            "coulomb_friction": 0.1 * torque[j],
-            "viscous_friction": 0.1 * torque[j] / speed[j],
-            "armature": 0.1 * inertia[j],
-            "motor_strength": -0.1,
-            "command_delay": 0.005,
-            "encoder_offset": 0.01,
-        }
-        for kind, step in steps.items():
-            if plant.actuator[j] < 0 and kind in ("motor_strength", "command_delay"):
-                continue
-            found.append(Candidate(kind, name, declared_value(plant, kind, name), step))
+        if name not in still:
+            found += [c for c in _on_joint(plant, scales, j, name)]
+    found += _on_whole(plant)
     total = plant.model.body_mass.sum()
     for body in _carried(plant, still):
-        mass = declared_value(plant, "link_mass", body)
-        found.append(Candidate("link_mass", body, mass, max(0.2 * mass, 0.01 * total)))
+        found += _on_body(plant, body, total)
+    if plant.floating:
+        base = plant.model.body(int(plant.model.jnt_bodyid[plant.model.dof_jntid[plant.base_dof]])).name
+        if base:
+            found.append(Candidate("imu_offset", base, (0.0, 0.0), (0.01, 0.01), (0, 1)))
+        for ground in _grounds(plant):
+            for kind, share in (("ground_friction", -0.3), ("ground_compliance", 0.5)):
+                value = declared_values(plant, kind, ground)[0]
+                if value > 0:
+                    found.append(Candidate(kind, ground, (value,), (share * value,)))
     return found
+
+
+def _on_joint(plant: Plant, s: Scales, j: int, name: str) -> Iterator[Candidate]:
+    def make(
+        kind: str,
+        *step: float,
+        free: tuple[int, ...] = (0,),
+        start: tuple[float, ...] | None = None,
+        shape: float = 0.0,
+    ) -> Candidate:
+        nominal = declared_values(plant, kind, name) if start is None else start
+        return Candidate(kind, name, tuple(0.0 if np.isinf(x) else x for x in nominal), step, free, shape)
+
+    tenth = 0.1 * s.torque[j]
+    yield make("coulomb_friction", tenth)
+    yield make("viscous_friction", tenth / s.speed[j])
+    for share in (0.3, 1.0):
+        speed = share * s.speed[j]
+        yield make("stribeck_friction", tenth, speed, start=(0.0, 0.0), shape=0.3 * speed)
+    yield make("asymmetric_friction", tenth)
+    yield make("armature", 0.1 * s.inertia[j])
+    yield make("joint_spring", tenth / max(s.travel[j], 0.05), tenth, free=(0, 1))
+    joint = plant.model.joint(name).id
+    for share in () if plant.model.jnt_stiffness[joint] else (0.03, 0.2):  # MJCF has one spring a joint
+        width = share * max(s.travel[j], 0.02)
+        yield make("hysteresis", tenth, width, start=(0.0, 0.0), shape=0.3 * width)
+    hinge = plant.model.jnt_type[plant.model.joint(name).id] == int(mujoco.mjtJoint.mjJNT_HINGE)
+    for n in _HARMONICS if hinge else ():
+        if n * s.travel[j] > np.pi:
+            sizes = (0.5 * tenth, 0.5 * tenth, float(n))
+            yield make("cogging", *sizes, free=(0, 1), start=(0.0, 0.0, 0.0), shape=0.3 / s.travel[j])
+    yield make("encoder_offset", 0.01)
+    if plant.actuator[j] < 0:
+        return
+    yield make("load_dependent_friction", 0.05)
+    yield make("command_delay", 0.005)
+    yield make("dropped_commands", 0.2)
+    if s.peak[j] > 0:
+        for share in (0.01, 0.05):
+            yield make("series_elasticity", share * max(s.travel[j], 0.02) / s.peak[j], start=(0.0,))
+        yield make("backlash", max(0.01 * s.travel[j], 0.002))
+    if not plant.scalable[j] or plant.torque_input:
+        if plant.torque_input and plant.scalable[j]:
+            yield make("motor_strength", -0.1)
+        return
+    for kind in ("motor_strength", "kp", "kd"):
+        yield make(kind, -0.1)
+    yield make("torque_lag", 0.005)
+    yield make("encoder_delay", 0.005)
+    yield make("strength_drift", 0.1 / max(s.duration, 1.0))
+    yield make("thermal_fade", 0.1 / max(s.duration, 1.0))
+    limit = declared_values(plant, "torque_limit", name)[0]
+    for share in (0.9, 0.6, 0.35):
+        if s.peak[j] > 0 and share * s.peak[j] < limit:
+            yield make("torque_limit", (share - 1.0) * s.peak[j], start=(min(limit, s.peak[j]),))
+    if np.isfinite(limit):
+        for factor in (0.6, 1.5, 4.0):
+            yield make("torque_speed_limit", 1.0 / (factor * s.fastest[j]), start=(0.0,))
+
+
+def _on_whole(plant: Plant) -> list[Candidate]:
+    found = [Candidate("ground_slope", "", (0.0, 0.0), (0.01, 0.01), (0, 1))]
+    driven = plant.actuator >= 0
+    if driven.sum() < 2:
+        return found
+    if np.ptp(plant.delay[plant.actuator[driven]]) == 0:
+        found.append(Candidate("command_delay", "", (float(plant.delay[plant.actuator[driven]][0]),), (0.005,)))
+    found.append(Candidate("dropped_commands", "", (0.0,), (0.2,)))
+    if not plant.torque_input and plant.scalable[driven].all():
+        found += [Candidate("torque_lag", "", (0.0,), (0.005,)), Candidate("encoder_delay", "", (0.0,), (0.005,))]
+    return found
+
+
+def _on_body(plant: Plant, body: str, total: float) -> list[Candidate]:
+    mass = declared_values(plant, "link_mass", body)[0]
+    index = plant.model.body(body).id
+    moments = plant.model.body_inertia[index]
+    size = float(np.sqrt(1.5 * moments.sum() / mass))  # of a ball of this inertia, twice
+    heavy = max(0.2 * mass, 0.01 * total)
+    weight = 9.81 * heavy
+    return [
+        Candidate("link_mass", body, (mass,), (heavy,)),
+        Candidate("link_com", body, declared_values(plant, "link_com", body), (max(0.1 * size, 0.01),) * 3, (0, 1, 2)),
+        Candidate("link_inertia", body, tuple(map(float, moments)), tuple(0.3 * moments + 1e-5), (0, 1, 2)),
+        Candidate("external_wrench", body, (0.0,) * 6, (*(weight,) * 3, 0.0, 0.0, 0.0), (0, 1, 2)),
+    ]
 
 
 def _carried(plant: Plant, still: Sequence[str]) -> list[str]:
@@ -98,24 +243,32 @@ def _carried(plant: Plant, still: Sequence[str]) -> list[str]:
     return names
 
 
-def _typical_torque(plant: Plant, rollouts: Sequence[Rollout]) -> np.ndarray:
-    """RMS torque of each joint's actuator by the declared model (J,), floored for joints that rest."""
-    squares = []
-    for rollout in rollouts:
-        command = command_inputs(plant, rollout)
-        a = np.maximum(plant.actuator, 0)
-        prm, gear = plant.model.actuator_biasprm[a], plant.model.actuator_gear[a, 0]
-        torque = plant.model.actuator_gainprm[a, 0] * command[:, a] + prm[:, 0]
-        torque = gear * (torque + gear * (prm[:, 1] * rollout.joint_pos + prm[:, 2] * rollout.joint_vel))
-        squares.append((torque**2).mean(axis=0))
-    rms = np.sqrt(np.mean(squares, axis=0))
-    return np.maximum(rms, 0.05 * rms.max() + 1e-9)
+def _grounds(plant: Plant) -> list[str]:
+    """Named geometries of the world that a moving body can touch."""
+    model = plant.model
+    fixed = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == 0]
+    return [model.geom(g).name for g in fixed if model.geom(g).name and touching(model, g)]
 
 
-def _typical_speed(rollouts: Sequence[Rollout]) -> np.ndarray:
-    """RMS speed of each joint (J,), floored."""
-    rms = np.sqrt(np.mean([(r.joint_vel**2).mean(axis=0) for r in rollouts], axis=0))
-    return np.maximum(rms, 0.1 * rms.max() + 1e-6)
+def scales_of(plant: Plant, rollouts: Sequence[Rollout], model: mujoco.MjModel | None = None) -> Scales:
+    """Typical sizes by `model`, or by the declared one; floored for joints that rest."""
+    servos = servos_of(model or plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
+    torques = [
+        servos.torque(r.joint_pos - plant.offset, r.joint_vel, servos.controls(command_inputs(plant, r)))
+        for r in rollouts
+    ]
+    rms = np.sqrt(np.mean([(t**2).mean(axis=0) for t in torques], axis=0))
+    torque = np.maximum(rms, 0.05 * rms.max() + 1e-9)
+    speeds = np.sqrt(np.mean([(r.joint_vel**2).mean(axis=0) for r in rollouts], axis=0))
+    return Scales(
+        torque=torque,
+        peak=np.max([np.quantile(np.abs(t), 0.995, axis=0) for t in torques], axis=0),
+        speed=np.maximum(speeds, 0.1 * speeds.max() + 1e-6),
+        fastest=np.max([np.quantile(np.abs(r.joint_vel), 0.995, axis=0) for r in rollouts], axis=0) + 1e-3,
+        travel=np.max([np.ptp(r.joint_pos, axis=0) for r in rollouts], axis=0),
+        inertia=_inertia(plant),
+        duration=float(max(r.time[-1] - r.time[0] for r in rollouts)),
+    )
 
 
 def _inertia(plant: Plant) -> np.ndarray:

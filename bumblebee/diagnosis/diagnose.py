@@ -6,20 +6,25 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import Candidate, all_candidates, still_joints
-from bumblebee.diagnosis.classes import detectable, equivalents
+from bumblebee.diagnosis.candidates import INVERSE, Candidate, all_candidates, scales_of, still_joints
+from bumblebee.diagnosis.classes import EXPERIMENTS, alike, detectable, label, rivals
+from bumblebee.diagnosis.discover import NOT_TESTED, discover, structure_table
 from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_whiteners, horizon_windows
-from bumblebee.diagnosis.fit import Fit, interval
+from bumblebee.diagnosis.fit import Fit
+from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.latency import latency_notes
 from bumblebee.diagnosis.nuisance import NAMES
-from bumblebee.diagnosis.problem import Problem, make_problem
+from bumblebee.diagnosis.problem import Problem, make_problem, without
+from bumblebee.diagnosis.quantised import entries, grids
+from bumblebee.diagnosis.refine import Refined, refine
 from bumblebee.diagnosis.search import Search, SearchConfig, search
 from bumblebee.diagnosis.session import Session
-from bumblebee.diagnosis.simulate import residuals
-from bumblebee.diagnosis.unexplained import unexplained
 from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.windows import choose_starts, cut
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import CATALOGUE, Effect
+
+_LONG = 1.0  # [s]
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,13 @@ class DiagnosisConfig:
     """Held-out windows that acceptance is decided on."""
     report_windows: int = 80
     """Windows for each horizon of the error block."""
+    max_long_windows: int = 20
+    """Windows of 1 s on which an accepted effect must not be worse."""
+    grow: bool = True
+    """Whether models of few degrees of freedom, which are cheap, get up to four times as many windows."""
     seed: int = 0
+    beyond: bool = True
+    """Whether to look for structure that no effect of the catalogue explains, and for its form."""
     search: SearchConfig = field(default_factory=SearchConfig)
     """How strict the search is."""
 
@@ -58,33 +69,73 @@ def diagnose(
     rng = np.random.default_rng(config.seed)
     still = still_joints(session.plant, session.rollouts, session.sigma)
     candidates = all_candidates(session.plant, session.rollouts, still)
-    say(f"{len(session.train)} rollouts to fit, {len(session.holdout)} held out, {len(candidates)} candidates")
-    problem = _problem(session, session.train, config.max_windows, config.horizon, rng)
-    holdout = (
-        _problem(session, session.holdout, config.max_holdout_windows, config.horizon, rng) if session.holdout else None
+    fitted = [i for i in session.train if i not in session.accept]
+    say(
+        f"{len(fitted)} rollouts to fit, {len(session.accept)} to accept by, {len(session.holdout)} held out, "
+        f"{len(candidates)} candidates"
     )
-    say(f"{len(problem.windows)} windows of {config.horizon:g} s; sensitivities of {len(candidates)} candidates")
-    found = search(problem, holdout, candidates, config.search, say)
-    say(f"{len(found.fit.chosen)} effects; error before and after")
+    # A small model costs little to simulate: more windows, up to four times as many.
+    more = float(np.clip(24 / session.plant.model.nv, 1.0, 4.0)) if config.grow else 1.0
+    problem = _problem(session, fitted, round(more * config.max_windows), config.horizon, rng)
+    holdout = _holdout(session, config, more, rng)
+    say(f"{len(problem.windows)} windows of {config.horizon:g} s")
+
+    def remake(effects: Sequence[Effect]) -> tuple[list[Candidate], np.ndarray]:
+        varied = vary(session.plant, effects)
+        model = varied.model if varied.plant is None else None
+        made = all_candidates(session.plant, session.rollouts, still, model)
+        return made, scales_of(session.plant, session.rollouts, model).torque
+
+    found = search(problem, holdout, remake, config.search, say)
+    last = refine(found.problem, found.fit, rng)
+    if last.fit.chosen:
+        holdout = holdout.relinearised(last.fit.effects)
+    say(f"{len(last.fit.chosen)} effects; error before and after")
     document = {"schema": 1, "train": session.ids(session.train), "holdout": session.ids(session.holdout)}
-    document["effects"] = _effects(problem, holdout, found, candidates)
-    judged = holdout or problem
-    document["unexplained"] = unexplained(judged, _on(judged, found.fit), session.plant.joints, _torques(judged))
-    document["error"] = _errors(session, found.fit.effects, config)
+    document["accept"] = session.ids(session.accept)
+    document["effects"] = _effects(found, last, holdout)
+    effects, document["unexplained"] = last.fit.effects, NOT_TESTED
+    if config.beyond:
+        say("what is left")
+        beyond = discover(session, last.problem, holdout.problem, effects, last.fit.nuisance)
+        effects, document["unexplained"] = [*effects, *beyond.effects], beyond.block
+        document["effects"] += beyond.entries
+        document["structure"] = structure_table(beyond.left)
+    rounded, steps = entries(grids(session.rollouts), holdout.problem or last.problem, last.fit)
+    effects, document["effects"] = [*effects, *steps], document["effects"] + rounded
+    document["error"] = _errors(session, effects, config)
     document["unidentifiable"] = [
         {"where": [name], "why": "the joint moves no more than its sensor's noise"} for name in still
     ]
-    document["smallest_detectable"] = detectable(candidates, found)
-    document["notes"] = session.notes
+    document["smallest_detectable"] = detectable(found)
+    document["set_aside"] = session.set_aside
+    document["notes"] = session.notes + latency_notes(document["effects"], _driven(session))
     document["settings"] = {
         "timestep": session.steps[0],
         "windows": len(problem.windows),
         "horizon": config.horizon,
         "seed": config.seed,
-        "numerics": dict(zip(NAMES, found.fit.nuisance.tolist(), strict=False)),
+        "candidates": len(candidates),
+        "bound": found.bound,
+        "numerics": dict(zip(NAMES, last.fit.nuisance.tolist(), strict=False)),
         "noise": dict(zip(session.layout.labels(session.plant.joints), session.sigma.tolist(), strict=True)),
     }
-    return Diagnosis(document, found.fit.effects, session, found, problem)
+    return Diagnosis(document, effects, session, found, last.problem)
+
+
+def _driven(session: Session) -> list[str]:
+    """Names of the joints with an actuator."""
+    return [name for name, a in zip(session.plant.joints, session.plant.actuator, strict=True) if a >= 0]
+
+
+def _holdout(session: Session, config: DiagnosisConfig, more: float, rng: np.random.Generator) -> Holdout:
+    """Windows of 0.2 s and of 1 s of the rollouts that acceptance is decided on."""
+    if not session.accept:
+        return Holdout()
+    problem = _problem(session, session.accept, round(more * config.max_holdout_windows), config.horizon, rng)
+    starts = choose_starts(session.rollouts, session.accept, _LONG, config.max_long_windows)
+    long = cut(session.plant, session.layout, session.rollouts, starts, outputs=1) if starts else None
+    return Holdout(problem, long)
 
 
 def _problem(session: Session, ids: Sequence[int], budget: int, horizon: float, rng: np.random.Generator) -> Problem:
@@ -96,64 +147,52 @@ def _problem(session: Session, ids: Sequence[int], budget: int, horizon: float, 
     return make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
 
 
-def _on(problem: Problem, fit: Fit) -> Fit:
-    """The fit's values looked at on other windows."""
-    residual = problem.residual([fit.effects])[0]
-    return Fit(fit.chosen, fit.values, fit.nuisance, residual, np.empty((0, *residual.shape)), 0.0)
-
-
-def _torques(problem: Problem) -> np.ndarray:
-    """Servo torque of the declared model at each window's start, (W, J)."""
-    plant, windows = problem.plant, problem.windows
-    a = np.maximum(plant.actuator, 0)
-    last = np.array([np.searchsorted(t, 1e-9) - 1 for t in windows.command_time])
-    command = windows.command[np.arange(len(windows)), np.maximum(last, 0)][:, a]
-    prm, gain = plant.model.actuator_biasprm[a], plant.model.actuator_gainprm[a, 0]
-    return gain * command + prm[:, 0] + prm[:, 1] * windows.qpos[:, plant.qpos] + prm[:, 2] * windows.qvel[:, plant.dof]
-
-
-def _effects(
-    problem: Problem, holdout: Problem | None, found: Search, candidates: Sequence[Candidate]
-) -> list[dict[str, Any]]:
+def _effects(found: Search, last: Refined, holdout: Holdout) -> list[dict[str, Any]]:
     """The contract's list, most explaining first."""
-    if not found.fit.chosen:
+    if not last.fit.chosen:
         return []
-    _, half = interval(problem, found.fit, found.weights)
-    shares = _explained(holdout or problem, found.fit)
-    classes = equivalents(problem, candidates, found)
+    shares = _explained(holdout.problem or last.problem, last.fit)
+    classes = rivals(found, holdout, alike(found.columns, found))
     steps = {s.candidate: s for s in found.steps}
     entries = []
-    for i, candidate in enumerate(found.fit.chosen):
-        kind, value = CATALOGUE[candidate.effect], float(found.fit.values[i])
-        low, high = max(kind.lower, value - half[i]), min(kind.upper, value + half[i])
-        entries.append(
-            {
-                "effect": candidate.effect,
-                "where": [candidate.where],
-                "parameters": {
-                    kind.parameter: {
-                        "value": value,
-                        "ci95": [float(low), float(high)],
-                        "nominal": candidate.nominal,
-                        "unit": kind.unit,
-                    }
-                },
-                "equivalent": classes[i],
-                "explains": float(shares[i]),
-                "evidence": {
-                    "p": float(steps[candidate].p),
-                    "test": f"Wald test in the joint fit, variance clustered by window, z = {steps[candidate].z:.1f}, "
-                    f"Bonferroni over {len(candidates)} candidates",
-                },
-                "native": candidate.effect != "encoder_offset",
-            }
-        )
+    for i, (c, part) in enumerate(zip(last.fit.chosen, last.fit.slices, strict=True)):
+        others = classes[i]
+        entry = label(c) | {
+            "parameters": _parameters(c, last.fit.values[part], last.half[part]),
+            "equivalent": [label(o) for o in others],
+            "explains": float(shares[i]),
+            "evidence": {
+                "p": float(steps[c].p),
+                "test": f"Wald test in the joint fit, variance clustered by window, z = {steps[c].z:.1f}, bound "
+                f"{found.bound:.1f} for {found.count} candidates",
+            },
+            "native": CATALOGUE[c.effect].native,
+        }
+        if others:
+            kinds = dict.fromkeys([c.effect, *(o.effect for o in others)])
+            entry["separate_by"] = [EXPERIMENTS[k] for k in kinds if k in EXPERIMENTS][:3]
+        entries.append(entry)
     return sorted(entries, key=lambda e: -e["explains"])
+
+
+def _parameters(c: Candidate, values: np.ndarray, half: np.ndarray) -> dict[str, Any]:
+    """The contract's parameters of one effect, in its own units."""
+    out = {}
+    for p, value, nominal, wide in zip(CATALOGUE[c.effect].parameters, values, c.nominal, half, strict=True):
+        ends = [float(value - wide), float(value + wide)]
+        if c.effect in INVERSE:
+            # The fit moves the inverse; an interval that reaches zero has no upper end.
+            low, high = 1.0 / max(ends[1], 1e-12), None if ends[0] <= 0 else 1.0 / ends[0]
+            out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": p.unit}
+        else:
+            ends = [max(p.lower, ends[0]), min(p.upper, ends[1])]
+            out[p.name] = {"value": float(value), "ci95": ends, "nominal": float(nominal), "unit": p.unit}
+    return out
 
 
 def _explained(problem: Problem, fit: Fit) -> np.ndarray:
     """Share of the excess of chi-square over its best value that comes back when an effect alone is taken out."""
-    sets = [fit.effects] + [[e for k, e in enumerate(fit.effects) if k != i] for i in range(len(fit.chosen))] + [[]]
+    sets = [fit.effects] + [without(fit.effects, c) for c in fit.chosen] + [[]]
     left = problem.residual(sets) - np.tensordot(fit.nuisance, problem.nuisance, axes=1)
     power = (left**2).mean(axis=(1, 2))
     excess = max(power[-1] - power[0], 1e-12)
@@ -161,7 +200,6 @@ def _explained(problem: Problem, fit: Fit) -> np.ndarray:
 
 
 def _errors(session: Session, effects: Sequence[Effect], config: DiagnosisConfig) -> dict[str, Any]:
-    """before, after and floor on held-out rollouts (on all of them where there is only one)."""
     ids = session.holdout or session.train
     windows = horizon_windows(session.plant, session.layout, session.rollouts, ids, config.report_windows)
     before, after = vary(session.plant, []), vary(session.plant, effects)
@@ -172,29 +210,4 @@ def _errors(session: Session, effects: Sequence[Effect], config: DiagnosisConfig
         "before": error_block(*common, whiteners, before, fine, config.seed),
         "after": error_block(*common, whiteners, after, fine, config.seed),
         "floor": floor_block(*common, whiteners, after, session.sigma, fine, config.seed),
-    }
-
-
-def example_window(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Measured, before and after in the joint and second where the effects matter most."""
-    session = diagnosis.session
-    ids = session.holdout or session.train
-    starts = choose_starts(session.rollouts, ids, 0.6, 60) or choose_starts(session.rollouts, ids, 0.2, 60)
-    windows = cut(session.plant, session.layout, session.rollouts, starts, outputs=120)
-    models = [vary(session.plant, []), vary(session.plant, diagnosis.effects)]
-    before, after = residuals(session.plant, session.layout, windows, models, session.steps[0])
-    part = session.layout.slices["joint_pos"]
-    scale = session.sigma[part]
-    power = [np.nan_to_num((r[..., part] ** 2).mean(axis=1), nan=0.0) / scale**2 for r in (before, after)]
-    gain = power[0] - power[1] if diagnosis.effects else power[0]
-    w, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    measured = windows.measured[w, :, part][..., j]
-    return {
-        "rollout": session.rollouts[windows.rollout[w]].rollout_id,
-        "start": float(session.rollouts[windows.rollout[w]].time[windows.start[w]]),
-        "joint": session.plant.joints[j],
-        "time": windows.out_time[w].tolist(),
-        "measured": measured.tolist(),
-        "before": (measured - before[w, :, part][..., j]).tolist(),
-        "after": (measured - after[w, :, part][..., j]).tolist(),
     }

@@ -1,13 +1,13 @@
 """Joint fit of the chosen effects: Gauss-Newton on whitened residuals, with the nuisances as further parameters."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.problem import Problem, rough
 from bumblebee.sim.effects import Effect
 
 _ENOUGH_ROLLOUTS = 6  # fewer say little about how much rollouts differ
@@ -15,27 +15,51 @@ _ENOUGH_ROLLOUTS = 6  # fewer say little about how much rollouts differ
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Chosen candidates with their values."""
+    """Chosen candidates with their parameters, those of all of them one after the other (P,)."""
 
     chosen: tuple[Candidate, ...]
     values: np.ndarray
-    """(k,) parameters."""
+    """(P,)."""
     nuisance: np.ndarray
-    """(3,) coefficients."""
+    """(4 or 5,) coefficients."""
     residual: np.ndarray
     """(W, M) whitened, nuisances not yet taken out."""
     columns: np.ndarray
-    """(k, W, M) change of the prediction per candidate's step, at the fit."""
+    """(P', W, M) change of the prediction for a change of `scales`, at the fit; P' parameters that are fitted."""
     cost: float
 
     @property
     def effects(self) -> list[Effect]:
         """The effects at their fitted values."""
-        return [c.at(v) for c, v in zip(self.chosen, self.values, strict=True)]
+        return effects_at(self.chosen, self.values)
+
+    @property
+    def slices(self) -> list[slice]:
+        """Where each candidate's parameters stand in `values`."""
+        ends = np.cumsum([len(c.nominal) for c in self.chosen]).tolist()
+        return [slice(end - len(c.nominal), end) for c, end in zip(self.chosen, ends, strict=True)]
+
+    @property
+    def scales(self) -> np.ndarray:
+        """(P,) changes that matter; 0 for a parameter that is not fitted."""
+        return np.concatenate([c.scales for c in self.chosen]) if self.chosen else np.empty(0)
+
+    def of(self, candidate: Candidate) -> np.ndarray:
+        """Parameters of one of the chosen."""
+        return self.values[self.slices[self.chosen.index(candidate)]]
 
     def clean(self, problem: Problem) -> np.ndarray:
         """Residual without nuisances (W, M)."""
         return self.residual - np.tensordot(self.nuisance, problem.nuisance, axes=1)
+
+
+def effects_at(chosen: Sequence[Candidate], values: np.ndarray) -> list[Effect]:
+    """The chosen effects with their parameters at `values` (P,)."""
+    out, at = [], 0
+    for c in chosen:
+        out.append(c.at(values[at : at + len(c.nominal)]))
+        at += len(c.nominal)
+    return out
 
 
 def project(problem: Problem, columns: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -46,12 +70,13 @@ def project(problem: Problem, columns: np.ndarray, weights: np.ndarray) -> tuple
     count = len(problem.nuisance)
     normal[np.arange(count), np.arange(count)] += 1.0  # the nuisances' prior
     normal[np.arange(count, len(normal)), np.arange(count, len(normal))] *= 1 + 1e-9
-    return basis, np.linalg.inv(normal)
+    return basis, np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
 
 
 def solve(basis: np.ndarray, inverse: np.ndarray, residual: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Weighted least-squares coefficients (B,) of `residual` (W, M)."""
-    return inverse @ np.einsum("bwm,wm->b", basis, residual * weights[:, None])
+    flat = basis.reshape(len(basis), -1)
+    return inverse @ (flat @ (residual * weights[:, None]).ravel())
 
 
 def cost_of(problem: Problem, residual: np.ndarray, weights: np.ndarray) -> tuple[float, np.ndarray]:
@@ -62,86 +87,115 @@ def cost_of(problem: Problem, residual: np.ndarray, weights: np.ndarray) -> tupl
     return float((weights[:, None] * left**2).sum() + nuisance @ nuisance), nuisance
 
 
+def resolved(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
+    """The same values with the nuisances and the cost of other nuisance columns or weights."""
+    cost, nuisance = cost_of(problem, fit.residual, weights)
+    return replace(fit, nuisance=nuisance, cost=cost)
+
+
 def gauss_newton(
     problem: Problem,
     chosen: Sequence[Candidate],
     values: Sequence[float] | np.ndarray,
     weights: np.ndarray,
     iterations: int = 4,
+    coarse: bool = False,
 ) -> Fit:
-    """Refit all chosen effects jointly, from `values`."""
-    values = np.array([c.clip(v) for c, v in zip(chosen, values, strict=True)], dtype=float)
-    residual = problem.residual([_effects(chosen, values)])[0]
+    """Refit all chosen effects jointly, from `values` (P,); `coarse` takes the sensitivities from coarse steps."""
+    values = _clip(chosen, np.asarray(values, dtype=float))
+    residual = problem.residual([effects_at(chosen, values)])[0]
     cost, nuisance = cost_of(problem, residual, weights)
-    columns = _columns(problem, chosen, values, residual)
-    steps = np.array([abs(c.step) for c in chosen])
+    scales = np.concatenate([c.scales for c in chosen]) if len(chosen) else np.empty(0)
+    moving = np.flatnonzero(scales)
+    columns = _columns(problem, chosen, values, residual, scales, coarse)
     for _ in range(iterations if len(chosen) else 0):
         basis, inverse = project(problem, columns, weights)
-        move = solve(basis, inverse, residual, weights)[len(problem.nuisance) :] * steps
-        trials = [np.array([c.clip(v) for c, v in zip(chosen, values + s * move, strict=True)]) for s in (1.0, 0.4)]
-        tried = problem.residual([_effects(chosen, v) for v in trials])
-        costs = [cost_of(problem, r, weights) for r in tried]
-        best = int(np.argmin([c for c, _ in costs]))
-        if costs[best][0] >= cost - 1e-3:
+        move = np.zeros(len(values))
+        move[moving] = solve(basis, inverse, residual, weights)[len(problem.nuisance) :] * scales[moving]
+        for share in (1.0, 0.4):
+            trial = _clip(chosen, values + share * move)
+            tried = problem.residual([effects_at(chosen, trial)])[0]
+            new = cost_of(problem, tried, weights)
+            if new[0] < cost - 1e-3:
+                break
+        else:
             break
-        small = np.all(np.abs(trials[best] - values) < 0.01 * steps)
-        gained = cost - costs[best][0]
-        values, residual, (cost, nuisance) = trials[best], tried[best], costs[best]
-        columns = _columns(problem, chosen, values, residual)
+        small = np.all(np.abs(trial - values) <= 0.01 * scales)
+        gained = cost - new[0]
+        values, residual, (cost, nuisance) = trial, tried, new
+        if not small:
+            columns = _columns(problem, chosen, values, residual, scales, coarse)
         if small or gained < 0.05:
             break
     return Fit(tuple(chosen), values, nuisance, residual, columns, cost)
 
 
-def _effects(chosen: Sequence[Candidate], values: Sequence[float] | np.ndarray) -> list[Effect]:
-    return [c.at(v) for c, v in zip(chosen, values, strict=True)]
+def _clip(chosen: Sequence[Candidate], values: np.ndarray) -> np.ndarray:
+    out, at = values.copy(), 0
+    for c in chosen:
+        part = slice(at, at + len(c.nominal))
+        out[part], at = c.clip(values[part]), part.stop
+    return out
 
 
-def _columns(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Sensitivities (k, W, M) per |step| at `values`, by differences of a fifth of a step, away from the bound."""
-    if not len(chosen):
+def _columns(
+    problem: Problem,
+    chosen: Sequence[Candidate],
+    values: np.ndarray,
+    residual: np.ndarray,
+    scales: np.ndarray,
+    coarse: bool,
+) -> np.ndarray:
+    """Sensitivities (P', W, M) per scale at `values`, by differences of a fifth of it, away from the bound."""
+    moving = np.flatnonzero(scales)
+    if not len(moving):
         return np.empty((0, *residual.shape))
-    moves = []
-    for c, v in zip(chosen, values, strict=True):
-        h = 0.2 * abs(c.step)
-        moves.append(h if c.clip(v + h) == v + h else -h)
-    sets = []
-    for i, h in enumerate(moves):
+    sets, sizes = [], []
+    for i in moving:
         moved = values.copy()
-        moved[i] += h
-        sets.append(_effects(chosen, moved))
-    tried = problem.residual(sets)
-    scale = np.array([abs(c.step) / h for c, h in zip(chosen, moves, strict=True)])
-    return (residual - tried) * scale[:, None, None]
+        moved[i] += 0.2 * scales[i]
+        if _clip(chosen, moved)[i] != moved[i]:
+            moved[i] = values[i] - 0.2 * scales[i]
+        sizes.append((moved[i] - values[i]) / scales[i])
+        sets.append(effects_at(chosen, moved))
+    if coarse and rough(c.effect for c in chosen):
+        here, *moved = problem.residual([effects_at(chosen, values), *sets], coarse=True)
+        return (here - np.stack(moved)) / np.array(sizes)[:, None, None]
+    return (residual - problem.residual(sets)) / np.array(sizes)[:, None, None]
 
 
 def covariance(problem: Problem, fit: Fit, weights: np.ndarray, clusters: np.ndarray) -> np.ndarray:
-    """Sandwich covariance (k, k) of the values, clustered over `clusters` (W,)."""
+    """Sandwich covariance (P, P) of the values, clustered over `clusters` (W,); 0 for what is not fitted."""
     basis, inverse = project(problem, fit.columns, weights)
     left = fit.clean(problem) * weights[:, None]
-    scores = np.einsum("bwm,wm->wb", basis, left)
+    scores = np.matmul(basis.transpose(1, 0, 2), left[:, :, None])[..., 0]
     groups = np.unique(clusters)
     summed = np.stack([scores[clusters == g].sum(axis=0) for g in groups])
     meat = summed.T @ summed * len(groups) / max(len(groups) - 1, 1)
-    steps = np.array([abs(c.step) for c in fit.chosen])
     count = len(problem.nuisance)
-    full = inverse @ meat @ inverse
-    return full[count:, count:] * np.outer(steps, steps)
+    full = (inverse @ meat @ inverse)[count:, count:]
+    scales = fit.scales
+    moving = np.flatnonzero(scales)
+    out = np.zeros((len(scales), len(scales)))
+    out[np.ix_(moving, moving)] = full * np.outer(scales[moving], scales[moving])
+    return out
 
 
-def standard_errors(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
-    """(k,) of the sizes: over windows, or over rollouts where these vary more and are enough to tell."""
-    windows = np.sqrt(np.diag(covariance(problem, fit, weights, np.arange(len(weights)))))
+def standard_covariance(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
+    """(P, P): over windows, or over rollouts where these vary more and are enough to tell."""
+    windows = covariance(problem, fit, weights, np.arange(len(weights)))
     groups = problem.windows.rollout
     if len(np.unique(groups)) < _ENOUGH_ROLLOUTS:
         return windows
-    return np.maximum(windows, np.sqrt(np.diag(covariance(problem, fit, weights, groups))))
+    ratio = np.sqrt(np.diag(covariance(problem, fit, weights, groups)) / np.maximum(np.diag(windows), 1e-300))
+    wider = np.maximum(ratio, 1.0)
+    return windows * np.outer(wider, wider)
 
 
 def interval(problem: Problem, fit: Fit, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Standard errors (k,) and half-widths of 95 % intervals (k,): windows, or rollouts where they vary more."""
+    """Standard errors (P,) and half-widths of 95 % intervals (P,): windows, or rollouts where they vary more."""
     windows = np.sqrt(np.diag(covariance(problem, fit, weights, np.arange(len(weights)))))
-    half = student.ppf(0.975, max(len(weights) - len(fit.chosen) - 1, 2)) * windows
+    half = student.ppf(0.975, max(len(weights) - len(fit.columns) - 1, 2)) * windows
     groups = len(np.unique(problem.windows.rollout))
     if groups >= _ENOUGH_ROLLOUTS:
         rollouts = np.sqrt(np.diag(covariance(problem, fit, weights, problem.windows.rollout)))

@@ -26,7 +26,7 @@ def estimate_noise(rollouts: Sequence[Rollout], layout: Layout) -> np.ndarray:
         if quat is not None:
             turn = rotation_vector(multiply(conjugate(quat[:-1]), quat[1:]))
             readings[1:, layout.slices["base_rot"]] = np.cumsum(turn, axis=0)
-        powers.append(_block_powers(readings))
+        powers.append(_block_powers(rollout.time, readings))
         steps.append(_quantisation(readings))
     every = np.concatenate([p for p in powers if len(p)]) if any(len(p) for p in powers) else np.zeros((1, layout.size))
     dof = _BLOCK * _DOF_SHARE
@@ -39,9 +39,16 @@ def estimate_noise(rollouts: Sequence[Rollout], layout: Layout) -> np.ndarray:
     return sigma
 
 
-def _block_powers(readings: np.ndarray) -> np.ndarray:
-    """Mean square of the normalised fourth difference in blocks, (blocks, D)."""
-    fourth = np.diff(readings, n=4, axis=0) / np.sqrt(70.0)
+def _block_powers(time: np.ndarray, readings: np.ndarray) -> np.ndarray:
+    """Mean square of the normalised fourth difference in blocks, (blocks, D).
+
+    On uneven stamps it is the divided difference: five weights that no cubic passes, of length one.
+    """
+    rows = np.arange(len(time) - 4)[:, None] + np.arange(5)
+    apart = time[rows][:, :, None] - time[rows][:, None, :] + np.eye(5)
+    weights = 1.0 / apart.prod(axis=2)
+    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
+    fourth = np.einsum("tk,tkd->td", weights, readings[rows])
     blocks = len(fourth) // _BLOCK
     return (fourth[: blocks * _BLOCK].reshape(blocks, _BLOCK, -1) ** 2).mean(axis=1)
 

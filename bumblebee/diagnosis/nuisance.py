@@ -12,6 +12,7 @@ A coefficient of 1 stands for one millisecond; that is also its prior's standard
 """
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,10 +44,10 @@ def nuisance_columns(plant: Plant, layout: Layout, windows: Windows, variation: 
 
 def _late_loop(plant: Plant, variation: Variation, part: str) -> Variation:
     """Torque kp (u - q(t-e)) - kd qd(t-e), to first order in e: less damping by kp e, less inertia by kd e."""
-    model = copy.copy(variation.model)
-    for column, a in enumerate(plant.actuator):
+    model, own = copy.copy(variation.model), variation.plant or plant
+    for column, a in enumerate(own.actuator):
         if a >= 0:
-            dof = plant.dof[column]
+            dof = own.dof[column]
             kp, kd = -model.actuator_biasprm[a, 1], -model.actuator_biasprm[a, 2]
             gear = model.actuator_gear[a, 0]
             if part == "kp":
@@ -54,7 +55,7 @@ def _late_loop(plant: Plant, variation: Variation, part: str) -> Variation:
             else:
                 lighter = model.dof_armature[dof] - kd * gear**2 * _UNIT
                 model.dof_armature[dof] = max(0.1 * model.dof_armature[dof], lighter)
-    return Variation(model, variation.delay, variation.offset)
+    return replace(variation, model=model)
 
 
 def _clock(

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import mujoco
 
-from bumblebee.diagnosis.diagnose import Diagnosis, example_window
+from bumblebee.diagnosis.diagnose import Diagnosis
+from bumblebee.diagnosis.example import examples
 from bumblebee.diagnosis.report import render_report
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import add_to_spec, write_effects
@@ -48,7 +49,8 @@ def fill(diagnosis: Diagnosis, folder: Path) -> None:
     (folder / "diagnosis.json").write_text(text)
     write_effects(folder / "effects.yaml", diagnosis.effects)
     (folder / "model.xml").write_text(corrected_xml(diagnosis))
-    (folder / "report.html").write_text(render_report(diagnosis.document, example_window(diagnosis)))
+    shown = examples(diagnosis.session, diagnosis.effects)
+    (folder / "report.html").write_text(render_report(diagnosis.document, shown))
 
 
 def corrected_xml(diagnosis: Diagnosis) -> str:

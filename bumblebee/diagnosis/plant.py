@@ -1,13 +1,15 @@
 """The declared model and its joints and actuators in the order of the log's columns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.drives import drive_law, take_target, take_torque
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effect_native import is_hidden
 
 _FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
 _ON_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
@@ -39,6 +41,14 @@ class Plant:
     """(nu,) command delay [s] that the model declares."""
     offset: np.ndarray
     """(J,) encoder offset [rad] that the servos of the model declare."""
+    scalable: np.ndarray
+    """(J,) bool: the drive's gains stand in gainprm and biasprm; not so for a dcmotor or a passive joint."""
+    spec: mujoco.MjSpec
+    """What it was made of, to be compiled again with effects that change its structure."""
+    example: Rollout
+    """A rollout whose columns it matches."""
+    compiled: dict[tuple, "Plant"] = field(default_factory=dict, repr=False)
+    """Plants of the same robot with play, flexible shafts or yielding springs, by their places."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -63,20 +73,20 @@ def load_spec(path: Path) -> mujoco.MjSpec:
 
 def make_plant(spec: mujoco.MjSpec, rollout: Rollout, where: object) -> Plant:
     """Match the model's joints and actuators with the columns of `rollout`; `where` names the model in errors."""
-    spec = spec.copy()
+    declared, spec = spec, spec.copy()
     delay = np.array([a.delay if a.nsample else 0.0 for a in spec.actuators])
     for actuator in spec.actuators:
         actuator.nsample, actuator.delay = 0, 0.0
+    torque_input = _set_inputs(spec, rollout, where)
     model = spec.compile()
     # More solver iterations than a training model allows itself: what is compared is physics, not a solver's haste.
     model.opt.iterations, model.opt.ls_iterations = max(30, model.opt.iterations), max(20, model.opt.ls_iterations)
     free, joints = _match_joints(model, rollout, where)
-    torque_input = _torque_input(model, joints, rollout, where)
     actuator = np.array([_actuator_of(model, j) for j in joints], dtype=int)
-    _set_input(model, actuator, torque_input, rollout, where)
+    law = drive_law(model, where)
     offset = np.zeros(len(joints))
     for column, a in enumerate(actuator):
-        if a >= 0 and model.actuator_biasprm[a, 1] != 0:
+        if a >= 0 and law.simple[a] and model.actuator_biasprm[a, 1] != 0:
             offset[column] = model.actuator_biasprm[a, 0] / model.actuator_biasprm[a, 1] / model.actuator_gear[a, 0]
     return Plant(
         model=model,
@@ -90,6 +100,9 @@ def make_plant(spec: mujoco.MjSpec, rollout: Rollout, where: object) -> Plant:
         base_dof=int(model.jnt_dofadr[free]) if free >= 0 else 0,
         delay=delay if len(delay) else np.zeros(model.nu),
         offset=offset,
+        scalable=np.array([a >= 0 and bool(law.simple[a]) for a in actuator]),
+        spec=declared,
+        example=rollout,
     )
 
 
@@ -103,7 +116,7 @@ def _match_joints(model: mujoco.MjModel, rollout: Rollout, where: object) -> tup
     for name in rollout.joints:
         if name not in names or kinds[names[name]] == _FREE:
             raise BadInput(f"{where}: joint {name!r} of {rollout.rollout_id}", "a hinge or slide of the model", "none")
-    if missing := [n for n, j in names.items() if kinds[j] != _FREE and n not in rollout.joints]:
+    if missing := [n for n, j in names.items() if kinds[j] != _FREE and n not in rollout.joints and not is_hidden(n)]:
         raise BadInput(f"{rollout.rollout_id}: joints", f"joint {missing[0]!r} of {where}", "no column for it")
     if free:
         for column in ("base_quat", "base_ang_vel", "base_lin_vel"):
@@ -120,33 +133,33 @@ def _actuator_of(model: mujoco.MjModel, joint: int) -> int:
     return -1
 
 
-def _torque_input(model: mujoco.MjModel, joints: np.ndarray, rollout: Rollout, where: object) -> bool:
-    """Position targets where they were logged and the model has servos (or gains are known); torques else."""
-    servo = any(model.actuator_biasprm[a, 1] != 0 for j in joints if (a := _actuator_of(model, j)) >= 0)
-    if rollout.joint_target is not None and (servo or rollout.joint_torque_cmd is None):
-        return False
-    if rollout.joint_torque_cmd is None:
+def _set_inputs(spec: mujoco.MjSpec, rollout: Rollout, where: object) -> bool:
+    """Make every actuator of `spec` on a logged joint take what was logged; True if that is torque.
+
+    Position targets where they were logged and the model has servos (or the gains are known); torques else.
+    """
+    model = spec.compile()
+    law = drive_law(model, where)
+    names = {model.joint(j).name: j for j in range(model.njnt)}
+    drives = {name: _actuator_of(model, names[name]) for name in rollout.joints if name in names}
+    drives = {name: a for name, a in drives.items() if a >= 0}
+    servo = any(law.servo[a] for a in drives.values())
+    if rollout.joint_target is None and rollout.joint_torque_cmd is None:
         raise BadInput(f"{rollout.rollout_id}: column joint_target", "joint_target or joint_torque_cmd", "neither")
-    return True
-
-
-def _set_input(model: mujoco.MjModel, actuator: np.ndarray, torque: bool, rollout: Rollout, where: object) -> None:
-    """Make every actuator take what was logged: a servo turned into a motor, or a motor into a servo of known gains."""
+    torque = rollout.joint_target is None or (not servo and rollout.joint_torque_cmd is not None)
     kp, kd = rollout.meta.get("kp"), rollout.meta.get("kd")
-    for column, a in enumerate(actuator):
-        if a < 0:
-            continue
-        is_servo = model.actuator_biasprm[a, 1] != 0
-        if torque and is_servo:
-            model.actuator_gainprm[a, 0], model.actuator_biasprm[a, :3] = 1.0, 0.0
-        elif not torque and not is_servo:
+    motor = int(mujoco.mjtGain.mjGAIN_FIXED)
+    for name, a in drives.items():
+        actuator = spec.actuators[a]
+        if torque and (law.servo[a] or int(model.actuator_gaintype[a]) != motor):
+            take_torque(actuator)
+        elif not torque and not law.servo[a]:
             if kp is None or kd is None:
                 raise BadInput(
-                    f"{where}: actuator {model.actuator(a).name!r}",
+                    f"{where}: actuator {actuator.name!r}",
                     "a position servo, or kp and kd in the rollouts' metadata",
                     f"a motor and position targets in {rollout.rollout_id}",
                 )
-            model.actuator_gainprm[a, 0] = kp[column]
-            model.actuator_biastype[a] = int(mujoco.mjtBias.mjBIAS_AFFINE)
-            model.actuator_biasprm[a, :3] = [0.0, -kp[column], -kd[column]]
-            model.actuator_ctrllimited[a] = 0
+            column = rollout.joints.index(name)
+            take_target(actuator, float(kp[column]), float(kd[column]), float(law.gain[a]))
+    return torque

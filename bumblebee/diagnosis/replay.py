@@ -16,11 +16,7 @@ from bumblebee.sim.effects import CATALOGUE, Effect
 def replay(session: Session, effects: Sequence[Effect] = (), budget: int = 120, seed: int = 0) -> dict[str, Any]:
     """Horizon -> errors of the session's model with `effects`, on all its rollouts."""
     for effect in effects:
-        for place in effect.where:
-            names = session.plant.joints if CATALOGUE[effect.effect].on == "joint" else session.plant.bodies
-            if place not in names:
-                kind = CATALOGUE[effect.effect].on
-                raise BadInput(f"effect {effect.effect}: where", f"a {kind} of the model", repr(place)[:80])
+        _known(session, effect)
     ids = list(range(len(session.rollouts)))
     windows = horizon_windows(session.plant, session.layout, session.rollouts, ids, budget)
     variation = vary(session.plant, effects)
@@ -29,9 +25,24 @@ def replay(session: Session, effects: Sequence[Effect] = (), budget: int = 120, 
     return error_block(*common, whiteners, variation, session.steps[0], seed)
 
 
+def _known(session: Session, effect: Effect) -> None:
+    """`BadInput` for a place that the model does not have."""
+    kind, plant = CATALOGUE[effect.effect].on, session.plant
+    geoms = {plant.model.geom(g).name for g in range(plant.model.ngeom)}
+    names = {"joint": plant.joints, "body": plant.bodies, "geom": geoms, "whole": ()}[kind]
+    for place in effect.where:
+        if place not in names:
+            raise BadInput(f"effect {effect.effect}: where", f"a {kind} of the model", repr(place)[:80])
+
+
 def write_json(path: Path, document: dict[str, Any]) -> None:
     """Write JSON; the file appears whole or not at all."""
+    write_text(path, json.dumps(document, indent=1, allow_nan=False))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write text; the file appears whole or not at all."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     temporary.parent.mkdir(parents=True, exist_ok=True)
-    temporary.write_text(json.dumps(document, indent=1, allow_nan=False))
+    temporary.write_text(text, encoding="utf-8")
     os.replace(temporary, path)

@@ -1,132 +1,197 @@
 """The diagnosis as one self-contained page: pictures are SVG, all text that came from files is escaped."""
 
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-_STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1d2430}
-table{border-collapse:collapse;margin:.5rem 0;width:100%}
-td,th{padding:.25rem .6rem;border-bottom:1px solid #dde;text-align:left}
-td.n{text-align:right;font-variant-numeric:tabular-nums}.lead{font-size:1.15rem}.note{color:#667}svg{width:100%;height:auto}"""
-_COLOURS = {"measured": "#1d2430", "before": "#d1495b", "after": "#2a9d8f"}
+from bumblebee.diagnosis.drawing import line_picture
+from bumblebee.diagnosis.gap_page import error_rows
+from bumblebee.diagnosis.page import figure, items, number, page, table, warning
+from bumblebee.diagnosis.verdict import worse_horizons
+
+_DETECTABLE = 60
 
 
-def render_report(document: dict[str, Any], example: dict[str, Any]) -> str:
-    """HTML of the document and the example window."""
+def render_report(document: dict[str, Any], examples: Sequence[dict[str, Any]]) -> str:
+    """HTML of the document and of windows to look at."""
+    held = bool(document["holdout"])
     parts = [
-        "<!doctype html><html lang='en'><head><meta charset='utf-8'><title>Diagnosis</title>",
-        f"<style>{_STYLE}</style></head><body><h1>What the model lacks</h1>",
+        "<h1>What the model lacks</h1>",
         f"<p class='lead'>{_lead(document)}</p>",
-        _picture(example),
+        *[warning(text) for text in worse_horizons(document["error"])],
+        *[warning(f"{a['rollout']} was set aside: {a['reason']}") for a in document.get("set_aside", [])],
+        *_pictures(examples),
         "<h2>Effects</h2>",
-        _effects_table(document["effects"]),
-        "<h2>Error on rollouts that took no part in the fit</h2>" if document["holdout"] else "<h2>Error</h2>",
-        _error_table(document["error"]),
+        _effects(document["effects"]),
+        "<h2>Error on rollouts that took no part in the fit</h2>" if held else "<h2>Error on the fitted rollout</h2>",
+        error_rows({k: document["error"][k] for k in ("before", "after", "oracle", "floor") if k in document["error"]}),
         "<h2>Joint by joint</h2>",
-        _joint_table(document["error"]),
+        _joints(document["error"]),
         "<h2>What is left</h2>",
-        _left(document),
-        "</body></html>",
+        _left(document["unexplained"], document.get("structure", {})),
+        _small(document.get("smallest_detectable", [])),
+        "<h2>Notes</h2>",
+        items(_notes(document)),
     ]
-    return "\n".join(parts)
+    return page("Diagnosis", parts)
 
 
 def _lead(document: dict[str, Any]) -> str:
-    effects = document["effects"]
+    effects, error = document["effects"], document["error"]
+    if effects:
+        names = [
+            f"<b>{escape(e['effect'])}</b> on {escape(', '.join(e['where']) or 'the whole robot')}" for e in effects
+        ]
+        more = f" and {len(names) - 6} more" if len(names) > 6 else ""
+        text = f"{len(effects)} effect{'s' if len(effects) > 1 else ''}: {'; '.join(names[:6])}{more}."
+    else:
+        text = "No effect of the catalogue is missing, as far as these data can tell."
+    horizon = "0.2" if "0.2" in error["before"] else next(iter(error["before"]), None)
+    if horizon is None or not effects:
+        return text
+    before, after, floor = (error[k].get(horizon, {}).get("joint_pos_rmse", {}) for k in ("before", "after", "floor"))
+    if not before.get("value") or not after.get("value"):
+        return text
+    where = "held-out joint error" if document["holdout"] else "joint error of the fitted rollout"
+    said = f" After {horizon} s the {where} falls from {1e3 * before['value']:.3g} to {1e3 * after['value']:.3g} mrad"
+    noise = f" (noise alone {1e3 * floor['value']:.2g})" if floor.get("value") else ""
+    return f"{text}{said}{noise}."
+
+
+def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
+    parts = []
+    for n, e in enumerate(examples):
+        series = {name: e[name] for name in ("target", "before", "after", "measured") if name in e}
+        axis = f"{e['joint']} [{e['unit']}]"
+        picture = line_picture(
+            e["time"],
+            series,
+            "s after the restart",
+            axis,
+            f"{e['joint']}: measured, before, after",
+            240 if n == 0 else 130,
+        )
+        text = f"{e['joint']}, restarted from the measured state in {e['rollout']} at {e['start']:.2f} s"
+        parts.append(figure(picture, escape(text)))
+    return parts
+
+
+def _effects(effects: Sequence[dict[str, Any]]) -> str:
     if not effects:
-        return "No effect of the catalogue is missing, as far as these data can tell."
-    names = [f"<b>{escape(e['effect'])}</b> on {escape(', '.join(e['where']))}" for e in effects]
-    return f"{len(effects)} found: " + "; ".join(names) + "."
-
-
-def _picture(example: dict[str, Any]) -> str:
-    """Measured against the model before and after, as SVG."""
-    series = {name: example[name] for name in ("before", "after", "measured")}
-    finite = [v for values in series.values() for v in values if v == v and abs(v) < 1e6]
-    if not finite or len(example["time"]) < 2:
-        return ""
-    low, high = min(finite), max(finite)
-    high = high if high > low else low + 1e-3
-    left, top, width, height = 70, 20, 760, 260
-    t0, t1 = example["time"][0], example["time"][-1]
-
-    def at(t: float, v: float) -> str:
-        return f"{left + (t - t0) / (t1 - t0) * width:.1f},{top + (high - v) / (high - low) * height:.1f}"
-
-    lines = []
-    for row, (name, values) in enumerate(series.items()):
-        points = " ".join(at(t, v) for t, v in zip(example["time"], values, strict=True) if v == v and abs(v) < 1e6)
-        lines.append(f"<polyline fill='none' stroke='{_COLOURS[name]}' stroke-width='2' points='{points}'/>")
-        lines.append(f"<text x='{left + 8 + 110 * row}' y='{top + 12}' fill='{_COLOURS[name]}'>{name}</text>")
-    axis = (
-        f"<rect x='{left}' y='{top}' width='{width}' height='{height}' fill='none' stroke='#bbc'/>"
-        f"<text x='4' y='{top + 10}'>{high:.4g}</text><text x='4' y='{top + height}'>{low:.4g}</text>"
-        f"<text x='{left}' y='{top + height + 18}'>{t0:.2f} s</text>"
-        f"<text x='{left + width - 40}' y='{top + height + 18}'>{t1:.2f} s</text>"
-    )
-    title = f"{example['joint']} [rad], restarted in {example['rollout']} at {example['start']:.2f} s"
-    return f"<h2>{escape(title)}</h2><svg viewBox='0 0 850 310' font-size='12'>{axis}{''.join(lines)}</svg>"
-
-
-def _effects_table(effects: list[dict[str, Any]]) -> str:
+        return "<p>None.</p>"
     rows = []
     for e in effects:
-        for name, p in e["parameters"].items():
-            same = ", ".join(f"{s['effect']} ({', '.join(s['where'])})" for s in e["equivalent"]) or "-"
-            cells = [
-                escape(e["effect"]),
-                escape(", ".join(e["where"])),
-                escape(f"{name} = {p['value']:.4g} {p['unit']}"),
-                escape(f"{p['ci95'][0]:.4g} to {p['ci95'][1]:.4g}"),
-                f"{p['nominal']:.4g}",
-                f"{100 * e['explains']:.1f} %",
-                f"{e['evidence']['p']:.1g}",
-                escape(same),
-            ]
-            rows.append("<tr>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>")
-    head = ("effect", "where", "value", "95 % interval", "declared", "explains", "p", "cannot be told from")
-    return _table(head, rows) if rows else "<p>None.</p>"
+        place = escape(", ".join(e["where"]) or "whole robot")
+        share = 100 * e["explains"]
+        bar = f"<span class='bar' style='width:{0.04 * share:.2f}rem'></span>{share:.0f} %"
+        values, declared = _values(e)
+        rows.append(
+            [f"<b>{escape(e['effect'])}</b>", place, values, declared, bar, f"{e['evidence']['p']:.1g}", _same(e)]
+        )
+    head = ["effect", "where", "value [95 % interval]", "declared", "explains", "p", "cannot be told from"]
+    text = (
+        "<p class='note'>explains: share of the excess over the best fit that comes back when this effect alone is "
+        "taken out. p: see diagnosis.json for the test.</p>"
+    )
+    return table(head, rows, (5,)) + text
 
 
-def _table(head: tuple[str, ...], rows: list[str]) -> str:
-    return "<table><tr>" + "".join(f"<th>{h}</th>" for h in head) + "</tr>" + "".join(rows) + "</table>"
+def _values(effect: dict[str, Any]) -> tuple[str, str]:
+    """Values with intervals, and the declared ones."""
+    parameters = effect["parameters"]
+    if effect["effect"] == "discovered":
+        terms = [
+            f"{_with_ends(t['coefficient'], t['ci95'])} &middot; <code>{escape(_short(t['term']))}</code>"
+            for t in parameters["terms"]
+        ]
+        return "<br>".join(terms), "-"
+    lines = [
+        f"{escape(name)} {_with_ends(p['value'], p['ci95'])} {escape(p['unit'])}" for name, p in parameters.items()
+    ]
+    return "<br>".join(lines), "<br>".join(number(p["nominal"]) for p in parameters.values())
 
 
-def _error_table(error: dict[str, Any]) -> str:
-    rows = []
-    for horizon, measures in error["before"].items():
-        for name in measures:
-            if name == "windows":
-                continue
-            cells = [f"<td>{escape(horizon)} s</td><td>{escape(name)}</td>"]
-            for part in ("before", "after", "floor"):
-                cells.append(f"<td class='n'>{_value(error[part].get(horizon, {}).get(name))}</td>")
-            rows.append("<tr>" + "".join(cells) + "</tr>")
-    return _table(("horizon", "measure", "before", "after", "noise floor"), rows)
+def _short(term: str) -> str:
+    return term if len(term) <= 60 else f"{term[:40]} ... (see effects.yaml)"
 
 
-def _joint_table(error: dict[str, Any]) -> str:
-    horizon = "0.2" if "0.2" in error["before"] else next(iter(error["before"]), None)
-    if horizon is None:
+def _with_ends(value: float, ends: Sequence[float | None] | None) -> str:
+    if not ends:
+        return f"{value:.4g}"
+    low, high = ("" if x is None else f"{x:.4g}" for x in ends)
+    return f"{value:.4g} <span class='note'>[{low}, {high}]</span>"
+
+
+def _same(effect: dict[str, Any]) -> str:
+    same = [f"{s['effect']} ({', '.join(s['where']) or 'whole'})" for s in effect["equivalent"]]
+    text = escape(", ".join(same)) or "-"
+    advice = "; ".join(effect.get("separate_by", []))
+    return text + (f"<br><span class='note'>to separate: {escape(advice)}</span>" if advice else "")
+
+
+def _joints(error: dict[str, Any]) -> str:
+    """Before and after by joint and horizon, coloured where they differ."""
+    if not error["before"]:
         return ""
     rows = []
-    for joint, before in error["before"][horizon]["joint_pos_rmse"]["per_joint"].items():
-        after = error["after"][horizon]["joint_pos_rmse"]["per_joint"][joint]
-        cells = f"<td>{escape(joint)}</td><td class='n'>{_value(before)}</td><td class='n'>{_value(after)}</td>"
-        rows.append(f"<tr>{cells}</tr>")
-    return f"<p class='note'>position error after {horizon} s [rad]</p>" + _table(("joint", "before", "after"), rows)
+    for joint in next(iter(error["before"].values()))["joint_pos_rmse"]["per_joint"]:
+        cells = [escape(joint)]
+        for horizon in error["before"]:
+            pair = [error[k][horizon]["joint_pos_rmse"]["per_joint"][joint]["value"] for k in ("before", "after")]
+            if None in pair:
+                cells.append("-")
+                continue
+            kind = "good" if pair[1] < 0.95 * pair[0] else "bad" if pair[1] > 1.05 * pair[0] else "note"
+            cells.append(f"{number(1e3 * pair[0])} <span class='{kind}'>&rarr; {number(1e3 * pair[1])}</span>")
+        rows.append(cells)
+    text = "<p class='note'>RMS position error before and after, in mrad (mm for slides).</p>"
+    return text + table(["joint", *[f"{h} s" for h in error["before"]]], rows, range(1, 1 + len(error["before"])))
 
 
-def _value(entry: dict[str, Any] | None) -> str:
-    if not entry or entry["value"] is None:
-        return "-"
-    ci = entry.get("ci95")
-    return f"{entry['value']:.4g}" + (f" <span class='note'>({ci[0]:.3g} to {ci[1]:.3g})</span>" if ci else "")
+def _left(left: dict[str, Any], structure: dict[str, Any]) -> str:
+    if not left["significant"]:
+        said = left["description"] or "No structure is left that these tests can see"
+        return f"<p>{escape(said)} (p = {left['p']:.2g}).</p>"
+    rows = [
+        [
+            escape(joint),
+            f"{e['torque_rms']:.3g}",
+            f"{100 * e['torque_rms'] / e['typical_torque']:.0f} %",
+            escape(", ".join(e["depends_on"])) or "-",
+            f"{e['p']:.1g}",
+        ]
+        for joint, e in structure.items()
+        if joint in left["where"]
+    ]
+    text = (
+        "<p>Structure remains that no effect above explains. It is described, not forced into a catalogue's name.</p>"
+    )
+    head = ["joint", "predictable RMS [N m]", "of the drive's", "goes with", "p"]
+    return text + table(head, rows, (1, 2, 4)) + f"<p>{escape(left['description'])}.</p>"
 
 
-def _left(document: dict[str, Any]) -> str:
-    left = document["unexplained"]
-    text = escape(left["description"]) if left["significant"] else "No structure is left that these tests can see."
-    notes = [f"<li>{escape(note)}</li>" for note in document.get("notes", [])]
-    for entry in document.get("unidentifiable", []):
-        notes.append(f"<li>{escape(', '.join(entry['where']))}: {escape(entry['why'])}</li>")
-    return f"<p>{text} (p = {left['p']:.2g})</p>" + (f"<ul>{''.join(notes)}</ul>" if notes else "")
+def _small(entries: Sequence[dict[str, Any]]) -> str:
+    known = [e for e in entries if e.get("change") is not None]
+    if not known:
+        return ""
+    rows = [
+        [
+            escape(e["effect"]),
+            escape(", ".join(e["where"]) or "whole robot"),
+            escape(e.get("parameter", "")),
+            f"{e['change']:.2g} {escape(e.get('unit', ''))}",
+        ]
+        for e in known[:_DETECTABLE]
+    ]
+    more = (
+        f"<p class='note'>and {len(known) - _DETECTABLE} more in diagnosis.json</p>" if len(known) > _DETECTABLE else ""
+    )
+    body = table(["effect", "where", "parameter", "change"], rows, (3,))
+    return f"<details><summary>The smallest effects that these data could have shown</summary>{body}{more}</details>"
+
+
+def _notes(document: dict[str, Any]) -> list[str]:
+    count = {k: len(document.get(k, [])) for k in ("train", "accept", "holdout")}
+    notes = [f"rollouts: {count['train']} to fit, of which {count['accept']} to accept by; {count['holdout']} held out"]
+    notes += document.get("notes", [])
+    return notes + [f"{', '.join(u['where'])}: {u['why']}" for u in document.get("unidentifiable", [])]

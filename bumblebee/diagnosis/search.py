@@ -1,14 +1,20 @@
 """Which effects: score tests of every candidate given those chosen, trials in the simulator, held-out gain, pruning."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.stats import norm
 
-from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.fit import Fit, covariance, gauss_newton, project, solve, standard_errors
+from bumblebee.diagnosis.candidates import Candidate, shortlisted
+from bumblebee.diagnosis.fit import Fit, gauss_newton, resolved, standard_covariance
+from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.scores import Columns, Scores, as_z, null_maxima, score_tests
+from bumblebee.diagnosis.screen import pulse_sizes, restless, screen, screening_windows
+from bumblebee.diagnosis.trials import Trial, far_trials, simplest, try_one
+from bumblebee.diagnosis.whiten import null_draws
+from bumblebee.sim.effects import Effect
 
 
 @dataclass(frozen=True)
@@ -16,18 +22,26 @@ class SearchConfig:
     """How strict and how long the search is."""
 
     level: float = 0.005
-    """False alarms allowed for a whole null dataset, shared among the candidates (Bonferroni)."""
-    trials: int = 6
-    """Candidates a round that are tried in the simulator."""
+    """False alarms allowed for a whole null dataset, shared among the candidates (Bonferroni, or by simulation)."""
+    screen_windows: int = 60
+    """Windows that all candidates are screened on."""
+    simulated: int = 10
+    """Best candidates of the screening a round, whose sensitivities are simulated on all windows."""
+    trials: int = 4
+    """Candidates a round that are tried at their size in the simulator."""
+    shortlist: int = 1
+    """Joints a round on which play and flexible shafts are tried."""
     most: int = 12
     """Effects at most."""
-    patience: int = 8
+    patience: int = 6
     """Rounds that may fail before the search ends."""
     holdout_z: float = 2.0
     """Held-out gain must exceed this many of its standard errors."""
     least_gain: float = 0.02
     """Held-out gain must exceed this share of the held-out chi-square that is left: with enough data the difference of
     two integrators is significant too, and was named armature on three light joints at a gain of 0.008."""
+    far: float = 30.0
+    """Median chi-square above which gains far from the declared ones are tried first."""
 
 
 @dataclass(eq=False)
@@ -37,8 +51,6 @@ class Step:
     candidate: Candidate
     z: float
     p: float
-    holdout_before: float
-    holdout_after: float
 
 
 @dataclass(eq=False)
@@ -46,165 +58,224 @@ class Search:
     """Outcome: the final fit and the way there."""
 
     fit: Fit
-    steps: list[Step]
-    columns: np.ndarray
-    """(C, W, M) sensitivities of all candidates at the declared model."""
+    problem: Problem
+    """The fitted windows, their nuisances around the fit."""
     weights: np.ndarray
-    tests: np.ndarray
-    """(C, 2) z and standard error (in steps) of every candidate given the chosen ones."""
+    steps: list[Step]
+    screened: Problem
+    """The windows that the columns are of."""
+    columns: Columns
+    """Screening columns of all candidates."""
+    tests: Scores
+    """Of every candidate of `columns`, given the chosen ones."""
+    bound: float
+    """z that a candidate had to reach."""
+    count: int
+    """Candidates among which the false alarms are shared."""
     rejected: list[str] = field(default_factory=list)
 
 
-def score_tests(problem: Problem, columns: np.ndarray, fit: Fit, weights: np.ndarray) -> np.ndarray:
-    """Of every candidate given the fit: estimate [steps], its standard error, z, gain in cost; (C, 4)."""
-    basis, inverse = project(problem, fit.columns, weights)
-    nuisance = solve(basis, inverse, fit.residual, weights)
-    left = fit.residual - np.tensordot(nuisance, basis, axes=1)
-    root = np.sqrt(weights)
-    weighted = (basis * weights[:, None]).reshape(len(basis), -1)
-    flat = columns.reshape(len(columns), -1)
-    shares = (flat @ weighted.T) @ inverse
-    out = np.zeros((len(columns), 4))
-    for c in range(len(columns)):
-        own = columns[c] - np.tensordot(shares[c], basis, axes=1)
-        own, part = own * root[:, None], left * root[:, None]
-        curvature = (own**2).sum()
-        raw = (columns[c] ** 2 * weights[:, None]).sum()
-        if curvature < 1e-3 * raw or curvature < 1e-6:
-            out[c, 1] = np.inf
-            continue
-        scores = (own * part).sum(axis=1)
-        spread = np.sqrt(max(((scores - scores.mean()) ** 2).sum(), 0.25 * curvature))
-        out[c] = scores.sum() / curvature, spread / curvature, scores.sum() / spread, scores.sum() ** 2 / curvature
-    return out
+_MUCH = 0.15  # share of the cost
+_CHANGED = 0.95  # share of the cost that a fit must leave less of, to be worth linearising around
+
+
+class _Run:
+    """The state of one search."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        holdout: Holdout,
+        remake: Callable[[Sequence[Effect]], tuple[list[Candidate], np.ndarray]],
+        config: SearchConfig,
+        say: Callable[[str], None],
+    ) -> None:
+        self.problem, self.holdout, self.remake, self.config, self.say = problem, holdout, remake, config, say
+        start = problem.residual([[]])[0]
+        self.weights = window_weights(start)
+        self.fit = gauss_newton(problem, (), (), self.weights)
+        self.keep = screening_windows(problem, config.screen_windows)
+        self.rescreen()
+        self.bound = self._bound()
+        self.closed: set[Candidate] = set()
+        self.steps: list[Step] = []
+        self.rejected: list[str] = []
+
+    def rescreen(self) -> None:
+        """Candidates with steps for the present fit, and the columns of all of them around it."""
+        self.small = self.problem.part(self.keep)
+        self.candidates, torque = self.remake(self.fit.effects)
+        self.columns = screen(self.small, self.candidates, self.fit.effects, pulse_sizes(self.problem, torque))
+        self.screened_cost = self.fit.cost
+
+    def _bound(self) -> float:
+        """The z for the level over all candidates: Bonferroni's, or that of simulated null datasets if higher."""
+        level, count = self.config.level, len(self.candidates)
+        draws = null_draws(self.small.whitener, self.small.sigma, np.random.default_rng(0))
+        maxima = null_maxima(self.small, self.columns, self.small_fit(), np.ones(len(self.keep)), draws)
+        scale = maxima.std() * np.sqrt(6) / np.pi  # a Gumbel distribution of the same mean and variance
+        simulated = maxima.mean() - scale * (np.euler_gamma + np.log(-np.log1p(-level)))
+        return float(max(norm.isf(level / (2 * count)), simulated))
+
+    def small_fit(self) -> Fit:
+        """The fit on the screening windows."""
+        return replace(self.fit, residual=self.fit.residual[self.keep], columns=self.fit.columns[:, self.keep])
+
+    def tests(self) -> Scores:
+        """Score tests of all candidates on the screening windows."""
+        return score_tests(self.small, self.columns, self.small_fit(), self.weights[self.keep])
+
+    def promising(self) -> list[Candidate]:
+        """The best of the screening, and play and shafts of the joints that are worst explained."""
+        tests = self.tests()
+        share = np.sqrt(len(self.keep) / len(self.problem.windows))
+        found = []
+        for k in np.argsort(-tests.gain):
+            c = self.columns.candidates[k]
+            if len(found) >= self.config.simulated or tests.gain[k] <= 0:
+                break
+            if self.is_open(c, tests, k, 0.7 * share * self.bound) and not _like(c, found):
+                found.append(c)
+        poor = restless(self.problem, self.fit.clean(self.problem), self.config.shortlist)
+        joints = len(self.problem.plant.joints)
+        listed = [c for c in self.candidates if c.where in poor and shortlisted(c, joints)]
+        return found + [c for c in listed if c not in self.closed and not self._chosen(c)]
+
+    def _chosen(self, c: Candidate) -> bool:
+        return any((c.effect, c.where) == (o.effect, o.where) for o in self.fit.chosen)
+
+    def is_open(self, c: Candidate, tests: Scores, k: int, bound: float) -> bool:
+        """Whether a candidate is significant, can move the way it wants to, and has not been tried in vain.
+
+        One that promises much of the whole cost is tried, too: where a few windows are very far off they decide its
+        variance, and only the fit with it, in which they are not, can say how sure it is.
+        """
+        if c in self.closed or self._chosen(c):
+            return False
+        much = tests.gain[k] > _MUCH * self.fit.cost * len(self.keep) / len(self.problem.windows)
+        return bool(tests.z[k] >= bound or much) and any(_can_move(c, tests.steps[k]))
+
+    def trials(self) -> tuple[list[Trial], list[Candidate]]:
+        """Candidates tried in the simulator with their costs; and those that were looked at."""
+        looked = self.promising()
+        if not looked:
+            return [], []
+        columns = Columns(looked, self.problem.sensitivities(looked, self.fit.effects))
+        tests = score_tests(self.problem, columns, self.fit, self.weights)
+        order = [k for k in np.argsort(-tests.gain) if self.is_open(looked[k], tests, k, self.bound)]
+        tried = [
+            try_one(self.problem, self.fit, looked[k], tests.steps[k], self.weights)
+            for k in order[: self.config.trials]
+        ]
+        return [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2], looked
+
+    def accept(self, candidate: Candidate, values: np.ndarray) -> bool:
+        """Refit with the candidate; keep it if the joint fit and the held-out windows agree."""
+        fit = gauss_newton(
+            self.problem,
+            (*self.fit.chosen, candidate),
+            np.concatenate((self.fit.values, values)),
+            self.weights,
+            iterations=2,
+            coarse=True,
+        )
+        z = wald(self.problem, fit, self.weights, len(fit.chosen) - 1)
+        p = min(1.0, 2 * norm.sf(z) * len(self.candidates))
+        if z < self.bound or not self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain):
+            self.closed.add(candidate)
+            self.rejected.append(f"{candidate.effect} on {candidate.where or 'the whole robot'}")
+            return False
+        self.steps.append(Step(candidate, z, p))
+        self.say(f"found {candidate.effect} on {candidate.where or 'the whole robot'}: {fit.of(candidate).round(5)}")
+        self.renew(fit)
+        return True
+
+    def renew(self, fit: Fit) -> None:
+        """Nuisances around what was found, where it is more than a little; weights; candidates, where it is a lot."""
+        if fit.cost < _CHANGED * self.fit.cost:
+            self.problem = self.problem.relinearised(fit.effects)
+            self.holdout = self.holdout.relinearised(fit.effects)
+        self.weights = window_weights(fit.clean(self.problem))
+        self.fit = resolved(self.problem, fit, self.weights)
+        self.small = self.problem.part(self.keep)
+        if self.fit.cost < 0.5 * self.screened_cost:
+            self.rescreen()
+
+    def prune(self) -> None:
+        """Drop effects that the others have made needless, worst first, refitting each time."""
+        while self.fit.chosen:
+            z = [wald(self.problem, self.fit, self.weights, i) for i in range(len(self.fit.chosen))]
+            worst = int(np.argmin(z))
+            if z[worst] >= self.bound:
+                break
+            self.say(f"needless: {self.fit.chosen[worst].effect} on {self.fit.chosen[worst].where}")
+            keep = [i for i in range(len(self.fit.chosen)) if i != worst]
+            values = [self.fit.values[self.fit.slices[i]] for i in keep]
+            chosen = [self.fit.chosen[i] for i in keep]
+            values = np.concatenate(values) if values else []
+            self.fit = gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True)
+
+
+def _can_move(c: Candidate, steps: np.ndarray) -> list[bool]:
+    """For each free parameter, whether the wanted change is not stopped by a bound."""
+    wanted = np.array(c.nominal)
+    wanted[list(c.free)] += np.asarray(steps) * np.array(c.step)[list(c.free)]
+    reached = np.abs(c.clip(wanted) - np.array(c.nominal))
+    return [bool(reached[i] > 1e-3 * abs(c.step[i])) for i in c.free]
+
+
+def _like(c: Candidate, others: Sequence[Candidate]) -> bool:
+    """Whether two of the same kind on the same place are already there, in other shapes."""
+    return sum((c.effect, c.where) == (o.effect, o.where) for o in others) >= 2
+
+
+def wald(problem: Problem, fit: Fit, weights: np.ndarray, index: int) -> float:
+    """The z of one chosen effect's free parameters in the joint fit."""
+    candidate, part = fit.chosen[index], fit.slices[index]
+    free = part.start + np.array(candidate.free)
+    covariance = standard_covariance(problem, fit, weights)[np.ix_(free, free)]
+    away = fit.values[free] - np.array(candidate.nominal)[list(candidate.free)]
+    value = float(away @ np.linalg.pinv(covariance, rcond=1e-9, hermitian=True) @ away)
+    return as_z(value, len(free), len(weights))
 
 
 def search(
     problem: Problem,
-    holdout: Problem | None,
-    candidates: Sequence[Candidate],
+    holdout: Holdout,
+    remake: Callable[[Sequence[Effect]], tuple[list[Candidate], np.ndarray]],
     config: SearchConfig,
     say: Callable[[str], None] = lambda text: None,
 ) -> Search:
-    """Forward selection with joint refits, then pruning."""
-    columns = problem.sensitivities(candidates)
-    start = problem.residual([[]])[0]
-    weights = window_weights(start)
-    fit = gauss_newton(problem, (), (), weights)
-    bound = norm.isf(config.level / (2 * len(candidates)))
-    steps: list[Step] = []
-    rejected: list[str] = []
-    closed: set[int] = set()
+    """Forward selection with joint refits, then pruning.
+
+    `remake` gives the candidates with steps for a model with some effects, and its joints' typical torques (J,) [N m].
+    """
+    run = _Run(problem, holdout, remake, config, say)
     vain = 0
-    while len(fit.chosen) < config.most:
-        tests = score_tests(problem, columns, fit, weights)
-        order = [c for c in np.argsort(-tests[:, 3]) if _open(c, candidates, fit, closed, tests, bound)]
-        if not order:
+    while len(run.fit.chosen) < config.most and vain < config.patience:
+        tried, looked = far_trials(run.problem, run.fit, run.candidates, run.weights, config.far), []
+        tried = [t for t in tried if t.candidate not in run.closed]
+        if not tried:
+            tried, looked = run.trials()
+        if not tried and not looked:
             break
-        trials = [t for c in order[: config.trials] if (t := _try(problem, fit, candidates[c], tests[c], weights))]
-        trials = [t for t in trials if t[1] < fit.cost - bound**2 / 2]
-        if not trials:
-            closed |= set(order[: config.trials])
+        if not tried:
+            run.closed |= set(looked)
             vain += 1
-            if vain >= config.patience:
-                break
             continue
-        candidate, _, value = min(trials, key=lambda t: t[1])
-        fresh = gauss_newton(problem, (*fit.chosen, candidate), (*fit.values, value), weights)
-        step = _evidence(problem, holdout, fit, fresh, weights, len(candidates), config)
-        if step is None:
-            rejected.append(f"{candidate.effect} on {candidate.where}")
-            closed.add(candidates.index(candidate))
-            vain += 1
-            if vain >= config.patience:
-                break
-            continue
-        fit = fresh
-        steps.append(step)
-        say(f"found {candidate.effect} on {candidate.where}: {fit.values[-1]:.4g}")
-        weights = window_weights(fit.clean(problem))
-        fit = gauss_newton(problem, fit.chosen, fit.values, weights, iterations=2)
-    fit, weights = _prune(problem, fit, weights, bound)
-    tests = score_tests(problem, columns, fit, weights)
-    steps = [s for s in steps if s.candidate in fit.chosen]
-    return Search(fit, steps, columns, weights, tests[:, [2, 1]], rejected)
-
-
-def _open(c: int, candidates: Sequence[Candidate], fit: Fit, closed: set[int], tests: np.ndarray, bound: float) -> bool:
-    """Whether a candidate is significant, can move the way it wants to, and has not been tried in vain."""
-    candidate = candidates[c]
-    if c in closed or candidate in fit.chosen or abs(tests[c, 2]) < bound:
-        return False
-    wanted = candidate.nominal + tests[c, 0] * candidate.step
-    return abs(candidate.clip(wanted) - candidate.nominal) > 1e-3 * abs(candidate.step)
-
-
-def _try(
-    problem: Problem, fit: Fit, candidate: Candidate, test: np.ndarray, weights: np.ndarray
-) -> tuple[Candidate, float, float] | None:
-    """Secant steps of one candidate's size, the chosen ones free to move linearly: (candidate, cost, value)."""
-    basis, inverse = project(problem, fit.columns, weights)
-    value = candidate.clip(candidate.nominal + test[0] * candidate.step)
-    best: tuple[Candidate, float, float] | None = None
-    for _ in range(3):
-        residual = problem.residual([[*fit.effects, candidate.at(value)]])[0]
-        left = residual - np.tensordot(solve(basis, inverse, residual, weights), basis, axes=1)
-        cost = float((weights[:, None] * left**2).sum())
-        if best is None or cost < best[1]:
-            best = (candidate, cost, value)
-        change = fit.residual - residual
-        change = change - np.tensordot(solve(basis, inverse, change, weights), basis, axes=1)
-        size = (weights[:, None] * change**2).sum()
-        if size < 1e-9:
-            return None
-        before = fit.residual - np.tensordot(solve(basis, inverse, fit.residual, weights), basis, axes=1)
-        factor = float(np.clip((weights[:, None] * change * before).sum() / size, 0.1, 4.0))
-        new = candidate.clip(candidate.nominal + factor * (value - candidate.nominal))
-        if abs(new - value) < 0.03 * abs(value - candidate.nominal):
-            break
-        value = new
-    return best
-
-
-def _evidence(
-    problem: Problem,
-    holdout: Problem | None,
-    before: Fit,
-    after: Fit,
-    weights: np.ndarray,
-    count: int,
-    config: SearchConfig,
-) -> Step | None:
-    """Test the newest effect in the joint fit and on held-out windows; None if it fails either."""
-    newest, value = after.chosen[-1], after.values[-1]
-    error = standard_errors(problem, after, weights)[-1]
-    z = abs(value - newest.nominal) / max(error, 1e-300)
-    p = min(1.0, 2 * norm.sf(z) * count)
-    if p > config.level:
-        return None
-    if holdout is None:
-        return Step(newest, z, p, np.nan, np.nan)
-    pair = holdout.residual([before.effects, after.effects])
-    nuisances = (before.nuisance, after.nuisance)
-    left = [r - np.tensordot(n, holdout.nuisance, axes=1) for r, n in zip(pair, nuisances, strict=True)]
-    scale = window_weights(left[0])
-    power = [(r**2).mean(axis=1) * scale for r in left]
-    gain = power[0] - power[1]
-    spread = gain.std(ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
-    if gain.mean() < config.holdout_z * spread or gain.mean() < config.least_gain * power[0].mean():
-        return None
-    return Step(newest, z, p, float(power[0].mean()), float(power[1].mean()))
-
-
-def _prune(problem: Problem, fit: Fit, weights: np.ndarray, bound: float) -> tuple[Fit, np.ndarray]:
-    """Drop effects that the others have made needless, worst first, refitting each time."""
-    while fit.chosen:
-        errors = np.sqrt(np.diag(covariance(problem, fit, weights, np.arange(len(weights)))))
-        nominal = np.array([c.nominal for c in fit.chosen])
-        z = np.abs(fit.values - nominal) / np.maximum(errors, 1e-300)
-        worst = int(np.argmin(z))
-        if z[worst] >= bound:
-            break
-        keep = [i for i in range(len(fit.chosen)) if i != worst]
-        fit = gauss_newton(problem, [fit.chosen[i] for i in keep], fit.values[keep], weights, iterations=2)
-    return fit, weights
+        best = simplest(tried, run.fit.cost)
+        vain += not run.accept(best.candidate, best.values)
+    run.prune()
+    steps = [s for s in run.steps if s.candidate in run.fit.chosen]
+    return Search(
+        run.fit,
+        run.problem,
+        run.weights,
+        steps,
+        run.small,
+        run.columns,
+        run.tests(),
+        run.bound,
+        len(run.candidates),
+        run.rejected,
+    )

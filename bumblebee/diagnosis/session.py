@@ -11,12 +11,17 @@ from bumblebee.diagnosis.noise import estimate_noise
 from bumblebee.diagnosis.plant import Plant, load_spec, make_plant
 from bumblebee.diagnosis.signals import Layout, layout_of
 from bumblebee.diagnosis.simulate import step_for
+from bumblebee.diagnosis.smooth import HALF_SPAN, smooth_rollouts
 from bumblebee.errors import BadInput
-from bumblebee.measured.rollout import Rollout, read_dataset
+from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
+from bumblebee.measured.usable import review
 
 _FINE, _COARSE = 0.001, 0.005
 # Shorter rollouts hold no window of 0.2 s after the lead that delayed commands need.
 _SHORTEST = 0.35
+# From so many rollouts to fit on, some are put aside to decide which effects are accepted.
+_ENOUGH_TO_SPLIT = 4
+_MOST_WARNINGS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +36,14 @@ class Session:
     """(D,) noise of every signal."""
     train: list[int]
     holdout: list[int]
+    """Rollouts that only the errors are reported on."""
+    accept: list[int]
+    """Rollouts that decide which effects are accepted: some of `train`, which then are not fitted; or `holdout`."""
     steps: tuple[float, float]
     """Simulation step [s] for residuals and for sensitivities."""
     notes: list[str]
+    set_aside: list[dict[str, str]]
+    """Rollouts that could not be used, with the reason."""
 
     def ids(self, which: Sequence[int]) -> list[str]:
         """Rollout ids of indices."""
@@ -42,36 +52,84 @@ class Session:
 
 def open_session(model: Path, dataset: Path) -> Session:
     """Read and match a model and a dataset."""
-    rollouts = read_dataset(dataset).rollouts
-    return make_session(load_spec(model), rollouts, model, dataset)
+    rollouts, errors, warnings = [], [], []
+    files = rollout_files(dataset)
+    if not files:
+        raise BadInput(Path(dataset) / "rollouts", "at least one *.parquet", "none")
+    spec = load_spec(model)
+    declared = spec.compile()
+    for file in files:
+        try:
+            rollout = read_rollout(file)
+        except BadInput as error:
+            errors.append((file.stem, error))
+            continue
+        refused, found = review(rollout, declared, file.name)
+        warnings += found
+        if refused is None:
+            rollouts.append(rollout)
+        else:
+            errors.append((file.stem, refused))
+    if not rollouts:
+        raise errors[0][1]
+    return make_session(spec, rollouts, model, dataset, errors, warnings)
 
 
-def make_session(spec: mujoco.MjSpec, rollouts: Sequence[Rollout], model: object, dataset: object) -> Session:
-    """The same from memory; `model` and `dataset` are names for messages."""
-    notes = []
-    long = [r for r in rollouts if r.time[-1] - r.time[0] >= _SHORTEST and r.frames >= 12]
+def make_session(
+    spec: mujoco.MjSpec,
+    rollouts: Sequence[Rollout],
+    model: object,
+    dataset: object,
+    errors: Sequence[tuple[str, BadInput]] = (),
+    warnings: Sequence[str] = (),
+) -> Session:
+    """The same from memory; `model` and `dataset` are names for messages.
+
+    A rollout that cannot be used is set aside with its reason, as are those in `errors` (id, error), which could not be
+    read; where none is left the first reason ends it.
+    """
+    notes, long, failed = [], [], list(errors)
+    for rollout in rollouts:
+        try:
+            _usable(dataset, rollout, long[0] if long else None)
+            long.append(rollout)
+        except BadInput as error:
+            failed.append((rollout.rollout_id, error))
     if not long:
-        raise BadInput(dataset, f"a rollout of at least {_SHORTEST} s", "only shorter ones", "Record longer runs.")
-    if len(long) < len(rollouts):
-        notes.append(f"{len(rollouts) - len(long)} rollouts shorter than {_SHORTEST} s were not used")
-    for rollout in long:
-        if rollout.joints != long[0].joints:
-            raise BadInput(f"{dataset}: {rollout.rollout_id}: joints", f"those of {long[0].rollout_id}", "others")
-        _finite(dataset, rollout)
+        raise failed[0][1]
+    notes += [f"set aside: {error}" for _, error in failed]
+    notes += [f"check: {text}" for text in warnings[:_MOST_WARNINGS]]
+    if len(warnings) > _MOST_WARNINGS:
+        notes.append(f"{len(warnings) - _MOST_WARNINGS} more findings that do not stop a file")
     plant = make_plant(spec, long[0], model)
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)
     if plant.floating and not has_pos:
         notes.append("no base_pos: the base's height comes from stance, its error is a nuisance")
     train, holdout = split(long)
-    if holdout:
+    accept = _accepting(long, train, holdout)
+    if set(accept) & set(holdout):
         notes.append("the held-out rollouts decided which effects were accepted, never how large they are")
-    else:
+    elif not holdout:
         notes.append("a single rollout: nothing could be held out; errors are those of the fitted data")
     period = float(np.median(np.diff(long[0].time)))
     declared = float(spec.option.timestep)
     steps = (step_for(period, min(_FINE, declared)), step_for(period, _COARSE))
-    return Session(spec, plant, layout, long, estimate_noise(long, layout), train, holdout, steps, notes)
+    sigma = estimate_noise(long, layout)
+    if not plant.floating:
+        long, sigma, fast = smooth_rollouts(long, layout, sigma)
+        if fast:
+            notes.append(f"{fast} fast rollouts: joint readings smoothed over +-{1000 * HALF_SPAN:g} ms")
+    aside = [{"rollout": name, "reason": str(error)} for name, error in failed]
+    return Session(spec, plant, layout, long, sigma, train, holdout, accept, steps, notes, aside)
+
+
+def _accepting(rollouts: Sequence[Rollout], train: Sequence[int], holdout: Sequence[int]) -> list[int]:
+    """Rollouts to decide on: of four and more to fit every fourth (by motion), else those that are held out."""
+    if len(train) < _ENOUGH_TO_SPLIT:
+        return list(holdout)
+    _, some = split([rollouts[i] for i in train])
+    return [train[k] for k in some]
 
 
 def split(rollouts: Sequence[Rollout]) -> tuple[list[int], list[int]]:
@@ -101,16 +159,25 @@ def split(rollouts: Sequence[Rollout]) -> tuple[list[int], list[int]]:
     return [i for i in range(len(rollouts)) if i not in holdout], sorted(holdout)
 
 
-def _finite(dataset: object, rollout: Rollout) -> None:
-    """Not-a-number anywhere ends it: no window may start from one."""
+def _usable(dataset: object, rollout: Rollout, first: Rollout | None) -> None:
+    """`BadInput` for a rollout that no window may start in: not-a-number anywhere, too short, other joints."""
+    name = f"{dataset}: {rollout.rollout_id}"
     for column in ("time", *rollout.columns):
         values = np.asarray(getattr(rollout, column))
         bad = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
         if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            where = f"{dataset}: {rollout.rollout_id}: column {column}: row {row}: rule finite"
+            where = f"{name}: column {column}: row {int(np.flatnonzero(bad)[0])}: rule finite"
             raise BadInput(where, "finite numbers", "NaN or infinity", "Set the file aside or repair the logger.")
     if rollout.frames > 1 and (np.diff(rollout.time) <= 0).any():
         row = int(np.flatnonzero(np.diff(rollout.time) <= 0)[0]) + 1
-        where = f"{dataset}: {rollout.rollout_id}: column time: row {row}: rule increasing"
-        raise BadInput(where, "strictly increasing times", "a step back or a repeat")
+        raise BadInput(
+            f"{name}: column time: row {row}: rule increasing", "strictly increasing times", "a step back or a repeat"
+        )
+    seconds = rollout.time[-1] - rollout.time[0]
+    if seconds < _SHORTEST or rollout.frames < 12:
+        raise BadInput(
+            f"{name}: column time", f"at least {_SHORTEST} s and 12 rows", f"{seconds:.2g} s, {rollout.frames} rows",
+            "Record longer runs.",
+        )  # fmt: skip
+    if first is not None and rollout.joints != first.joints:
+        raise BadInput(f"{name}: joints", f"those of {first.rollout_id}", "others")

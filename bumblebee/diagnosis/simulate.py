@@ -1,16 +1,27 @@
 """Many windows under many variations at once, on `mujoco.batch`."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from bumblebee.diagnosis.memory import at_starts, logged_torques, read_at, remember, yielded
 from bumblebee.diagnosis.plant import Plant
-from bumblebee.diagnosis.signals import Layout, difference, simulated_readings
+from bumblebee.diagnosis.signals import (
+    Layout,
+    conjugate,
+    difference,
+    from_rotation_vector,
+    multiply,
+    rotate,
+    simulated_readings,
+)
 from bumblebee.diagnosis.variation import Variation
 from bumblebee.diagnosis.windows import Windows, controls
+from bumblebee.sim.effect_forces import Memory, StepHooks
+from bumblebee.sim.effect_native import SUFFIX
 
 THREADS = 2
 _CHUNK_BYTES = 48e6
@@ -47,17 +58,39 @@ def residuals(
     chunk = max(1, int(_CHUNK_BYTES / (8.0 * count * width * len(windows))))
     out = np.empty((copies, *windows.measured.shape))
     cache: dict[bytes, np.ndarray] = {}
-    for first in range(0, copies, chunk):
-        part = range(first, min(first + chunk, copies))
+    first = 0
+    while first < copies:
+        part = _together(variations, first, chunk) if starts is None else range(first, min(first + chunk, copies))
         chosen = [variations[0] if starts is not None else variations[v] for v in part]
-        inputs = []
-        for variation in chosen:
-            key = variation.delay.tobytes()
-            if key not in cache:
-                cache[key] = controls(windows, variation.delay, step, count)
-            inputs.append(cache[key])
+        inputs = [inputs_of(windows, variation, step, count, cache) for variation in chosen]
         out[part.start : part.stop] = _run(plant, layout, windows, chosen, inputs, step, count, starts, part)
+        first = part.stop
     return out
+
+
+def _together(variations: Sequence[Variation], first: int, chunk: int) -> range:
+    """Plain variations from `first` on run in one batch; one that is more than a model runs alone."""
+    last = first
+    while last < min(first + chunk, len(variations)) and variations[last].plain:
+        last += 1
+    return range(first, max(last, first + 1))
+
+
+def inputs_of(
+    windows: Windows, variation: Variation, step: float, count: int, cache: dict[bytes, np.ndarray]
+) -> np.ndarray:
+    """Controls (W, count, nu) of a variation: late, and on the mean as held as dropped commands leave them."""
+    share = variation.dropped
+    key = variation.delay.tobytes() + (b"" if share is None else share.tobytes())
+    if key not in cache:
+        sent = windows
+        if share is not None:
+            command = windows.command.copy()
+            for k in range(1, command.shape[1]):
+                command[:, k] = (1 - share) * command[:, k] + share * command[:, k - 1]
+            sent = replace(windows, command=command)
+        cache[key] = controls(sent, variation.delay, step, count)
+    return cache[key]
 
 
 def _run(
@@ -73,9 +106,12 @@ def _run(
 ) -> np.ndarray:
     """One chunk: residuals (len(chosen), W, N, D)."""
     copies, size = len(chosen), len(windows)
-    models = {id(v.model): _with_step(v.model, step) for v in chosen}
-    batch = Batch(plant.model, copies * size, THREADS)
-    batch.set_models([models[id(v.model)] for v in chosen for _ in range(size)])
+    lead = chosen[0]
+    models = {id(v.model): with_step(v.model, step) for v in chosen}
+    own = lead.plant or plant
+    batch = Batch(lead.model, copies * size, THREADS)
+    if lead.plain:
+        batch.set_models([models[id(v.model)] for v in chosen for _ in range(size)])
     offset = np.stack([v.offset for v in chosen])[:, None, :]
     if starts is None:
         qpos = np.repeat(windows.qpos[None], copies, axis=0)
@@ -83,16 +119,31 @@ def _run(
     else:
         qpos, qvel = starts.qpos[part.start : part.stop].copy(), starts.qvel[part.start : part.stop]
     qpos[..., plant.qpos] -= offset
+    late = _late(plant, lead)
+    if late.any():
+        qpos, qvel = _caught_up(plant, windows, qpos, qvel, late)
+    if lead.tilt is not None:
+        qpos, qvel = _righted(plant, qpos, qvel, lead.tilt)
+    if lead.plant is not None:
+        qpos, qvel = _restructured(plant, windows, lead, qpos, qvel)
     batch.bind("qpos")[:] = qpos.reshape(copies * size, -1)
     batch.bind("qvel")[:] = qvel.reshape(copies * size, -1)
     control = np.stack(inputs).reshape(copies * size, count, -1)
-    if plant.model.na:
-        batch.bind("act")[:] = _activation(plant.model, control[:, 0])
-    out = batch.rollout(count, control, record=("qpos", "qvel"))
+    if own.model.na:
+        batch.bind("act")[:] = _activation(own.model, control[:, 0])
+    _set_plastic(batch, plant, windows, lead, copies)
+    path_q, path_v = _roll(batch, plant, windows, lead, control, step, copies)
     failed = batch.warning.reshape(copies * size, -1).any(axis=1)
-    at_q = _at_ticks(windows, qpos, out["qpos"], step, copies)
-    at_v = _at_ticks(windows, qvel, out["qvel"], step, copies)
-    simulated, quat = simulated_readings(plant, layout, at_q, at_v, offset[:, :, None, :])
+    at_q = at_ticks(windows, qpos, path_q, step, copies)
+    at_v = at_ticks(windows, qvel, path_v, step, copies)
+    for delay in np.unique(late[late > 0]):
+        old = replace(windows, out_time=np.maximum(windows.out_time - delay, 0.0))
+        for at, start, path, where in ((at_q, qpos, path_q, own.qpos), (at_v, qvel, path_v, own.dof)):
+            columns = where[late == delay]
+            at[..., columns] = at_ticks(old, start, path, step, copies)[..., columns]
+    simulated, quat = simulated_readings(own, layout, at_q, at_v, offset[:, :, None, :])
+    if quat is not None and lead.tilt is not None:
+        quat = multiply(quat, from_rotation_vector(lead.tilt))
     measured = np.broadcast_to(windows.measured, simulated.shape)
     target = None if windows.quat is None else np.broadcast_to(windows.quat, quat.shape)
     result = difference(layout, measured, target, simulated, quat)
@@ -100,7 +151,99 @@ def _run(
     return result
 
 
-def _with_step(model: mujoco.MjModel, step: float) -> mujoco.MjModel:
+def _late(plant: Plant, lead: Variation) -> np.ndarray:
+    """How old readings are when they are logged, (J,) [s]."""
+    out = np.zeros(len(plant.joints))
+    if lead.hooks is not None:
+        out[[plant.joints.index(name) for name in lead.hooks.joints]] = lead.hooks.encoder_delay
+    return out
+
+
+def _caught_up(
+    plant: Plant, windows: Windows, qpos: np.ndarray, qvel: np.ndarray, late: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Starts in which joints with late encoders are where a later reading puts them."""
+    every = range(len(plant.joints))
+    moved, still = read_at(windows, 0.0, late, every), read_at(windows, 0.0, 0.0 * late, every)
+    qpos, qvel = qpos.copy(), qvel.copy()
+    qpos[..., plant.qpos] += moved[0] - still[0]
+    qvel[..., plant.dof] += moved[1] - still[1]
+    return qpos, qvel
+
+
+def _roll(
+    batch: Batch, plant: Plant, windows: Windows, lead: Variation, control: np.ndarray, step: float, copies: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """States (n, count, nq) and (n, count, nv) after every step."""
+    hooks = lead.hooks
+    if hooks is not None:
+        running = StepHooks(hooks, lead.model, batch)
+        running.reset(np.arange(len(control)), _repeated(remember(plant, windows, hooks, step), copies))
+    if hooks is None or not hooks.each_step:
+        out = batch.rollout(control.shape[1], control, record=("qpos", "qvel"))
+        return out["qpos"], out["qvel"]
+    q, v, ctrl = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
+    path_q = np.empty((len(q), control.shape[1], q.shape[1]))
+    path_v = np.empty((len(v), control.shape[1], v.shape[1]))
+    for k in range(control.shape[1]):
+        ctrl[:] = control[:, k]
+        running.apply()
+        batch.step()
+        path_q[:, k], path_v[:, k] = q, v
+    return path_q, path_v
+
+
+def _repeated(memory: Memory, copies: int) -> Memory:
+    """The memory of every window, once for each copy of the windows."""
+    values = {f.name: getattr(memory, f.name) for f in fields(memory)}
+    return Memory(**{k: None if v is None else np.concatenate([v] * copies) for k, v in values.items()})
+
+
+def _righted(plant: Plant, qpos: np.ndarray, qvel: np.ndarray, tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Starts whose base stands as it is, not as a tilted sensor says; velocities in the base's frame stay."""
+    qpos, qvel = qpos.copy(), qvel.copy()
+    at, dof = slice(plant.base_qpos + 3, plant.base_qpos + 7), slice(plant.base_dof, plant.base_dof + 3)
+    speed_b = rotate(conjugate(qpos[..., at]), qvel[..., dof])
+    qpos[..., at] = multiply(qpos[..., at], conjugate(from_rotation_vector(tilt)))
+    qvel[..., dof] = rotate(qpos[..., at], speed_b)
+    return qpos, qvel
+
+
+def _restructured(
+    plant: Plant, windows: Windows, lead: Variation, qpos: np.ndarray, qvel: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The starts in the layout of a model with play or shafts, whose own state follows from the servo's torque."""
+    own = lead.plant
+    q = np.broadcast_to(own.model.qpos0, (*qpos.shape[:-1], own.model.nq)).copy()
+    v = np.zeros((*qvel.shape[:-1], own.model.nv))
+    q[..., own.qpos], v[..., own.dof] = qpos[..., plant.qpos], qvel[..., plant.dof]
+    if plant.floating:
+        q[..., own.base_qpos : own.base_qpos + 7] = qpos[..., plant.base_qpos : plant.base_qpos + 7]
+        v[..., own.base_dof : own.base_dof + 6] = qvel[..., plant.base_dof : plant.base_dof + 6]
+    for kind, joint, value in lead.hidden:
+        if kind in SUFFIX:
+            column, second = plant.joints.index(joint), own.model.joint(joint + SUFFIX[kind])
+            torque = at_starts(windows, lambda r: logged_torques(plant, r)[0])[:, column]
+            # The motor leads the link by half the gap, or by the shaft's twist, in the direction in which it pushes.
+            behind = 0.5 * value * np.sign(torque) if kind == "backlash" else torque / value
+            q[..., int(second.qposadr[0])] = -behind
+    return q, v
+
+
+def _set_plastic(batch: Batch, plant: Plant, windows: Windows, lead: Variation, copies: int) -> None:
+    """References of yielding springs, where the log before the start has left them."""
+    if lead.plant is None or not any(kind == "hysteresis" for kind, _, _ in lead.hidden):
+        return
+    plastic = batch.bind("plastic")
+    for kind, joint, width in lead.hidden:
+        if kind == "hysteresis":
+            column = plant.joints.index(joint)
+            address = int(lead.model.jnt_plasticadr[lead.model.joint(joint).id])
+            centre = yielded(windows, column, width) - lead.offset[column]
+            plastic[:, address] = np.tile(centre, copies)
+
+
+def with_step(model: mujoco.MjModel, step: float) -> mujoco.MjModel:
     """The model itself, its step set: variations are never stepped from two places at once."""
     model.opt.timestep = step
     return model
@@ -115,7 +258,7 @@ def _activation(model: mujoco.MjModel, control: np.ndarray) -> np.ndarray:
     return act
 
 
-def _at_ticks(windows: Windows, start: np.ndarray, path: np.ndarray, step: float, copies: int) -> np.ndarray:
+def at_ticks(windows: Windows, start: np.ndarray, path: np.ndarray, step: float, copies: int) -> np.ndarray:
     """States (copies, W, N, .) at the compared ticks, linear between simulation steps."""
     size = len(windows)
     path = path.reshape(copies, size, *path.shape[1:])

@@ -2,15 +2,20 @@
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.plant import Plant, make_plant
+from bumblebee.sim import effect_native as native
 from bumblebee.sim.effect_catalogue import CATALOGUE, STICTION_SOLIMP, STICTION_SOLREF, Effect
+from bumblebee.sim.effect_hooks import RuntimeHooks, runtime_hooks
+from bumblebee.sim.effects import add_to_spec
 
 _ORDER = tuple(CATALOGUE)
+# Effects that change the layout of MuJoCo's state: they are compiled, once for each set of places.
+STRUCTURAL = ("backlash", "series_elasticity", "hysteresis")
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,69 +27,222 @@ class Variation:
     """(nu,) command delay [s]."""
     offset: np.ndarray
     """(J,) what the encoder adds to the joint's position [rad], in the log's column order."""
+    plant: Plant | None = None
+    """The plant of `model` where its structure differs from the declared one's."""
+    hooks: RuntimeHooks | None = None
+    """What must be done beside MuJoCo at every step."""
+    dropped: np.ndarray | None = None
+    """(nu,) share of commands that never arrive."""
+    tilt: np.ndarray | None = None
+    """(3,) [rad] rotation vector multiplied onto the reading of the base's orientation."""
+    hidden: tuple[tuple[str, str, float], ...] = field(default=())
+    """(kind, joint, value) of the structural effects, for the state that no sensor reads."""
+
+    @property
+    def plain(self) -> bool:
+        """Whether a model and a delay are all there is to it."""
+        return self.plant is None and self.hooks is None and self.tilt is None and self.dropped is None
 
 
 def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
     """The plant with `effects`; the same meaning as `sim.effect_spec.add_to_spec`, without compiling again."""
     if not effects:
         return Variation(plant.model, plant.delay, plant.offset)
-    model, delay, offset = copy.copy(plant.model), plant.delay.copy(), plant.offset.copy()
-    constants = False
+    structural = [e for e in effects if e.effect in STRUCTURAL]
+    own = _structure(plant, structural) if structural else plant
+    model, delay, offset = copy.copy(own.model), plant.delay.copy(), plant.offset.copy()
+    constants, hidden = False, []
     for effect in sorted(effects, key=lambda e: _ORDER.index(e.effect)):
-        for place in effect.where:
-            constants |= _apply(plant, model, delay, offset, effect.effect, place, effect.value())
+        for place in effect.where or _everywhere(plant, effect.effect):
+            constants |= _apply(own, model, delay, offset, effect, place)
+            if effect.effect in STRUCTURAL:
+                hidden.append((effect.effect, place, effect.values()[-1]))
     if constants:
         # set_const reads qpos0 through a scratch MjData; gains, friction and damping do not enter it.
         mujoco.mj_setConst(model, mujoco.MjData(model))
-    return Variation(model, delay, offset)
+    hooks = runtime_hooks(effects, model)
+    return Variation(
+        model,
+        delay,
+        offset,
+        plant=own if structural else None,
+        hooks=hooks if hooks.steps else None,
+        dropped=_dropped(plant, hooks),
+        tilt=hooks.imu if hooks.imu.any() else None,
+        hidden=tuple(hidden),
+    )
+
+
+def _dropped(plant: Plant, hooks: RuntimeHooks) -> np.ndarray | None:
+    if not hooks.dropped.any():
+        return None
+    share = np.zeros(plant.model.nu)
+    for name, value in zip(hooks.joints, hooks.dropped, strict=True):
+        actuator = plant.actuator[plant.joints.index(name)]
+        if actuator >= 0:
+            share[actuator] = value
+    return share
+
+
+def _everywhere(plant: Plant, kind: str) -> tuple[str, ...]:
+    """The places that `where: []` stands for."""
+    if not CATALOGUE[kind].whole:
+        return ("",)
+    return tuple(name for name, a in zip(plant.joints, plant.actuator, strict=True) if a >= 0)
+
+
+def _structure(plant: Plant, effects: Sequence[Effect]) -> Plant:
+    """The plant compiled with play, shafts and yielding springs; their sizes are set afterwards."""
+    key = tuple(sorted((e.effect, e.where) for e in effects))
+    if key not in plant.compiled:
+        spec = plant.spec.copy()
+        add_to_spec(spec, effects)
+        plant.compiled[key] = make_plant(spec, plant.example, "declared model")
+    return plant.compiled[key]
 
 
 def _apply(
-    plant: Plant, model: mujoco.MjModel, delay: np.ndarray, offset: np.ndarray, kind: str, place: str, value: float
+    plant: Plant, model: mujoco.MjModel, delay: np.ndarray, offset: np.ndarray, effect: Effect, place: str
 ) -> bool:
     """Write one effect; True if constants that derive from the model must be computed again."""
-    if kind == "link_mass":
-        model.body_mass[model.body(place).id] = value
-        return True
+    kind, values = effect.effect, effect.values()
+    if CATALOGUE[kind].on == "body":
+        return _apply_to_body(model, kind, place, values)
+    if CATALOGUE[kind].on == "geom":
+        _apply_to_ground(model, kind, place, values[0])
+        return False
+    if kind == "ground_slope":
+        model.opt.gravity = native.sloped(model.opt.gravity, *values)
+        return False
     column = plant.joints.index(place)
-    dof, actuator = plant.dof[column], plant.actuator[column]
-    if kind == "coulomb_friction":
-        model.dof_frictionloss[dof] = value
+    if kind == "discovered":  # a hook; its terms may be dry friction, which has to stick
+        dof = plant.dof[column]
         model.dof_solref[dof], model.dof_solimp[dof, :2] = STICTION_SOLREF, STICTION_SOLIMP
+        return False
+    _apply_to_joint(plant, model, kind, column, values)
+    if kind == "command_delay":
+        delay[plant.actuator[column]] = values[0]
+    elif kind == "encoder_offset":
+        offset[column] = values[0]
+    return kind in ("armature", *STRUCTURAL)
+
+
+def _apply_to_joint(plant: Plant, model: mujoco.MjModel, kind: str, column: int, values: tuple[float, ...]) -> None:
+    dof, a, value = plant.dof[column], plant.actuator[column], values[0]
+    joint = int(model.dof_jntid[dof])
+    if kind in ("coulomb_friction", "stribeck_friction", "load_dependent_friction"):
+        model.dof_solref[dof], model.dof_solimp[dof, :2] = STICTION_SOLREF, STICTION_SOLIMP
+        if kind == "coulomb_friction":
+            model.dof_frictionloss[dof] = value
     elif kind == "viscous_friction":
         model.dof_damping[dof] = value
     elif kind == "armature":
         model.dof_armature[dof] = value
-        return True
-    elif kind == "command_delay":
-        delay[actuator] = value
     elif kind == "encoder_offset":
-        offset[column] = value
-        model.actuator_biasprm[actuator, 0] = (
-            model.actuator_biasprm[actuator, 1] * value * model.actuator_gear[actuator, 0]
-        )
+        if a >= 0:
+            model.actuator_biasprm[a, 0] = model.actuator_biasprm[a, 1] * value * model.actuator_gear[a, 0]
+    elif kind == "torque_limit":
+        force = value / abs(model.actuator_gear[a, 0])
+        model.actuator_forcelimited[a], model.actuator_forcerange[a] = 1, (-force, force)
+    elif kind in ("motor_strength", "kp", "kd"):
+        kp = value if kind != "kd" else 1.0
+        kd = value if kind != "kp" else 1.0
+        model.actuator_gainprm[a, 0] *= kp
+        model.actuator_biasprm[a, :3] *= [kp, kp, kd]
+    elif kind == "asymmetric_friction":
+        stiffness, rest = model.jnt_stiffness[joint], model.qpos_spring[model.jnt_qposadr[joint]]
+        _set_spring(model, joint, stiffness, stiffness * rest - 0.5 * value)
+    elif kind == "joint_spring":
+        _set_spring(model, joint, *values)
+    elif kind == "hysteresis":
+        model.jnt_stiffness[joint], model.jnt_springyield[joint] = value / values[1], values[1]
+    elif kind in native.SUFFIX:
+        second = int(model.joint(plant.joints[column] + native.SUFFIX[kind]).id)
+        if kind == "backlash":
+            model.jnt_range[second] = (-0.5 * value, 0.5 * value)
+        else:
+            model.jnt_stiffness[second] = value
+            model.dof_damping[model.jnt_dofadr[second]] = native.FLEX_LOSS * value
+
+
+def _set_spring(model: mujoco.MjModel, joint: int, stiffness: float, preload: float) -> None:
+    stiffness, rest = native.spring_of(float(stiffness), float(preload))
+    model.jnt_stiffness[joint], model.qpos_spring[model.jnt_qposadr[joint]] = stiffness, rest
+
+
+def _apply_to_body(model: mujoco.MjModel, kind: str, place: str, values: tuple[float, ...]) -> bool:
+    body = model.body(place).id
+    if kind == "link_mass":
+        model.body_mass[body] = values[0]
+    elif kind == "link_com":
+        model.body_ipos[body] = values
+    elif kind == "link_inertia":
+        model.body_inertia[body] = native.physical_inertia(values)
+    return kind in ("link_mass", "link_com", "link_inertia")
+
+
+def touching(model: mujoco.MjModel, ground: int) -> list[int]:
+    """Geometries that the geometry `ground` can touch."""
+    types, affinities = model.geom_contype, model.geom_conaffinity
+    pairs = ((g, native.touch(types[ground], affinities[ground], types[g], affinities[g])) for g in range(model.ngeom))
+    return [g for g, meet in pairs if meet and g != ground]
+
+
+def _apply_to_ground(model: mujoco.MjModel, kind: str, place: str, value: float) -> None:
+    ground = int(model.geom(place).id)
+    others = touching(model, ground)
+    if kind == "ground_friction":
+        model.geom_friction[ground, 0] = value
+        model.geom_friction[others, 0] = np.minimum(value, model.geom_friction[others, 0])
     else:
-        kp = value if kind in ("motor_strength", "kp") else 1.0
-        kd = value if kind in ("motor_strength", "kd") else 1.0
-        model.actuator_gainprm[actuator, 0] *= kp
-        model.actuator_biasprm[actuator, :3] *= [kp, kp, kd]
-    return False
+        model.geom_solref[[ground, *others], 0] = value
+
+
+def declared_values(plant: Plant, kind: str, place: str) -> tuple[float, ...]:
+    """The parameters of an effect as the declared model has them; infinite where it knows no bound."""
+    model = plant.model
+    entry = CATALOGUE[kind]
+    if kind in ("link_mass", "link_com", "link_inertia"):
+        body = model.body(place).id
+        fields = {"link_mass": model.body_mass, "link_com": model.body_ipos, "link_inertia": model.body_inertia}
+        return tuple(float(x) for x in np.atleast_1d(fields[kind][body]))
+    if kind == "ground_friction":
+        ground = int(model.geom(place).id)
+        others = [model.geom_friction[g, 0] for g in touching(model, ground)]
+        return (float(max(model.geom_friction[ground, 0], np.median(others) if others else 0.0)),)
+    if kind == "ground_compliance":
+        return (float(model.geom_solref[int(model.geom(place).id), 0]),)
+    if entry.on != "joint" or not place:
+        return (0.0,) * len(entry.parameters)
+    return _declared_on_joint(plant, kind, plant.joints.index(place))
+
+
+def _declared_on_joint(plant: Plant, kind: str, column: int) -> tuple[float, ...]:
+    model, dof, a = plant.model, plant.dof[column], plant.actuator[column]
+    joint = int(model.dof_jntid[dof])
+    simple = {
+        "coulomb_friction": model.dof_frictionloss[dof],
+        "viscous_friction": model.dof_damping[dof],
+        "armature": model.dof_armature[dof],
+        "command_delay": plant.delay[a] if a >= 0 else 0.0,
+        "encoder_offset": plant.offset[column],
+        "motor_strength": 1.0,
+        "kp": 1.0,
+        "kd": 1.0,
+        "torque_speed_limit": np.inf,
+        "series_elasticity": np.inf,
+    }
+    if kind in simple:
+        return (float(simple[kind]),)
+    if kind == "torque_limit":
+        limited = a >= 0 and model.actuator_forcelimited[a]
+        return (float(abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1]) if limited else np.inf,)
+    if kind == "joint_spring":
+        stiffness = float(model.jnt_stiffness[joint])
+        return (stiffness, stiffness * float(model.qpos_spring[model.jnt_qposadr[joint]]))
+    return (0.0,) * len(CATALOGUE[kind].parameters)
 
 
 def declared_value(plant: Plant, kind: str, place: str) -> float:
-    """The parameter of an effect as the declared model has it."""
-    if kind == "link_mass":
-        return float(plant.model.body_mass[plant.model.body(place).id])
-    column = plant.joints.index(place)
-    dof = plant.dof[column]
-    if kind == "coulomb_friction":
-        return float(plant.model.dof_frictionloss[dof])
-    if kind == "viscous_friction":
-        return float(plant.model.dof_damping[dof])
-    if kind == "armature":
-        return float(plant.model.dof_armature[dof])
-    if kind == "command_delay":
-        return float(plant.delay[plant.actuator[column]])
-    if kind == "encoder_offset":
-        return float(plant.offset[column])
-    return 1.0
+    """The first parameter of an effect as the declared model has it."""
+    return declared_values(plant, kind, place)[0]

@@ -34,6 +34,12 @@ class Whitener:
     """(W, M) mean residual that noise in the start leaves."""
     valid: np.ndarray
     """(W,) windows whose simulations stayed finite."""
+    moved: np.ndarray
+    """(K, W, M) whitened change of the residual from K perturbed starts, less its mean: what noise alone looks like."""
+
+    def part(self, keep: np.ndarray) -> "Whitener":
+        """The whitener of the windows at the indices or mask `keep`."""
+        return Whitener(self.factor[keep], self.bias[keep], self.valid[keep], self.moved[:, keep])
 
     def __call__(self, residual: np.ndarray, centre: bool = True) -> np.ndarray:
         """Whiten residuals (..., W, N, D) -> (..., W, M); differences of residuals are whitened with centre=False."""
@@ -98,7 +104,21 @@ def fit_whitener(
     moved = np.nan_to_num(moved).reshape(len(moved), len(windows), -1)
     bias = moved.mean(axis=0)
     reading = np.broadcast_to(np.tile(sigma**2, windows.measured.shape[1]), bias.shape)
-    return Whitener(_factors(moved - bias, reading), bias, valid)
+    factor = _factors(moved - bias, reading)
+    white = np.matmul(factor, (moved - bias).transpose(1, 2, 0)).transpose(2, 0, 1).astype(np.float32)
+    return Whitener(factor, bias, valid, white)
+
+
+def null_draws(whitener: Whitener, sigma: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Whitened residuals (K, W, M) of a complete model: noise `sigma` (D,) in the readings and in the starts.
+
+    Each window's perturbed starts come in an order of its own.
+    """
+    count, windows, size = whitener.moved.shape
+    order = np.argsort(rng.random((count, windows)), axis=0)
+    starts = np.take_along_axis(whitener.moved, order[..., None], axis=0)
+    reading = np.tile(sigma, size // len(sigma)) * rng.standard_normal((count, windows, size))
+    return starts + np.matmul(whitener.factor, reading.transpose(1, 2, 0)).transpose(2, 0, 1)
 
 
 def _factors(moved: np.ndarray, reading: np.ndarray) -> np.ndarray:

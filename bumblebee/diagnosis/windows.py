@@ -13,6 +13,10 @@ from bumblebee.measured.rollout import Rollout
 
 # A window starts this long after its rollout, so that a delayed command is known from the start [s].
 LEAD = 0.1
+# Nothing is compared sooner after a start [s]: at 500 Hz the next reading says only that the start was read.
+_FIRST = 0.02
+# Periods between two rows from which on a tick is missing between them.
+_GAP = 1.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +43,8 @@ class Windows:
     """(W, C, nu) logged commands around the window, in the actuators' own input."""
     command_time: np.ndarray
     """(W, C) times at which they were issued, after the start [s]."""
+    source: Sequence[Rollout] = ()
+    """The rollouts that `rollout` counts, for what drives remember from before the start."""
 
     def __len__(self) -> int:
         return len(self.start)
@@ -47,28 +53,50 @@ class Windows:
 def choose_starts(
     rollouts: Sequence[Rollout], ids: Sequence[int], horizon: float, budget: int
 ) -> list[tuple[int, int, int]]:
-    """At most `budget` windows (rollout, first tick, last tick), apart from each other and spread over the rollouts."""
-    every = []
-    for i in ids:
-        time = rollouts[i].time
-        ticks = max(1, round(horizon * rollouts[i].control_hz))
-        first = int(np.searchsorted(time, time[0] + min(LEAD, 0.25 * (time[-1] - time[0]))))
-        last = len(time) - 1 - ticks
-        every += [(i, k, k + ticks) for k in range(first, last + 1, ticks)]
+    """At most `budget` windows (rollout, first tick, last tick), apart from each other and spread over the rollouts.
+
+    A window is `horizon` s long by its time stamps, to the nearest tick, whatever the rate; none holds a gap in the
+    log, for nobody knows what was commanded there.
+    """
+    every = [(i, first, last) for i in ids for first, last in _stretches(rollouts[i].time, horizon)]
     if len(every) > budget:
         every = [every[k] for k in np.unique(np.linspace(0, len(every) - 1, budget).round().astype(int))]
     return every
+
+
+def _stretches(time: np.ndarray, horizon: float) -> list[tuple[int, int]]:
+    """Consecutive stretches (first, last) of `horizon` s within the stamps `time` (T,)."""
+    period = float(np.median(np.diff(time)))
+    gaps = np.concatenate(([0], np.cumsum(np.diff(time) > _GAP * period)))
+    last = np.searchsorted(time, time + horizon + 0.5 * period - 1e-9) - 1
+    last = np.maximum(last, np.minimum(np.arange(len(time)) + 1, len(time) - 1))
+    off = np.abs(time[last] - time - horizon)
+    good = (off <= 0.51 * period + 1e-9) & (gaps[last] == gaps)
+    found = []
+    k = int(np.searchsorted(time, time[0] + min(LEAD, 0.25 * (time[-1] - time[0]))))
+    while k < len(time) - 1:
+        if good[k]:
+            found.append((k, int(last[k])))
+            k = int(last[k])
+        else:
+            k += 1
+    return found
 
 
 def cut(
     plant: Plant, layout: Layout, rollouts: Sequence[Rollout], starts: list[tuple[int, int, int]], outputs: int = 6
 ) -> Windows:
     """Cut the windows; at most `outputs` ticks of each are compared, the last among them."""
-    ticks = min(last - first for _, first, last in starts)
-    picks = np.unique(np.linspace(ticks, 1, min(outputs, ticks)).round().astype(int))  # one output: the last tick
+    firsts = {i: max(1, round(_FIRST / float(np.median(np.diff(rollouts[i].time))))) for i in {s[0] for s in starts}}
+    count = min(outputs, *(max(1, last - k - firsts[i] + 1) for i, k, last in starts))
     cache = {i: measured_readings(rollouts[i], layout) for i in {s[0] for s in starts}}
+    commands = {i: command_inputs(plant, rollouts[i]) for i in cache}
     heights = stance_heights(plant, rollouts, {s[0] for s in starts}) if _needs_height(plant, layout) else {}
-    rows = [_one(plant, rollouts[i], cache[i], heights.get(i), k, picks) for i, k, _ in starts]
+    rows = []
+    for i, k, last in starts:
+        picks = np.linspace(last - k, min(firsts[i], last - k), count)[::-1]  # one output: the last tick
+        picks = np.floor(picks + 0.5).astype(int)
+        rows.append(_one(plant, rollouts[i], cache[i], commands[i], heights.get(i), k, picks))
     size = max(len(row["command_time"]) for row in rows)
     quats = [row["quat"] for row in rows]
     return Windows(
@@ -82,6 +110,7 @@ def cut(
         quat=None if quats[0] is None else np.stack(quats),
         command=np.stack([_pad(row["command"], size) for row in rows]),
         command_time=np.stack([_pad(row["command_time"], size) for row in rows]),
+        source=rollouts,
     )
 
 
@@ -123,6 +152,7 @@ def _one(
     plant: Plant,
     rollout: Rollout,
     readings: tuple[np.ndarray, np.ndarray | None],
+    command: np.ndarray,
     heights: np.ndarray | None,
     k: int,
     picks: np.ndarray,
@@ -138,7 +168,7 @@ def _one(
         "qvel": qvel,
         "measured": signals[k + picks],
         "quat": None if quat is None else quat[k + picks],
-        "command": command_inputs(plant, rollout)[first:stop],
+        "command": command[first:stop],
         "command_time": rollout.time[first:stop] - t0,
     }
 

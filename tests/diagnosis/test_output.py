@@ -5,10 +5,13 @@ import json
 from pathlib import Path
 
 import mujoco
+import numpy as np
 import pytest
 
+from bumblebee.diagnosis.example import examples
 from bumblebee.diagnosis.output import write_diagnosis
 from bumblebee.diagnosis.report import render_report
+from bumblebee.diagnosis.terminal import plot, summary
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import read_effects
 
@@ -62,7 +65,26 @@ def test_text_from_files_cannot_become_markup(diagnosed) -> None:
     document = copy.deepcopy(diagnosed(CASE, seed=3).document)
     document["effects"][0]["where"] = ["<script>alert(1)</script>"]
     document["notes"] = ["<img src=x>"]
-    example = {"joint": "<b>", "rollout": "</svg><script>", "start": 0.0, "time": [0.0, 1.0]}
-    page = render_report(document, example | {name: [0.0, 1.0] for name in ("measured", "before", "after")})
+    example = {"joint": "<b>", "rollout": "</svg><script>", "start": 0.0, "time": [0.0, 1.0], "unit": "<i>"}
+    page = render_report(document, [example | {name: [0.0, 1.0] for name in ("measured", "before", "after")}])
     assert "<script>" not in page
-    assert "<img" not in page
+    assert "<img" not in page and "<b>" not in page.replace("<b>motor_strength</b>", "") and "<i>" not in page
+
+
+def test_a_correction_that_is_worse_is_said_loudly(diagnosed) -> None:
+    """At any horizon, in the page and in the terminal; and not where it is better everywhere."""
+    document = copy.deepcopy(diagnosed(CASE, seed=3).document)
+    assert "WORSE" not in render_report(document, []) and "WORSE" not in summary(document)
+    document["error"]["after"]["1.0"]["joint_pos_rmse"]["value"] *= 100
+    assert "WORSE after 1.0 s" in render_report(document, [])
+    assert "WORSE after 1.0 s" in summary(document)
+
+
+def test_the_terminal_shows_what_the_page_shows(diagnosed) -> None:
+    """The effect, its interval, the errors and a window drawn with characters."""
+    result = diagnosed(CASE, seed=3)
+    text, (window,) = summary(result.document), examples(result.session, result.effects, count=1)
+    assert "motor_strength" in text and "floor" in text
+    assert window["joint"] == "j3" and set(plot(window)) >= {"#", "x"}
+    before, after = (np.abs(np.subtract(window["measured"], window[k])).mean() for k in ("before", "after"))
+    assert after < 0.3 * before

@@ -1,0 +1,113 @@
+"""What the drives remember when a window starts, from the log before it: clocks, heat, filters, play.
+
+A window restarts a simulation in the middle of a rollout. Position and velocity are read; what is not read follows from
+the readings and commands since the rollout began.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.windows import Windows, command_inputs
+from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effect_forces import Memory, history_length
+from bumblebee.sim.effect_hooks import RuntimeHooks
+from bumblebee.sim.servo import Servos, servos_of
+
+
+def plant_servos(plant: Plant) -> Servos:
+    """The servos of the plant's joints, in the log's column order."""
+    return servos_of(plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
+
+
+def logged_torques(plant: Plant, rollout: Rollout) -> tuple[np.ndarray, np.ndarray]:
+    """Servo torque (T, J) [N m] by the declared gains just before each tick and just after it."""
+    servos = plant_servos(plant)
+    command = servos.controls(command_inputs(plant, rollout))
+    held = np.concatenate((command[:1], command[:-1]))
+    place = rollout.joint_pos - plant.offset
+    return (
+        servos.torque(place, rollout.joint_vel, held),
+        servos.torque(place, rollout.joint_vel, command),
+    )
+
+
+def at_starts(windows: Windows, of: Callable[[Rollout], np.ndarray]) -> np.ndarray:
+    """Rows (W, ...) of the tables `of` the windows' rollouts (T, ...) at their starts."""
+    tables = {i: of(windows.source[i]) for i in np.unique(windows.rollout)}
+    return np.stack([tables[i][k] for i, k in zip(windows.rollout, windows.start, strict=True)])
+
+
+def remember(plant: Plant, windows: Windows, hooks: RuntimeHooks, step: float) -> Memory:
+    """The memory of every window; its columns are the hooks' joints."""
+    order = [plant.joints.index(name) for name in hooks.joints]
+    limit = plant_servos(plant).limit
+    scale = np.where(np.isfinite(limit), limit, 1.0)
+
+    def heat(rollout: Rollout) -> np.ndarray:
+        before, after = logged_torques(plant, rollout)
+        power = 0.5 * ((before[1:] / scale) ** 2 + (after[:-1] / scale) ** 2) * np.diff(rollout.time)[:, None]
+        return np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)))
+
+    back = history_length(hooks, step)
+    late = bool(hooks.torque_lag.any())
+    past = _past(windows, back, step, hooks.encoder_delay, order) if back else None
+    return Memory(
+        time=at_starts(windows, lambda r: r.time - r.time[0]),
+        heat=at_starts(windows, heat)[:, order],
+        torque=at_starts(windows, lambda r: lagged(plant, r, order, hooks.torque_lag)) if late else None,
+        position=None if past is None else past[0] - hooks.encoder_offset,
+        velocity=None if past is None else past[1],
+    )
+
+
+def lagged(plant: Plant, rollout: Rollout, order: Sequence[int], time: np.ndarray) -> np.ndarray:
+    """State (T, J) of a first-order lag of the logged torque, whose course between ticks is linear."""
+    before, after = (x[:, order] for x in logged_torques(plant, rollout))
+    out, safe = before.copy(), np.maximum(time, 1e-6)
+    for k, dt in enumerate(np.diff(rollout.time)):
+        keep = np.exp(-dt / safe)
+        slope = (before[k + 1] - after[k]) / dt
+        out[k + 1] = keep * out[k] + (1 - keep) * after[k] + slope * (dt - safe * (1 - keep))
+    return out
+
+
+def _past(
+    windows: Windows, back: int, step: float, delay: np.ndarray, order: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and velocities (W, back, J) at the `back` steps before each start, the newest last."""
+    parts = [read_at(windows, -step * k, delay, order) for k in range(back, 0, -1)]
+    return np.stack([p for p, _ in parts], axis=1), np.stack([v for _, v in parts], axis=1)
+
+
+def read_at(windows: Windows, shift: float, delay: np.ndarray, order: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and velocities (W, J) that the joints `order` had `shift` s after the starts, by their late readings.
+
+    What an encoder reads `delay` (J,) s later is where the joint is now; between ticks a reading is linear in time.
+    """
+    place, speed = np.empty((len(windows), len(order))), np.empty((len(windows), len(order)))
+    for w, (i, k) in enumerate(zip(windows.rollout, windows.start, strict=True)):
+        rollout = windows.source[i]
+        at = np.clip(rollout.time[k] + shift + delay, rollout.time[0], rollout.time[-1])
+        high = np.clip(np.searchsorted(rollout.time, at), 1, len(rollout.time) - 1)
+        share = (at - rollout.time[high - 1]) / (rollout.time[high] - rollout.time[high - 1])
+        for out, values in ((place, rollout.joint_pos), (speed, rollout.joint_vel)):
+            low = values[high - 1, order]
+            out[w] = low + share * (values[high, order] - low)
+    return place, speed
+
+
+def yielded(windows: Windows, column: int, width: float) -> np.ndarray:
+    """Reference (W,) [rad] of an elasto-plastic spring of `width` on a joint, its path followed from the first tick."""
+
+    def centre(rollout: Rollout) -> np.ndarray:
+        q = rollout.joint_pos[:, column]
+        out = np.empty_like(q)
+        at = q[0]
+        for k, value in enumerate(q):
+            at = min(max(at, value - width), value + width)
+            out[k] = at
+        return out
+
+    return at_starts(windows, centre)

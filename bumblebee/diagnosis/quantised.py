@@ -1,0 +1,105 @@
+"""Encoders that read in steps: seen in the readings themselves, not in the motion.
+
+Readings on a grid of step s add up in phase at the frequency 1 / s: |mean exp(2 pi i x / s)| is 1 without further noise
+and exp(-2 (pi sigma / s)^2) with noise of standard deviation sigma, and nearly 0 where there is no grid.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bumblebee.diagnosis.fit import Fit
+from bumblebee.diagnosis.problem import Problem
+from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effects import Effect, single
+
+_SAMPLES = 1500
+_SMALLEST, _CELLS = 5e-4, 20  # a step is at least half a milliradian, and the joint crosses at least so many
+_IN_PHASE = 0.5
+_ABOVE = 4.0  # times the typical resultant of other frequencies
+_DENSE = 0.25  # of the width of a peak
+
+
+@dataclass(frozen=True)
+class Grid:
+    """One joint's readings lie on a grid."""
+
+    joint: str
+    step: float
+    """[rad]"""
+    error: float
+    """Standard error of the step [rad]."""
+    p: float
+    """Rayleigh's test, times the number of frequencies looked at."""
+
+
+def grids(rollouts: Sequence[Rollout]) -> list[Grid]:
+    """The joints whose positions were read in steps, with the step."""
+    joints = rollouts[0].joints
+    every = np.concatenate([r.joint_pos for r in rollouts])
+    some = every[np.unique(np.linspace(0, len(every) - 1, _SAMPLES).round().astype(int))]
+    found = [_grid(name, some[:, j]) for j, name in enumerate(joints)]
+    return [g for g in found if g is not None]
+
+
+def entries(found: Sequence[Grid], problem: Problem, fit: Fit) -> tuple[list[dict[str, Any]], list[Effect]]:
+    """The contract's entries of rounded readings, and the effects; they explain what the servo's rounding does."""
+    effects = [single("encoder_quantisation", g.joint, g.step) for g in found]
+    if not found:
+        return [], []
+    sets = [[], fit.effects, *([*fit.effects, e] for e in effects)]
+    left = problem.residual(sets) - np.tensordot(fit.nuisance, problem.nuisance, axes=1)
+    power = (left**2).mean(axis=(1, 2))
+    excess = max(power[0] - power[2:].min(initial=power[1]), 1e-12)
+    out = [
+        {
+            "effect": "encoder_quantisation",
+            "where": [g.joint],
+            "parameters": {
+                "step": {
+                    "value": g.step,
+                    "ci95": [float(g.step - 1.96 * g.error), float(g.step + 1.96 * g.error)],
+                    "nominal": 0.0,
+                    "unit": "rad",
+                }
+            },
+            "equivalent": [],
+            "explains": float(np.clip((power[1] - after) / excess, 0.0, 1.0)),
+            "evidence": {
+                "p": g.p,
+                "test": "Rayleigh's test of the readings' phases on a grid, Bonferroni over its step",
+            },
+            "native": False,
+        }
+        for g, after in zip(found, power[2:], strict=True)
+    ]
+    return out, effects
+
+
+def _grid(joint: str, x: np.ndarray) -> Grid | None:
+    span = float(np.ptp(x))
+    if span < _CELLS * _SMALLEST:
+        return None
+    x = x - x.mean()
+    frequency = np.arange(_CELLS / span, 1.0 / _SMALLEST, _DENSE / span)
+    resultant = np.concatenate([np.abs(_mean_phase(x, part)) for part in np.array_split(frequency, 40)])
+    # The coarsest grid that fits: its multiples in frequency fit as well.
+    high = np.flatnonzero(resultant > max(_IN_PHASE, _ABOVE * float(np.median(resultant))))
+    if not len(high):
+        return None
+    first = high[high <= high[0] + round(2 / _DENSE)]
+    best = frequency[first[np.argmax(resultant[first])]]
+    near = np.linspace(best - _DENSE / span, best + _DENSE / span, 41)
+    fine = np.abs(_mean_phase(x, near))
+    value, top = float(near[np.argmax(fine)]), float(fine.max())
+    # Phase noise of each reading, and how well a slope of phase over x is known from them.
+    spread = np.sqrt(-2.0 * np.log(min(top, 1 - 1e-6)))
+    error = spread / (2 * np.pi * np.sqrt(len(x)) * x.std())
+    p = min(1.0, len(frequency) * float(np.exp(-min(len(x) * top**2, 600.0))))
+    return Grid(joint, 1.0 / value, float(error / value**2), p)
+
+
+def _mean_phase(x: np.ndarray, frequency: np.ndarray) -> np.ndarray:
+    return np.exp(2j * np.pi * np.outer(frequency, x)).mean(axis=1)

@@ -1,0 +1,79 @@
+"""Columns of all candidates on some of the windows: from torque answers where an effect is a torque, else simulated."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates import SIMULATED, Candidate, shortlisted
+from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.pulses import Answers, answers_of
+from bumblebee.diagnosis.scores import Columns
+from bumblebee.diagnosis.signatures import Signatures
+from bumblebee.diagnosis.variation import Variation, vary
+from bumblebee.sim.effects import Effect
+
+_RESTLESS = 1.5  # whitened power
+
+
+def screening_windows(problem: Problem, budget: int) -> np.ndarray:
+    """Indices of at most `budget` windows, spread evenly."""
+    count = len(problem.windows)
+    return np.unique(np.linspace(0, count - 1, min(budget, count)).round().astype(int))
+
+
+def screen(problem: Problem, candidates: Sequence[Candidate], effects: Sequence[Effect], torque: np.ndarray) -> Columns:
+    """Columns of `candidates` on the problem's windows, around the model with `effects`.
+
+    `torque` (nv,) is a pulse that matters on each degree of freedom. Candidates that are only shortlisted have none.
+    """
+    kept = [c for c in candidates if not shortlisted(c, len(problem.plant.joints))]
+    variation = vary(problem.plant, effects)
+    plain = Variation(variation.model, variation.delay, variation.offset) if variation.plant is None else None
+    around = plain or vary(problem.plant, [])
+    answers = answers_of(problem.plant, problem.layout, problem.windows, around, problem.coarse, torque)
+    white = _whitened(problem, answers)
+    signatures = Signatures(problem.plant, problem.windows, around, answers.path)
+    rows = [len(c.free) for c in kept]
+    values = np.empty((sum(rows), *problem.nuisance.shape[1:]), dtype=np.float32)
+    simulated, at = [], 0
+    for c, count in zip(kept, rows, strict=True):
+        if c.effect in SIMULATED:
+            simulated.append((c, at))
+        else:
+            torques = signatures.of(c).astype(np.float32)
+            flat = torques.transpose(1, 0, 3, 2).reshape(len(problem.windows), count, -1)
+            values[at : at + count] = np.matmul(flat, white).transpose(1, 0, 2)
+        at += count
+    if simulated:
+        drawn = problem.sensitivities([c for c, _ in simulated], list(effects))
+        first = 0
+        for c, where in simulated:
+            values[where : where + len(c.free)] = drawn[first : first + len(c.free)]
+            first += len(c.free)
+    return Columns(kept, values)
+
+
+def _whitened(problem: Problem, answers: Answers) -> np.ndarray:
+    """(W, nv * S, M): the answers as the residual's whitened change."""
+    raw = answers.torque
+    white = problem.whitener(raw.reshape(-1, *raw.shape[2:]), centre=False)
+    return white.transpose(1, 0, 2).astype(np.float32)
+
+
+def pulse_sizes(problem: Problem, torque: np.ndarray) -> np.ndarray:
+    """(nv,) pulses of a tenth of the joints' typical torque (J,); a hundredth of the weight on a floating base."""
+    plant = problem.plant
+    out = np.full(plant.model.nv, 0.1 * float(np.median(torque)))
+    out[plant.dof] = 0.1 * torque
+    if plant.floating:
+        weight = 9.81 * float(plant.model.body_mass.sum())
+        out[plant.base_dof : plant.base_dof + 3] = 0.01 * weight
+        out[plant.base_dof + 3 : plant.base_dof + 6] = 0.002 * weight
+    return np.maximum(out, 1e-9)
+
+
+def restless(problem: Problem, residual: np.ndarray, count: int) -> list[str]:
+    """Joints whose velocities are worst explained, worst first: where play and shafts are worth a simulation."""
+    part = problem.layout.slices["joint_vel"]
+    power = (residual.reshape(problem.windows.measured.shape)[..., part] ** 2).mean(axis=(0, 1))
+    return [problem.plant.joints[j] for j in np.argsort(-power)[:count] if power[j] > _RESTLESS]
