@@ -75,6 +75,7 @@ class Search:
     rejected: list[str] = field(default_factory=list)
 
 
+_SPRINGS = {"joint_spring", "asymmetric_friction"}
 _MUCH = 0.15  # share of the cost
 _CHANGED = 0.95  # share of the cost that a fit must leave less of, to be worth linearising around
 
@@ -142,7 +143,11 @@ class _Run:
         return found + [c for c in listed if c not in self.closed and not self._chosen(c)]
 
     def _chosen(self, c: Candidate) -> bool:
-        return any((c.effect, c.where) == (o.effect, o.where) for o in self.fit.chosen)
+        """Whether it is chosen, or something on its place that one spring of MJCF cannot be as well."""
+        there = {o.effect for o in self.fit.chosen if o.where == c.where}
+        if c.effect in there:
+            return True
+        return bool((c.effect == "hysteresis" and there & _SPRINGS) or (c.effect in _SPRINGS and "hysteresis" in there))
 
     def is_open(self, c: Candidate, tests: Scores, k: int, bound: float) -> bool:
         """Whether a candidate is significant, can move the way it wants to, and has not been tried in vain.

@@ -156,12 +156,13 @@ def _offset(spec: mujoco.MjSpec, name: str, value: float) -> None:
 
 
 def _second_hinge(spec: mujoco.MjSpec, name: str, kind: str) -> Any:
-    """A joint on the same axis, after `name` in the same body; keyframes get a zero for it."""
+    """A joint on the same axis, the last of its body; keyframes get a zero for it."""
     joint, body = _joint(spec, name), _joint(spec, name).parent
-    if body.joints[-1].name != name:
-        raise BadInput(f"{kind} on joint {name!r}", "the last joint of its body", "another joint after it")
+    last = body.joints[-1].name
+    if last not in (name, *(name + suffix for suffix in native.SUFFIX.values())):
+        raise BadInput(f"{kind} on joint {name!r}", "the last joint of its body", f"joint {last!r} after it")
     declared = spec.compile()
-    index = declared.joint(name).id
+    index = declared.joint(last).id
     at_q, at_v = int(declared.jnt_qposadr[index]) + 1, int(declared.jnt_dofadr[index]) + 1
     keys = [(np.insert(k.qpos, at_q, 0.0), np.insert(k.qvel, at_v, 0.0)) for k in _filled_keys(spec, declared)]
     hinge = body.add_joint(name=name + native.SUFFIX[kind], type=joint.type, axis=joint.axis, pos=joint.pos)
