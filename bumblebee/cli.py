@@ -1,4 +1,4 @@
-"""Command line: `bumblebee diagnose`, `replay` and `gap`. Status 0: done, 2: unusable input, one line on stderr."""
+"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`. Status 0: done, 2: unusable input, one line."""
 
 import sys
 import time
@@ -27,15 +27,18 @@ def diagnose(
 ) -> None:
     """Find which effect the model lacks, add it, and report the error before and after."""
     from bumblebee.diagnosis.diagnose import DiagnosisConfig, diagnose
+    from bumblebee.diagnosis.example import examples
     from bumblebee.diagnosis.output import refuse_existing, write_diagnosis
     from bumblebee.diagnosis.session import open_session
-    from bumblebee.diagnosis.terminal import summary
+    from bumblebee.diagnosis.terminal import plot, summary
 
     refuse_existing(out, overwrite)
     session = open_session(model, dataset)
     result = diagnose(session, DiagnosisConfig(max_windows=max_windows, seed=seed), _teller())
     write_diagnosis(result, out, overwrite)
     print(summary(result.document))
+    shown = examples(session, result.effects, count=1)
+    print(plot(shown[0]) if shown else "")
     print(f"written: {out / 'diagnosis.json'}, model.xml, effects.yaml, report.html")
 
 
@@ -60,17 +63,40 @@ def replay(
 def gap(
     model: Model,
     dataset: Data,
-    out: Annotated[Path | None, typer.Option("--out", help="Also write the table as JSON.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Also write gap.json and gap.html here.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")] = False,
 ) -> None:
     """Where the model errs before anything is fitted."""
-    from bumblebee.diagnosis.replay import replay, write_json
+    from bumblebee.diagnosis.gap import gap as compare
+    from bumblebee.diagnosis.gap_page import gap_page
+    from bumblebee.diagnosis.output import refuse_existing
+    from bumblebee.diagnosis.replay import write_json, write_text
     from bumblebee.diagnosis.session import open_session
-    from bumblebee.diagnosis.terminal import gap_table
+    from bumblebee.diagnosis.terminal import gap_summary
 
-    block = replay(open_session(model, dataset))
-    print(gap_table(block))
     if out:
-        write_json(out, block)
+        refuse_existing(out, overwrite)
+    report = compare(open_session(model, dataset))
+    print(gap_summary(report.document, report.examples))
+    if out:
+        write_json(out / "gap.json", report.document)
+        write_text(out / "gap.html", gap_page(report))
+        print(f"written: {out / 'gap.html'}, gap.json")
+
+
+@app.command(name="import")
+def import_(
+    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="Folder, zip archive or file of logs.")],
+    dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="New folder for rollouts/*.parquet.")],
+    kind: Annotated[str, typer.Option("--kind", help="so101, csv, double_pendulum, asap or sysid.")],
+    model: Annotated[Path | None, typer.Option("--model", help="The declared MJCF; copied to model.xml.")] = None,
+    columns: Annotated[Path | None, typer.Option("--columns", help="Column map of CSV logs, a YAML file.")] = None,
+) -> None:
+    """Turn logs of another layout into a dataset of the contract."""
+    from bumblebee.measured.importers import import_dataset
+
+    ids = import_dataset(source, kind, dataset, model, columns)
+    print(f"{len(ids)} rollouts: {', '.join(ids[:6])}{' ...' if len(ids) > 6 else ''}")
 
 
 def _teller() -> Callable[[str], None]:

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from bumblebee.diagnosis.form import Form, find_form
+from bumblebee.diagnosis.form import Form, examine
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.session import Session
-from bumblebee.diagnosis.structure import JointStructure, joint_structure
+from bumblebee.diagnosis.structure import JointStructure
 from bumblebee.diagnosis.torque_residual import TorqueResidual, torque_residual
 from bumblebee.sim.effects import Effect
 
@@ -57,11 +57,10 @@ def discover(
         block = _block([], [], [])
         block["description"] = "too few windows to look for structure"
         return Discovery(block, [], [], [])
-    structures = [joint_structure(train, held, j) for j in range(len(train.joints))]
-    forms, kept, entries, left = [], [], [], structures
-    for one in sorted((s for s in structures if s.significant), key=lambda s: (-s.share, s.joint))[:_JOINTS]:
-        joint = train.joints.index(one.joint)
-        form = find_form(train, held, joint, one.share)
+    seen = [examine(train, held, j) for j in range(len(train.joints))]
+    forms, kept, entries, left = [], [], [], [s for s, _ in seen]
+    for one, _ in sorted((x for x in seen if x[0].significant), key=lambda x: (-x[0].share, x[0].joint))[:_JOINTS]:
+        form = examine(train, held, train.joints.index(one.joint))[1]
         forms.append(form)
         if not form.terms:
             continue
@@ -75,7 +74,7 @@ def discover(
         if train is None or held is None:
             break
     if kept and train is not None and held is not None:
-        left = [joint_structure(train, held, j) for j in range(len(train.joints))]
+        left = [examine(train, held, j)[0] for j in range(len(train.joints))]
     return Discovery(_block(left, forms, kept), entries, kept, left)
 
 
@@ -122,9 +121,8 @@ def _refit(
     for _ in range(_PASSES):
         moved = [best + 0.2 * scale * row for row in np.eye(len(best))]
         columns = np.stack([(left - _clean(problem, [*effects, effect(x)], nuisance)) / 0.2 for x in moved])
-        flat = (columns * np.sqrt(weights)[:, None]).reshape(len(columns), -1)
-        normal = flat @ flat.T + 1e-9 * np.trace(flat @ flat.T) * np.eye(len(flat))
-        move = np.linalg.solve(normal, np.einsum("bwm,wm->b", columns, left * weights[:, None]))
+        basis, inverse = _inverse(problem, columns, weights)
+        move = (inverse @ np.einsum("bwm,wm->b", basis, left * weights[:, None]))[len(problem.nuisance) :]
         trial = best + np.clip(move, -3, 3) * scale
         tried = _clean(problem, [*effects, effect(trial)], nuisance)
         if cost(tried) >= cost(left):
@@ -139,7 +137,7 @@ def _refit(
     z = float(gain.mean() / (gain.std(ddof=1) / np.sqrt(len(gain)) + 1e-30))
     if z < _Z or gain.mean() < _LEAST or (holdout is None and cost(left) > cost(without)):
         return None
-    half = 1.96 * np.sqrt(np.diag(_covariance(columns, left, weights))) * scale
+    half = 1.96 * np.sqrt(np.diag(_covariance(problem, columns, left, weights))) * scale
     return effect(best), _entry(form, names, best, half, gain, before, after, z)
 
 
@@ -148,12 +146,21 @@ def _clean(problem: Problem, effects: Sequence[Effect], nuisance: np.ndarray) ->
     return problem.residual([list(effects)])[0] - np.tensordot(nuisance, problem.nuisance, axes=1)
 
 
-def _covariance(columns: np.ndarray, left: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _inverse(problem: Problem, columns: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nuisances and columns (B, W, M), and the inverse of their normal matrix with the nuisances' prior."""
+    basis = np.concatenate((problem.nuisance, columns))
+    flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
+    normal, count = flat @ flat.T, len(problem.nuisance)
+    normal[np.arange(count), np.arange(count)] += 1.0
+    normal[np.arange(count, len(normal)), np.arange(count, len(normal))] *= 1 + 1e-9
+    return basis, np.linalg.inv(normal)
+
+
+def _covariance(problem: Problem, columns: np.ndarray, left: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Sandwich covariance (B, B) of the coefficients, in units of their scales, windows as clusters."""
-    flat = (columns * np.sqrt(weights)[:, None]).reshape(len(columns), -1)
-    inverse = np.linalg.inv(flat @ flat.T + 1e-9 * np.trace(flat @ flat.T) * np.eye(len(flat)))
-    scores = np.einsum("bwm,wm->wb", columns, left * weights[:, None])
-    return inverse @ (scores.T @ scores) @ inverse
+    basis, inverse = _inverse(problem, columns, weights)
+    scores = np.einsum("bwm,wm->wb", basis, left * weights[:, None])
+    return (inverse @ (scores.T @ scores) @ inverse)[len(problem.nuisance) :, len(problem.nuisance) :]
 
 
 def _entry(

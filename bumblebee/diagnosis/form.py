@@ -5,14 +5,15 @@ held-out windows agree. Of terms that explain nearly the same the simplest is ta
 of the held-out structure than boosted trees do, a curve over the one quantity that says most stands in for them.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bumblebee.diagnosis.dictionary import Entry, dictionary, torque_of
-from bumblebee.diagnosis.structure import clipped, gain_test
+from bumblebee.diagnosis.structure import JointStructure, clipped, gain_test, joint_structure
 from bumblebee.diagnosis.torque_residual import TorqueResidual
-from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.effect_terms import Term, read_term
 
 MOST_TERMS = 3
 _Z = 4.5  # of a term over blocks; a hundred terms are looked at
@@ -32,6 +33,39 @@ class Form:
     """Share of the held-out residual's variance that the terms predict."""
     kind: str
     """"formula", "curve" or ""."""
+    p: float = 1.0
+    """Of the held-out gain, Bonferroni over the joints."""
+    rms: float = 0.0
+    """RMS of the prediction [N m]."""
+
+
+def examine(train: TorqueResidual, held: TorqueResidual, joint: int) -> tuple[JointStructure, Form]:
+    """What is left in a joint, by boosted trees or by formulas, whichever sees more; and its form.
+
+    Trees see any shape but do not reach beyond the data that they learned on; formulas do.
+    """
+    seen = joint_structure(train, held, joint)
+    form = find_form(train, held, joint, seen.share)
+    p = min(1.0, 2.0 * min(seen.p, form.p))
+    if form.p >= seen.p and seen.share >= form.share:
+        return replace(seen, p=p), form
+    names = [name for name, used in _QUANTITY.items() if any(used(read_term(t)) for t in form.terms)]
+    names += [f"joint {other}" for t in form.terms for other in read_term(t).others]
+    depends = seen.depends_on or tuple(dict.fromkeys(names))
+    return replace(seen, p=p, share=form.share, rms=form.rms, depends_on=depends), form
+
+
+def _uses(*names: str) -> Callable[[Term], bool]:
+    return lambda term: any(name in term.names for name in names)
+
+
+_QUANTITY = {
+    "position": _uses("q"),
+    "velocity": lambda term: term.rubs or "v" in term.names,
+    "target": _uses("u"),
+    "torque": _uses("tau"),
+    "time": _uses("t"),
+}
 
 
 def find_form(train: TorqueResidual, held: TorqueResidual, joint: int, reachable: float) -> Form:
@@ -39,14 +73,17 @@ def find_form(train: TorqueResidual, held: TorqueResidual, joint: int, reachable
     y, target = clipped(train.missing[:, joint]), clipped(held.missing[:, joint])
     formula = _stepwise(train, held, joint, y, target)
     share = _share(formula, train, held, joint, target, y)
-    if formula and share >= _ENOUGH * reachable:
-        return Form(held.joints[joint], _coefficients(formula, train, joint, y), share, "formula")
-    curve = _curve(train, held, joint, y, target)
-    if curve and curve[1] > max(1.1 * share, 0.2 * reachable):
-        return Form(held.joints[joint], {curve[0]: 1.0}, curve[1], "curve")
-    if formula and share > 0:
-        return Form(held.joints[joint], _coefficients(formula, train, joint, y), share, "formula")
-    return Form(held.joints[joint], {}, 0.0, "")
+    terms, kind = _coefficients(formula, train, joint, y) if formula and share > 0 else {}, "formula"
+    if not terms or share < _ENOUGH * reachable:
+        curve = _curve(train, held, joint, y, target)
+        if curve and curve[1] > max(1.1 * share, 0.2 * reachable):
+            terms, kind, share = {curve[0]: 1.0}, "curve", curve[1]
+    if not terms:
+        return Form(held.joints[joint], {}, 0.0, "")
+    said = np.sum([c * torque_of(read_term(t), held, joint) for t, c in terms.items()], axis=0)
+    p, _ = gain_test(target - y.mean(), target - said, held.block)
+    rms = float(np.sqrt((said**2).mean()))
+    return Form(held.joints[joint], terms, share, kind, min(1.0, p * len(held.joints)), rms)
 
 
 def _stepwise(
@@ -83,7 +120,8 @@ def _scores(x: np.ndarray, given: np.ndarray, left: np.ndarray, block: np.ndarra
     power = (x**2).sum(axis=1)
     scale = np.maximum(power, 1e-12 * max(power.max(), 1e-30))
     along = x @ left
-    blocks = np.stack([np.bincount(block, row * left) for row in x])
+    rest = left - (along / scale)[:, None] * x
+    blocks = np.stack([np.bincount(block, row * r) for row, r in zip(x, rest, strict=True)])
     spread = np.sqrt((blocks**2).sum(axis=1)) + 1e-30
     return np.stack((along**2 / scale, along / spread), axis=1)
 

@@ -10,10 +10,11 @@ from bumblebee.diagnosis.candidates import still_joints
 from bumblebee.diagnosis.discover import missing_torques
 from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_whiteners, horizon_windows
 from bumblebee.diagnosis.example import examples
+from bumblebee.diagnosis.form import examine
 from bumblebee.diagnosis.reported import reported_torque
 from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.simulate import residuals
-from bumblebee.diagnosis.structure import JointStructure, joint_structure
+from bumblebee.diagnosis.structure import JointStructure
 from bumblebee.diagnosis.torque_residual import TorqueResidual
 from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.windows import Windows
@@ -38,7 +39,7 @@ def gap(session: Session, budget: int = 120, seed: int = 0) -> Gap:
     train, held = missing_torques(session, [], np.zeros(1))
     found = []
     if train is not None and held is not None:
-        found = [joint_structure(train, held, j) for j, n in enumerate(train.joints) if n not in still]
+        found = [examine(train, held, j)[0] for j, n in enumerate(train.joints) if n not in still]
     document = {
         "schema": 1,
         "rollouts": session.ids(ids),

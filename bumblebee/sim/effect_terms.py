@@ -54,6 +54,8 @@ class Term:
     """Whether it is dry friction, a loss instead of a torque."""
     others: tuple[str, ...]
     """Names of the other joints that it uses."""
+    names: frozenset[str]
+    """Those of the joint's own names that it uses."""
     _tree: ast.expr
 
     def __call__(self, values: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -75,7 +77,10 @@ def read_term(text: str) -> Term:
     except (ValueError, SyntaxError, RecursionError, MemoryError) as error:
         names = ", ".join((*OWN, *_FUNCTIONS, "curve", "friction"))
         raise BadInput(f"term {text[:60]!r}", f"a formula of {names}", str(error)[:80]) from None
-    return Term(text, rubs, tuple(dict.fromkeys(others)), tree)
+    inside = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Subscript)}
+    inside |= {id(n.slice) for n in ast.walk(tree) if isinstance(n, ast.Subscript)}
+    names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in OWN and id(n) not in inside}
+    return Term(text, rubs, tuple(dict.fromkeys(others)), frozenset(names), tree)
 
 
 def _check(node: ast.expr, others: list[str]) -> None:
