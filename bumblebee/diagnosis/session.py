@@ -9,6 +9,7 @@ import numpy as np
 
 from bumblebee.diagnosis.noise import estimate_noise
 from bumblebee.diagnosis.plant import Plant, load_spec, make_plant
+from bumblebee.diagnosis.repeats import motion_names
 from bumblebee.diagnosis.signals import Layout, layout_of
 from bumblebee.diagnosis.simulate import step_for
 from bumblebee.diagnosis.smooth import HALF_SPAN, smooth_rollouts
@@ -139,10 +140,11 @@ def split(rollouts: Sequence[Rollout]) -> tuple[list[int], list[int]]:
     that names no motions, has one motion only, every fourth of its rollouts is held out (the second of two).
     """
     clusters: dict[str, dict[str, list[int]]] = {}
+    names = motion_names(rollouts)
     for i in sorted(range(len(rollouts)), key=lambda i: rollouts[i].rollout_id):
         meta = rollouts[i].meta
         motions = clusters.setdefault(str(meta.get("cluster")), {})
-        motions.setdefault(str(meta.get("motion")), []).append(i)
+        motions.setdefault(names[i], []).append(i)
     holdout: list[int] = []
     for _, motions in sorted(clusters.items()):
         groups = [group for _, group in sorted(motions.items())]

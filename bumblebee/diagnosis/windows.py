@@ -55,13 +55,34 @@ def choose_starts(
 ) -> list[tuple[int, int, int]]:
     """At most `budget` windows (rollout, first tick, last tick), apart from each other and spread over the rollouts.
 
+    Every rollout has the same share of the budget, as far as it is long enough: one long run must not decide alone.
     A window is `horizon` s long by its time stamps, to the nearest tick, whatever the rate; none holds a gap in the
     log, for nobody knows what was commanded there.
     """
-    every = [(i, first, last) for i in ids for first, last in _stretches(rollouts[i].time, horizon)]
-    if len(every) > budget:
-        every = [every[k] for k in np.unique(np.linspace(0, len(every) - 1, budget).round().astype(int))]
-    return every
+    every = [[(i, first, last) for first, last in _stretches(rollouts[i].time, horizon)] for i in ids]
+    quota = _shares([len(part) for part in every], budget)
+    picked = []
+    for part, count in zip(every, quota, strict=True):
+        some = np.linspace(0, len(part) - 1, count + 2)[1:-1] if count < len(part) else np.arange(len(part))
+        picked += [part[k] for k in np.unique(np.round(some).astype(int))]
+    return picked
+
+
+def _shares(lengths: Sequence[int], budget: int) -> list[int]:
+    """How many of each one's windows to take, equal as far as they go; together at most `budget`."""
+    shares, left = [0] * len(lengths), min(budget, sum(lengths))
+    while left > 0:
+        open_ = [k for k, n in enumerate(lengths) if shares[k] < n]
+        each = left // len(open_)
+        if each == 0:
+            for k in np.linspace(0, len(open_) - 1, left).round().astype(int):
+                shares[open_[k]] += 1
+            break
+        for k in open_:
+            more = min(each, lengths[k] - shares[k])
+            shares[k] += more
+            left -= more
+    return shares
 
 
 def _stretches(time: np.ndarray, horizon: float) -> list[tuple[int, int]]:

@@ -6,6 +6,7 @@ import pytest
 
 from bumblebee.diagnosis.error_block import HORIZONS, horizon_windows
 from bumblebee.diagnosis.session import make_session, split
+from bumblebee.diagnosis.windows import choose_starts
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import arm
 
@@ -40,3 +41,34 @@ def test_every_horizon_compares_the_state_at_its_own_end() -> None:
     for name, part in windows.items():
         np.testing.assert_allclose(part.out_time[:, -1], float(name), atol=1e-9)
         assert part.out_time.shape[1] == 1
+
+
+def test_a_long_rollout_gets_no_more_windows_than_the_others() -> None:
+    time = np.arange(5000) / 50
+    zeros = np.zeros((5000, 1))
+    long = Rollout("long", ("j",), 50.0, time, zeros, zeros, joint_target=zeros)
+    short = [
+        Rollout(f"s{k}", ("j",), 50.0, time[:n], zeros[:n], zeros[:n], joint_target=zeros[:n])
+        for k, n in enumerate((200, 200, 40))
+    ]
+    count = np.bincount([i for i, _, _ in choose_starts([long, *short], range(4), 0.2, 40)])
+    assert count.sum() == 40 and count[:3].max() - count[:3].min() <= 1 and count[3] < 5
+    assert len(choose_starts([long, *short], range(4), 0.2, 3)) == 3
+    every = choose_starts([long, *short], range(4), 0.2, 10**6)
+    assert len(every) == len(choose_starts([long], [0], 0.2, 10**6)) + sum(
+        len(choose_starts([s], [0], 0.2, 10**6)) for s in short
+    )
+
+
+def test_the_same_commands_under_other_names_are_repeats() -> None:
+    rng, time = np.random.default_rng(0), np.arange(100) / 50
+    paths = [np.sin(k * time + k)[:, None] for k in (1, 2, 3, 4)]
+    made = []
+    for day in range(2):
+        for k, path in enumerate(paths):
+            sent = path + 0.02 * rng.standard_normal(path.shape)
+            made.append(
+                Rollout(f"{day}-{k}", ("j",), 50.0, time, sent, sent, joint_target=sent, meta={"motion": f"{day}{k}"})
+            )
+    train, holdout = split(made)
+    assert not {i % 4 for i in train} & {i % 4 for i in holdout}
