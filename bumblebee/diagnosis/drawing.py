@@ -19,7 +19,7 @@ class Frame:
     width: float = 640
     height: float = 220
     left: float = 64
-    top: float = 14
+    top: float = 28
     bottom: float = 40
 
     def at(self, x: float, y: float) -> tuple[float, float]:
@@ -91,9 +91,9 @@ def line_picture(
         dash = " stroke-dasharray='4 3'" if name == "target" else ""
         wide = 2.2 if name == "measured" else 1.8
         parts.append(f"<polyline fill='none' stroke='{COLOURS[name]}' stroke-width='{wide}'{dash} points='{points}'/>")
-        x0 = frame.left + 10 + 96 * row
-        parts.append(f"<rect x='{x0}' y='{frame.top + 7}' width='14' height='3' fill='{COLOURS[name]}'/>")
-        parts.append(f"<text x='{x0 + 18}' y='{frame.top + 13}' fill='{COLOURS[name]}'>{name}</text>")
+        x0 = frame.left + 96 * row
+        parts.append(f"<rect x='{x0}' y='{frame.top - 16}' width='14' height='3' fill='{COLOURS[name]}'/>")
+        parts.append(f"<text x='{x0 + 18}' y='{frame.top - 10}' fill='{COLOURS[name]}'>{name}</text>")
     return _svg(frame, parts, title)
 
 
