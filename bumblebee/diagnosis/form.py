@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bumblebee.diagnosis.dictionary import Entry, dictionary, torque_of
-from bumblebee.diagnosis.structure import JointStructure, clipped, gain_test, joint_structure
+from bumblebee.diagnosis.structure import JointStructure, clipped, gain_test, joint_structure, other_joint
 from bumblebee.diagnosis.torque_residual import TorqueResidual
 from bumblebee.sim.effect_terms import Term, read_term
 
@@ -50,7 +50,7 @@ def examine(train: TorqueResidual, held: TorqueResidual, joint: int) -> tuple[Jo
     if form.p >= seen.p and seen.share >= form.share:
         return replace(seen, p=p), form
     names = [name for name, used in _QUANTITY.items() if any(used(read_term(t)) for t in form.terms)]
-    names += [f"joint {other}" for t in form.terms for other in read_term(t).others]
+    names += [other_joint(other) for t in form.terms for other in read_term(t).others]
     depends = seen.depends_on or tuple(dict.fromkeys(names))
     return replace(seen, p=p, share=form.share, rms=form.rms, depends_on=depends), form
 

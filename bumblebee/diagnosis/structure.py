@@ -38,7 +38,7 @@ class JointStructure:
     typical: float
     """RMS torque of the joint's servo, or of what was commanded [N m]."""
     depends_on: tuple[str, ...]
-    """Quantities of `QUANTITIES` and "joint NAME", the most important first."""
+    """Quantities of `QUANTITIES` and "another joint (NAME)", the most important first."""
     ljung_box: float
     """p that the held-out residual does not follow from its own past."""
 
@@ -46,6 +46,11 @@ class JointStructure:
     def significant(self) -> bool:
         """Whether there is structure, and enough of it to matter."""
         return self.p < LEVEL and self.rms > _LEAST * self.typical and self.share > 0
+
+
+def other_joint(name: str) -> str:
+    """How a dependence on another joint is called."""
+    return f"another joint ({name})"
 
 
 def clipped(values: np.ndarray) -> np.ndarray:
@@ -118,14 +123,14 @@ def _features(data: TorqueResidual, joint: int, names: list[str] | None = None) 
     columns |= {f"history:play {k}": data.history[:, joint, k] for k in range(data.history.shape[2])}
     for k, name in enumerate(data.joints):
         if k != joint:
-            columns |= {f"joint {name}:q": data.q[:, k], f"joint {name}:v": data.v[:, k]}
+            columns |= {f"{other_joint(name)}:q": data.q[:, k], f"{other_joint(name)}:v": data.v[:, k]}
     if names is None:
-        own = [name for name in columns if not name.startswith("joint ")]
+        own = [name for name in columns if not name.startswith("another joint")]
         y = data.missing[:, joint] - data.missing[:, joint].mean()
-        others = [name for name in columns if name.startswith("joint ")]
+        others = [name for name in columns if name.startswith("another joint")]
         tie = {name: abs(float(np.corrcoef(columns[name], y)[0, 1])) if np.ptp(columns[name]) else 0 for name in others}
-        best = sorted({name.split(":")[0] for name in others}, key=lambda j: -max(tie[f"{j}:q"], tie[f"{j}:v"]))
-        names = own + [name for name in others if name.split(":")[0] in best[:_NEIGHBOURS]]
+        best = sorted({name.rsplit(":", 1)[0] for name in others}, key=lambda j: -max(tie[f"{j}:q"], tie[f"{j}:v"]))
+        names = own + [name for name in others if name.rsplit(":", 1)[0] in best[:_NEIGHBOURS]]
     return names, np.stack([columns[name] for name in names], axis=1)
 
 
@@ -140,11 +145,11 @@ def _important(
 ) -> tuple[str, ...]:
     """Groups of columns without which the held-out prediction is worse, by how much worse."""
     rng = np.random.default_rng(seed)
-    groups = list(dict.fromkeys(name.split(":")[0] for name in names))
+    groups = list(dict.fromkeys(name.rsplit(":", 1)[0] for name in names))
     order = np.argsort(held.block, kind="stable")
     found = []
     for group in groups:
-        columns = [k for k, name in enumerate(names) if name.split(":")[0] == group]
+        columns = [k for k, name in enumerate(names) if name.rsplit(":", 1)[0] == group]
         losses, worst = [], 1.0
         for _ in range(3):
             moved = z.copy()

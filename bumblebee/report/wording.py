@@ -46,7 +46,10 @@ def effect_line(effect: dict[str, Any]) -> tuple[str, str, str]:
     """(what and where, value with interval, nominal) of one entry of `effects` in diagnosis.json."""
     places = ", ".join(effect["where"]) or "whole robot"
     values, nominal = [], []
-    for name, parameter in effect["parameters"].items():
+    parameters = effect["parameters"]
+    if effect["effect"] == "discovered":
+        parameters = {t["term"]: t | {"value": t["coefficient"]} for t in parameters["terms"]}
+    for name, parameter in parameters.items():
         low, high = parameter.get("ci95") or (None, None)
         interval = "" if low is None or high is None else f" [{low:.4g}, {high:.4g}]"
         values.append(f"{name} {parameter['value']:.4g}{interval} {parameter.get('unit', '')}".strip())

@@ -43,7 +43,7 @@ def test_noise_has_no_structure() -> None:
         (lambda q, v, tau, t: -0.3 * v[:, 0] * np.abs(v[:, 0]), "velocity", {"v*abs(v)": -0.3}),
         (lambda q, v, tau, t: -0.15 * np.abs(tau) * np.sign(v[:, 0]), "torque", {"friction(abs(tau))": 0.15}),
         (lambda q, v, tau, t: -0.008 * t * tau, "torque", {"t*tau": -0.008}),
-        (lambda q, v, tau, t: 0.3 * v[:, 1], "joint knee", {"v[knee]": 0.3}),
+        (lambda q, v, tau, t: 0.3 * v[:, 1], "another joint (knee)", {"v[knee]": 0.3}),
         (lambda q, v, tau, t: -0.4 * (1 + np.cos(3 * q[:, 0])) * np.sign(v[:, 0]), "velocity",
          {"friction(1 + cos(3*q))": 0.4}),
     ],

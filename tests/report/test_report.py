@@ -16,7 +16,7 @@ from bumblebee.report.policy_sections import registry_section, success_section, 
 from bumblebee.report.round_sections import round_section
 from bumblebee.report.truth import match
 from bumblebee.report.verdict import verdict
-from bumblebee.report.wording import change, percent, shown
+from bumblebee.report.wording import change, effect_line, percent, shown
 from bumblebee.robot.facts import joint_names, stand_pose
 from bumblebee.robot.model import build_spec
 from tests.report.made import TRUTH, estimate, found, loop_results
@@ -128,3 +128,10 @@ def test_a_stick_figure_stands_in_where_nothing_renders(monkeypatch: pytest.Monk
     assert shown_film.animation == "" and "no device" in shown_film.note
     kind, data = shown_film.strip.split(",", 1)
     assert kind.startswith("data:image/svg+xml") and b"<path" in base64.b64decode(data)
+
+
+def test_a_discovered_effect_is_told_by_its_terms() -> None:
+    terms = [{"term": "sin(12*q)", "coefficient": 0.31, "ci95": [0.3, 0.32]}, {"term": "v", "coefficient": -1.0}]
+    name, value, _ = effect_line({"effect": "discovered", "where": ["knee"], "parameters": {"terms": terms}})
+    assert name == "discovered on knee"
+    assert value == "sin(12*q) 0.31 [0.3, 0.32]; v -1"
