@@ -14,12 +14,13 @@ from bumblebee.diagnosis.fit import Fit
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.latency import latency_notes
 from bumblebee.diagnosis.nuisance import NAMES
+from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.problem import Problem, make_problem, without
 from bumblebee.diagnosis.quantised import entries, grids
 from bumblebee.diagnosis.refine import Refined, refine
 from bumblebee.diagnosis.search import Search, SearchConfig, search
 from bumblebee.diagnosis.session import Session
-from bumblebee.diagnosis.variation import vary
+from bumblebee.diagnosis.variation import declared_values, vary
 from bumblebee.diagnosis.windows import choose_starts, cut
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import CATALOGUE, Effect
@@ -100,7 +101,7 @@ def diagnose(
         beyond = discover(session, last.problem, holdout.problem, effects, last.fit.nuisance)
         effects, document["unexplained"] = [*effects, *beyond.effects], beyond.block
         document["effects"] += beyond.entries
-        document["structure"] = structure_table(beyond.left)
+        document["structure"] = structure_table(beyond)
     rounded, steps = entries(grids(session.rollouts), holdout.problem or last.problem, last.fit)
     effects, document["effects"] = [*effects, *steps], document["effects"] + rounded
     document["error"] = _errors(session, effects, config)
@@ -158,7 +159,7 @@ def _effects(found: Search, last: Refined, holdout: Holdout) -> list[dict[str, A
     for i, (c, part) in enumerate(zip(last.fit.chosen, last.fit.slices, strict=True)):
         others = classes[i]
         entry = label(c) | {
-            "parameters": _parameters(c, last.fit.values[part], last.half[part]),
+            "parameters": _parameters(last.problem.plant, c, last.fit.values[part], last.half[part]),
             "equivalent": [label(o) for o in others],
             "explains": float(shares[i]),
             "evidence": {
@@ -175,10 +176,12 @@ def _effects(found: Search, last: Refined, holdout: Holdout) -> list[dict[str, A
     return sorted(entries, key=lambda e: -e["explains"])
 
 
-def _parameters(c: Candidate, values: np.ndarray, half: np.ndarray) -> dict[str, Any]:
-    """The contract's parameters of one effect, in its own units."""
+def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray) -> dict[str, Any]:
+    """The contract's parameters of one effect, in its own units; `nominal` is null where the model knows no bound."""
     out = {}
-    for p, value, nominal, wide in zip(CATALOGUE[c.effect].parameters, values, c.nominal, half, strict=True):
+    # A limit is tried from the largest torque in the data on, which is not where the model has it.
+    declared = declared_values(plant, c.effect, c.where) if c.effect == "torque_limit" else c.nominal
+    for p, value, nominal, wide in zip(CATALOGUE[c.effect].parameters, values, declared, half, strict=True):
         ends = [float(value - wide), float(value + wide)]
         if c.effect in INVERSE:
             # The fit moves the inverse; an interval that reaches zero has no upper end.
@@ -186,7 +189,8 @@ def _parameters(c: Candidate, values: np.ndarray, half: np.ndarray) -> dict[str,
             out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": p.unit}
         else:
             ends = [max(p.lower, ends[0]), min(p.upper, ends[1])]
-            out[p.name] = {"value": float(value), "ci95": ends, "nominal": float(nominal), "unit": p.unit}
+            known = float(nominal) if np.isfinite(nominal) else None
+            out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": p.unit}
     return out
 
 

@@ -6,12 +6,13 @@ than two standard errors. What is not kept is described, never forced into a nam
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from scipy.stats import norm
 
+from bumblebee.diagnosis.curves import joint_curves
 from bumblebee.diagnosis.form import Form, examine
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.session import Session
@@ -38,6 +39,8 @@ class Discovery:
     """The discovered effects, to be added to those of the catalogue."""
     left: list[JointStructure]
     """Every joint with all effects in force."""
+    curves: dict[str, dict[str, list[list[float]]]] = field(default_factory=dict)
+    """Joint with structure -> quantity -> measured curve of what is left, see `curves.measured_curve`."""
 
 
 def discover(
@@ -75,7 +78,10 @@ def discover(
             break
     if kept and train is not None and held is not None:
         left = [examine(train, held, j)[0] for j in range(len(train.joints))]
-    return Discovery(_block(left, forms, kept), entries, kept, left)
+    curves = {}
+    if train is not None:
+        curves = {s.joint: joint_curves(train, train.joints.index(s.joint)) for s in left if s.significant}
+    return Discovery(_block(left, forms, kept), entries, kept, left, curves)
 
 
 def missing_torques(
@@ -205,8 +211,8 @@ def _block(left: Sequence[JointStructure], forms: Sequence[Form], kept: Sequence
     }
 
 
-def structure_table(left: Sequence[JointStructure]) -> dict[str, dict[str, Any]]:
-    """Joint -> what its test said, for `diagnosis.json`."""
+def structure_table(found: Discovery) -> dict[str, dict[str, Any]]:
+    """Joint -> what its test said, with measured curves where there is structure, for `diagnosis.json`."""
     return {
         s.joint: {
             "p": s.p,
@@ -217,7 +223,8 @@ def structure_table(left: Sequence[JointStructure]) -> dict[str, dict[str, Any]]
             "depends_on": list(s.depends_on),
             "ljung_box_p": s.ljung_box,
         }
-        for s in left
+        | ({"curves": found.curves[s.joint]} if s.joint in found.curves else {})
+        for s in found.left
     }
 
 

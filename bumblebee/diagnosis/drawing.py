@@ -97,6 +97,21 @@ def line_picture(
     return _svg(frame, parts, title)
 
 
+def curve_picture(rows: Sequence[Sequence[float]], x_label: str, y_label: str, title: str) -> str:
+    """A measured curve: rows of x, mean and half-width of its interval."""
+    if len(rows) < 3:
+        return ""
+    x, y, half = np.array(rows, dtype=float).T
+    frame = Frame(_span([x]), _span([y - half, y + half, np.zeros(1)]), width=300, height=150, top=14)
+    parts = _axes(frame, escape(x_label), y_label)
+    for a, b, h in zip(x, y, half, strict=True):
+        (px, upper), (_, lower) = frame.at(a, b + h), frame.at(a, b - h)
+        parts.append(f"<line x1='{px:.1f}' x2='{px:.1f}' y1='{upper:.1f}' y2='{lower:.1f}' stroke='{FAINT}'/>")
+    points = " ".join("{:.1f},{:.1f}".format(*frame.at(a, b)) for a, b in zip(x, y, strict=True))
+    parts.append(f"<polyline fill='none' stroke='{INK}' stroke-width='2' points='{points}'/>")
+    return _svg(frame, parts, title)
+
+
 def cloud_picture(x: np.ndarray, y: np.ndarray, x_label: str, y_label: str, title: str, bins: int = 15) -> str:
     """Points (N,) and the mean in equally filled bins with its 95 % interval."""
     keep = np.isfinite(x) & np.isfinite(y)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from bumblebee.diagnosis.drawing import line_picture
+from bumblebee.diagnosis.drawing import curve_picture, line_picture
 from bumblebee.diagnosis.gap_page import error_rows
 from bumblebee.diagnosis.page import figure, items, number, page, table, warning
 from bumblebee.diagnosis.verdict import worse_horizons
@@ -167,7 +167,21 @@ def _left(left: dict[str, Any], structure: dict[str, Any]) -> str:
         "<p>Structure remains that no effect above explains. It is described, not forced into a catalogue's name.</p>"
     )
     head = ["joint", "predictable RMS [N m]", "of the drive's", "goes with", "p"]
-    return text + table(head, rows, (1, 2, 4)) + f"<p>{escape(left['description'])}.</p>"
+    said = f"<p>{escape(left['description'])}.</p>"
+    return text + table(head, rows, (1, 2, 4)) + said + "".join(_curves(structure, left["where"][:3]))
+
+
+def _curves(structure: dict[str, Any], joints: Sequence[str]) -> list[str]:
+    """What is left over velocity, position and so on, a row of pictures a joint."""
+    parts = []
+    for joint in joints:
+        known = structure.get(joint, {}).get("curves", {})
+        drawn = [
+            figure(curve_picture(rows, quantity, "missing [N m]", f"{joint} over {quantity}"), escape(joint))
+            for quantity, rows in known.items()
+        ]
+        parts.append(f"<div class='row'>{''.join(drawn)}</div>")
+    return parts
 
 
 def _small(entries: Sequence[dict[str, Any]]) -> str:

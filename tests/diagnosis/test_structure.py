@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bumblebee.diagnosis.curves import joint_curves
 from bumblebee.diagnosis.form import find_form
 from bumblebee.diagnosis.structure import joint_structure
 from bumblebee.diagnosis.torque_residual import TorqueResidual
@@ -69,3 +70,10 @@ def test_a_shape_that_no_formula_has_is_given_as_a_curve() -> None:
     assert form.share > 0.6 * hip.share
     if form.kind == "curve":
         assert next(iter(form.terms)).startswith("curve(q,")
+
+
+def test_a_measured_curve_is_the_mean_with_an_interval_that_covers() -> None:
+    wanted = lambda q, v, tau, t: -0.5 * np.tanh(4 * v[:, 0])  # noqa: E731
+    rows = np.array(joint_curves(data(wanted, 3), 0)["velocity [rad/s]"])
+    off = np.abs(rows[:, 1] + 0.5 * np.tanh(4 * rows[:, 0]))
+    assert len(rows) == 15 and (off < rows[:, 2]).mean() > 0.8
