@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.undeclared.kinds import CATALOGUE, KINDS, OUTSIDE, fits
 
-VERSION = 1  # of what a case's number means; a change of kinds, robots, motions or sizes raises it
+VERSION = 2  # of what a case's number means; a change of kinds, robots, motions or sizes raises it
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Suite:
 
     def cases(self) -> list[Case]:
         """In an order whose every beginning is a mixed sample."""
-        rng = np.random.default_rng([self.seed, VERSION])
+        rng = np.random.default_rng([self.seed, 1])
         strata = [_nulls(), *_singles(), *_several(rng), *_outside()]
         placed = []
         for index, stratum in enumerate(strata):

@@ -85,8 +85,9 @@ def test_dry_friction_holds_a_joint_that_is_pushed_less_than_its_level():
     assert robots.state()[0][0, 0] > 0.01
 
 
-def test_backlash_without_a_gap_is_the_declared_joint():
-    null, law = _fly([]), _fly([Backlash("elbow", float(ARM.armature[2]), 1e-9)])
+@pytest.mark.parametrize("on_motor", [False, True])
+def test_backlash_without_a_gap_is_the_declared_joint(on_motor):
+    null, law = _fly([]), _fly([Backlash("elbow", float(ARM.armature[2]), 1e-9, on_motor)])
     assert np.abs(null.qpos - law.qpos).max() < 2e-4
 
 

@@ -143,12 +143,14 @@ class Backlash(Law):
     """A rotor that turns freely within `gap` [rad] of the joint; where they touch they move as one.
 
     While they touch, the joint carries the declared armature and gets the drive's torque. When the rotor would have to
-    pull it lets go; when it has crossed the gap it takes the joint along without bouncing. The encoder is the joint's.
+    pull it lets go; when it has crossed the gap it takes the joint along without bouncing.
     """
 
     joint: str
     armature: float
     gap: float
+    on_motor: bool = False
+    """Whether the encoder reads the rotor; else it reads the joint."""
 
     def start(self, world: World, target: np.ndarray) -> None:
         """Touching on the forward side."""
@@ -177,6 +179,20 @@ class Backlash(Law):
         self._last = v.copy()
         return torque
 
+    def sense(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The rotor's angle and speed, if the encoder sits there."""
+        if not self.on_motor:
+            return q, v
+        j = world.column(self.joint)
+        q, v = q.copy(), v.copy()
+        q[:, j] += self._play
+        v[:, j] = np.where(self._side == 0, self._speed, v[:, j])
+        return q, v
+
+    def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same."""
+        return self.sense(world, q, v)
+
     def inertia(self, world: World, armature: np.ndarray) -> None:
         """A tenth stays with the joint when the rotor lets go."""
         j = world.column(self.joint)
@@ -187,13 +203,14 @@ class Backlash(Law):
 class Elastic(Law):
     """A rotor of its own behind a spring of `stiffness` [N m/rad], damped by a tenth of critical.
 
-    The rotor carries the declared armature but for a tenth; the encoder is the joint's. Integrated in 16 parts of a
-    millisecond.
+    The rotor carries the declared armature but for a tenth. Integrated in 16 parts of a millisecond.
     """
 
     joint: str
     armature: float
     stiffness: float
+    on_motor: bool = False
+    """Whether the encoder reads the rotor; else it reads the joint."""
 
     def model(self, model: mujoco.MjModel) -> None:
         """The armature moves to the rotor."""
@@ -219,3 +236,16 @@ class Elastic(Law):
         torque = torque.copy()
         torque[:, j] = given
         return torque
+
+    def sense(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The rotor's angle and speed, if the encoder sits there."""
+        if not self.on_motor:
+            return q, v
+        j = world.column(self.joint)
+        q, v = q.copy(), v.copy()
+        q[:, j], v[:, j] = self._angle, self._speed
+        return q, v
+
+    def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same."""
+        return self.sense(world, q, v)
