@@ -118,6 +118,7 @@ def main() -> None:
     parser.add_argument("--physics-hz", type=float, nargs="+", default=[200.0])
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=5.0)
+    parser.add_argument("--compile", action="store_true", help="observations and rewards by torch's compiler")
     parser.add_argument("--steps", type=int, default=24, help="of an iteration of PPO")
     parser.add_argument("--hidden", type=int, nargs="+", default=[512, 256, 128])
     options = parser.parse_args()
@@ -127,7 +128,13 @@ def main() -> None:
     print("worlds  physics   row          control steps/s  of physics  goal")
     for worlds in options.worlds:
         for hz in options.physics_hz:
-            config = EnvConfig(engine=options.engine, num_worlds=worlds, threads=options.threads, physics_hz=hz)
+            config = EnvConfig(
+                engine=options.engine,
+                compile=options.compile,
+                num_worlds=worlds,
+                threads=options.threads,
+                physics_hz=hz,
+            )
             env = make_env(config, clips)
             alone, whole = physics_and_environment(env, options.seconds)
             loop, iteration, update = loop_rate(env, ppo, options.seconds)

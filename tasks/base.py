@@ -1,13 +1,23 @@
 """Train the base policy on all training clips: data/filtered -> models/base (paper, section 3.2)."""
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
+from bumblebee.learning import pretrained
 from bumblebee.learning.trial import World
 from bumblebee.sim.sensors import load_model
 from tasks.stage import load, run_stage
 from tasks.training import Job, TrainingConfig, train_policy, training_clips
 
-BaseConfig = TrainingConfig
+
+@dataclass(frozen=True)
+class BaseConfig(TrainingConfig):
+    """The training of the base policy."""
+
+    init: Literal["pretrained", "scratch"] = "pretrained"
+    """Go on from the policy that comes with BumbleBee, with its layers, or from nothing. The pretrained one has seen
+    the embedded library's training clips and real motions (bumblebee/learning/pretrained/README.md)."""
 
 
 def main() -> None:
@@ -16,7 +26,8 @@ def main() -> None:
     clips = training_clips()
     world = World(load_model(physics_hz=config.env.physics_hz), threads=config.env.threads)
     own = [clip for clip in clips if clip.split == "train"]
-    train_policy(Job("base", "base", Path("models/base"), own, clips, world), config)
+    parent = pretrained.FOLDER if config.init == "pretrained" else None
+    train_policy(Job("base", "base", Path("models/base"), own, clips, world, parent=parent), config)
 
 
 if __name__ == "__main__":

@@ -16,8 +16,8 @@ from bumblebee.learning.recordings import Recordings, stack
 from bumblebee.measured.rollout import read_dataset
 from bumblebee.progress import progress
 from bumblebee.sim.effects import read_effects, runtime_hooks
-from bumblebee.sim.engine import RobotState
-from bumblebee.sim.mujoco_cpu import MujocoCpu
+from bumblebee.sim.engine import Engine, RobotState
+from bumblebee.sim.engines import make_engine
 from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.sim.sensors import load_model
 from tasks.diagnosed import split
@@ -34,7 +34,7 @@ def main(round: int, cluster: str) -> None:
     hooks = runtime_hooks(read_effects(found / "effects.yaml"), model)
     offset = torch.as_tensor(hooks.encoder_offset, dtype=torch.float32)
     train, held_out = recordings(round, cluster)
-    engine = MujocoCpu(model, config.num_envs, threads=config.threads, hooks=hooks)
+    engine = make_engine("mujoco", model, config.num_envs, config.threads, hooks)
     steps = int(config.episode_seconds / engine.control_dt + 0.5)
     if train is None or len(train.windows(steps, 1)) == 0:
         leave_out(round, cluster, config, f"no rollout to train on that lasts {config.episode_seconds:g} s")
@@ -43,7 +43,7 @@ def main(round: int, cluster: str) -> None:
     total = config.iterations * config.steps_per_iteration * config.num_envs
     with progress(total, f"delta action, round {round}, {cluster}", "frames") as bar:
         delta, curve = train_delta(env, config, bar.update)
-    judge = MujocoCpu(model, _WORLDS_TO_JUDGE, threads=config.threads, hooks=hooks)
+    judge = make_engine("mujoco", model, _WORLDS_TO_JUDGE, config.threads, hooks)
     nothing = Gain(0, {}, False, "no held-out rollouts")
     gain = judged(judge, held_out, offset, delta) if held_out is not None else nothing
     card = {
@@ -90,7 +90,7 @@ def recordings(round: int, cluster: str) -> tuple[Recordings | None, Recordings 
     return stack(train, declared) if train else None, stack(held_out, declared) if held_out else None
 
 
-def judged(engine: MujocoCpu, held_out: Recordings, offset: torch.Tensor, delta: DeltaAction) -> Gain:
+def judged(engine: Engine, held_out: Recordings, offset: torch.Tensor, delta: DeltaAction) -> Gain:
     """The held-out comparison with and without the delta."""
     without = replay_error(engine, held_out, offset, None)
     return compare(without, replay_error(engine, held_out, offset, delta))

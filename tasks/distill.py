@@ -21,7 +21,7 @@ from bumblebee.motion.store import read_library
 from bumblebee.progress import progress
 from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
 from bumblebee.sim.engine import RobotState
-from bumblebee.sim.mujoco_cpu import MujocoCpu
+from bumblebee.sim.engines import make_engine
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.env import TrackingEnv, action_scale
 from bumblebee.tracking.library import MotionLibrary
@@ -84,7 +84,7 @@ def environment(
 ) -> TrackingEnv:
     """The tracking task over all clusters, each with the same share of the frames."""
     library = MotionLibrary(clips, config.env.ahead)
-    engine = MujocoCpu(model, config.env.num_worlds, threads=config.env.threads, hooks=hooks)
+    engine = make_engine("mujoco", model, config.env.num_worlds, config.env.threads, hooks)
     return TrackingEnv(library, engine, config.env, config.seed, clip_share=equal_shares(library.length, cluster))
 
 

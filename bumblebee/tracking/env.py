@@ -71,6 +71,12 @@ class TrackingEnv(VecEnv):
         self.max_episode_length = round(config.episode_seconds / self.dt)
         self.scale = action_scale().to(device)
         self.reward = Reward(config.reward, self.dt)
+        self._earned: Callable[[Step], Tensor] = self.reward
+        self._seen, self._fallen = observe, fallen
+        if config.compile:
+            self._earned, self._seen, self._fallen = (
+                torch.compile(work, dynamic=False) for work in (self.reward.__call__, observe, fallen)
+            )
         self.limits = Limits.of_robot(config.reward.soft_limit, device)
         self.sampler = ClipSampler(
             library.length, config.sampler_floor, config.sampler_memory, config.start_share, clip_share
@@ -175,8 +181,8 @@ class TrackingEnv(VecEnv):
         )
         unstable = self.engine.unstable()
         # A world that blew up holds no meaningful numbers: it neither earns nor is averaged.
-        self._rewards.copy_(self.reward(outcome).masked_fill(unstable, 0.0))
-        lost = fallen(state, self._ref) | (key_distance(state, self._ref) > self._threshold) | unstable
+        self._rewards.copy_(self._earned(outcome).masked_fill(unstable, 0.0))
+        lost = self._fallen(state, self._ref) | (key_distance(state, self._ref) > self._threshold) | unstable
         ended = self._frame >= self.library.length[self._clip] - 1
         self._time_outs.copy_((ended | (self.episode_length_buf >= self.max_episode_length)) & ~lost)
         self._dones.copy_(lost | self._time_outs)
@@ -218,7 +224,7 @@ class TrackingEnv(VecEnv):
 
     def _observe(self, state: RobotState, ref: ReferenceFrame) -> tuple[Tensor, Tensor, Tensor]:
         """The observation (B, D) as it is, as the policy sees it, and as the critic does (B, D + extras)."""
-        exact = observe(state, ref, self._action)
+        exact = self._seen(state, ref, self._action)
         draws = torch.rand(exact.shape, generator=self._generator, device=exact.device)
         left = (self.library.length[self._clip] - self._frame).float() * self.dt
         # What the sensors of a robot that was put anew say belongs to the time before.

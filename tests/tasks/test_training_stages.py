@@ -9,6 +9,8 @@ import pytest
 import yaml
 
 from bumblebee.errors import BadInput
+from bumblebee.learning import pretrained
+from bumblebee.learning.policy import load_policy
 from bumblebee.motion.store import write_library
 from tasks import base, experts, training
 from tests.tracking.clips import waving
@@ -30,7 +32,9 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Path("data/clusters").mkdir(parents=True)
     labels = {"name": list("abcd"), "cluster": ["c0", "c1", "c0", "c1"]}
     pd.DataFrame(labels).to_parquet("data/clusters/labels.parquet")
-    Path("params.yaml").write_text(yaml.safe_dump({"clusters": ["c0", "c1"], "base": TINY, "experts": TINY}))
+    Path("params.yaml").write_text(
+        yaml.safe_dump({"clusters": ["c0", "c1"], "base": TINY | {"init": "scratch"}, "experts": TINY})
+    )
     return tmp_path
 
 
@@ -64,3 +68,24 @@ def test_a_cluster_without_motions_is_bad_input(workspace: Path) -> None:
     """One line names the cluster."""
     with pytest.raises(BadInput, match="c7"):
         training.cluster_clips("c7", 0.1)
+
+
+def test_base_goes_on_from_the_policy_that_comes_with_the_code(workspace: Path) -> None:
+    """Its layers are the shipped policy's, whatever the section says; the card names the parent without its place."""
+    content = yaml.safe_load(Path("params.yaml").read_text())
+    content["base"]["init"] = "pretrained"
+    Path("params.yaml").write_text(yaml.safe_dump(content))
+    base.main()
+    card = json.loads(Path("models/base/card.json").read_text())
+    assert card["parent"] == "pretrained"
+    assert load_policy(Path("models/base")).shape.hidden == load_policy(pretrained.FOLDER).shape.hidden
+
+
+def test_a_parent_that_looks_elsewhere_is_bad_input(workspace: Path) -> None:
+    """Another look-ahead is another observation: one line says so before training starts."""
+    content = yaml.safe_load(Path("params.yaml").read_text())
+    content["base"] |= {"init": "pretrained", "env": TINY["env"] | {"ahead": [0.2]}}
+    Path("params.yaml").write_text(yaml.safe_dump(content))
+    with pytest.raises(BadInput, match="looks ahead"):
+        base.main()
+    assert not Path("models/base").exists()

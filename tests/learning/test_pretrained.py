@@ -1,0 +1,33 @@
+"""The policy that comes with the code: small, safe to read, of the task's layout, and able to move."""
+
+import pytest
+import torch
+
+from bumblebee.learning import pretrained
+from bumblebee.learning.policy import FILE, load_policy
+from bumblebee.learning.trial import World, try_policy
+from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.sim.sensors import load_model
+from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.observations import layout
+
+
+def test_it_is_small_and_of_the_layout_that_the_task_has() -> None:
+    """At most 4 MB with its critic; its observation and look-ahead are the environment's defaults."""
+    assert (pretrained.FOLDER / FILE).stat().st_size <= 4e6
+    policy = load_policy(pretrained.FOLDER)
+    assert policy.shape.ahead == EnvConfig().ahead
+    assert policy.shape.observation == sum(size for _, size in layout(23, len(policy.shape.ahead)))
+    assert policy.shape.actions == 23
+    assert policy(torch.zeros(2, policy.shape.observation)).isfinite().all()
+    assert all(value.isfinite().all() for value in policy.critic_state.values())
+
+
+@pytest.mark.parametrize("physics_hz", [100.0, 200.0])
+def test_it_follows_embedded_motions_without_training(physics_hz: float) -> None:
+    """Each of seven kinds from its first frame to its last, at the rates that base and refine train at."""
+    clips = make_library(EmbeddedConfig(limit=7))
+    policy = load_policy(pretrained.FOLDER)
+    trials = try_policy(policy, clips, World(load_model(physics_hz=physics_hz), threads=1), policy.shape.ahead)
+    assert trials["success"].all()
+    assert trials["key_error"].mean() < 0.03  # m
