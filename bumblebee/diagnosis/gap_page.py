@@ -5,7 +5,7 @@ from typing import Any
 
 from bumblebee.diagnosis.drawing import cloud_picture, line_picture
 from bumblebee.diagnosis.gap import Gap
-from bumblebee.diagnosis.page import UNITS, figure, interval, items, number, page, shade, table, warning
+from bumblebee.diagnosis.page import UNITS, figure, interval, items, number, page, probability, shade, table, warning
 
 _MOTIONS = 15
 
@@ -118,7 +118,7 @@ def _torque(lacking: dict[str, Any]) -> str:
                 number(entry["structured_rms"]) if entry["significant"] else "-",
                 share if entry["significant"] else "-",
                 on if entry["significant"] else "<span class='note'>nothing that these tests can see</span>",
-                f"{entry['p']:.1g}",
+                probability(entry["p"]),
             ]
         )
     head = ["joint", "mean [N m]", "predictable RMS [N m]", "of the drive's", "goes with", "p"]

@@ -16,7 +16,8 @@ margin:.8rem 0}
 svg{max-width:100%;height:auto;font-size:11px}.row{display:flex;flex-wrap:wrap;gap:.6rem}.row figure{flex:1 1 18rem}
 figure{margin:.4rem 0}figcaption{color:#6b7385;font-size:.86rem}
 code{font-size:.86rem;white-space:normal;overflow-wrap:anywhere}
-details{margin:.6rem 0}summary{cursor:pointer;color:#6b7385}.good{color:#1b8a6b}.bad{color:#c8553d}"""
+details{margin:.6rem 0}summary{cursor:pointer;color:#6b7385}.good{color:#1b8a6b}.bad{color:#c8553d}
+.values{min-width:13rem;display:inline-block}"""
 
 
 def page(title: str, parts: Sequence[str]) -> str:
@@ -56,6 +57,11 @@ def number(value: float | None, digits: int = 3) -> str:
     if value is None:
         return "-"
     return f"{value:,.0f}" if 10**digits <= abs(value) < 1e9 else f"{value:.{digits}g}"
+
+
+def probability(p: float) -> str:
+    """A p value; below 1e-12 nobody's model of noise is that good."""
+    return "&lt; 1e-12" if p < 1e-12 else f"{p:.1g}"
 
 
 def interval(entry: dict[str, Any] | None, scale: float = 1.0) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from bumblebee.diagnosis.drawing import curve_picture, line_picture
 from bumblebee.diagnosis.gap_page import error_rows
-from bumblebee.diagnosis.page import figure, items, number, page, table, warning
+from bumblebee.diagnosis.page import figure, items, number, page, probability, table, warning
 from bumblebee.diagnosis.verdict import worse_horizons
 
 _DETECTABLE = 60
@@ -86,7 +86,15 @@ def _effects(effects: Sequence[dict[str, Any]]) -> str:
         bar = f"<span class='bar' style='width:{0.04 * share:.2f}rem'></span>{share:.0f} %"
         values, declared = _values(e)
         rows.append(
-            [f"<b>{escape(e['effect'])}</b>", place, values, declared, bar, f"{e['evidence']['p']:.1g}", _same(e)]
+            [
+                f"<b>{escape(e['effect'])}</b>",
+                place,
+                f"<span class='values'>{values}</span>",
+                declared,
+                bar,
+                probability(e["evidence"]["p"]),
+                _same(e),
+            ]
         )
     head = ["effect", "where", "value [95 % interval]", "declared", "explains", "p", "cannot be told from"]
     text = (
@@ -158,7 +166,7 @@ def _left(left: dict[str, Any], structure: dict[str, Any]) -> str:
             f"{e['torque_rms']:.3g}",
             f"{100 * e['torque_rms'] / e['typical_torque']:.0f} %",
             escape(", ".join(e["depends_on"])) or "-",
-            f"{e['p']:.1g}",
+            probability(e["p"]),
         ]
         for joint, e in structure.items()
         if joint in left["where"]
