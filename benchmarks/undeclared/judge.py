@@ -60,7 +60,7 @@ def _place(truth: Entry, found: Entry) -> bool:
 
 
 def _size(truth: Entry, found: Entry) -> dict[str, Any] | None:
-    """Error of the parameter that the truth changes most, relative to that change; None if called otherwise."""
+    """Error of the first parameter that the truth changes, relative to that change; None if called otherwise."""
     shared = [n for n in truth["parameters"] if n in found["parameters"]]
     change = {n: truth["parameters"][n] - truth["nominal"].get(n, 0.0) for n in shared}
     change = {n: c for n, c in change.items() if abs(c) > 1e-12}
@@ -70,6 +70,8 @@ def _size(truth: Entry, found: Entry) -> dict[str, Any] | None:
     got = found["parameters"][name]
     value, (low, high) = got["value"], got["ci95"]
     wanted = truth["parameters"][name]
+    # A stiffness or a limit comes from infinity: there the value itself is the measure.
+    scale = min(abs(change[name]), abs(wanted)) if wanted else abs(change[name])
     return {
         "effect": truth["effect"],
         "group": truth["group"],
@@ -77,7 +79,7 @@ def _size(truth: Entry, found: Entry) -> dict[str, Any] | None:
         "true": wanted,
         "value": value,
         "ci95": [low, high],
-        "relative": abs(value - wanted) / abs(change[name]),
+        "relative": abs(value - wanted) / scale,
         "covered": bool(low <= wanted <= high),
     }
 

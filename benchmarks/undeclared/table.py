@@ -53,6 +53,8 @@ def number(values: Sequence[float], scale: float = 1.0, unit: str = "", statisti
     """As `1.2 % [0.9, 1.6] n 40`; the median unless told otherwise."""
     if not len(values):
         return _DASH
+    if len(values) < 2:
+        return f"{scale * statistic(values):.3g}{unit} n 1"
     low, high = bootstrap(values, statistic)
     return f"{scale * statistic(values):.3g}{unit} [{scale * low:.2g}, {scale * high:.2g}] n {len(values)}"
 

@@ -33,6 +33,15 @@ def test_an_effect_found_counts_with_its_size_and_interval():
     assert not missed["sizes"][0]["covered"]
 
 
+def test_sizes_are_relative_to_the_change_and_where_it_is_infinite_to_the_value():
+    mass = _truth("link_mass", ("fore",), 1.1, "mass") | {"nominal": {"mass": 1.0}}
+    marks = score([mass], {"effects": [_found("link_mass", ("fore",), 1.09, (1.0, 1.2), "mass")]})
+    assert marks["sizes"][0]["relative"] == pytest.approx(0.1)
+    shaft = _truth("series_elasticity", value=600.0, name="stiffness") | {"nominal": {"stiffness": 1e12}}
+    marks = score([shaft], {"effects": [_found("series_elasticity", value=660.0, ci=(0, 1e3), name="stiffness")]})
+    assert marks["sizes"][0]["relative"] == pytest.approx(0.1)
+
+
 def test_a_member_of_a_stated_class_counts_and_another_joint_does_not():
     same = score([_truth()], {"effects": [_found("kd", same=[("coulomb_friction", "elbow")])]})
     assert same["top"] and same["found"] == [True] and same["exact"] == [False]
