@@ -127,7 +127,7 @@ def _refit(
     for _ in range(_PASSES):
         moved = [best + 0.2 * scale * row for row in np.eye(len(best))]
         columns = np.stack([(left - _clean(problem, [*effects, effect(x)], nuisance)) / 0.2 for x in moved])
-        basis, inverse = _inverse(problem, columns, weights)
+        basis, inverse = inverse_normal(problem.nuisance, columns, weights)
         move = (inverse @ np.einsum("bwm,wm->b", basis, left * weights[:, None]))[len(problem.nuisance) :]
         trial = best + np.clip(move, -3, 3) * scale
         tried = _clean(problem, [*effects, effect(trial)], nuisance)
@@ -152,19 +152,20 @@ def _clean(problem: Problem, effects: Sequence[Effect], nuisance: np.ndarray) ->
     return problem.residual([list(effects)])[0] - np.tensordot(nuisance, problem.nuisance, axes=1)
 
 
-def _inverse(problem: Problem, columns: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def inverse_normal(nuisance: np.ndarray, columns: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Nuisances and columns (B, W, M), and the inverse of their normal matrix with the nuisances' prior."""
-    basis = np.concatenate((problem.nuisance, columns))
+    basis = np.concatenate((nuisance, columns))
     flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
-    normal, count = flat @ flat.T, len(problem.nuisance)
+    normal, count = flat @ flat.T, len(nuisance)
     normal[np.arange(count), np.arange(count)] += 1.0
-    normal[np.arange(count, len(normal)), np.arange(count, len(normal))] *= 1 + 1e-9
+    # A term that does nothing in these windows must not make the matrix singular.
+    normal[np.arange(count, len(normal)), np.arange(count, len(normal))] += 1e-9 * np.diag(normal).max()
     return basis, np.linalg.inv(normal)
 
 
 def _covariance(problem: Problem, columns: np.ndarray, left: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Sandwich covariance (B, B) of the coefficients, in units of their scales, windows as clusters."""
-    basis, inverse = _inverse(problem, columns, weights)
+    basis, inverse = inverse_normal(problem.nuisance, columns, weights)
     scores = np.einsum("bwm,wm->wb", basis, left * weights[:, None])
     return (inverse @ (scores.T @ scores) @ inverse)[len(problem.nuisance) :, len(problem.nuisance) :]
 
@@ -233,14 +234,17 @@ def _describe(found: Sequence[JointStructure], forms: Sequence[Form]) -> str:
     lines = []
     for s in found[:3]:
         on = ", ".join(s.depends_on) or "no single quantity"
-        line = (
-            f"{s.joint}: a torque of {s.rms:.2g} RMS ({100 * s.rms / s.typical:.0f} % of its drive's) depends on {on}"
-        )
+        part = f"{s.rms:.2g} N m RMS ({100 * s.rms / s.typical:.0f} % of its drive's)"
+        line = f"{s.joint}: a torque of {part} depends on {on}"
         form = next((f for f in forms if f.joint == s.joint), None)
         if form is not None:
-            line += f"; near {' + '.join(f'{v:.3g}*{t}' for t, v in form.terms.items())}, which the held-out "
-            line += "windows did not confirm"
+            terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in form.terms.items())
+            line += f"; near {_shortened(terms)}, which the held-out windows did not confirm"
         lines.append(line)
     if len(found) > 3:
         lines.append(f"and {len(found) - 3} joints more")
     return "; ".join(lines)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= 100 else f"{text[:80]} ..."

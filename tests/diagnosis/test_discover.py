@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.discover import discover
+from bumblebee.diagnosis.discover import discover, inverse_normal
 from bumblebee.diagnosis.problem import Problem, make_problem
 from bumblebee.diagnosis.session import Session, make_session
 from bumblebee.diagnosis.windows import choose_starts, cut
@@ -37,3 +37,12 @@ def test_a_complete_model_leaves_nothing() -> None:
     session, problem, holdout = prepared(cubic=0.0)
     found = discover(session, problem, holdout, [], np.zeros(len(problem.nuisance)))
     assert found.effects == [] and not found.block["significant"]
+
+
+def test_a_term_that_does_nothing_has_no_size_and_breaks_nothing() -> None:
+    """Its column of zeros leaves the other's coefficient alone."""
+    rng = np.random.default_rng(0)
+    column, nuisance = rng.standard_normal((12, 5)), rng.standard_normal((2, 12, 5))
+    basis, inverse = inverse_normal(nuisance, np.stack((column, np.zeros((12, 5)))), np.ones(12))
+    move = inverse @ np.einsum("bwm,wm->b", basis, 3.0 * column)
+    np.testing.assert_allclose(move[2:], [3.0, 0.0], atol=1e-3)
