@@ -3,6 +3,7 @@
 Play and flexible shafts add joints that no encoder reads; the map between the task's joints and the model's is here.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import mujoco
@@ -52,6 +53,12 @@ class EffectsCpu(MujocoCpu):
         self._plastic = [j for j in range(model.njnt) if model.jnt_plasticadr[j] >= 0]
         self._rng = np.random.default_rng(seed)
         self._last = np.zeros((num_worlds, model.nu))
+
+    def set_fields(self, fields: Mapping[str, np.ndarray]) -> None:
+        """See `Engine.set_fields`; the hooks act upon the fields as they are then."""
+        super().set_fields(fields)
+        if self._running is not None:
+            self._running.rebase(fields)
 
     def reset(self, rows: Tensor, qpos: Tensor, qvel: Tensor, targets: Tensor) -> None:
         """See `Engine.reset`: joints that no encoder reads start at rest, springs that yield unloaded."""

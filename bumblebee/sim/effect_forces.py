@@ -16,6 +16,7 @@ written anew, so that MuJoCo's implicit treatment of both stays. The others are 
 | discovered | the terms' sum, as torque or, for `friction(...)`, as frictionloss |
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import mujoco
@@ -75,10 +76,19 @@ class StepHooks:
             self._gain, self._bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
         if self._rubbing:
             self._loss = batch.expand("dof_frictionloss")
-            self._loss0 = model.dof_frictionloss[self.servos.dof].copy()
         if self._running_out:
             self._range = batch.expand("actuator_forcerange")
-        self._model = model
+        self.rebase(("dof_frictionloss", "actuator_gainprm", "actuator_biasprm"))
+
+    def rebase(self, fields: Iterable[str]) -> None:
+        """Take the worlds' present values of some fields (randomised, for instance) as those that the hooks act upon."""
+        for name in fields:
+            if name == "dof_frictionloss" and self._rubbing:
+                self._loss0 = self._loss[:, self.servos.dof].copy()
+            elif name == "actuator_gainprm" and self._fading:
+                self._gain0 = self._gain.copy()
+            elif name == "actuator_biasprm" and self._fading:
+                self._bias0 = self._bias.copy()
 
     def reset(self, ids: np.ndarray, memory: Memory | None = None) -> None:
         """Worlds `ids` (n,) begin anew, with a memory (n worlds) or at rest."""
@@ -166,8 +176,8 @@ class StepHooks:
         strength = np.maximum(1.0 - h.drift * self._time[:, None] - h.thermal * self._heat, 0.0)
         has = servos.actuator >= 0
         a = servos.actuator[has]
-        self._gain[:, a, 0] = strength[:, has] * self._model.actuator_gainprm[a, 0]
-        self._bias[:, a, :3] = strength[:, has, None] * self._model.actuator_biasprm[a, :3]
+        self._gain[:, a, 0] = strength[:, has] * self._gain0[:, a, 0]
+        self._bias[:, a, :3] = strength[:, has, None] * self._bias0[:, a, :3]
         return strength
 
     def _torque_limit(self, v: np.ndarray) -> np.ndarray:

@@ -117,3 +117,16 @@ def test_it_goes_on_from_where_it_was() -> None:
     for engine in (first, second):
         engine.step(target)
     assert torch.equal(first.state().joint_pos, second.state().joint_pos)
+
+
+def test_friction_that_is_set_a_world_stays_beside_a_hook() -> None:
+    """A hook adds to what a world was given; it does not put the model's own value back."""
+    engine = engine_with(single("stribeck_friction", KNEE, 1.0, 0.5))
+    dof = int(engine.model.joint(KNEE).dofadr[0])
+    loss = np.tile(engine.model.dof_frictionloss, (2, 1))
+    loss[1, dof] = 4.0
+    engine.set_fields({"dof_frictionloss": loss})
+    stand(engine, steps=1)
+    written = engine.batch.expand("dof_frictionloss")[:, dof]
+    assert written[1] - written[0] == pytest.approx(4.0, abs=1.0)
+    assert written[1] >= 4.0
