@@ -81,7 +81,7 @@ class StepHooks:
         self.rebase(("dof_frictionloss", "actuator_gainprm", "actuator_biasprm"))
 
     def rebase(self, fields: Iterable[str]) -> None:
-        """Take the worlds' present values of some fields (randomised, for instance) as those that the hooks act upon."""
+        """Take the worlds' present values of some fields (randomised ones, say) as those that the hooks act upon."""
         for name in fields:
             if name == "dof_frictionloss" and self._rubbing:
                 self._loss0 = self._loss[:, self.servos.dof].copy()
