@@ -13,7 +13,7 @@ from benchmarks.undeclared.kinds import KINDS, Place, fits, places
 from benchmarks.undeclared.robots import declared
 from benchmarks.undeclared.truth.bodies import Slope
 from benchmarks.undeclared.truth.law import World
-from benchmarks.undeclared.truth.rubbing import Backlash, Coulomb, Hysteresis
+from benchmarks.undeclared.truth.rubbing import Armature, Backlash, Coulomb, Elastic, Hysteresis
 from benchmarks.undeclared.truth.signals import Line
 from benchmarks.undeclared.truth.simulation import TrueRobots
 
@@ -87,8 +87,15 @@ def test_dry_friction_holds_a_joint_that_is_pushed_less_than_its_level():
 
 @pytest.mark.parametrize("on_motor", [False, True])
 def test_backlash_without_a_gap_is_the_declared_joint(on_motor):
-    null, law = _fly([]), _fly([Backlash("elbow", float(ARM.armature[2]), 1e-9, on_motor)])
+    null, law = _fly([]), _fly([Backlash("elbow", 1e-9, on_motor)])
     assert np.abs(null.qpos - law.qpos).max() < 2e-4
+
+
+def test_a_heavier_rotor_and_a_soft_shaft_on_one_joint_do_not_count_the_rotor_twice():
+    laws = [Elastic("elbow", 2000.0), Armature("elbow", 0.05)]
+    robots = TrueRobots(ARM, laws, 1, np.random.default_rng(0))
+    left = robots.model.dof_armature[robots.model.joint("elbow").dofadr[0]]
+    assert left == pytest.approx(0.005) and laws[0]._rotor == pytest.approx(0.045)
 
 
 def test_hysteresis_dissipates_work_in_a_closed_cycle_and_stays_bounded():

@@ -36,6 +36,9 @@ class World:
 class Law:
     """One undeclared effect."""
 
+    first = False
+    """Whether it changes the model before the others do."""
+
     def spec(self, spec: mujoco.MjSpec) -> None:
         """Change the structure before it is compiled."""
 

@@ -84,6 +84,7 @@ class Armature(Law):
 
     joint: str
     rotor: float
+    first = True
 
     def model(self, model: mujoco.MjModel) -> None:
         """The joint's own field."""
@@ -147,17 +148,20 @@ class Backlash(Law):
     """
 
     joint: str
-    armature: float
     gap: float
     on_motor: bool = False
     """Whether the encoder reads the rotor; else it reads the joint."""
+
+    def model(self, model: mujoco.MjModel) -> None:
+        """A tenth of the armature, declared or not, stays with the joint when the rotor lets go."""
+        self._armature = float(model.dof_armature[model.joint(self.joint).dofadr[0]])
+        self._rotor = 0.9 * self._armature
 
     def start(self, world: World, target: np.ndarray) -> None:
         """Touching on the forward side."""
         j = world.column(self.joint)
         self._side, self._play = np.ones(world.count), np.full(world.count, self.gap / 2)
         self._speed, self._last = world.v[:, j].copy(), world.v[:, j].copy()
-        self._rotor = 0.9 * self.armature
 
     def transmit(self, world: World, torque: np.ndarray) -> np.ndarray:
         """Nothing, the torque, or the torque and the rotor's blow."""
@@ -194,9 +198,9 @@ class Backlash(Law):
         return self.sense(world, q, v)
 
     def inertia(self, world: World, armature: np.ndarray) -> None:
-        """A tenth stays with the joint when the rotor lets go."""
+        """By whether the rotor touches."""
         j = world.column(self.joint)
-        armature[:, j] = np.where(self._side == 0, 0.1, 1.0) * self.armature
+        armature[:, j] = np.where(self._side == 0, 0.1, 1.0) * self._armature
 
 
 @dataclass
@@ -207,20 +211,20 @@ class Elastic(Law):
     """
 
     joint: str
-    armature: float
     stiffness: float
     on_motor: bool = False
     """Whether the encoder reads the rotor; else it reads the joint."""
 
     def model(self, model: mujoco.MjModel) -> None:
-        """The armature moves to the rotor."""
-        model.dof_armature[model.joint(self.joint).dofadr[0]] = 0.1 * self.armature
+        """The armature, declared or not, moves to the rotor."""
+        dof = model.joint(self.joint).dofadr[0]
+        self._rotor = 0.9 * float(model.dof_armature[dof])
+        model.dof_armature[dof] *= 0.1
 
     def start(self, world: World, target: np.ndarray) -> None:
         """With the joint."""
         j = world.column(self.joint)
         self._angle, self._speed = world.q[:, j].copy(), world.v[:, j].copy()
-        self._rotor = 0.9 * self.armature
         self._damping = 0.2 * np.sqrt(self.stiffness * self._rotor)
 
     def transmit(self, world: World, torque: np.ndarray) -> np.ndarray:

@@ -119,7 +119,7 @@ class TrueRobots:
                 law.friction(world, level)
             self._rub[np.ix_(self.everyone, self._v)] = level
         if self._inertia is not None:
-            armature = np.tile(self.robot.armature, (world.count, 1))
+            armature = np.tile(self.model.dof_armature[self._v], (world.count, 1))
             for law in self.laws:
                 law.inertia(world, armature)
             self._inertia[np.ix_(self.everyone, self._v)] = armature
@@ -144,7 +144,7 @@ def _true_model(robot: Declared, laws: Sequence[Law]) -> mujoco.MjModel:
     dofs = [model.joint(name).dofadr[0] for name in robot.joints]
     if any(type(law).friction is not Law.friction for law in laws):
         model.dof_solref[dofs], model.dof_solimp[dofs, :2] = _STIFF
-    for law in laws:
+    for law in sorted(laws, key=lambda law: not law.first):
         law.model(model)
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
