@@ -79,11 +79,12 @@ class EffectsCpu(MujocoCpu):
 
     def step(self, targets: Tensor) -> None:
         """See `Engine.step`; hooks are written before every physics step."""
-        if self._effects is None or not (self._effects.each_step or self._effects.dropped.any()):
+        hooks = self._effects
+        if hooks is None or self._running is None or not (hooks.each_step or hooks.dropped.any()):
             super().step(targets)
             return
-        held = torch.from_numpy(self._arrived(targets.numpy()))
-        if not self._effects.each_step:
+        held = torch.from_numpy(self._arrived(hooks, targets.numpy()))
+        if not hooks.each_step:
             super().step(held)
             return
         self.batch.ctrl[:] = held.numpy()
@@ -95,9 +96,8 @@ class EffectsCpu(MujocoCpu):
         super().step(held)
         self.substeps = substeps
 
-    def _arrived(self, targets: np.ndarray) -> np.ndarray:
+    def _arrived(self, hooks: RuntimeHooks, targets: np.ndarray) -> np.ndarray:
         """The targets (B, J) with some of them lost: the one before is held."""
-        hooks = self._effects
         if hooks.dropped.any():
             draw = self._rng.random((len(targets), 1 if hooks.dropped_together else targets.shape[1]))
             targets = np.where(draw < hooks.dropped, self._last, targets)
@@ -133,7 +133,7 @@ class EffectsCpu(MujocoCpu):
     def torque(self) -> Tensor:
         """See `Engine.torque`."""
         force = super().torque()
-        if self._running is None or not self._effects.each_step:
+        if self._running is None or self._effects is None or not self._effects.each_step:
             return force
         return force + torch.from_numpy(self._running.applied.astype(np.float32))
 

@@ -95,9 +95,9 @@ class StepHooks:
         self._time[ids] = 0.0 if memory is None else memory.time
         self._heat[ids] = 0.0 if memory is None else memory.heat
         q, v = self._readings()
-        known = memory is not None and memory.position is not None and self._back > 0
-        self._past_q[ids] = memory.position if known else q[ids][:, None]
-        self._past_v[ids] = memory.velocity if known else v[ids][:, None]
+        self._past_q[ids], self._past_v[ids] = q[ids][:, None], v[ids][:, None]
+        if memory is not None and memory.position is not None and self._back > 0:
+            self._past_q[ids], self._past_v[ids] = memory.position, memory.velocity
         self._fresh[ids] = memory is None or memory.torque is None
         if memory is not None and memory.torque is not None:
             self._lagged[ids] = memory.torque

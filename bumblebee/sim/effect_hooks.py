@@ -121,7 +121,8 @@ def runtime_hooks(effects: Sequence[Effect], model: mujoco.MjModel) -> RuntimeHo
             if effect.effect == "stribeck_friction":
                 stiction[column] = effect.values()
             elif effect.effect == "cogging":
-                cogging.append((column, *effect.values()))
+                sine, cosine, periods = effect.values()
+                cogging.append((column, sine, cosine, periods))
             else:
                 table[_COLUMN[effect.effect]][column] = effect.value()
     return RuntimeHooks(
