@@ -37,20 +37,25 @@ def warp_modules(device: str) -> tuple[Any, Any]:
     except ImportError as error:
         came = f"no module {error.name!r}"
         raise BadInput("engine mujoco_warp", "the packages of the extra `gpu`", came, _INSTALL) from None
-    warp.config.quiet = True
+    warp.config.log_level = warp.LOG_WARNING
+    on_gpu = torch.device(device).type == "cuda"
+    if on_gpu and not torch.cuda.is_available():  # asked first: without a GPU, Warp has a warning of its own
+        raise _no_gpu("torch")
     warp.init()
-    if torch.device(device).type == "cuda":
-        if not torch.cuda.is_available() or not warp.is_cuda_available():
-            blind = "torch" if not torch.cuda.is_available() else "warp"
-            do = "Use the engine `mujoco`, or install a CUDA build of torch and NVIDIA's driver."
-            raise BadInput("engine mujoco_warp", "an NVIDIA GPU", f"none that {blind} can use", do)
-        if not warp.is_conditional_graph_supported():
-            came = ".".join(map(str, warp.get_cuda_driver_version() or ("none",)))
-            raise BadInput("NVIDIA driver", "CUDA 12.4 or later, for graphs", f"CUDA {came}", "Update the driver.")
+    if on_gpu and not warp.is_cuda_available():
+        raise _no_gpu("warp")
+    if on_gpu and not warp.is_conditional_graph_supported():
+        came = ".".join(map(str, warp.get_cuda_driver_version() or ("none",)))
+        raise BadInput("NVIDIA driver", "CUDA 12.4 or later, for graphs", f"CUDA {came}", "Update the driver.")
     return warp, mujoco_warp
 
 
-_INSTALL = "Install them with `pip install 'bumblebee[gpu]'`."
+def _no_gpu(blind: str) -> BadInput:
+    do = "Use the engine `mujoco`, or install a CUDA build of torch and NVIDIA's driver."
+    return BadInput("engine mujoco_warp", "an NVIDIA GPU", f"none that {blind} can use", do)
+
+
+_INSTALL = "Install them in the checkout with `pip install -e '.[gpu]'`."
 
 
 def refuse_hooks(model: mujoco.MjModel, hooks: RuntimeHooks | None) -> None:
