@@ -61,7 +61,10 @@ def discover(
         block["description"] = "too few windows to look for structure"
         return Discovery(block, [], [], [])
     seen = [examine(train, held, j) for j in range(len(train.joints))]
-    forms, kept, entries, left = [], [], [], [s for s, _ in seen]
+    forms: list[Form] = []
+    kept: list[Effect] = []
+    entries: list[dict[str, Any]] = []
+    left = [s for s, _ in seen]
     for one, _ in sorted((x for x in seen if x[0].significant), key=lambda x: (-x[0].share, x[0].joint))[:_JOINTS]:
         form = examine(train, held, train.joints.index(one.joint))[1]
         forms.append(form)
@@ -88,12 +91,14 @@ def missing_torques(
     session: Session, effects: Sequence[Effect], nuisance: np.ndarray
 ) -> tuple[TorqueResidual | None, TorqueResidual | None]:
     """Missing torques of the fitted and of the accepting rollouts; of a lone one its first two thirds and the rest."""
-    common = (session.plant, session.layout, session.rollouts)
-    rest = (effects, nuisance, session.sigma, session.steps)
-    fitted = [i for i in session.train if i not in session.accept]
-    train = torque_residual(*common, fitted, *rest)
+
+    def lacking(ids: Sequence[int], most: int) -> TorqueResidual | None:
+        plant, layout, rollouts = session.plant, session.layout, session.rollouts
+        return torque_residual(plant, layout, rollouts, ids, effects, nuisance, session.sigma, session.steps, most)
+
+    train = lacking([i for i in session.train if i not in session.accept], 4000)
     if session.accept:
-        return train, torque_residual(*common, session.accept, *rest, most=2000)
+        return train, lacking(session.accept, 2000)
     if train is None:
         return None, None
     late = train.t > np.quantile(train.t, 2 / 3)

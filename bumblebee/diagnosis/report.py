@@ -61,7 +61,7 @@ def _lead(document: dict[str, Any]) -> str:
 def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
     parts = []
     for n, e in enumerate(examples):
-        series = {name: e[name] for name in ("target", "before", "after", "measured") if name in e}
+        series: dict[str, Any] = {name: e[name] for name in ("target", "before", "after", "measured") if name in e}
         axis = f"{e['joint']} [{e['unit']}]"
         picture = line_picture(
             e["time"],

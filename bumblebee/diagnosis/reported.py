@@ -33,7 +33,9 @@ def reported_torque(plant: Plant, rollouts: Sequence[Rollout]) -> dict[str, dict
     for j, name in enumerate(plant.joints):
         if plant.actuator[j] < 0:
             continue
-        best = max((_fit(_pairs(plant, servos, some, j, k)) | {"delay": float(k * period)} for k in shifts), key=_tie)
+        best = max(
+            (_fit(_pairs(plant, servos, some, j, int(k))) | {"delay": float(k * period)} for k in shifts), key=_tie
+        )
         if np.isfinite(best["correlation"]):
             out[name] = best
     return out

@@ -154,7 +154,7 @@ def _important(
         for _ in range(3):
             moved = z.copy()
             shift = int(rng.integers(len(z) // 4, 3 * len(z) // 4 + 1))
-            moved[np.ix_(order, columns)] = z[np.ix_(np.roll(order, shift), columns)]
+            moved[np.ix_(order, np.array(columns))] = z[np.ix_(np.roll(order, shift), np.array(columns))]
             p, loss = gain_test(target - trees.predict(moved), target - said, held.block)
             losses.append(loss)
             worst = min(worst, p)

@@ -69,8 +69,9 @@ def read_term(text: str) -> Term:
         if len(text) > _LONGEST:
             raise ValueError(f"{len(text)} characters")
         tree = ast.parse(text.replace("^", "**"), mode="eval").body
-        rubs = isinstance(tree, ast.Call) and isinstance(tree.func, ast.Name) and tree.func.id == "friction"
-        if rubs:
+        rubs = False
+        if isinstance(tree, ast.Call) and isinstance(tree.func, ast.Name) and tree.func.id == "friction":
+            rubs = True
             (tree,) = tree.args
         others: list[str] = []
         _check(tree, others)
@@ -79,8 +80,8 @@ def read_term(text: str) -> Term:
         raise BadInput(f"term {text[:60]!r}", f"a formula of {names}", str(error)[:80]) from None
     inside = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Subscript)}
     inside |= {id(n.slice) for n in ast.walk(tree) if isinstance(n, ast.Subscript)}
-    names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in OWN and id(n) not in inside}
-    return Term(text, rubs, tuple(dict.fromkeys(others)), frozenset(names), tree)
+    used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in OWN and id(n) not in inside}
+    return Term(text, rubs, tuple(dict.fromkeys(others)), frozenset(used), tree)
 
 
 def _check(node: ast.expr, others: list[str]) -> None:
