@@ -26,6 +26,7 @@ from bumblebee.errors import BadInput
 from bumblebee.sim.effects import CATALOGUE, Effect
 
 _LONG = 1.0  # [s]
+_MORE = 2.5  # times as many windows for the smallest models
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class DiagnosisConfig:
     max_long_windows: int = 20
     """Windows of 1 s on which an accepted effect must not be worse."""
     grow: bool = True
-    """Whether models of few degrees of freedom, which are cheap, get up to four times as many windows."""
+    """Whether models of few degrees of freedom, which are cheap, get more windows."""
     seed: int = 0
     beyond: bool = True
     """Whether to look for structure that no effect of the catalogue explains, and for its form."""
@@ -75,8 +76,8 @@ def diagnose(
         f"{len(fitted)} rollouts to fit, {len(session.accept)} to accept by, {len(session.holdout)} held out, "
         f"{len(candidates)} candidates"
     )
-    # A small model costs little to simulate: more windows, up to four times as many.
-    more = float(np.clip(24 / session.plant.model.nv, 1.0, 4.0)) if config.grow else 1.0
+    # A small model costs little to simulate: more windows.
+    more = float(np.clip(12 / session.plant.model.nv, 1.0, _MORE)) if config.grow else 1.0
     problem = _problem(session, fitted, round(more * config.max_windows), config.horizon, rng)
     holdout = _holdout(session, config, more, rng)
     say(f"{len(problem.windows)} windows of {config.horizon:g} s")
@@ -153,11 +154,11 @@ def _effects(found: Search, last: Refined, holdout: Holdout) -> list[dict[str, A
     if not last.fit.chosen:
         return []
     shares = _explained(holdout.problem or last.problem, last.fit)
-    classes = rivals(found, holdout, alike(found.columns, found))
+    classes = dict(zip(found.fit.chosen, rivals(found, holdout, alike(found.columns, found)), strict=True))
     steps = {s.candidate: s for s in found.steps}
     entries = []
     for i, (c, part) in enumerate(zip(last.fit.chosen, last.fit.slices, strict=True)):
-        others = classes[i]
+        others = classes[c]
         entry = label(c) | {
             "parameters": _parameters(last.problem.plant, c, last.fit.values[part], last.half[part]),
             "equivalent": [label(o) for o in others],

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import norm, wilcoxon
 
 from bumblebee.diagnosis.fit import Fit
 from bumblebee.diagnosis.problem import Problem
@@ -16,6 +17,7 @@ from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.windows import Windows
 from bumblebee.sim.effects import Effect
 
+_FEW = 8  # windows that ranks can be trusted with
 _WORSE = 0.02  # a longer window's error may grow by this share
 
 
@@ -34,6 +36,8 @@ class Holdout:
     def logs(self, fits: Sequence[Fit]) -> np.ndarray:
         """log(1 + chi-square) of every fit on every window, (F, W)."""
         problem = self.problem
+        if problem is None:
+            raise ValueError("nothing is held out")
         raw = problem.residual([f.effects for f in fits])
         left = np.stack(
             [r - np.tensordot(f.nuisance, problem.nuisance, axes=1) for r, f in zip(raw, fits, strict=True)]
@@ -41,13 +45,18 @@ class Holdout:
         return np.log1p((left**2).mean(axis=2))
 
     def gains(self, before: Fit, after: Fit, z: float, least: float) -> bool:
-        """Whether `after` is better by `z` standard errors and by `least`, and no worse after 1 s."""
+        """Whether `after` is better by the share `least` of chi-square and beyond doubt, and no worse after 1 s.
+
+        Beyond doubt is `z` standard errors of the mean or as much by signed ranks, which a few odd windows do not sway.
+        """
         if self.problem is None:
             return True
         logs = self.logs([before, after])
         gain = logs[0] - logs[1]
         spread = gain.std(ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
-        if gain.mean() < z * spread or gain.mean() < least:
+        ranks = wilcoxon(gain, alternative="greater").pvalue if np.count_nonzero(gain) > _FEW else 1.0
+        least *= float(-np.expm1(-logs[0]).mean())  # a share of chi-square, as a difference of its log(1 + .)
+        if gain.mean() < least or (gain.mean() < z * spread and ranks > norm.sf(z)):
             return False
         return not self.worse_later(before.effects, after.effects)
 

@@ -21,8 +21,10 @@ def screening_windows(problem: Problem, budget: int) -> np.ndarray:
     return np.unique(np.linspace(0, count - 1, min(budget, count)).round().astype(int))
 
 
-def screen(problem: Problem, candidates: Sequence[Candidate], effects: Sequence[Effect], torque: np.ndarray) -> Columns:
-    """Columns of `candidates` on the problem's windows, around the model with `effects`.
+def screen(
+    problem: Problem, candidates: Sequence[Candidate], effects: Sequence[Effect], torque: np.ndarray
+) -> tuple[Columns, np.ndarray]:
+    """Columns of `candidates` on the problem's windows, around the model with `effects`; and the whitened answers.
 
     `torque` (nv,) is a pulse that matters on each degree of freedom. Candidates that are only shortlisted have none.
     """
@@ -41,8 +43,11 @@ def screen(problem: Problem, candidates: Sequence[Candidate], effects: Sequence[
             simulated.append((c, at))
         else:
             torques = signatures.of(c).astype(np.float32)
-            flat = torques.transpose(1, 0, 3, 2).reshape(len(problem.windows), count, -1)
-            values[at : at + count] = np.matmul(flat, white).transpose(1, 0, 2)
+            felt = np.flatnonzero(np.abs(torques).any(axis=(0, 1, 2)))  # a joint's effect is felt by its own dof alone
+            flat = torques[..., felt].transpose(1, 0, 3, 2).reshape(len(problem.windows), count, -1)
+            values[at : at + count] = np.matmul(flat, white[:, felt].reshape(len(flat), -1, white.shape[-1])).transpose(
+                1, 0, 2
+            )
         at += count
     if simulated:
         drawn = problem.sensitivities([c for c, _ in simulated], list(effects))
@@ -50,14 +55,14 @@ def screen(problem: Problem, candidates: Sequence[Candidate], effects: Sequence[
         for c, where in simulated:
             values[where : where + len(c.free)] = drawn[first : first + len(c.free)]
             first += len(c.free)
-    return Columns(kept, values)
+    return Columns(kept, values), white
 
 
 def _whitened(problem: Problem, answers: Answers) -> np.ndarray:
-    """(W, nv * S, M): the answers as the residual's whitened change."""
+    """(W, nv, S, M): the answers as the residual's whitened change."""
     raw = answers.torque
     white = problem.whitener(raw.reshape(-1, *raw.shape[2:]), centre=False)
-    return white.transpose(1, 0, 2).astype(np.float32)
+    return white.reshape(*raw.shape[:3], -1).transpose(2, 0, 1, 3).astype(np.float32)
 
 
 def pulse_sizes(problem: Problem, torque: np.ndarray) -> np.ndarray:
@@ -72,8 +77,20 @@ def pulse_sizes(problem: Problem, torque: np.ndarray) -> np.ndarray:
     return np.maximum(out, 1e-9)
 
 
-def restless(problem: Problem, residual: np.ndarray, count: int) -> list[str]:
-    """Joints whose velocities are worst explained, worst first: where play and shafts are worth a simulation."""
-    part = problem.layout.slices["joint_vel"]
-    power = (residual.reshape(problem.windows.measured.shape)[..., part] ** 2).mean(axis=(0, 1))
+def restless(problem: Problem, answers: np.ndarray, residual: np.ndarray, count: int) -> list[str]:
+    """Joints that lack most torque, worst first: where play and shafts are worth a simulation.
+
+    `answers` (W, nv, S, M) to pulses explain the whitened residual (W, M), all degrees of freedom together; a joint's
+    power is the mean square of its torques in their own standard errors, 1 for noise.
+    """
+    size = answers.shape[1] * answers.shape[2]
+    rows = answers.reshape(len(answers), size, -1).astype(float)
+    scale = np.sqrt((rows**2).mean(axis=(0, 2), keepdims=True)) + 1e-12
+    rows = rows / scale
+    normal = np.matmul(rows, rows.transpose(0, 2, 1))
+    normal[:, np.arange(size), np.arange(size)] += 1e-3 * normal.trace(axis1=1, axis2=2)[:, None] / size
+    inverse = np.linalg.inv(normal)
+    torque = np.matmul(inverse, np.matmul(rows, residual[:, :, None]))[..., 0]
+    lacks = torque**2 / np.diagonal(inverse, axis1=1, axis2=2)
+    power = lacks.reshape(len(answers), *answers.shape[1:3]).mean(axis=(0, 2))[problem.plant.dof]
     return [problem.plant.joints[j] for j in np.argsort(-power)[:count] if power[j] > _RESTLESS]

@@ -7,12 +7,12 @@ import numpy as np
 from scipy.stats import norm
 
 from bumblebee.diagnosis.candidates import Candidate, shortlisted
-from bumblebee.diagnosis.fit import Fit, gauss_newton, resolved, standard_covariance
+from bumblebee.diagnosis.fit import Fit, cost_of, effects_at, gauss_newton, resolved, standard_covariance
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.scores import Columns, Scores, as_z, null_maxima, score_tests
 from bumblebee.diagnosis.screen import pulse_sizes, restless, screen, screening_windows
-from bumblebee.diagnosis.trials import Trial, far_trials, simplest, try_one
+from bumblebee.diagnosis.trials import Trial, far_trials, limit_trials, simplest, try_one
 from bumblebee.diagnosis.whiten import null_draws
 from bumblebee.sim.effects import Effect
 
@@ -23,17 +23,17 @@ class SearchConfig:
 
     level: float = 0.005
     """False alarms allowed for a whole null dataset, shared among the candidates (Bonferroni, or by simulation)."""
-    screen_windows: int = 60
+    screen_windows: int = 40
     """Windows that all candidates are screened on."""
     simulated: int = 10
     """Best candidates of the screening a round, whose sensitivities are simulated on all windows."""
     trials: int = 4
     """Candidates a round that are tried at their size in the simulator."""
-    shortlist: int = 1
+    shortlist: int = 2
     """Joints a round on which play and flexible shafts are tried."""
     most: int = 12
     """Effects at most."""
-    patience: int = 6
+    patience: int = 4
     """Rounds that may fail before the search ends."""
     holdout_z: float = 2.0
     """Held-out gain must exceed this many of its standard errors."""
@@ -75,9 +75,10 @@ class Search:
     rejected: list[str] = field(default_factory=list)
 
 
+_ANEW = 0.1  # share of the cost left, below which all candidates are screened anew
 _SPRINGS = {"joint_spring", "asymmetric_friction"}
 _MUCH = 0.15  # share of the cost
-_CHANGED = 0.95  # share of the cost that a fit must leave less of, to be worth linearising around
+_CHANGED = 0.8  # share of the cost that a fit must leave less of, to be worth linearising around
 
 
 class _Run:
@@ -106,7 +107,9 @@ class _Run:
         """Candidates with steps for the present fit, and the columns of all of them around it."""
         self.small = self.problem.part(self.keep)
         self.candidates, torque = self.remake(self.fit.effects)
-        self.columns = screen(self.small, self.candidates, self.fit.effects, pulse_sizes(self.problem, torque))
+        self.columns, self.answers = screen(
+            self.small, self.candidates, self.fit.effects, pulse_sizes(self.problem, torque)
+        )
         self.screened_cost = self.fit.cost
 
     def _bound(self) -> float:
@@ -135,9 +138,10 @@ class _Run:
             c = self.columns.candidates[k]
             if len(found) >= self.config.simulated or tests.gain[k] <= 0:
                 break
-            if self.is_open(c, tests, k, 0.7 * share * self.bound) and not _like(c, found):
+            if self.is_open(c, tests, k, 0.7 * share * self.bound, share**2) and not _like(c, found):
                 found.append(c)
-        poor = restless(self.problem, self.fit.clean(self.problem), self.config.shortlist)
+        left = self.small_fit().clean(self.small)
+        poor = restless(self.small, self.answers, left, self.config.shortlist)
         joints = len(self.problem.plant.joints)
         listed = [c for c in self.candidates if c.where in poor and shortlisted(c, joints)]
         return found + [c for c in listed if c not in self.closed and not self._chosen(c)]
@@ -149,15 +153,17 @@ class _Run:
             return True
         return bool((c.effect == "hysteresis" and there & _SPRINGS) or (c.effect in _SPRINGS and "hysteresis" in there))
 
-    def is_open(self, c: Candidate, tests: Scores, k: int, bound: float) -> bool:
+    def is_open(self, c: Candidate, tests: Scores, k: int, bound: float, share: float) -> bool:
         """Whether a candidate is significant, can move the way it wants to, and has not been tried in vain.
 
         One that promises much of the whole cost is tried, too: where a few windows are very far off they decide its
-        variance, and only the fit with it, in which they are not, can say how sure it is.
+        variance, and only the fit with it, in which they are not, can say how sure it is. One that promises less than
+        the held-out windows would have to show is not. `share` is that of the windows the tests were made on.
         """
-        if c in self.closed or self._chosen(c):
+        cost = share * self.fit.cost
+        if c in self.closed or self._chosen(c) or tests.gain[k] < 0.5 * self.config.least_gain * cost:
             return False
-        much = tests.gain[k] > _MUCH * self.fit.cost * len(self.keep) / len(self.problem.windows)
+        much = tests.gain[k] > _MUCH * cost
         return bool(tests.z[k] >= bound or much) and any(_can_move(c, tests.steps[k]))
 
     def trials(self) -> tuple[list[Trial], list[Candidate]]:
@@ -167,24 +173,22 @@ class _Run:
             return [], []
         columns = Columns(looked, self.problem.sensitivities(looked, self.fit.effects))
         tests = score_tests(self.problem, columns, self.fit, self.weights)
-        order = [k for k in np.argsort(-tests.gain) if self.is_open(looked[k], tests, k, self.bound)]
+        order = [k for k in np.argsort(-tests.gain) if self.is_open(looked[k], tests, k, self.bound, 1.0)]
         tried = [
             try_one(self.problem, self.fit, looked[k], tests.steps[k], self.weights)
             for k in order[: self.config.trials]
         ]
-        return [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2], looked
+        least = max(self.bound**2 / 2, 0.5 * self.config.least_gain * self.fit.cost)
+        return [t for t in tried if t is not None and t.cost < self.fit.cost - least], looked
 
     def accept(self, candidate: Candidate, values: np.ndarray) -> bool:
         """Refit with the candidate; keep it if the joint fit and the held-out windows agree."""
-        fit = gauss_newton(
-            self.problem,
-            (*self.fit.chosen, candidate),
-            np.concatenate((self.fit.values, values)),
-            self.weights,
-            iterations=2,
-            coarse=True,
-        )
-        z = wald(self.problem, fit, self.weights, len(fit.chosen) - 1)
+        chosen, start = (*self.fit.chosen, candidate), np.concatenate((self.fit.values, values))
+        # Windows that only this effect explains weighed little so far: weigh them as it leaves them.
+        residual = self.problem.residual([effects_at(chosen, start)])[0]
+        weights = window_weights(residual - np.tensordot(self.fit.nuisance, self.problem.nuisance, axes=1))
+        fit = gauss_newton(self.problem, chosen, start, weights, iterations=2, coarse=True)
+        z = wald(self.problem, fit, weights, len(fit.chosen) - 1)
         p = min(1.0, 2 * norm.sf(z) * len(self.candidates))
         if z < self.bound or not self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain):
             self.closed.add(candidate)
@@ -197,13 +201,13 @@ class _Run:
 
     def renew(self, fit: Fit) -> None:
         """Nuisances around what was found, where it is more than a little; weights; candidates, where it is a lot."""
-        if fit.cost < _CHANGED * self.fit.cost:
+        if cost_of(self.problem, fit.residual, self.weights)[0] < _CHANGED * self.fit.cost:
             self.problem = self.problem.relinearised(fit.effects)
             self.holdout = self.holdout.relinearised(fit.effects)
         self.weights = window_weights(fit.clean(self.problem))
         self.fit = resolved(self.problem, fit, self.weights)
         self.small = self.problem.part(self.keep)
-        if self.fit.cost < 0.5 * self.screened_cost:
+        if self.fit.cost < _ANEW * self.screened_cost:
             self.rescreen()
 
     def prune(self) -> None:
@@ -258,7 +262,8 @@ def search(
     run = _Run(problem, holdout, remake, config, say)
     vain = 0
     while len(run.fit.chosen) < config.most and vain < config.patience:
-        tried, looked = far_trials(run.problem, run.fit, run.candidates, run.weights, config.far), []
+        tried, looked = limit_trials(run.problem, run.fit, run.candidates), []
+        tried = tried or far_trials(run.problem, run.fit, run.candidates, run.weights, config.far)
         tried = [t for t in tried if t.candidate not in run.closed]
         if not tried:
             tried, looked = run.trials()

@@ -89,7 +89,9 @@ def make_session(
     A rollout that cannot be used is set aside with its reason, as are those in `errors` (id, error), which could not be
     read; where none is left the first reason ends it.
     """
-    notes, long, failed = [], [], list(errors)
+    notes: list[str] = []
+    long: list[Rollout] = []
+    failed = list(errors)
     for rollout in rollouts:
         try:
             _usable(dataset, rollout, long[0] if long else None)

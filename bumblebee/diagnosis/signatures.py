@@ -19,6 +19,7 @@ from bumblebee.diagnosis.variation import Variation
 from bumblebee.diagnosis.windows import Windows
 from bumblebee.sim.effect_hooks import runtime_hooks
 from bumblebee.sim.effect_native import sloped
+from bumblebee.sim.effects import Effect
 from bumblebee.sim.servo import servos_of
 
 _CREEP = 0.02  # [rad/s]: speeds below are no motion that dry friction could be told by
@@ -109,7 +110,7 @@ class Signatures:
             return self.servos.gain[j] * (self._moved_control(effect)[..., j] - self.u[..., j])
         raise ValueError(f"{c.effect} has no signature: simulate it")
 
-    def _moved_control(self, effect: object) -> np.ndarray:
+    def _moved_control(self, effect: Effect) -> np.ndarray:
         """Controls (W, K, J) with a delay or lost commands on all joints, of which the caller takes one."""
         kind, value = effect.effect, effect.value()
         key = (kind, round(1e9 * value))

@@ -213,7 +213,7 @@ def _restructured(
     plant: Plant, windows: Windows, lead: Variation, qpos: np.ndarray, qvel: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The starts in the layout of a model with play or shafts, whose own state follows from the servo's torque."""
-    own = lead.plant
+    own = lead.plant or plant
     q = np.broadcast_to(own.model.qpos0, (*qpos.shape[:-1], own.model.nq)).copy()
     v = np.zeros((*qvel.shape[:-1], own.model.nv))
     q[..., own.qpos], v[..., own.dof] = qpos[..., plant.qpos], qvel[..., plant.dof]

@@ -104,6 +104,39 @@ def far_trials(
     return found
 
 
+# A limit acts in few windows: there it decides everything, elsewhere nothing.
+_LIMITS = ("torque_limit", "torque_speed_limit")
+_ODD, _FEW, _WORTH = 9.0, 3, 15.0  # times the median power; such windows; fall of the log-likelihood
+
+
+def limit_trials(problem: Problem, fit: Fit, candidates: Sequence[Candidate]) -> list[Trial]:
+    """Limits of torque, tried on the windows that are far worse than the others.
+
+    Those windows weigh little in a fit, and are too few for a variance between windows to call them significant. Here a
+    limit is worth a trial if the sum of log(1 + chi-square) over them falls by much.
+    """
+    clean = fit.clean(problem)
+    power = (clean**2).mean(axis=1)
+    odd = np.flatnonzero(power > _ODD * max(float(np.median(power)), 1.0))
+    kinds = [c for c in candidates if c.effect in _LIMITS and (c.effect, c.where) not in _places(fit)]
+    if len(odd) < _FEW or not kinds:
+        return []
+    part = problem.part(odd)
+    declared = part.residual([fit.effects], coarse=True)[0]
+    found = []
+    for c in kinds:
+        moved = part.residual([[*fit.effects, c.at(c.start)]], coarse=True)[0]
+        left = clean[odd] - (declared - moved)
+        gain = float((np.log1p(power[odd]) - np.log1p((left**2).mean(axis=1))).sum())
+        if gain > _WORTH:
+            found.append(Trial(c, c.clip(c.start), fit.cost - gain, np.zeros_like(clean)))
+    return sorted(found, key=lambda t: t.cost)[:1]
+
+
+def _places(fit: Fit) -> set[tuple[str, str]]:
+    return {(c.effect, c.where) for c in fit.chosen}
+
+
 # Of effects that fit the same the one that is met most often is named; the others are its class.
 _USUAL = (
     "coulomb_friction", "viscous_friction", "armature", "motor_strength", "command_delay", "encoder_offset",

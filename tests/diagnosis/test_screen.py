@@ -28,7 +28,7 @@ def made() -> tuple[Problem, list[Candidate], Columns]:
     candidates = all_candidates(session.plant, session.rollouts, [])
     few = [c for c in candidates if c.effect != "cogging" or c.step[2] in (3, 12)]
     torque = scales_of(session.plant, session.rollouts).torque
-    return problem, few, screen(problem, few, [], pulse_sizes(problem, torque))
+    return problem, few, screen(problem, few, [], pulse_sizes(problem, torque))[0]
 
 
 def test_columns_of_torque_answers_are_those_of_simulations(made: tuple) -> None:

@@ -1,0 +1,55 @@
+"""Effects beyond the usual ones, from truths with equations of their own: named up to their class, with their size."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.diagnose import diagnose
+from bumblebee.diagnosis.quantised import grids
+from bumblebee.diagnosis.session import make_session
+from bumblebee.sim.effects import CATALOGUE
+from tests.diagnosis import arm
+from tests.diagnosis.strange_arm import simulate
+
+CONFIG = replace(arm.SMALL, beyond=False)
+CASES = [
+    ("command_delay", "", (0.012,), "delay", 0.03),
+    ("strength_drift", "j2", (0.04,), "rate", 0.1),
+    ("cogging", "j1", (0.3, 0.2, 12.0), "periods", 0.01),
+    ("hysteresis", "j2", (0.5, 0.05), "amplitude", 0.1),
+    ("backlash", "j2", (0.03,), "gap", 0.25),
+]
+
+
+@pytest.mark.parametrize(("kind", "place", "values", "parameter", "tolerance"), CASES)
+def test_an_effect_is_named_up_to_its_class(
+    kind: str, place: str, values: tuple[float, ...], parameter: str, tolerance: float
+) -> None:
+    """The first in the list is the effect, or lists it as the same to these data."""
+    rollouts = simulate({(kind, place): values}, seed=5)
+    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    found = diagnose(session, CONFIG).document["effects"]
+    same = [(e["effect"], e["where"]) for e in (found[0], *found[0]["equivalent"])]
+    assert (kind, [place] if place else []) in same
+    if found[0]["effect"] == kind:
+        truth = values[CATALOGUE[kind].names.index(parameter)]
+        assert found[0]["parameters"][parameter]["value"] == pytest.approx(truth, rel=tolerance)
+
+
+@pytest.mark.parametrize("noise", [0.0, 4e-4])
+def test_an_encoders_steps_are_seen_in_its_readings(noise: float) -> None:
+    """The grid is found with its step, with noise on top as well; a smooth reading has none."""
+    rng = np.random.default_rng(0)
+    smooth = arm.simulate({}, count=2, seconds=3.0)
+    assert grids(smooth) == []
+    steps = np.array([0.004, 0.0, 0.0])
+    rounded = []
+    for rollout in smooth:
+        q = rollout.joint_pos.copy()
+        q[:, 0] = np.round(q[:, 0] / steps[0]) * steps[0] + noise * rng.standard_normal(len(q))
+        rounded.append(replace(rollout, joint_pos=q))
+    (found,) = grids(rounded)
+    assert found.joint == "j1"
+    assert found.step == pytest.approx(0.004, abs=max(4 * found.error, 1e-9))
