@@ -190,7 +190,7 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
             out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": p.unit}
         else:
             ends = [max(p.lower, ends[0]), min(p.upper, ends[1])]
-            known = float(nominal) if np.isfinite(nominal) else None
+            known = float(nominal) + 0.0 if np.isfinite(nominal) else None  # no -0
             out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": p.unit}
     return out
 
