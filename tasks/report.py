@@ -80,6 +80,7 @@ def collect(shape: Loop) -> LoopResults:
         published=_json(Path("data/published.json")),
         sealed=sealed_truth(),
         rounds=tuple(round_results(turn.n, shape.clusters) for turn in shape.rounds if turn.n <= shape.final_round),
+        pretrained=_json(Path("models/base/card.json")).get("parent") == "pretrained",
     )
 
 

@@ -35,8 +35,9 @@ def training_section(results: LoopResults) -> Section:
     experts = {n: c for n, c in results.curves.items() if n.startswith("expert")}
     rest = {n: c for n, c in results.curves.items() if n == "generalist"}
     blocks: list[Block] = []
+    start = "from the policy that comes along" if results.pretrained else "from scratch"
     captions = (
-        "Base policy, from scratch; episodes start anywhere in a clip, with noise and a shrinking threshold.",
+        f"Base policy, {start}; episodes start anywhere in a clip, with noise and a shrinking threshold.",
         "Experts (r0: fine-tuned from base; r1 ...: refined in the corrected simulator).",
         "Generalist, by DAgger from the final experts.",
     )

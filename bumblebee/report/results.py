@@ -52,6 +52,8 @@ class LoopResults:
     """data/sealed/robot.json, opened at the very end; None where the measured rollouts are of the user's robot."""
     rounds: tuple[RoundResults, ...] = ()
     """The turns with the robot."""
+    pretrained: bool = False
+    """Whether the base policy went on from the one that comes along."""
 
     @property
     def real_robot(self) -> bool:

@@ -9,10 +9,16 @@ from bumblebee.report.success_figure import pick
 from bumblebee.report.truth import match
 from bumblebee.report.wording import change, percent
 
+PRETRAINED = (
+    "Training began from the policy that comes along, which real motions on a GPU had taught most of this already; "
+    "motions held out here may be among what it saw (bumblebee/learning/pretrained/README.md)."
+)
+
 
 def verdict(results: LoopResults) -> list[str]:
     """Sentences."""
-    lines = [_headline(results), NOT_YOURS if results.real_robot else "", *_first_steps(results)]
+    lines = [_headline(results), PRETRAINED if results.pretrained else "", NOT_YOURS if results.real_robot else ""]
+    lines += _first_steps(results)
     for turn in results.rounds:
         lines += [_found(results, turn), _error(turn), _delta(turn)]
     return [line for line in lines if line] + _short(results)

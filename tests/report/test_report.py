@@ -2,6 +2,7 @@
 
 import base64
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from bumblebee.report.page import image, render
 from bumblebee.report.policy_sections import registry_section, success_section, training_section
 from bumblebee.report.round_sections import round_section
 from bumblebee.report.truth import match
-from bumblebee.report.verdict import verdict
+from bumblebee.report.verdict import PRETRAINED, verdict
 from bumblebee.report.wording import change, effect_line, percent, shown
 from bumblebee.robot.facts import joint_names, stand_pose
 from bumblebee.robot.model import build_spec
@@ -97,6 +98,15 @@ def test_two_motions_prove_nothing_however_alike_they_are(motions: int, said: st
 
 def test_every_version_of_this_run_is_listed() -> None:
     assert "<td>3, 4</td>" in page([found()], [TRUTH])
+
+
+def test_a_base_policy_that_was_not_made_here_is_said() -> None:
+    made = loop_results([found()], [TRUTH])
+    assert PRETRAINED not in verdict(made)
+    told = replace(made, pretrained=True)
+    assert PRETRAINED in verdict(told)
+    captions = "".join(getattr(block, "caption", "") or str(block) for block in training_section(told).blocks)
+    assert "from the policy that comes along" in captions and "from scratch" not in captions
 
 
 def test_an_interval_across_zero_is_no_gain_in_the_verdict() -> None:
