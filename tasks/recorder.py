@@ -29,7 +29,8 @@ def record(run: dict[str, Any]) -> None:
         run: the arguments of `registry.log_run`.
 
     Raises:
-        RuntimeError: with MLflow's last word, where the run could not be written.
+        OSError: where a file could not be read or written, as it came up there.
+        RuntimeError: with MLflow's words, where the run could not be written for another reason.
     """
     if not _started:
         registry.log_run(**run)
@@ -37,7 +38,26 @@ def record(run: dict[str, Any]) -> None:
     process = _started.pop()
     _, said = process.communicate(json.dumps(_plain(run)))
     if process.returncode:
-        raise RuntimeError((said.strip().splitlines() or ["the recorder ended without a word"])[-1])
+        raise heard(said)
+
+
+def told(error: Exception) -> str:
+    """An error as one line for the other process."""
+    text = " ".join(str(error).split())
+    facts = {"type": type(error).__name__, "text": text, "errno": getattr(error, "errno", None)}
+    return json.dumps({**facts, "file": str(getattr(error, "filename", None) or "")})
+
+
+def heard(said: str) -> Exception:
+    """The error that the last line of `said` tells, whole: its number and file decide what the user reads."""
+    last = (said.strip().splitlines() or ["the recorder ended without a word"])[-1]
+    try:
+        facts = json.loads(last)
+    except ValueError:
+        return RuntimeError(last)
+    if facts["errno"] is not None:
+        return OSError(facts["errno"], facts["text"], facts["file"] or None)
+    return RuntimeError(f"{facts['type']}: {facts['text']}")
 
 
 def _plain(run: dict[str, Any]) -> dict[str, Any]:
@@ -47,16 +67,21 @@ def _plain(run: dict[str, Any]) -> dict[str, Any]:
     return {**run, "params": registry.flatten(run["params"]), "curve": curve, "artifacts": files}
 
 
-def main() -> None:
+def main() -> int:
     """Get ready, wait for the stage's run, write it; nothing when the stage ends without one."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the stage's; its end closes the pipe
-    registry.prepare()
-    text = sys.stdin.read()
-    if text:
-        run = json.loads(text)
-        curve = None if run["curve"] is None else Path(run["curve"])
-        registry.log_run(**{**run, "curve": curve, "artifacts": [Path(name) for name in run["artifacts"]]})
+    try:
+        registry.prepare()
+        text = sys.stdin.read()
+        if text:
+            run = json.loads(text)
+            curve = None if run["curve"] is None else Path(run["curve"])
+            registry.log_run(**{**run, "curve": curve, "artifacts": [Path(name) for name in run["artifacts"]]})
+    except Exception as error:  # every one is the stage's, which says it in its own way
+        print(told(error), file=sys.stderr)
+        return 1
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

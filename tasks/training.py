@@ -3,7 +3,7 @@
 import json
 import shutil
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +106,7 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     library = MotionLibrary(job.clips, own.ahead, device=engine.device)
     env = TrackingEnv(library, engine, config.env, config.seed, job.world.action_adapter, job.share)
     trainer = Trainer(env, config.ppo, folder, config.seed, job.parent)
+    config = replace(config, ppo=trainer.config)  # a child has its parent's layers: card and run say which
     if trainer.iteration == 0:
         _try(trainer.policy(), job, config).to_parquet(folder / BEFORE)
     else:

@@ -13,6 +13,7 @@ Row = dict[str, Any]
 RIVALS = ("fit_everything", "ridge", "pace", "delta")
 _FIVE, _WEAK, _STRONG = (3.5, 9.0), (0.0, 3.5), (9.0, np.inf)
 _DASH = "-"
+_DRAWN = ("single", "pair", "triple")
 
 
 def table(rows: Sequence[Row]) -> str:
@@ -66,7 +67,7 @@ def _between(rows: Sequence[Row], group: str, bounds: tuple[float, float]) -> li
 def _measures(good: Sequence[Row]) -> str:
     """residual.md's measures; rivals on the cases where they ran."""
     lines = ["| measure | good | excellent | ours | " + " | ".join(RIVALS) + " |", "|" + "---|" * (4 + len(RIVALS))]
-    for name, levels, measure in _list():
+    for name, levels, measure in _MEASURES:
         cells = [measure(good, "ours")]
         for rival in RIVALS:
             own = [r for r in good if rival in r.get("rivals", {}) and "failed" not in r["rivals"][rival]]
@@ -79,80 +80,84 @@ def _marks(row: Row, method: str) -> Row:
     return row["ours"] if method == "ours" else row["rivals"][method]
 
 
-def _list() -> list[tuple[str, tuple[str, str], Callable[[Sequence[Row], str], str]]]:
-    def of(group: str, bounds: tuple[float, float], mark: str) -> Callable:
-        return lambda rows, method: (
-            _DASH
-            if method == "delta"
-            else share([bool(np.all(_marks(r, method)[mark])) for r in _between(rows, group, bounds)])
-        )
+Measure = Callable[[Sequence[Row], str], str]
 
-    def sizes(groups: tuple[str, ...]) -> Callable:
-        return lambda rows, method: number(
-            [s["relative"] for r in rows if method == "ours" for s in r["ours"]["sizes"] if s["group"] in groups],
-            100,
-            " %",
-        )
 
-    def covers(rows: Sequence[Row], method: str) -> str:
-        return share([s["covered"] for r in rows if method == "ours" for s in r["ours"]["sizes"]])
+def _of(group: str, bounds: tuple[float, float], mark: str) -> Measure:
+    """Share of a group's cases of some size that have `mark`, of each effect in them."""
 
-    def alarms(rows: Sequence[Row], method: str) -> str:
-        return _DASH if method == "delta" else share([_marks(r, method)["alarm"] for r in rows if r["group"] == "null"])
-
-    def claimed(rows: Sequence[Row], method: str) -> str:
-        return (
-            share([r["ours"]["outside"]["flagged"] for r in rows if r["group"] == "null"])
-            if method == "ours"
-            else _DASH
-        )
-
-    def spurious(rows: Sequence[Row], method: str) -> str:
-        if method == "delta":
+    def measure(rows: Sequence[Row], method: str) -> str:
+        if method == "delta":  # it names nothing
             return _DASH
-        counts = [
-            _marks(r, method)["spurious"] / len(r["truth"])
-            for r in rows
-            if r["group"] in ("single", "pair", "triple") and r["truth"]
-        ]
-        return number(counts, statistic=np.mean)
+        return share([bool(np.all(_marks(r, method)[mark])) for r in _between(rows, group, bounds)])
 
-    def gained(statistic: Callable) -> Callable:
-        def measure(rows: Sequence[Row], method: str) -> str:
-            shares = [_achieved(r, method) for r in rows if r["group"] in ("single", "pair", "triple")]
-            return number([s for s in shares if s is not None], statistic=statistic)
+    return measure
 
-        return measure
 
-    def outside(mark: str) -> Callable:
-        return lambda rows, method: share(
-            [r["ours"]["outside"][mark] for r in rows if r["group"] == "outside"] if method == "ours" else []
-        )
+def _sizes(groups: tuple[str, ...]) -> Measure:
+    """Relative error of the sizes of ours."""
+    return lambda rows, method: number(
+        [s["relative"] for r in rows if method == "ours" for s in r["ours"]["sizes"] if s["group"] in groups], 100, " %"
+    )
 
-    def seconds(rows: Sequence[Row], method: str) -> str:
-        return number([_marks(r, method)["seconds"] for r in rows], 1, " s")
 
-    none = ("", "")
-    return [
-        ("single, top-1 up to its class, 5x", ("85 %", "95 %"), of("single", _FIVE, "top")),
-        ("the same, 2x", none, of("single", _WEAK, "top")),
-        ("the same, 20x", none, of("single", _STRONG, "top")),
-        ("single found at all, 5x", none, of("single", _FIVE, "found")),
-        ("joint or link right, 5x", ("90 %", "97 %"), of("single", _FIVE, "top_place")),
-        ("size, relative error, joint", ("5 %", "2 %"), sizes(("joint", "sensor"))),
-        ("size, relative error, mass and contact", ("15 %", "5 %"), sizes(("mass", "contact"))),
-        ("95 % interval covers", ("85-99 %", "92-98 %"), covers),
-        ("false alarms on nulls", ("5 %", "1 %"), alarms),
-        ("structure claimed on nulls", none, claimed),
-        ("spurious effects beside each true one", ("0.15", "0.05"), spurious),
-        ("both of two found", ("70 %", "90 %"), of("pair", (0.0, np.inf), "found")),
-        ("all of three found", none, of("triple", (0.0, np.inf), "found")),
-        ("achievable error removed, held out, median", ("0.85", "0.97"), gained(np.median)),
-        ("the same, mean", none, gained(np.mean)),
-        ("outside the catalogue: flagged", ("90 %", "98 %"), outside("flagged")),
-        ("outside: its form right", ("50 %", "75 %"), outside("form")),
-        ("time, one core", ("5 min", "1 min"), seconds),
-    ]
+def _covers(rows: Sequence[Row], method: str) -> str:
+    return share([s["covered"] for r in rows if method == "ours" for s in r["ours"]["sizes"]])
+
+
+def _alarms(rows: Sequence[Row], method: str) -> str:
+    return _DASH if method == "delta" else share([_marks(r, method)["alarm"] for r in rows if r["group"] == "null"])
+
+
+def _outside(group: str, mark: str) -> Measure:
+    """Share of a group's cases of which ours says this of what is left."""
+    return lambda rows, method: (
+        share([r["ours"]["outside"][mark] for r in rows if r["group"] == group]) if method == "ours" else _DASH
+    )
+
+
+def _spurious(rows: Sequence[Row], method: str) -> str:
+    if method == "delta":
+        return _DASH
+    drawn = [r for r in rows if r["group"] in _DRAWN and r["truth"]]
+    return number([_marks(r, method)["spurious"] / len(r["truth"]) for r in drawn], statistic=np.mean)
+
+
+def _gained(statistic: Callable) -> Measure:
+    """Share of the error that could be removed, over the cases where that is known."""
+
+    def measure(rows: Sequence[Row], method: str) -> str:
+        shares = [_achieved(r, method) for r in rows if r["group"] in _DRAWN]
+        return number([s for s in shares if s is not None], statistic=statistic)
+
+    return measure
+
+
+def _seconds(rows: Sequence[Row], method: str) -> str:
+    return number([_marks(r, method)["seconds"] for r in rows], 1, " s")
+
+
+_NONE = ("", "")
+_MEASURES: tuple[tuple[str, tuple[str, str], Measure], ...] = (
+    ("single, top-1 up to its class, 5x", ("85 %", "95 %"), _of("single", _FIVE, "top")),
+    ("the same, 2x", _NONE, _of("single", _WEAK, "top")),
+    ("the same, 20x", _NONE, _of("single", _STRONG, "top")),
+    ("single found at all, 5x", _NONE, _of("single", _FIVE, "found")),
+    ("joint or link right, 5x", ("90 %", "97 %"), _of("single", _FIVE, "top_place")),
+    ("size, relative error, joint", ("5 %", "2 %"), _sizes(("joint", "sensor"))),
+    ("size, relative error, mass and contact", ("15 %", "5 %"), _sizes(("mass", "contact"))),
+    ("95 % interval covers", ("85-99 %", "92-98 %"), _covers),
+    ("false alarms on nulls", ("5 %", "1 %"), _alarms),
+    ("structure claimed on nulls", _NONE, _outside("null", "flagged")),
+    ("spurious effects beside each true one", ("0.15", "0.05"), _spurious),
+    ("both of two found", ("70 %", "90 %"), _of("pair", (0.0, np.inf), "found")),
+    ("all of three found", _NONE, _of("triple", (0.0, np.inf), "found")),
+    ("achievable error removed, held out, median", ("0.85", "0.97"), _gained(np.median)),
+    ("the same, mean", _NONE, _gained(np.mean)),
+    ("outside the catalogue: flagged", ("90 %", "98 %"), _outside("outside", "flagged")),
+    ("outside: its form right", ("50 %", "75 %"), _outside("outside", "form")),
+    ("time, one core", ("5 min", "1 min"), _seconds),
+)
 
 
 def _achieved(row: Row, method: str) -> float | None:
@@ -173,7 +178,7 @@ def _conditions(good: Sequence[Row]) -> str:
         *[(f"noise x{n:g}", lambda r, n=n: r["noise"] == n) for n in sorted({r["noise"] for r in good})],
         *[(f"{n} rollouts", lambda r, n=n: r["rollouts"] == n) for n in sorted({r["rollouts"] for r in good})],
     ]
-    measures = {name: measure for name, _, measure in _list()}
+    measures = {name: measure for name, _, measure in _MEASURES}
     names = ("single, top-1 up to its class, 5x", "false alarms on nulls", "spurious effects beside each true one",
              "95 % interval covers", "time, one core")  # fmt: skip
     for name, keep in splits:

@@ -1,10 +1,12 @@
 """The process that writes a stage's run to MLflow beside it."""
 
+import errno
 from pathlib import Path
 
 import pytest
 
 from tasks import recorder, registry
+from tasks.stage import disk_line
 
 
 @pytest.fixture
@@ -38,8 +40,16 @@ def test_the_run_is_written_with_everything_in_it(workspace: Path) -> None:
 
 def test_a_failure_is_the_stages(workspace: Path) -> None:
     recorder.start()
-    with pytest.raises(RuntimeError, match="curve"):
+    with pytest.raises(FileNotFoundError, match="no-curve"):
         recorder.record(run(curve=workspace / "no-curve.csv"))
+
+
+def test_a_full_disk_is_still_known_as_one_on_the_other_side() -> None:
+    full = recorder.heard("a warning\n" + recorder.told(OSError(errno.ENOSPC, "No space left", "artifacts/x")))
+    assert isinstance(full, OSError) and disk_line(full) is not None and full.filename == "artifacts/x"
+    database = recorder.heard(recorder.told(ValueError("database or disk is full\n[SQL: INSERT]\n(Background: ...)")))
+    assert isinstance(database, RuntimeError) and "database or disk is full" in str(database)
+    assert "Killed" in str(recorder.heard("Killed\n")) and str(recorder.heard(""))
 
 
 def test_a_stage_that_ends_without_a_run_leaves_none(workspace: Path) -> None:
