@@ -47,14 +47,19 @@ def _methods(case: Case, drawn: Drawn, seed: int) -> dict[str, Any]:
     line: dict[str, Any] = {}
     session = _session(drawn, drawn.shown)
     began = time.monotonic()
-    found = diagnose(session)
-    line["ours"] = score(drawn.truth, found.document) | {"seconds": round(time.monotonic() - began, 2)}
-    line["smallest"] = [_smallest(t, found.document) for t in drawn.truth]
-    line["effects"] = [_brief(e) for e in found.document["effects"]]
-    line["unexplained"] = found.document["unexplained"]
+    try:
+        found = diagnose(session)
+        document, effects = found.document, found.effects
+    except Exception as error:  # counts as a diagnosis that named nothing: it must not leave the table
+        document, effects = {"effects": [], "unexplained": {}}, []
+        line["broke"] = f"{type(error).__name__}: {error}"[:300]
+    line["ours"] = score(drawn.truth, document) | {"seconds": round(time.monotonic() - began, 2)}
+    line["smallest"] = [_smallest(t, document) for t in drawn.truth]
+    line["effects"] = [_brief(e) for e in document["effects"]]
+    line["unexplained"] = document["unexplained"]
     judge = _session(drawn, drawn.judge)
     problem = problem_of(judge, range(len(judge.rollouts)), _JUDGED, session.sigma)
-    before, after = error_of([])(problem), error_of(found.effects)(problem)
+    before, after = error_of([])(problem), error_of(effects)(problem)
     errors = {"before": before, "ours": after}
     best = oracle.run(drawn.robot, drawn.truth)
     try:

@@ -39,6 +39,9 @@ def _head(rows: Sequence[Row], good: Sequence[Row]) -> str:
         for r in lost:
             why[r.get("failed", r.get("skipped", "?"))[:70]] += 1
         text.append("Not scored: " + "; ".join(f"{n} x {w}" for w, n in why.items()) + ".")
+    broken = sum("broke" in r for r in good)
+    if broken:
+        text.append(f"Diagnoses that broke, counted as naming nothing: {broken}.")
     return "\n".join(text)
 
 
