@@ -7,7 +7,7 @@ its, unchanged.
 import contextlib
 import io
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 import torch
 from rsl_rl.algorithms import PPO
-from rsl_rl.runners import OnPolicyRunner
 
 from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.curve import CurveWriter
 from bumblebee.learning.policy import Policy, Shape, load_policy, model_config, new_actor
+from bumblebee.learning.ranks import Ranks
 from bumblebee.progress import progress
 from bumblebee.tracking.env import TrackingEnv
 
@@ -83,50 +83,78 @@ class Trainer:
         folder: for the checkpoint and the curve; a checkpoint found there is continued.
         seed: of the network and of the actions' noise.
         parent: folder of a policy to start from, if any; a child has its parent's layers, whatever `config` says.
+        ranks: the processes that train this policy together, each with such a trainer around its own worlds.
     """
 
     def __init__(
-        self, env: TrackingEnv, config: PpoConfig, folder: Path, seed: int = 0, parent: Path | None = None
+        self,
+        env: TrackingEnv,
+        config: PpoConfig,
+        folder: Path,
+        seed: int = 0,
+        parent: Path | None = None,
+        ranks: Ranks | None = None,
     ) -> None:
         origin = None if parent is None else load_policy(parent)
         if origin is not None:
             config = replace(config, hidden=origin.shape.hidden)
-        self.env, self.config, self.folder = env, config, Path(folder)
+        self.env, self.config, self.folder, self.ranks = env, config, Path(folder), ranks or Ranks()
         torch.manual_seed(seed)
         if torch.device(env.device).type == "cuda":
             torch.set_float32_matmul_precision("high")
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
-            self._runner = OnPolicyRunner(env, runner_config(config), log_dir=None, device=env.device)
-        self.algorithm: BoundedPpo = self._runner.alg
+            settings = runner_config(config) | {"multi_gpu": self.ranks.settings}
+            built = BoundedPpo.construct_algorithm(env.get_observations(), env, settings, env.device)
+        assert isinstance(built, BoundedPpo)
+        self.algorithm = built
         self.iteration, self._seconds = 0, 0.0
         if origin is not None:
             self._start_from(origin, str(parent))
+        if self.ranks.count > 1:
+            self.algorithm.broadcast_parameters()
+            torch.manual_seed(self.ranks.seed(seed))  # the networks are alike everywhere, the noise is not
         self._resume()
 
     @property
     def frames(self) -> int:
-        """Control steps seen so far, of all worlds."""
-        return self.iteration * self.config.steps * self.env.num_envs
+        """Control steps seen so far, of all worlds of all ranks."""
+        return self.iteration * self._frames_an_iteration
+
+    @property
+    def _frames_an_iteration(self) -> int:
+        return self.config.steps * self.env.num_envs * self.ranks.count
 
     def train(self, what: str = "policy", enough: Callable[[], bool] = lambda: False) -> None:
         """Train up to the configured iterations, or until it is `enough`; a line of `curve.csv` each."""
-        config, per_iteration = self.config, self.config.steps * self.env.num_envs
-        curve = CurveWriter(self.folder / CURVE, self.iteration)
+        config, per_iteration = self.config, self._frames_an_iteration
         self.algorithm.train_mode()
-        total = config.iterations * per_iteration
-        with progress(total, f"train {what}", "frames", start=self.frames) as bar:
-            while self.iteration < config.iterations and not enough():
+        with self._told(what) as tell:
+            while self.iteration < config.iterations and not self.ranks.decide(enough):
                 began = time.monotonic()
                 scalars = self._iterate()
                 self._seconds += time.monotonic() - began
                 self.iteration += 1
-                row = {"frames": self.frames, "seconds": self._seconds, **scalars}
+                tell({"frames": self.frames, "seconds": self._seconds, **scalars}, per_iteration)
+                if self.iteration % config.checkpoint_every == 0:
+                    self.save_checkpoint()
+
+    @contextlib.contextmanager
+    def _told(self, what: str) -> Iterator[Callable[[dict[str, float], int], None]]:
+        """What writes an iteration's row to the curve and counts its frames; on the first rank alone."""
+        if not self.ranks.first:
+            yield lambda row, frames: None
+            return
+        curve = CurveWriter(self.folder / CURVE, self.iteration)
+        total = self.config.iterations * self._frames_an_iteration
+        with progress(total, f"train {what}", "frames", start=self.frames) as bar:
+
+            def tell(row: dict[str, float], frames: int) -> None:
                 for name, value in row.items():
                     curve.add_scalar(name, value, self.iteration)
                 curve.flush()
-                bar.update(per_iteration, f"success {scalars['success']:.2f}, key error {scalars['key_error']:.3f} m")
-                if self.iteration % config.checkpoint_every == 0:
-                    self.save_checkpoint()
+                bar.update(frames, f"success {row['success']:.2f}, key error {row['key_error']:.3f} m")
+
+            yield tell
         curve.stop()
 
     def policy(self) -> Policy:
@@ -145,15 +173,17 @@ class Trainer:
         return Policy(actor, critic, shape)
 
     def save_checkpoint(self) -> None:
-        """Write all that the next iteration depends on, whole or not at all."""
+        """Write all that the next iteration depends on, of all ranks, whole or not at all; all ranks must call it."""
+        each = self.ranks.gather({"env": self.env.state_dict(), "random": _random_state()})
+        if each is None:
+            return
         self.folder.mkdir(parents=True, exist_ok=True)
         content = {
             "algorithm": self.algorithm.save(),
             "learning_rate": self.algorithm.learning_rate,
             "iteration": self.iteration,
             "seconds": self._seconds,
-            "env": self.env.state_dict(),
-            "random": _random_state(),
+            "ranks": each,
         }
         save_tensors(self.folder / CHECKPOINT, content)
 
@@ -166,8 +196,12 @@ class Trainer:
         self.algorithm.load(content["algorithm"], None, True)
         self.algorithm.learning_rate = content["learning_rate"]
         self.iteration, self._seconds = content["iteration"], content["seconds"]
-        self.env.load_state_dict(content["env"])
-        _set_random_state(content["random"])
+        each = content["ranks"]
+        if len(each) == self.ranks.count:
+            self.env.load_state_dict(each[self.ranks.rank]["env"])
+            _set_random_state(each[self.ranks.rank]["random"])
+        elif self.ranks.first:
+            print(f"{path}: of {len(each)} GPUs, goes on with {self.ranks.count} and new episodes", flush=True)
 
     def _start_from(self, parent: Policy, name: str) -> None:
         here = tuple(self.env.library.ahead)
@@ -192,7 +226,9 @@ class Trainer:
             std = float(algorithm.actor.output_std.mean())
         env.engine.check()
         losses = algorithm.update()
-        scalars = env.statistics.take() | {f"loss_{name}": float(value) for name, value in losses.items()}
+        self.ranks.add(env.statistics.sums)
+        losses = self.ranks.mean({name: float(value) for name, value in losses.items()}, env.device)
+        scalars = env.statistics.take() | {f"loss_{name}": value for name, value in losses.items()}
         scalars |= {"learning_rate": algorithm.learning_rate, "action_std": std, "threshold": env.threshold}
         if not np.isfinite(scalars["loss_value"]):
             raise FloatingPointError(f"the critic's loss is no number at iteration {self.iteration}")

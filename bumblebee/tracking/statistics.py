@@ -33,6 +33,11 @@ class Statistics:
         )
         self._sums += torch.stack([value.double() for value in counted])
 
+    @property
+    def sums(self) -> Tensor:
+        """What `take` will read, to be added up over several environments first."""
+        return self._sums
+
     def take(self) -> dict[str, float]:
         """The means since the last call: reward a step, episode length [steps], success, errors [m, rad, m/s]."""
         *means, steps, ended, lost, unstable, length = self._sums.tolist()

@@ -1,0 +1,84 @@
+"""Training by several processes: one policy, worlds of their own, one curve, and going on after a death."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from bumblebee.errors import BadInput
+from bumblebee.learning.ppo import CHECKPOINT, CURVE
+from bumblebee.learning.ranks import Ranks, join, launch
+from tests.learning.two_ranks import CONFIG
+
+PROCESS = ["-m", "tests.learning.two_ranks"]
+
+
+def learned(folder: Path) -> list[dict[str, Any]]:
+    return [torch.load(folder / f"{rank}.pt", weights_only=False) for rank in (0, 1)]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of two processes that trained to the end."""
+    folder = tmp_path_factory.mktemp("whole")
+    assert launch(2, [*PROCESS, str(folder)]) == 0
+    return folder
+
+
+def test_both_processes_learn_one_policy_from_worlds_of_their_own(whole: Path) -> None:
+    """Parameters, normalisation and learning rate are equal to the bit; worlds and episodes are not."""
+    first, second = learned(whole)
+    assert set(first["state"]) == set(second["state"]) and len(first["state"]) > 10
+    for name, value in first["state"].items():
+        assert torch.equal(value, second["state"][name]), name
+    assert any("_mean" in name and bool(value.abs().sum() > 0) for name, value in first["state"].items())
+    assert first["rate"] == second["rate"]
+    assert not torch.equal(first["frame"], second["frame"])
+    assert not np.allclose(first["mass"], second["mass"])
+
+
+def test_the_normalisation_has_seen_the_frames_of_all(whole: Path) -> None:
+    """Its count is the number of control steps of both processes, as is the curve's."""
+    state = learned(whole)[0]["state"]
+    counts = {int(value) for name, value in state.items() if name.endswith("count")}
+    frames = 2 * 8 * CONFIG.steps * CONFIG.iterations
+    assert counts == {frames}
+    curve = pd.read_csv(whole / CURVE)
+    assert curve["frames"].tolist() == [frames // 3, 2 * frames // 3, frames]
+
+
+def test_it_goes_on_where_it_was_when_one_process_died(whole: Path, tmp_path: Path) -> None:
+    """The other is ended, the checkpoint of iteration 2 is continued, and the end is that of an unbroken training."""
+    assert launch(2, [*PROCESS, str(tmp_path), "2"]) == 7
+    assert (tmp_path / CHECKPOINT).exists() and not (tmp_path / "0.pt").exists()
+    assert launch(2, [*PROCESS, str(tmp_path)]) == 0
+    again, unbroken = learned(tmp_path), learned(whole)
+    assert [one["began"] for one in again] == [2, 2]
+    for name, value in unbroken[0]["state"].items():
+        assert torch.equal(value, again[0]["state"][name]), name
+    for a, b in zip(again, unbroken, strict=True):
+        assert torch.equal(a["frame"], b["frame"])
+    curves = [pd.read_csv(folder / CURVE).drop(columns="seconds") for folder in (whole, tmp_path)]
+    pd.testing.assert_frame_equal(*curves)
+
+
+def test_more_ranks_than_gpus_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first rank says how many there are; the others leave without a word."""
+    monkeypatch.setenv("WORLD_SIZE", "65")
+    monkeypatch.setenv("RANK", "0")
+    with pytest.raises(BadInput, match=r"gpus: expected 65 NVIDIA GPUs.*Train on \d+ at most"):
+        join()
+    monkeypatch.setenv("RANK", "64")
+    with pytest.raises(SystemExit) as silent:
+        join()
+    assert silent.value.code == 2
+
+
+def test_alone_nothing_is_asked_of_others() -> None:
+    """One process decides, gathers and averages by itself."""
+    alone = Ranks()
+    assert alone.decide(lambda: True) and alone.gather(5) == [5]
+    assert alone.mean({"a": 2.0}, "cpu") == {"a": 2.0} and alone.seed(4) == 4
