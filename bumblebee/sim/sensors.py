@@ -36,6 +36,11 @@ def add_foot_sensors(spec: mujoco.MjSpec) -> None:
 
 
 def load_model(path: Path | None = None, physics_hz: float | None = None) -> mujoco.MjModel:
+    """`load_spec`, compiled."""
+    return load_spec(path, physics_hz).compile()
+
+
+def load_spec(path: Path | None = None, physics_hz: float | None = None) -> mujoco.MjSpec:
     """The declared model, or the MJCF at `path`, with foot sensors and, if given, another physics rate.
 
     Raises:
@@ -52,4 +57,4 @@ def load_model(path: Path | None = None, physics_hz: float | None = None) -> muj
     add_foot_sensors(spec)
     if physics_hz is not None:
         spec.option.timestep = 1.0 / physics_hz
-    return spec.compile()
+    return spec

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-MASSES = {"body_mass", "body_inertia"}
+MASSES = {"body_mass", "body_inertia", "body_ipos"}
 """Fields from which constants follow."""
 _CONSTANTS = ("body_subtreemass", "body_invweight0", "dof_invweight0", "actuator_acc0")
 _AT_ONCE = 1024  # worlds, to bound the memory

@@ -40,6 +40,41 @@ class Randomisation:
     """Largest change of the root's horizontal velocity by a push [m/s]."""
     push_interval: float = 5.0
     """Mean time between pushes [s]."""
+    push_regular: bool = False
+    """Push each world exactly every `push_interval` with exactly `push`, its heading drawn, instead of by chance."""
+    base_com: float = 0.0
+    """Largest shift of the torso's centre of mass along each of its axes [m]."""
+    delay: tuple[float, float] = (0.0, 0.0)
+    """Range of the delay [s] of all of a world's commands, on top of the model's own; the model needs room for it
+    (`tracking.model.task_model`)."""
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """The ground that policies learn on (paper, table of domain randomisation: flat, rough)."""
+
+    rough: float = 0.0
+    """Share of the episodes on rough ground; with 0 the floor is a plane."""
+    amplitude: float = 0.025
+    """Largest height of rough ground above or below the flat one [m]."""
+    cell: float = 0.2
+    """Distance of the knots, between which the ground is straight [m]."""
+    size: float = 20.0
+    """Half the side of the terrain [m]; an episode that comes within 1 m of the edge ends, which is no failure."""
+    seed: int = 0
+    """Of the heights."""
+
+
+@dataclass(frozen=True)
+class ObservationConfig:
+    """What a network sees: terms of `tracking.terms.TERMS`, or names of sets of them, over some control steps."""
+
+    terms: tuple[str, ...] = ("demo",)
+    """Names of terms in order; `teacher` and `student` stand for sets of them. Without any: no such group."""
+    history: int = 1
+    """Control steps that are seen, the oldest first; what was before an episode's start is its first step."""
+    noise: float = 1.0
+    """Factor on the sensor noise, beside `env.observation_noise`."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +115,16 @@ class EnvConfig:
     """A clip is drawn by its length times (this + its failure rate): no clip is ever forgotten."""
     sampler_memory: float = 0.9
     """How much of a clip's failure rate one more episode leaves."""
+    observation: ObservationConfig = field(default_factory=ObservationConfig)
+    """What the policy sees; the critic sees the same without noise, forces, torques and the time left."""
+    student: ObservationConfig = field(default_factory=lambda: ObservationConfig(terms=()))
+    """What a student of the policy sees, as a group of its own; nothing where nobody is distilled."""
+    action: Literal["reference", "default"] = "reference"
+    """What an action of zero commands: the reference one step ahead with its gravity lead (ours), or the relaxed stand
+    (the paper: actions are joint targets)."""
     reward: RewardConfig = field(default_factory=RewardConfig)
     """The reward."""
     randomisation: Randomisation = field(default_factory=Randomisation)
     """Differences between the worlds."""
+    terrain: Terrain = field(default_factory=Terrain)
+    """The ground."""

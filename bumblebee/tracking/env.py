@@ -1,7 +1,8 @@
 """The environment of PPO: robots that follow clips, as an rsl_rl `VecEnv`.
 
-The action moves the servo targets around the reference one control step ahead; observations are groups "policy" (noisy,
-computable on the robot) and "critic" (exact, with forces and the time left in the clip).
+The action moves the servo targets around the reference one control step ahead, or around a stand; observations are
+groups "policy" (with the sensors' noise), "critic" (exact, with forces and the time left in the clip) and, where the
+policy has a student, "student".
 """
 
 from collections.abc import Callable
@@ -19,15 +20,16 @@ from bumblebee.sim.cuda_graph import Captured
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.sim.rotations import from_rotation_vector, multiply
 from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
-from bumblebee.tracking.noise import noise_levels
-from bumblebee.tracking.observations import joint_targets, layout, observe
-from bumblebee.tracking.randomisation import draw_push, randomise_worlds
+from bumblebee.tracking.observations import action_middle, joint_targets
+from bumblebee.tracking.randomisation import draw_push, push_phase, randomise_worlds, regular_push
 from bumblebee.tracking.rewards import Limits, Reward, Step
 from bumblebee.tracking.rows import Rows
 from bumblebee.tracking.sampler import ClipSampler
 from bumblebee.tracking.statistics import Statistics
 from bumblebee.tracking.terminations import fallen, key_distance, threshold_at
+from bumblebee.tracking.terrain import Ground
 
 ActionAdapter = Callable[[RobotState, Tensor, Tensor], Tensor]
 """(state, exact observation (B, D), action (B, J)) -> the action that the motors execute, (B, J)."""
@@ -69,25 +71,27 @@ class TrackingEnv(VecEnv):
         self.num_envs, self.num_actions, self.device = engine.num_worlds, library.num_joints, str(device)
         self.dt = engine.control_dt
         self.max_episode_length = round(config.episode_seconds / self.dt)
-        self.scale = action_scale().to(device)
+        self.scale, middle = action_scale().to(device), action_middle(config.action)
+        self._middle = None if middle is None else middle.to(device)
         self.reward = Reward(config.reward, self.dt)
         self._earned: Callable[[Step], Tensor] = self.reward
-        self._seen, self._fallen = observe, fallen
+        self._fallen = fallen
         if config.compile:
-            self._earned, self._seen, self._fallen = (
-                torch.compile(work, dynamic=False) for work in (self.reward.__call__, observe, fallen)
-            )
+            self._earned, self._fallen = (torch.compile(work, dynamic=False) for work in (self.reward.__call__, fallen))
         self.limits = Limits.of_robot(config.reward.soft_limit, device)
         self.sampler = ClipSampler(
             library.length, config.sampler_floor, config.sampler_memory, config.start_share, clip_share
         )
         self.statistics = Statistics(device)
-        self._noise = config.observation_noise * noise_levels(layout(self.num_actions, len(library.ahead))).to(device)
         self._generator = torch.Generator(device).manual_seed(seed)
         randomise_worlds(engine, config.randomisation, seed)
         self._threshold = torch.zeros((), device=device)
         self.progress = 0.0
         n, j = self.num_envs, self.num_actions
+        self.ground = Ground(config.terrain, n, device) if config.terrain.rough else None
+        wanted = {"policy": config.observation} | ({"student": config.student} if config.student.terms else {})
+        sizes, noise = (n, j, len(library.ahead)), config.observation_noise
+        self.groups = {name: Group(own, sizes, noise, device, config.compile) for name, own in wanted.items()}
         self.episode_length_buf = torch.zeros(n, dtype=torch.long, device=device)
         self._clip, self._frame = torch.zeros_like(self.episode_length_buf), torch.zeros_like(self.episode_length_buf)
         self._command = torch.zeros(n, j, device=device)
@@ -95,12 +99,14 @@ class TrackingEnv(VecEnv):
         self._rewards = torch.zeros(n, device=device)
         self._dones = torch.zeros(n, dtype=torch.bool, device=device)
         self._time_outs = torch.zeros_like(self._dones)
+        self._push_clock = push_phase(config.randomisation, n, self.dt, device)
         self._restart(torch.ones_like(self._dones))
         engine.settle()
-        self._state, self._ref = engine.state(), self._coming()
-        self._exact, self._noisy, self._privileged = self._observe(self._state, self._ref)
+        self._state, self._ref = self._read(), self._coming()
+        self._privileged = self._extended(self.groups["policy"].exact)
         self._judge_recorded = Captured(self._judge, device, [self._generator])
         self._look_recorded = Captured(self._look, device, [self._generator])
+        self._look()
 
     @property
     def progress(self) -> float:
@@ -124,15 +130,16 @@ class TrackingEnv(VecEnv):
         return self._clip
 
     def get_observations(self) -> TensorDict:
-        """Groups "policy" (B, D) and "critic" (B, D + extras); the tensors are the caller's to keep."""
-        groups = {"policy": self._noisy.clone(), "critic": self._privileged.clone()}
-        return TensorDict(groups, batch_size=[self.num_envs])
+        """Groups "policy" (B, D), "critic" (B, D + extras), perhaps "student"; the tensors are the caller's to keep."""
+        groups = {name: group.noisy.clone() for name, group in self.groups.items()}
+        return TensorDict(groups | {"critic": self._privileged.clone()}, batch_size=[self.num_envs])
 
     def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
         """One control period: observations, rewards (B,), dones (B,) and `extras["time_outs"]` (B,)."""
-        motor = actions if self.action_adapter is None else self.action_adapter(self._state, self._exact, actions)
+        adapter, exact = self.action_adapter, self.groups["policy"].exact
+        motor = actions if adapter is None else adapter(self._state, exact, actions)
         self._command.copy_(actions)
-        self.engine.step(joint_targets(self._ref, motor, self.scale))
+        self.engine.step(joint_targets(self._ref, motor, self.scale, self._middle))
         self._judge_recorded()
         self.engine.settle()
         self._look_recorded()
@@ -154,19 +161,28 @@ class TrackingEnv(VecEnv):
         self.progress = saved["progress"]
         for name, tensor in self._kept().items():
             tensor.copy_(saved[name])
-        _copy(self.engine.state(), self._state)
+        _copy(self._read(), self._state)
         _copy(self._coming(), self._ref)
         self._generator.set_state(saved["generator"].cpu())
 
     def _kept(self) -> dict[str, Tensor]:
         """What a step leaves for the next, beside state and reference, which follow from it."""
-        names = ("clip", "frame", "action", "action_before", "exact", "noisy", "privileged")
+        names = ("clip", "frame", "action", "action_before", "push_clock", "privileged")
         kept = {name: getattr(self, f"_{name}") for name in names}
+        for group, own in self.groups.items():
+            kept |= {f"{group}_{name}": tensor for name, tensor in own.kept().items()}
+        if self.ground is not None:
+            kept["origin"] = self.ground.origin
         return kept | {"episode_length": self.episode_length_buf, "failure": self.sampler.failure}
+
+    def _read(self) -> RobotState:
+        """The robots now, each in its clip's frame."""
+        state = self.engine.state()
+        return state if self.ground is None else self.ground.in_clip_frame(state)
 
     def _judge(self) -> None:
         """What the step earned, who has failed or come to an end, and new starts for these."""
-        state = self.engine.state()
+        state = self._read()
         self._frame += 1
         self.episode_length_buf += 1
         outcome = Step(
@@ -184,6 +200,8 @@ class TrackingEnv(VecEnv):
         self._rewards.copy_(self._earned(outcome).masked_fill(unstable, 0.0))
         lost = self._fallen(state, self._ref) | (key_distance(state, self._ref) > self._threshold) | unstable
         ended = self._frame >= self.library.length[self._clip] - 1
+        if self.ground is not None:
+            ended |= self.ground.beyond(state)
         self._time_outs.copy_((ended | (self.episode_length_buf >= self.max_episode_length)) & ~lost)
         self._dones.copy_(lost | self._time_outs)
         self._action_before.copy_(self._action)
@@ -192,8 +210,15 @@ class TrackingEnv(VecEnv):
         over = Rows(self._dones, self.engine.by_mask)
         self.sampler.update(over.of(self._clip), over.of(lost), over.of(self._dones))
         self._restart(self._dones)
-        push = draw_push(self.cfg.randomisation, self.num_envs, self.dt, self._generator)
-        if push is not None:
+        self._push()
+
+    def _push(self) -> None:
+        """Push whom it hits now."""
+        config = self.cfg.randomisation
+        self._push_clock += 1
+        if config.push and config.push_regular:
+            self.engine.push(regular_push(config, self._push_clock, self.dt, self._generator))
+        elif (push := draw_push(config, self.num_envs, self.dt, self._generator)) is not None:
             self.engine.push(push)
 
     def _restart(self, over: Tensor) -> None:
@@ -204,6 +229,8 @@ class TrackingEnv(VecEnv):
         clip, frame = self.sampler.draw(len(rows), g)
         ref = self.library.frames(clip, frame * self.dt)
         qpos, qvel = start_state(ref, self.cfg.reset_noise, g)
+        if self.ground is not None:
+            qpos = self.ground.place(rows, qpos, g)
         self.engine.reset(rows.chosen, qpos, qvel, ref.hold_pos)
         rows.put(self._clip, clip)
         rows.put(self._frame, frame)
@@ -212,20 +239,19 @@ class TrackingEnv(VecEnv):
 
     def _look(self) -> None:
         """The state, the reference of the coming step, and the observations of both."""
-        _copy(self.engine.state(), self._state)
+        _copy(self._read(), self._state)
         _copy(self._coming(), self._ref)
-        into = (self._exact, self._noisy, self._privileged)
-        for old, new in zip(into, self._observe(self._state, self._ref), strict=True):
-            old.copy_(new)
+        fresh = Rows(self.episode_length_buf == 0, self.engine.by_mask)
+        for group in self.groups.values():
+            group.look(self._state, self._ref, self._action, fresh, self._generator)
+        self._privileged.copy_(self._extended(self.groups["policy"].exact))
 
     def _coming(self) -> ReferenceFrame:
         """The reference at the end of the coming control period."""
         return self.library.frames(self._clip, (self._frame + 1) * self.dt)
 
-    def _observe(self, state: RobotState, ref: ReferenceFrame) -> tuple[Tensor, Tensor, Tensor]:
-        """The observation (B, D) as it is, as the policy sees it, and as the critic does (B, D + extras)."""
-        exact = self._seen(state, ref, self._action)
-        draws = torch.rand(exact.shape, generator=self._generator, device=exact.device)
+    def _extended(self, exact: Tensor) -> Tensor:
+        """What the critic sees (B, D + extras), from the exact observation (B, D)."""
         left = (self.library.length[self._clip] - self._frame).float() * self.dt
         # What the sensors of a robot that was put anew say belongs to the time before.
         fresh = (self.episode_length_buf == 0)[:, None]
@@ -235,7 +261,7 @@ class TrackingEnv(VecEnv):
             left[:, None].clamp(max=2.0),
             self._threshold.expand(self.num_envs, 1),
         )
-        return exact, exact + self._noise * (2 * draws - 1), torch.cat((exact, *extras), dim=-1)
+        return torch.cat((exact, *extras), dim=-1)
 
 
 def _copy(source: RobotState | ReferenceFrame, into: RobotState | ReferenceFrame) -> None:

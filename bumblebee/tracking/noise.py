@@ -14,6 +14,13 @@ LEVELS = {
     "key_error_b": 0.02,  # m
     "ref_rotation": 0.02,
     "ref_lin_vel_b": 0.02,
+    "root_rotation_g": 0.02,
+    "target_key_pos_g": 0.02,
+    "target_root_pos_g": 0.02,
+    "target_key_pos_b": 0.02,
+    "target_root_pos_b": 0.02,
+    "target_root_rotation_b": 0.02,
+    "target_lin_vel_b": 0.02,
 }
 """Largest error of each part; parts that are not named carry none. Look-ahead parts are matched by their ending."""
 

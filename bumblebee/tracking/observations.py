@@ -7,7 +7,7 @@ kinematics; nothing depends on the heading or the place in the world (paper, sec
 import torch
 from torch import Tensor
 
-from bumblebee.robot.facts import KEY_BODIES
+from bumblebee.robot.facts import KEY_BODIES, stand_pose
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, matrix, multiply, rotate_inverse
 from bumblebee.tracking.library import ReferenceFrame
@@ -77,12 +77,17 @@ def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tens
     return torch.cat(parts, dim=-1)
 
 
-def joint_targets(ref: ReferenceFrame, action: Tensor, scale: Tensor) -> Tensor:
+def joint_targets(ref: ReferenceFrame, action: Tensor, scale: Tensor, middle: Tensor | None = None) -> Tensor:
     """Targets (B, J) [rad] of the position servos.
 
-    What holds the reference one step ahead against gravity, plus scale (J,) [rad] times action.
+    What holds the reference one step ahead against gravity, or `middle` (J,) [rad], plus scale (J,) [rad] times action.
     """
-    return ref.hold_pos + scale * action
+    return (ref.hold_pos if middle is None else middle) + scale * action
+
+
+def action_middle(kind: str) -> Tensor | None:
+    """The joint targets (J,) [rad] of an action of zero: the relaxed stand for "default", None for the reference."""
+    return torch.tensor(stand_pose(), dtype=torch.float32) if kind == "default" else None
 
 
 def _six(quat: Tensor) -> Tensor:

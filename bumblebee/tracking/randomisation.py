@@ -1,4 +1,17 @@
-"""Worlds that differ: ground friction, servo gains, motor strength, link masses, dry friction, and pushes."""
+"""Worlds that differ (paper, appendix B, table of domain randomisation), and pushes.
+
+| row of the table | here |
+|---|---|
+| Friction, U(0.5, 1.25) | `friction`: a factor on the friction of all geometries, 1 on floor and soles |
+| Base CoM offset, U(-0.1, 0.1) m | `base_com`: along each axis of the torso, as public code of the field has it |
+| Link mass, U(0.8, 1.2) x default | `mass` 0.2: each body's mass and inertia by one factor |
+| P gain, D gain, U(0.75, 1.25) x default | `gains` 0.25: each servo's P and D by factors of their own |
+| Control delay, U(20, 40) ms | `delay`: one for all commands of a world, need not be a whole number of physics steps |
+| Push robot, interval 10 s, v_xy 0.5 m/s | `push`, `push_interval`, `push_regular` |
+| Terrain type, flat, rough | `tracking.terrain` |
+
+Drawn once for each world. `strength` and `frictionloss` are ours.
+"""
 
 import math
 
@@ -7,8 +20,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from bumblebee.errors import BadInput
 from bumblebee.sim.engine import Engine
 from bumblebee.tracking.config import Randomisation
+
+BASE = "torso_link"
+"""The body whose centre of mass `base_com` shifts."""
 
 
 def randomise_worlds(engine: Engine, config: Randomisation, seed: int) -> None:
@@ -45,7 +62,39 @@ def draw_fields(model: mujoco.MjModel, config: Randomisation, n: int, seed: int)
         factor = random.uniform(1 - config.mass, 1 + config.mass, size=(n, model.nbody))
         expand("body_mass")[:] *= factor
         expand("body_inertia")[:] *= factor[:, :, None]
+    if config.base_com:
+        shift = random.uniform(-config.base_com, config.base_com, size=(n, 3))
+        expand("body_ipos")[:, model.body(BASE).id] += shift
+    if any(config.delay):
+        _check_buffers(model, config.delay[1])
+        expand("actuator_delay")[:] += random.uniform(*config.delay, size=(n, 1))
     return fields
+
+
+def _check_buffers(model: mujoco.MjModel, longest: float) -> None:
+    """Refuse a model whose servos cannot delay their commands by `longest` [s] more."""
+    room = (model.actuator_history[:, 0] - 1) * model.opt.timestep
+    if (room < model.actuator_delay + longest).any():
+        came, do = "a model without room for it", "Load it with tracking.model.task_model."
+        raise BadInput("env.randomisation.delay", f"buffers for {1e3 * longest:g} ms", came, do)
+
+
+def push_phase(config: Randomisation, n: int, dt: float, device: torch.device) -> Tensor:
+    """Control steps (n,) by which the worlds' clocks of regular pushes are ahead, spread over the interval."""
+    return torch.arange(n, device=device) * _every(config, dt) // n
+
+
+def regular_push(config: Randomisation, clock: Tensor, dt: float, generator: torch.Generator) -> Tensor:
+    """Velocities (n, 3) [m/s] to add to the roots: `push`, its heading drawn, where a clock (n,) ends an interval."""
+    due = (clock % _every(config, dt) == 0) & (clock > 0)
+    heading = 2 * math.pi * torch.rand(len(clock), generator=generator, device=clock.device)
+    speed = config.push * due
+    return torch.stack((speed * heading.cos(), speed * heading.sin(), torch.zeros_like(heading)), dim=-1)
+
+
+def _every(config: Randomisation, dt: float) -> int:
+    """Control steps between regular pushes."""
+    return max(round(config.push_interval / dt), 1)
 
 
 def draw_push(config: Randomisation, n: int, dt: float, generator: torch.Generator) -> Tensor | None:

@@ -1,0 +1,80 @@
+"""One group of observations: its terms, its sensor noise, its history."""
+
+from collections.abc import Callable
+from functools import partial
+
+import torch
+from torch import Tensor
+
+from bumblebee.errors import BadInput
+from bumblebee.sim.engine import RobotState
+from bumblebee.tracking.config import ObservationConfig
+from bumblebee.tracking.history import History
+from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.noise import noise_levels
+from bumblebee.tracking.rows import Rows
+from bumblebee.tracking.terms import Part, expanded, parts, see
+
+Look = Callable[[RobotState, ReferenceFrame, Tensor], Tensor]
+
+
+class Group:
+    """What one network sees of B robots, in tensors that stay where they are.
+
+    Args:
+        config: its terms and history.
+        sizes: (B, J, A) worlds, joints, reference frames further ahead.
+        noise: factor on the sensor noise; with 0 the group is exact.
+        device: where the robots' states are.
+        compiled: whether torch compiles the terms.
+    """
+
+    def __init__(
+        self,
+        config: ObservationConfig,
+        sizes: tuple[int, int, int],
+        noise: float,
+        device: torch.device,
+        compiled: bool = False,
+    ) -> None:
+        worlds, joints, ahead = sizes
+        if config.history < 1:
+            raise BadInput("observation.history", "at least 1 step", str(config.history))
+        self.parts: list[Part] = parts(config.terms, joints, ahead)
+        """Parts of one control step."""
+        self._look: Look = partial(see, expanded(config.terms))
+        if compiled:
+            self._look = torch.compile(self._look, dynamic=False)
+        levels = noise * config.noise * noise_levels(self.parts)
+        self._levels = levels.to(device) if bool(levels.any()) else None
+        kinds = 1 if self._levels is None else 2
+        kept = kinds if config.history > 1 else 0
+        self._rings = [History(worlds, len(levels), config.history, device) for _ in range(kept)]
+        whole = torch.zeros(worlds, config.history * len(levels), device=device)
+        self.exact = whole
+        """(B, H * D) without noise."""
+        self.noisy = whole if self._levels is None else whole.clone()
+        """(B, H * D) as sensors would have it."""
+
+    def look(
+        self, state: RobotState, ref: ReferenceFrame, action: Tensor, fresh: Rows, generator: torch.Generator
+    ) -> None:
+        """Take in a control step of all worlds; those `fresh` have begun an episode with it."""
+        exact = self._look(state, ref, action)
+        rows = [exact]
+        if self._levels is not None:
+            draws = torch.rand(exact.shape, generator=generator, device=exact.device)
+            rows.append(exact + self._levels * (2 * draws - 1))
+        if self._rings:
+            for ring, row in zip(self._rings, rows, strict=True):
+                ring.add(row, fresh)
+            rows = [ring.stacked() for ring in self._rings]
+        for into, values in zip((self.exact, self.noisy), rows, strict=False):
+            into.copy_(values)
+
+    def kept(self) -> dict[str, Tensor]:
+        """All that the next look depends on, and what was seen last."""
+        kept = {"exact": self.exact, "noisy": self.noisy}
+        for index, ring in enumerate(self._rings):
+            kept |= {f"ring{index}": ring.ring, f"oldest{index}": ring.oldest}
+        return kept
