@@ -73,6 +73,8 @@ class ObservationConfig:
     """Names of terms in order; `teacher` and `student` stand for sets of them. Without any: no such group."""
     history: int = 1
     """Control steps that are seen, the oldest first; what was before an episode's start is its first step."""
+    now: tuple[str, ...] = ()
+    """Terms of which the newest step alone is seen, after all others."""
     noise: float = 1.0
     """Factor on the sensor noise, beside `env.observation_noise`."""
 

@@ -41,20 +41,23 @@ class Group:
         if config.history < 1:
             raise BadInput("observation.history", "at least 1 step", str(config.history))
         self.parts: list[Part] = parts(config.terms, joints, ahead)
-        """Parts of one control step."""
-        self._look: Look = partial(see, expanded(config.terms))
+        """Parts of one control step, those that are seen over the history."""
+        self.parts_now: list[Part] = parts(config.now, joints, ahead)
+        """Parts of which the newest step alone is seen."""
+        self._look: Look = partial(see, expanded((*config.terms, *config.now)))
         if compiled:
             self._look = torch.compile(self._look, dynamic=False)
-        levels = noise * config.noise * noise_levels(self.parts)
+        levels = noise * config.noise * noise_levels(self.parts + self.parts_now)
+        self._size = sum(size for _, size in self.parts)
         self._levels = levels.to(device) if bool(levels.any()) else None
         kinds = 1 if self._levels is None else 2
         kept = kinds if config.history > 1 else 0
-        self._rings = [History(worlds, len(levels), config.history, device) for _ in range(kept)]
-        whole = torch.zeros(worlds, config.history * len(levels), device=device)
+        self._rings = [History(worlds, self._size, config.history, device) for _ in range(kept)]
+        whole = torch.zeros(worlds, config.history * self._size + len(levels) - self._size, device=device)
         self.exact = whole
-        """(B, H * D) without noise."""
+        """(B, H * D + N) without noise, N of it the newest step's alone."""
         self.noisy = whole if self._levels is None else whole.clone()
-        """(B, H * D) as sensors would have it."""
+        """(B, H * D + N) as sensors would have it."""
 
     def look(
         self, state: RobotState, ref: ReferenceFrame, action: Tensor, fresh: Rows, generator: torch.Generator
@@ -67,8 +70,9 @@ class Group:
             rows.append(exact + self._levels * (2 * draws - 1))
         if self._rings:
             for ring, row in zip(self._rings, rows, strict=True):
-                ring.add(row, fresh)
-            rows = [ring.stacked() for ring in self._rings]
+                ring.add(row[:, : self._size], fresh)
+            pairs = zip(self._rings, rows, strict=True)
+            rows = [torch.cat((ring.stacked(), row[:, self._size :]), dim=-1) for ring, row in pairs]
         for into, values in zip((self.exact, self.noisy), rows, strict=False):
             into.copy_(values)
 

@@ -5,7 +5,7 @@ targets "in the global coordinates" are taken in the latter: nothing may depend 
 `docs/decisions/observations.md` says what else the paper leaves open.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -16,6 +16,7 @@ from bumblebee.robot.facts import KEY_BODIES
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, matrix, multiply
 from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.noise import LEVELS
 from bumblebee.tracking.observations import layout, observe
 
 Part = tuple[str, int]
@@ -214,6 +215,18 @@ SETS: dict[str, tuple[str, ...]] = {
     ),
 }
 """Terms that go by one name: the paper's teacher and student."""
+
+
+def add_terms(sizes: Mapping[Term, int | None], noise: Mapping[str, float] | None = None) -> None:
+    """Make further terms known by their names, with the largest error of those that carry any.
+
+    Args:
+        sizes: entries of each term; None: one a joint.
+        noise: see `tracking.noise.LEVELS`.
+    """
+    _SIZES.update(sizes)
+    TERMS.update({term.__name__: term for term in sizes})
+    LEVELS.update(noise or {})
 
 
 def expanded(terms: Sequence[str]) -> tuple[str, ...]:
