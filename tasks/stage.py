@@ -44,7 +44,7 @@ def run_stage(main: Callable[..., object], argv: list[str] | None = None, *, log
     options = _parser(main).parse_args(argv)
     if "DVC_STAGE" in os.environ:
         end_with_parent()
-        if logs:
+        if logs and os.environ.get("RANK", "0") == "0":  # of processes that train together, one logs
             recorder.start()
     try:
         main(**vars(options))
@@ -144,7 +144,8 @@ def scratch(stage: str, *inputs: object) -> Path:
     if folder.exists() and (not stamp.exists() or stamp.read_text() != key):
         shutil.rmtree(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    stamp.write_text(key)
+    if not stamp.exists():  # processes that train together come here at once
+        stamp.write_text(key)
     _used_scratch.add(folder)
     return folder
 

@@ -1,6 +1,7 @@
 """What base, experts and refine share: train a policy, try it before and after, write its folder."""
 
 import json
+import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -16,6 +17,7 @@ from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.learning.ppo import CURVE, Trainer
+from bumblebee.learning.ranks import Ranks, check_gpus, join, launch, leave, this_command
 from bumblebee.learning.trial import Trials, World, success_by_family, try_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
@@ -41,6 +43,8 @@ class TrainingConfig:
     """The algorithm."""
     trials: Trials = field(default_factory=Trials)
     """How the policy is tried before and after."""
+    gpus: int = 1
+    """GPUs of this machine that train together, each with `env.num_worlds` worlds; for the engine `mujoco_warp`."""
 
 
 @dataclass(frozen=True)
@@ -98,21 +102,36 @@ def cluster_clips(cluster: str, others: float) -> tuple[list[Clip], torch.Tensor
 
 
 def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
-    """Train, try before and after on the same starts, write the policy's folder; returns its card."""
+    """Train, try before and after on the same starts, write the policy's folder; returns its card.
+
+    With several GPUs it starts this stage once for each, of which the first does all but the training alone.
+
+    Raises:
+        BadInput: if there are fewer GPUs, or the engine has no use for them.
+    """
     torch.set_num_threads(config.env.threads)
     folder = scratch(f"{job.stage}-{job.name}", job.parent or FILTERED, config)
     own = config.env
-    engine = make_engine(own.engine, job.world.model, own.num_worlds, own.threads, job.world.hooks, own.buffers)
+    if config.gpus > 1 and "RANK" not in os.environ:
+        return _train_together(job, config)
+    ranks = join() if config.gpus > 1 else Ranks()
+    world, buffers = job.world, own.buffers
+    engine = make_engine(own.engine, world.model, own.num_worlds, own.threads, world.hooks, buffers, ranks.device)
     library = MotionLibrary(job.clips, own.ahead, device=engine.device)
-    env = TrackingEnv(library, engine, config.env, config.seed, job.world.action_adapter, job.share)
-    trainer = Trainer(env, config.ppo, folder, config.seed, job.parent)
+    env = TrackingEnv(library, engine, own, ranks.seed(config.seed), world.action_adapter, job.share)
+    trainer = Trainer(env, config.ppo, folder, config.seed, job.parent, ranks)
     config = replace(config, ppo=trainer.config)  # a child has its parent's layers: card and run say which
+    if not ranks.first:
+        trainer.train(job.name)
+        leave()
+        raise SystemExit(0)
     if trainer.iteration == 0:
         _try(trainer.policy(), job, config).to_parquet(folder / BEFORE)
     else:
         print(f"{job.name}: goes on after iteration {trainer.iteration} of {config.ppo.iterations}", flush=True)
     before = pd.read_parquet(folder / BEFORE)
     trainer.train(job.name)
+    leave()
     after = _try(trainer.policy(), job, config)
     policy, kept = trainer.policy(), after
     if job.parent is not None and _score(after) < _score(before):
@@ -138,6 +157,17 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
         artifacts=[job.out],
     )
     return card
+
+
+def _train_together(job: Job, config: TrainingConfig) -> dict[str, Any]:
+    """Run this stage as `config.gpus` processes; the card that the first of them wrote."""
+    if config.env.engine != "mujoco_warp":
+        came, do = f"{config.gpus} with the engine {config.env.engine!r}", "Set `env.engine: mujoco_warp`."
+        raise BadInput(f"params.yaml: {job.stage}.gpus", "1, or the engine `mujoco_warp`", came, do)
+    check_gpus(config.gpus)
+    if status := launch(config.gpus, this_command()):
+        raise SystemExit(status)
+    return json.loads((job.out / "card.json").read_text())
 
 
 def _try(policy: Policy, job: Job, config: TrainingConfig) -> pd.DataFrame:

@@ -121,6 +121,12 @@ def check_gpus(count: int) -> None:
         raise BadInput("gpus", f"{count} NVIDIA GPUs on this machine", came, f"Train on {max(have, 1)} at most.")
 
 
+def this_command() -> list[str]:
+    """The arguments of Python that started this program as a module."""
+    spec = getattr(sys.modules["__main__"], "__spec__", None)
+    return ["-m", spec.name, *sys.argv[1:]] if spec is not None else list(sys.argv)
+
+
 def launch(count: int, command: Sequence[str]) -> int:
     """Run `command`, arguments of this Python, as `count` ranks; the status of the first that fails, else 0.
 

@@ -41,6 +41,7 @@ class Captured:
         for generator in self._generators:
             graph.register_generator_state(generator)
         torch.cuda.synchronize()
-        with torch.cuda.graph(graph):
+        # Threads of NCCL look at events of their own meanwhile, which a global capture forbids them.
+        with torch.cuda.graph(graph, capture_error_mode="thread_local"):
             self._work()
         return graph

@@ -20,8 +20,9 @@ def make_engine(
     threads: int = 2,
     hooks: RuntimeHooks | None = None,
     buffers: Buffers | None = None,
+    device: str = "cuda",
 ) -> Engine:
-    """An engine with `num_worlds` copies of `model`: MuJoCo on `threads` CPU threads, or MuJoCo Warp on a GPU.
+    """An engine with `num_worlds` copies of `model`: MuJoCo on `threads` CPU threads, or MuJoCo Warp on `device`.
 
     Raises:
         BadInput: for a model or a machine that the engine cannot use.
@@ -31,4 +32,4 @@ def make_engine(
         return kind(model, num_worlds, threads=threads, hooks=hooks)
     from bumblebee.sim.mujoco_warp import MujocoWarp
 
-    return MujocoWarp(model, num_worlds, hooks=hooks, buffers=buffers)
+    return MujocoWarp(model, num_worlds, hooks=hooks, buffers=buffers, device=device)

@@ -89,3 +89,15 @@ def test_a_parent_that_looks_elsewhere_is_bad_input(workspace: Path) -> None:
     with pytest.raises(BadInput, match="looks ahead"):
         base.main()
     assert not Path("models/base").exists()
+
+
+@pytest.mark.parametrize(
+    ("engine", "words"), [("mujoco", "1, or the engine `mujoco_warp`"), ("mujoco_warp", "99 NVIDIA GPUs")]
+)
+def test_more_gpus_than_there_are_is_bad_input(workspace: Path, engine: str, words: str) -> None:
+    """Before any of the processes is started: the CPU engine has no use for them, and nobody has 99."""
+    tiny = TINY | {"env": TINY["env"] | {"engine": engine}, "gpus": 99, "init": "scratch"}
+    Path("params.yaml").write_text(yaml.safe_dump({"clusters": ["c0", "c1"], "base": tiny}))
+    with pytest.raises(BadInput, match=words):
+        base.main()
+    assert not Path("models/base").exists()
