@@ -11,12 +11,14 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.robot.facts import joint_names, joints
 from bumblebee.robot.model import gains
-from bumblebee.tracking.observations import layout
+from bumblebee.tracking.config import ObservationConfig
+from bumblebee.tracking.terms import parts
 
 if TYPE_CHECKING:
     import onnxruntime
 
 FEED_FORWARDS = (None, "quasi-static")
+ACTION_BASES = ("reference", "default")
 _REQUIRED = ("joints", "kp", "kd", "control_hz", "action", "observation", "onnx_sha256")
 
 
@@ -69,6 +71,11 @@ class ExportedPolicy:
         return np.asarray(self.contract["action"]["scale"], dtype=np.float64)
 
     @property
+    def seen(self) -> ObservationConfig:
+        """What it sees: terms and control steps."""
+        return observed(self.contract)
+
+    @property
     def ahead(self) -> int:
         """Number of further reference frames in the observation."""
         return ahead_frames(self.contract)
@@ -90,13 +97,35 @@ def read_policy_contract(path: Path) -> dict[str, Any]:
     _check_joints(path, contract)
     if contract["action"].get("feed_forward") not in FEED_FORWARDS:
         raise BadInput(f"{path}: action.feed_forward", str(FEED_FORWARDS), str(contract["action"]["feed_forward"]))
-    expected = [[name, size] for name, size in layout(len(contract["joints"]), ahead_frames(contract))]
-    came = [[part["name"], part["size"]] for part in contract["observation"]]
-    for index in range(max(len(expected), len(came))):
-        one, other = (parts[index] if index < len(parts) else None for parts in (expected, came))
-        if one != other:
-            raise BadInput(f"{path}: observation[{index}]", str(one), str(other), "Export it with this version.")
+    if contract["action"].setdefault("base", ACTION_BASES[0]) not in ACTION_BASES:
+        raise BadInput(f"{path}: action.base", " or ".join(ACTION_BASES), str(contract["action"]["base"]))
+    seen = observed(contract)
+    for key, terms in (("observation", seen.terms), ("observation_now", seen.now)):
+        _check_parts(f"{path}: {key}", terms, contract, key)
     return contract
+
+
+def _check_parts(where: str, terms: tuple[str, ...], contract: dict[str, Any], key: str) -> None:
+    """Refuse a contract whose list of parts is not what this version makes of its terms."""
+    expected = [[name, size] for name, size in parts(terms, len(contract["joints"]), ahead_frames(contract))]
+    came = [[part["name"], part["size"]] for part in contract.get(key, [])]
+    for index in range(max(len(expected), len(came))):
+        one, other = (pair[index] if index < len(pair) else None for pair in (expected, came))
+        if one != other:
+            raise BadInput(f"{where}[{index}]", str(one), str(other), "Export it with this version.")
+
+
+def observed(contract: dict[str, Any]) -> ObservationConfig:
+    """Terms and control steps of the observation; contracts from before there was a choice name none.
+
+    Raises:
+        BadInput: if they are no terms or no number of steps.
+    """
+    terms, now = (tuple(map(str, contract.get(key, without))) for key, without in (("terms", ["demo"]), ("now", [])))
+    history = contract.get("history", 1)
+    if not isinstance(history, int) or history < 1:
+        raise BadInput("contract.json: history", "a number of control steps", repr(history))
+    return ObservationConfig(terms, history, now)
 
 
 def ahead_frames(contract: dict[str, Any]) -> int:
@@ -130,7 +159,9 @@ def _check_joints(path: Path, contract: dict[str, Any]) -> None:
 
 
 def _check_sizes(policy: ExportedPolicy) -> None:
-    size = sum(part["size"] for part in policy.contract["observation"])
+    stated, seen = policy.contract, policy.seen
+    size = seen.history * sum(part["size"] for part in stated["observation"])
+    size += sum(part["size"] for part in stated.get("observation_now", []))
     inputs = {value.name: value.shape for value in policy.session.get_inputs()}
     outputs = {value.name: value.shape for value in policy.session.get_outputs()}
     where = policy.folder / "policy.onnx"

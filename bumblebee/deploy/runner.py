@@ -1,7 +1,7 @@
 """The policy's 50 Hz step on the robot: from sensor readings to joint targets.
 
-The observation is the training environment's own (`tracking.observations.observe`), fed with forward kinematics of the
-measured joints where the simulator would know the bodies' places.
+The observation is the training environment's own (`tracking.terms.see`), fed with forward kinematics of the measured
+joints where the simulator would know the bodies' places.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,8 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import forward_key_positions
 from bumblebee.sim.engine import RobotState
 from bumblebee.tracking.library import AHEAD, MotionLibrary, ReferenceFrame
-from bumblebee.tracking.observations import joint_targets, observe
+from bumblebee.tracking.observations import action_middle, joint_targets
+from bumblebee.tracking.terms import expanded, see
 
 
 def robot_state(sensors: Sensors) -> RobotState:
@@ -49,6 +50,9 @@ class PolicyRunner:
         self._scale = torch.as_tensor(policy.scale, dtype=torch.float32)
         self._dt = 1.0 / float(policy.contract["control_hz"])
         self._last_action = torch.zeros(len(names), len(self._scale))
+        self._seen, self._middle = policy.seen, action_middle(policy.contract["action"]["base"])
+        self._past: Tensor | None = None  # (B, H, D) terms of the last control steps, the oldest first
+        self._begun = torch.zeros(len(names), dtype=torch.bool)
 
     def hold(self) -> np.ndarray:
         """Joint targets (B, J) [rad] that carry each clip's first frame: what the servos hold before the start."""
@@ -56,14 +60,34 @@ class PolicyRunner:
 
     def observe(self, robots: np.ndarray, tick: int, sensors: Sensors) -> Tensor:
         """Observations (n, D) of `robots` (n,) at control tick `tick`; sensors are those of these robots."""
-        return observe(robot_state(sensors), self._reference(robots, tick), self._last_action[torch.as_tensor(robots)])
+        steps, now = self._look(robots, tick, sensors)
+        return torch.cat((steps.flatten(1), now), dim=-1)
 
     def step(self, robots: np.ndarray, tick: int, sensors: Sensors) -> tuple[np.ndarray, np.ndarray]:
         """Actions and joint targets [rad], (n, J) each, of `robots` (n,) at control tick `tick`."""
-        action = torch.as_tensor(self.policy.act(self.observe(robots, tick, sensors).numpy()))
-        self._last_action[torch.as_tensor(robots)] = action
-        target = joint_targets(self._reference(robots, tick), action, self._scale)
+        rows = torch.as_tensor(robots)
+        steps, now = self._look(robots, tick, sensors)
+        action = torch.as_tensor(self.policy.act(torch.cat((steps.flatten(1), now), dim=-1).numpy()))
+        self._last_action[rows] = action
+        if self._past is None:
+            self._past = torch.zeros(len(self._ids), *steps.shape[1:])
+        self._past[rows], self._begun[rows] = steps, True
+        target = joint_targets(self._reference(robots, tick), action, self._scale, self._middle)
         return action.numpy().astype(np.float64), target.numpy().astype(np.float64)
+
+    def _look(self, robots: np.ndarray, tick: int, sensors: Sensors) -> tuple[Tensor, Tensor]:
+        """What `robots` (n,) see over time (n, H, D) and of the newest step alone (n, N).
+
+        Before its first step a robot saw the same.
+        """
+        rows, seen = torch.as_tensor(robots), self._seen
+        state, ref = robot_state(sensors), self._reference(robots, tick)
+        terms, alone = (expanded(names) for names in (seen.terms, seen.now))
+        last = self._last_action[rows]
+        row = see(terms, state, ref, last)[:, None]
+        before = row.expand(-1, seen.history, -1) if self._past is None else self._past[rows]
+        steps = torch.where(self._begun[rows][:, None, None], torch.cat((before[:, 1:], row), dim=1), row)
+        return steps, see(alone, state, ref, last) if alone else row[:, 0, :0]
 
     def _reference(self, robots: np.ndarray, tick: int) -> ReferenceFrame:
         ids = self._ids[torch.as_tensor(robots)]

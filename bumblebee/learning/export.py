@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ from torch import nn
 from bumblebee.learning.policy import Policy
 from bumblebee.robot.facts import joint_names, joints, stand_pose
 from bumblebee.robot.model import gains
+from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import action_scale
-from bumblebee.tracking.observations import layout
+from bumblebee.tracking.terms import parts
 
 ONNX, CONTRACT = "policy.onnx", "contract.json"
 OPSET, IR_VERSION = 17, 8  # read by every onnxruntime since 1.14
@@ -21,20 +23,38 @@ OPSET, IR_VERSION = 17, 8  # read by every onnxruntime since 1.14
 
 def export_policy(folder: Path, policy: Policy, physics_hz: float = 200.0) -> None:
     """Write `policy.onnx` (input "obs" (N, D), output "actions" (N, J), the mean) and `contract.json`."""
-    write_export(folder, onnx_of(policy), policy.shape.ahead, physics_hz)
+    shape = policy.shape
+    write_export(folder, onnx_of(policy), shape.ahead, physics_hz, shape.seen, shape.action)
 
 
-def write_export(folder: Path, onnx_bytes: bytes, ahead: tuple[float, ...], physics_hz: float = 200.0) -> None:
-    """Write any ONNX policy over our observation with its contract."""
+def write_export(
+    folder: Path,
+    onnx_bytes: bytes,
+    ahead: tuple[float, ...],
+    physics_hz: float = 200.0,
+    seen: ObservationConfig | None = None,
+    action: str = "reference",
+) -> None:
+    """Write any ONNX policy over our observations with its contract."""
     folder = Path(folder)
     (folder / ONNX).write_bytes(onnx_bytes)
-    (folder / CONTRACT).write_text(json.dumps(contract(onnx_bytes, ahead, physics_hz), indent=1) + "\n")
+    stated = contract(onnx_bytes, ahead, physics_hz, seen or ObservationConfig(), action)
+    (folder / CONTRACT).write_text(json.dumps(stated, indent=1) + "\n")
 
 
-def contract(onnx_bytes: bytes, ahead: tuple[float, ...], physics_hz: float) -> dict[str, Any]:
-    """What a runner must know to feed the policy and to use its output."""
+def contract(
+    onnx_bytes: bytes, ahead: tuple[float, ...], physics_hz: float, seen: ObservationConfig, action: str
+) -> dict[str, Any]:
+    """What a runner must know to feed the policy and to use its output.
+
+    "observation" lists the parts of one control step; the input has "history" of them, the oldest first, and then the
+    parts "observation_now" of the newest step alone.
+    """
     table = [gains(joint) for joint in joints()]
-    parts = layout(len(table), len(ahead))
+
+    def listed(terms: Sequence[str]) -> list[dict[str, Any]]:
+        return [{"name": name, "size": size} for name, size in parts(terms, len(table), len(ahead))]
+
     return {
         "schema": 1,
         "robot": "g1_23dof",
@@ -46,11 +66,15 @@ def contract(onnx_bytes: bytes, ahead: tuple[float, ...], physics_hz: float) -> 
         "default_pos": [round(float(q), 6) for q in stand_pose()],
         "ahead": list(ahead),
         "action": {
-            "base": "reference",
+            "base": action,
             "scale": [round(float(s), 6) for s in action_scale()],
             "feed_forward": "quasi-static",  # tracking/feed_forward.py, of the clip and the declared model
         },
-        "observation": [{"name": name, "size": size} for name, size in parts],
+        "terms": list(seen.terms),
+        "history": seen.history,
+        "now": list(seen.now),
+        "observation": listed(seen.terms),
+        "observation_now": listed(seen.now),
         "onnx_sha256": hashlib.sha256(onnx_bytes).hexdigest(),
     }
 

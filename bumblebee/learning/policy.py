@@ -1,8 +1,9 @@
 """A trained policy in torch: building, saving and loading the network, apart from how it was trained."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import torch
 from rsl_rl.models import MLPModel
@@ -11,19 +12,53 @@ from torch import Tensor
 
 from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
+from bumblebee.tracking.config import ObservationConfig
+from bumblebee.tracking.env import TrackingEnv
 
 FILE = "policy.pt"
 
 
 @dataclass(frozen=True)
 class Shape:
-    """What fixes an actor and its critic: entries of their observations, actions, layers, look-ahead [s]."""
+    """What fixes an actor and its critic."""
 
     observation: int
+    """Entries of the actor's observation, of all control steps that it sees."""
     critic_observation: int
     actions: int
     hidden: tuple[int, ...]
     ahead: tuple[float, ...]
+    """Look-ahead times [s] of the reference."""
+    terms: tuple[str, ...] = ("demo",)
+    """Terms of the observation, see `tracking.terms`."""
+    history: int = 1
+    """Control steps of the observation, the oldest first."""
+    now: tuple[str, ...] = ()
+    """Terms of which the newest step alone is seen, after the others."""
+    action: Literal["reference", "default"] = "reference"
+    """What an action of zero commands, see `EnvConfig.action`."""
+
+    @property
+    def seen(self) -> ObservationConfig:
+        """What the actor sees, as the environment's configuration has it."""
+        return ObservationConfig(self.terms, self.history, self.now)
+
+
+def shape_of(env: TrackingEnv, hidden: Sequence[int], group: str = "policy") -> Shape:
+    """The shape of a policy that acts in `env` and sees the observations of `group`."""
+    observation = env.get_observations()
+    config = env.cfg.student if group == "student" else env.cfg.observation
+    return Shape(
+        observation=observation[group].shape[1],
+        critic_observation=observation["critic"].shape[1],
+        actions=env.num_actions,
+        hidden=tuple(hidden),
+        ahead=tuple(env.library.ahead),
+        terms=tuple(config.terms),
+        history=config.history,
+        now=tuple(config.now),
+        action=env.cfg.action,
+    )
 
 
 def model_config(hidden: tuple[int, ...], initial_std: float | None) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.curve import CurveWriter
-from bumblebee.learning.policy import Policy, Shape, load_policy, model_config, new_actor
+from bumblebee.learning.policy import Policy, load_policy, model_config, new_actor, shape_of
 from bumblebee.learning.ranks import Ranks
 from bumblebee.progress import progress
 from bumblebee.tracking.env import TrackingEnv
@@ -159,14 +159,7 @@ class Trainer:
 
     def policy(self) -> Policy:
         """The policy as it is now; a copy."""
-        observation = self.env.get_observations()
-        shape = Shape(
-            observation=observation["policy"].shape[1],
-            critic_observation=observation["critic"].shape[1],
-            actions=self.env.num_actions,
-            hidden=tuple(self.config.hidden),
-            ahead=tuple(self.env.library.ahead),
-        )
+        shape = shape_of(self.env, self.config.hidden)
         actor = new_actor(shape)
         actor.load_state_dict(self.algorithm.actor.state_dict())
         critic = {name: tensor.cpu().clone() for name, tensor in self.algorithm.critic.state_dict().items()}
@@ -204,10 +197,11 @@ class Trainer:
             print(f"{path}: of {len(each)} GPUs, goes on with {self.ranks.count} and new episodes", flush=True)
 
     def _start_from(self, parent: Policy, name: str) -> None:
-        here = tuple(self.env.library.ahead)
-        if tuple(parent.shape.ahead) != here:
-            wanted = f"a policy that looks ahead {list(here)} s, as `env.ahead` says"
-            raise BadInput(name, wanted, f"one that looks ahead {list(parent.shape.ahead)} s")
+        here, there = shape_of(self.env, self.config.hidden), parent.shape
+        for field in ("ahead", "terms", "history", "now", "action", "observation", "critic_observation"):
+            wanted, came = getattr(here, field), getattr(there, field)
+            if wanted != came:
+                raise BadInput(f"{name}: {field}", f"{wanted} as in `env`", str(came), "Start from another policy.")
         self.algorithm.actor.load_state_dict(parent.actor.state_dict())
         self.algorithm.critic.load_state_dict(parent.critic_state)
 

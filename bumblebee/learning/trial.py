@@ -11,10 +11,12 @@ from torch import Tensor
 from bumblebee.motion.clip import Clip
 from bumblebee.sim.effect_hooks import RuntimeHooks
 from bumblebee.sim.engines import make_engine
+from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import ActionAdapter, action_scale, start_state
+from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.noise import noise_levels
-from bumblebee.tracking.observations import joint_targets, layout, observe
+from bumblebee.tracking.observations import action_middle, joint_targets
+from bumblebee.tracking.rows import Rows
 from bumblebee.tracking.terminations import fallen, key_distance, success_threshold
 
 _WORLDS = 128  # at once
@@ -51,6 +53,8 @@ def try_policy(
 ) -> pd.DataFrame:
     """Roll out each clip, from its first frame.
 
+    A `Policy` is shown what its shape says that it sees; any other function gets the demo's observation (N, D).
+
     Returns:
         a row a rollout: name, family, split, success, share (of the clip until it failed), key_error [m] and
         joint_error [rad] (means until then).
@@ -76,7 +80,9 @@ def _try_some(
     library = MotionLibrary(clips, ahead)
     engine = make_engine("mujoco", world.model, n, min(world.threads, n), world.hooks)
     ids, scale, dt = torch.arange(n), action_scale(), engine.control_dt
-    levels = trials.noise * noise_levels(layout(library.num_joints, len(library.ahead)))
+    shape = getattr(policy, "shape", None)
+    seen, middle = (shape.seen, action_middle(shape.action)) if shape else (ObservationConfig(), None)
+    group = Group(seen, (n, library.num_joints, len(library.ahead)), trials.noise, engine.device)
     limit = torch.tensor([success_threshold(clip.family) for clip in clips])
     first = library.frames(ids, torch.zeros(n))
     qpos, qvel = start_state(first, trials.noise, generator)
@@ -88,11 +94,10 @@ def _try_some(
     for frame in range(int(library.length.max()) - 1):
         ref = library.frames(ids, torch.full((n,), (frame + 1) * dt))
         state = engine.state()
-        seen = observe(state, ref, action)
-        noise = levels * (2 * torch.rand(seen.shape, generator=generator) - 1) if trials.noise else 0.0
-        action = policy(seen + noise)
-        motor = action if world.action_adapter is None else world.action_adapter(state, seen, action)
-        engine.step(joint_targets(ref, motor, scale))
+        group.look(state, ref, action, Rows(torch.full((n,), frame == 0), by_mask=False), generator)
+        action = policy(group.noisy)
+        motor = action if world.action_adapter is None else world.action_adapter(state, group.exact, action)
+        engine.step(joint_targets(ref, motor, scale, middle))
         state = engine.state()
         running = frame + 1 < library.length
         good = (key_distance(state, ref) <= limit) & ~fallen(state, ref) & ~engine.unstable()
