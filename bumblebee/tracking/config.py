@@ -117,6 +117,8 @@ class EnvConfig:
     """A clip is drawn by its length times (this + its failure rate): no clip is ever forgotten."""
     sampler_memory: float = 0.9
     """How much of a clip's failure rate one more episode leaves."""
+    sampler_stretch: float = 0.0
+    """Length of the stretches of a clip whose own failure rates are followed [s]; 0: whole clips' rates."""
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     """What the policy sees; the critic sees the same without noise, forces, torques and the time left."""
     student: ObservationConfig = field(default_factory=lambda: ObservationConfig(terms=()))

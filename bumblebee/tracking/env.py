@@ -28,6 +28,7 @@ from bumblebee.tracking.rewards import Limits, Reward, Step
 from bumblebee.tracking.rows import Rows
 from bumblebee.tracking.sampler import ClipSampler
 from bumblebee.tracking.statistics import Statistics
+from bumblebee.tracking.stretches import StretchSampler
 from bumblebee.tracking.terminations import fallen, key_distance, threshold_at
 from bumblebee.tracking.terrain import Ground
 
@@ -79,8 +80,10 @@ class TrackingEnv(VecEnv):
         if config.compile:
             self._earned, self._fallen = (torch.compile(work, dynamic=False) for work in (self.reward.__call__, fallen))
         self.limits = Limits.of_robot(config.reward.soft_limit, device)
-        self.sampler = ClipSampler(
-            library.length, config.sampler_floor, config.sampler_memory, config.start_share, clip_share
+        drawing = (config.sampler_floor, config.sampler_memory, config.start_share, clip_share)
+        stretch = round(config.sampler_stretch / self.dt)
+        self.sampler: ClipSampler | StretchSampler = (
+            StretchSampler(library.length, stretch, *drawing) if stretch else ClipSampler(library.length, *drawing)
         )
         self.statistics = Statistics(device)
         self._generator = torch.Generator(device).manual_seed(seed)
@@ -208,7 +211,10 @@ class TrackingEnv(VecEnv):
         self._action.copy_(self._command)
         self.statistics.add(outcome, self._rewards, self._dones, lost, unstable, self.episode_length_buf)
         over = Rows(self._dones, self.engine.by_mask)
-        self.sampler.update(over.of(self._clip), over.of(lost), over.of(self._dones))
+        if isinstance(self.sampler, StretchSampler):
+            self.sampler.follow(self._clip, self._frame, lost, self._dones)
+        else:
+            self.sampler.update(over.of(self._clip), over.of(lost), over.of(self._dones))
         self._restart(self._dones)
         self._push()
 
