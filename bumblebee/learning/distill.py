@@ -2,10 +2,13 @@
 
 The generalist acts, the expert of each motion's cluster says what it would have done there, and the generalist learns
 from everything gathered so far by KL(general || expert). Clusters are drawn with equal shares (appendix D).
+
+A teacher and its student are the same with one expert and two observations: in an environment with a group "student",
+the experts answer what they see in "policy", and who learns sees "student".
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import pandas as pd
@@ -13,7 +16,7 @@ import torch
 from rsl_rl.models import MLPModel
 from torch import Tensor
 
-from bumblebee.learning.policy import Policy, Shape, new_actor
+from bumblebee.learning.policy import Policy, Shape, new_actor, shape_of
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 
@@ -39,13 +42,18 @@ class DistillConfig:
     expert_share: float = 0.5
     """Share of the worlds in which the expert acts at first; falls to 0 over the first half."""
     init: Literal["base", "scratch"] = "base"
-    """Start from the base policy or from nothing."""
+    """Start from the base policy or from nothing; a student with an observation of its own starts from nothing."""
     hidden: tuple[int, ...] = (256, 256, 128)
     """Layers of a generalist from scratch; from base they are base's."""
     seed: int = 0
     """Seed of the draws and of the network."""
     env: EnvConfig = field(default_factory=EnvConfig)
     """The environment it learns in."""
+
+
+PAPER_DAGGER = DistillConfig(steps=1, learning_rate=1e-4, init="scratch", hidden=(1024, 1024, 512))
+"""Appendix B, "Hyperparameters for DAgger": Adam 1e-4, batch 4096 (a step of 4096 worlds), 2 epochs of 4 mini-batches,
+gradient norm 1; the paper's MLP."""
 
 
 def gaussian_kl(mean: Tensor, std: Tensor, other_mean: Tensor, other_std: Tensor) -> Tensor:
@@ -71,28 +79,28 @@ def gaussian(actor: MLPModel, observation: Tensor) -> tuple[Tensor, Tensor]:
 class Aggregate:
     """The data set that DAgger aggregates: a ring of observations with the experts' answers."""
 
-    def __init__(self, capacity: int, observation: int, actions: int) -> None:
-        self.observation = torch.zeros(capacity, observation)
-        self.mean, self.std = torch.zeros(capacity, actions), torch.zeros(capacity, actions)
+    def __init__(self, capacity: int, observation: int, actions: int, device: torch.device | str = "cpu") -> None:
+        self.observation = torch.zeros(capacity, observation, device=device)
+        self.mean, self.std = (torch.zeros(capacity, actions, device=device) for _ in range(2))
         self.capacity, self.size, self._next = capacity, 0, 0
 
     def add(self, observation: Tensor, mean: Tensor, std: Tensor) -> None:
         """Append B samples; beyond the capacity the oldest are overwritten."""
-        rows = (self._next + torch.arange(len(observation))) % self.capacity
+        rows = (self._next + torch.arange(len(observation), device=observation.device)) % self.capacity
         self.observation[rows], self.mean[rows], self.std[rows] = observation, mean, std
         self._next = int((self._next + len(observation)) % self.capacity)
         self.size = min(self.size + len(observation), self.capacity)
 
     def draw(self, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
         """Draw `count` samples, with replacement."""
-        rows = torch.randint(self.size, (count,), generator=generator)
+        rows = torch.randint(self.size, (count,), generator=generator, device=generator.device)
         return self.observation[rows], self.mean[rows], self.std[rows]
 
 
 def equal_shares(lengths: Tensor, cluster: Sequence[int]) -> Tensor:
     """(N,) factors on the clips' frames that give every cluster the same share of the draws (appendix D)."""
-    index = torch.as_tensor(cluster)
-    total = torch.zeros(int(index.max()) + 1).index_add(0, index, lengths.float())
+    index = torch.as_tensor(cluster, device=lengths.device)
+    total = torch.zeros(int(index.max()) + 1, device=lengths.device).index_add(0, index, lengths.float())
     return lengths.float().mean() / total[index]
 
 
@@ -101,8 +109,9 @@ def distill(
     experts: Mapping[int, Policy],
     cluster: Sequence[int],
     config: DistillConfig,
-    base: Policy,
+    base: Policy | None = None,
     report: Callable[[int, str], None] = lambda frames, note: None,
+    enough: Callable[[], bool] = lambda: False,
 ) -> tuple[Policy, pd.DataFrame]:
     """Distil.
 
@@ -111,44 +120,56 @@ def distill(
         experts: cluster index -> its expert.
         cluster: (N,) cluster index of each clip of `env.library`.
         config: see `DistillConfig`.
-        base: gives the start (`init: base`) and the sizes.
+        base: gives the start (`init: base`) and the sizes; nothing for a student with an observation of its own.
         report: called after each round with its frames and a short note.
+        enough: asked after each round whether to stop.
 
     Returns:
         The generalist, and the curve: iteration, frames, kl, success, key_error.
     """
     torch.manual_seed(config.seed)
-    generator = torch.Generator().manual_seed(config.seed)
-    student = _student(base, config)
+    generator = torch.Generator(env.device).manual_seed(config.seed)
+    student, shape = _student(env, base, config)
+    experts = {index: expert.to(env.device) for index, expert in experts.items()}
     optimiser = torch.optim.Adam(student.parameters(), lr=config.learning_rate)
-    data = Aggregate(config.capacity, base.shape.observation, base.shape.actions)
-    of_clip, rows = torch.as_tensor(cluster), []
+    data = Aggregate(config.capacity, shape.observation, shape.actions, env.device)
+    of_clip, rows = torch.as_tensor(cluster, device=env.device), []
     frames_each = config.steps * env.num_envs
     for iteration in range(config.iterations):
         env.progress = 1.0  # the success threshold at its final value
         share = config.expert_share * max(0.0, 1.0 - 2.0 * iteration / config.iterations)
         _collect(env, student, experts, of_clip, data, config, share, generator)
+        env.engine.check()
         kl = _learn(student, optimiser, data, frames_each, config, generator)
         scalars = env.statistics.take()
         kept = {name: scalars[name] for name in ("success", "key_error")}
         rows.append({"iteration": iteration + 1, "frames": (iteration + 1) * frames_each, "kl": kl, **kept})
         report(frames_each, f"KL {kl:.3f}, success {kept['success']:.2f}")
+        if enough():
+            break
     student.eval()
-    shape = Shape(
-        **{**vars(base.shape), "hidden": tuple(config.hidden if config.init == "scratch" else base.shape.hidden)}
-    )
-    return Policy(student, base.critic_state, shape), pd.DataFrame(rows)
+    return Policy(student.cpu(), base.critic_state if base else {}, shape), pd.DataFrame(rows)
 
 
-def _student(base: Policy, config: DistillConfig) -> MLPModel:
+def _student(env: TrackingEnv, base: Policy | None, config: DistillConfig) -> tuple[MLPModel, Shape]:
+    """Who learns, on the environment's device, and its shape."""
+    if base is None:
+        shape = shape_of(env, config.hidden, _group(env))
+        return new_actor(shape).to(env.device).train(), shape
+    shape = replace(base.shape, hidden=tuple(config.hidden)) if config.init == "scratch" else base.shape
     if config.init == "base":
         student = new_actor(base.shape)
         student.load_state_dict(base.actor.state_dict())
     else:
-        student = new_actor(Shape(**{**vars(base.shape), "hidden": tuple(config.hidden)}))
+        student = new_actor(shape)
         student.obs_normalizer.load_state_dict(base.actor.obs_normalizer.state_dict())
     student.obs_normalizer.eval()  # the statistics stay those of base's training
-    return student
+    return student.to(env.device), shape
+
+
+def _group(env: TrackingEnv) -> str:
+    """The observations of who learns."""
+    return "student" if "student" in env.groups else "policy"
 
 
 @torch.no_grad()
@@ -163,16 +184,18 @@ def _collect(
     generator: torch.Generator,
 ) -> None:
     for _ in range(config.steps):
-        seen = env.get_observations()["policy"]
-        wanted = torch.zeros(env.num_envs, env.num_actions)
+        groups = env.get_observations()
+        known, seen = groups["policy"], groups[_group(env)]
+        student.update_normalization({"policy": seen})  # nothing where base's statistics stay
+        wanted = torch.zeros(env.num_envs, env.num_actions, device=seen.device)
         spread = torch.ones_like(wanted)
         now = of_clip[env.clip]
         for index, expert in experts.items():
             own = (now == index).nonzero()[:, 0]
             if len(own):
-                wanted[own], spread[own] = gaussian(expert.actor, seen[own])
+                wanted[own], spread[own] = gaussian(expert.actor, known[own])
         data.add(seen, wanted, spread)
-        leads = torch.rand(env.num_envs, 1, generator=generator) < expert_share
+        leads = torch.rand(env.num_envs, 1, generator=generator, device=seen.device) < expert_share
         env.step(torch.where(leads, wanted, student({"policy": seen})))
 
 

@@ -1,6 +1,7 @@
 """A trained policy in torch: building, saving and loading the network, apart from how it was trained."""
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -90,6 +91,10 @@ class Policy:
     def __call__(self, observation: Tensor) -> Tensor:
         """Mean actions (N, J) of observations (N, D)."""
         return self.actor({"policy": observation})
+
+    def to(self, device: torch.device | str) -> "Policy":
+        """The policy on a device; a copy."""
+        return Policy(deepcopy(self.actor).to(device), self.critic_state, self.shape)
 
     def save(self, folder: Path) -> None:
         """Write `policy.pt` into an existing folder."""
