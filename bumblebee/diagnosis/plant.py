@@ -10,9 +10,9 @@ from bumblebee.diagnosis.drives import drive_law, take_target, take_torque
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effect_native import is_hidden
+from bumblebee.sim.servo import actuator_of
 
 _FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
-_ON_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ def make_plant(spec: mujoco.MjSpec, rollout: Rollout, where: object) -> Plant:
     # More solver iterations than a training model allows itself: what is compared is physics, not a solver's haste.
     model.opt.iterations, model.opt.ls_iterations = max(30, model.opt.iterations), max(20, model.opt.ls_iterations)
     free, joints = _match_joints(model, rollout, where)
-    actuator = np.array([_actuator_of(model, j) for j in joints], dtype=int)
+    actuator = np.array([actuator_of(model, j) for j in joints], dtype=int)
     law = drive_law(model, where)
     offset = np.zeros(len(joints))
     for column, a in enumerate(actuator):
@@ -125,14 +125,6 @@ def _match_joints(model: mujoco.MjModel, rollout: Rollout, where: object) -> tup
     return (free[0] if free else -1), np.array([names[n] for n in rollout.joints], dtype=int)
 
 
-def _actuator_of(model: mujoco.MjModel, joint: int) -> int:
-    """The first actuator on a joint, -1 if none."""
-    for a in range(model.nu):
-        if int(model.actuator_trntype[a]) in _ON_JOINT and model.actuator_trnid[a, 0] == joint:
-            return a
-    return -1
-
-
 def _set_inputs(spec: mujoco.MjSpec, rollout: Rollout, where: object) -> bool:
     """Make every actuator of `spec` on a logged joint take what was logged; True if that is torque.
 
@@ -141,7 +133,7 @@ def _set_inputs(spec: mujoco.MjSpec, rollout: Rollout, where: object) -> bool:
     model = spec.compile()
     law = drive_law(model, where)
     names = {model.joint(j).name: j for j in range(model.njnt)}
-    drives = {name: _actuator_of(model, names[name]) for name in rollout.joints if name in names}
+    drives = {name: actuator_of(model, names[name]) for name in rollout.joints if name in names}
     drives = {name: a for name, a in drives.items() if a >= 0}
     servo = any(law.servo[a] for a in drives.values())
     if rollout.joint_target is None and rollout.joint_torque_cmd is None:

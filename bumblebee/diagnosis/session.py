@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.dampers import fold_dampers
 from bumblebee.diagnosis.noise import estimate_noise
 from bumblebee.diagnosis.plant import Plant, load_spec, make_plant
 from bumblebee.diagnosis.repeats import motion_names
@@ -104,6 +105,9 @@ def make_session(
     notes += [f"check: {text}" for text in warnings[:_MOST_WARNINGS]]
     if len(warnings) > _MOST_WARNINGS:
         notes.append(f"{len(warnings) - _MOST_WARNINGS} more findings that do not stop a file")
+    spec, folded = fold_dampers(spec)
+    if folded:
+        notes.append(f"position and velocity actuators taken as one servo: {', '.join(folded[:6])}")
     plant = make_plant(spec, long[0], model)
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-_ON_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+ON_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Servos:
 
 def servos_of(model: mujoco.MjModel, joints: list[int]) -> Servos:
     """The servos of the joints with these ids."""
-    actuator = np.array([_actuator_of(model, j) for j in joints], dtype=int)
+    actuator = np.array([actuator_of(model, j) for j in joints], dtype=int)
     has, a = actuator >= 0, np.maximum(actuator, 0)
     if not model.nu:
         zeros = np.zeros(len(joints))
@@ -72,9 +72,7 @@ def servos_of(model: mujoco.MjModel, joints: list[int]) -> Servos:
     )
 
 
-def _actuator_of(model: mujoco.MjModel, joint: int) -> int:
-    """The first actuator on a joint, -1 if none."""
-    for a in range(model.nu):
-        if int(model.actuator_trntype[a]) in _ON_JOINT and model.actuator_trnid[a, 0] == joint:
-            return a
-    return -1
+def actuator_of(model: mujoco.MjModel, joint: int) -> int:
+    """The actuator that drives a joint: the first that follows a position, else the first on it, -1 if none."""
+    there = [a for a in range(model.nu) if model.actuator_trntype[a] in ON_JOINT and model.actuator_trnid[a, 0] == joint]
+    return next((a for a in there if model.actuator_biasprm[a, 1] != 0), there[0] if there else -1)
