@@ -1,0 +1,156 @@
+"""Rates and memory of one environment: its physics alone, the environment, the PPO loop.
+
+Physics alone is the engine's step on the states that the environment has just reached, again and again within the same
+run: half a second of the environment, half a second of physics from there, back. Actions are random around the
+reference, so that robots fall and are reset.
+"""
+
+import gc
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+
+from bumblebee.learning.config import PpoConfig
+from bumblebee.learning.ppo import Trainer
+from bumblebee.learning.ranks import Ranks
+from bumblebee.sim.engines import make_engine
+from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.env import TrackingEnv
+from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.model import task_model
+
+ROUND = 25  # control steps: short enough that robots without resets do not all lie on the floor
+ACTION = 0.3  # deviation of the random actions, of the action's scale
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The PPO loop of all ranks together."""
+
+    frames: float
+    """Control steps a second."""
+    iteration: float
+    """Seconds of one iteration, updating included."""
+    update: float
+    """Seconds of the update."""
+
+
+def make_env(
+    config: EnvConfig, library_on: Callable[[torch.device], MotionLibrary], ranks: Ranks | None = None
+) -> TrackingEnv:
+    """An environment of its own, so that rows share no states."""
+    alone = ranks or Ranks()
+    model = task_model(config)
+    engine = make_engine(config.engine, model, config.num_worlds, config.threads, None, config.buffers, alone.device)
+    return TrackingEnv(library_on(engine.device), engine, config, alone.seed(0))
+
+
+def physics_step(env: TrackingEnv) -> Callable[[], None]:
+    """One control period of the engine alone: no kinematics afterwards, no copies."""
+    engine = env.engine
+    if env.cfg.engine == "mujoco":
+        return lambda: engine.batch.step(nstep=engine.substeps)
+    import mujoco_warp
+    import warp
+
+    with warp.ScopedDevice(str(engine.device)), warp.ScopedCapture() as capture:
+        for _ in range(engine.substeps):
+            mujoco_warp.step(engine._model, engine._data)
+    stream = warp.stream_from_torch(torch.cuda.current_stream(engine.device))
+    return lambda: warp.capture_launch(capture.graph, stream=stream)
+
+
+def timed(work: Callable[[], object], device: str, times: int = 1) -> float:
+    """Seconds that `work` takes, `times` in a row."""
+    wait(device)
+    began = time.perf_counter()
+    for _ in range(times):
+        work()
+    wait(device)
+    return time.perf_counter() - began
+
+
+def wait(device: str) -> None:
+    """Until the device has done what it was given."""
+    if device != "cpu":
+        torch.cuda.synchronize(torch.device(device))
+
+
+@torch.inference_mode()
+def physics_and_environment(env: TrackingEnv, seconds: float) -> tuple[float, float]:
+    """Control steps a second of the physics alone and of the environment, on the same states."""
+    actions = random_actions(env)
+    for action in actions * 2:
+        env.step(action)
+    alone = physics_step(env)
+    spent, rounds = [0.0, 0.0], 0
+    while sum(spent) < 2 * seconds:
+        turn = iter(actions)
+        whole = timed(lambda turn=turn: env.step(next(turn)), env.device, ROUND)
+        kept = env.engine.state_dict()
+        only = timed(alone, env.device, ROUND)
+        env.engine.load_state_dict(kept)
+        spent, rounds = [spent[0] + only, spent[1] + whole], rounds + 1
+    steps = rounds * ROUND * env.num_envs
+    return steps / spent[0], steps / spent[1]
+
+
+@torch.inference_mode()
+def environment_rate(env: TrackingEnv, seconds: float) -> float:
+    """Control steps a second of the environment alone."""
+    actions = random_actions(env)
+    for action in actions:
+        env.step(action)
+    spent, rounds = 0.0, 0
+    while spent < seconds:
+        turn = iter(actions)
+        spent += timed(lambda turn=turn: env.step(next(turn)), env.device, ROUND)
+        rounds += 1
+    return rounds * ROUND * env.num_envs / spent
+
+
+def random_actions(env: TrackingEnv) -> list[torch.Tensor]:
+    """`ROUND` actions for all worlds, the same each time."""
+    generator = torch.Generator(env.device).manual_seed(0)
+    shape = (env.num_envs, env.num_actions)
+    return [ACTION * torch.randn(shape, generator=generator, device=env.device) for _ in range(ROUND)]
+
+
+def loop_rate(env: TrackingEnv, ppo: PpoConfig, seconds: float, ranks: Ranks | None = None) -> Loop:
+    """The PPO loop for at least `seconds`, after three iterations that are not counted; all ranks call it together."""
+    together = ranks or Ranks()
+    trainer = Trainer(env, ppo, Path(tempfile.mkdtemp()), ranks=together)
+    trainer.algorithm.train_mode()
+    for _ in range(3):
+        trainer._iterate()
+    updates, update = [0.0], trainer.algorithm.update
+
+    def counted() -> dict[str, float]:
+        wait(env.device)
+        began = time.perf_counter()
+        losses = update()
+        wait(env.device)
+        updates[0] += time.perf_counter() - began
+        return losses
+
+    trainer.algorithm.update = counted  # type: ignore[method-assign]
+    spent: list[float] = []
+    while together.decide(lambda: sum(spent) < seconds):
+        spent.append(timed(trainer._iterate, env.device))
+    count, total = len(spent), sum(spent)
+    return Loop(count * ppo.steps * env.num_envs * together.count / total, total / count, updates[0] / count)
+
+
+def used_memory(device: str) -> float:
+    """Memory of the whole GPU that is in use [GiB], after what nobody holds was given back; nan on a CPU."""
+    if device == "cpu":
+        return float("nan")
+    gc.collect()
+    torch.cuda.empty_cache()
+    torch.cuda.synchronize(torch.device(device))
+    free, total = torch.cuda.mem_get_info(torch.device(device))
+    return (total - free) / 2**30

@@ -1,0 +1,70 @@
+"""The PPO loop on several GPUs of one machine, beside the same loop on one.
+
+    python -m benchmarks.throughput.several WORLDS SECONDS STEPS COMPILE LAYER...      # one of the processes
+
+The first of the processes prints its result as a line of JSON.
+"""
+
+import json
+import subprocess
+import sys
+
+from benchmarks.throughput.measure import Loop, loop_rate, make_env
+from bumblebee.errors import BadInput
+from bumblebee.learning.config import PpoConfig
+from bumblebee.learning.ranks import join, leave
+from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.library import MotionLibrary
+
+GOALS = {2: 1.8, 4: 3.5}
+TORCHRUN = "torch.distributed.run"
+
+
+def measured(gpus: int, config: EnvConfig, ppo: PpoConfig, seconds: float) -> Loop:
+    """The loop on `gpus` GPUs, each with the worlds of `config`, as processes of torchrun.
+
+    Raises:
+        BadInput: if it did not come to an end, with its last line.
+    """
+    own = [str(value) for value in (config.num_worlds, seconds, ppo.steps, int(config.compile), *ppo.hidden)]
+    start = ["-m", TORCHRUN, "--standalone", "--nproc-per-node", str(gpus)]
+    module = ["-m", "benchmarks.throughput.several", *own]
+    done = subprocess.run([sys.executable, *start, *module], capture_output=True, text=True)
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    if done.returncode or not lines:
+        told = [line for line in done.stderr.splitlines() if "expected" in line or "Error" in line]
+        raise BadInput(f"{gpus} GPUs", "a measured loop", (told or done.stderr.splitlines() or ["nothing"])[0])
+    return Loop(**json.loads(lines[-1]))
+
+
+def print_several(counts: list[int], config: EnvConfig, ppo: PpoConfig, seconds: float) -> None:
+    """A row for each number of GPUs; the ratios are to the first."""
+    print("GPUs  worlds each  loop frames/s  of the first  goal  iteration [ms]  update [ms]")
+    first: tuple[int, float] | None = None
+    for gpus in counts:
+        loop = measured(gpus, config, ppo, seconds)
+        first = first or (gpus, loop.frames)
+        ratio, goal = loop.frames / first[1], GOALS.get(gpus, "") if first[0] == 1 else ""
+        times = f"{1e3 * loop.iteration:14.0f}  {1e3 * loop.update:11.0f}"
+        print(
+            f"{gpus:4d}  {config.num_worlds:11d}  {loop.frames:13.0f}  {ratio:12.2f}  {goal!s:>4}  {times}", flush=True
+        )
+
+
+def main() -> None:
+    """One process of several."""
+    worlds, seconds, steps, compiled, *hidden = sys.argv[1:]
+    ranks = join()
+    config = EnvConfig(engine="mujoco_warp", physics_hz=200.0, num_worlds=int(worlds), compile=bool(int(compiled)))
+    ppo = PpoConfig(steps=int(steps), epochs=5, mini_batches=4, hidden=tuple(map(int, hidden)))
+    clips = make_library(EmbeddedConfig(limit=7))
+    env = make_env(config, lambda device: MotionLibrary(clips, config.ahead, device=device), ranks)
+    loop = loop_rate(env, ppo, float(seconds), ranks)
+    if ranks.first:
+        print(json.dumps(vars(loop)), flush=True)
+    leave()
+
+
+if __name__ == "__main__":
+    main()
