@@ -30,16 +30,19 @@ def model() -> mujoco.MjModel:
 
 def test_the_preset_is_the_papers_table() -> None:
     """Appendix B, number by number."""
-    assert Randomisation(
-        friction=(0.5, 1.25),
-        base_com=0.1,
-        mass=0.2,
-        gains=0.25,
-        delay=(0.020, 0.040),
-        push=0.5,
-        push_interval=10.0,
-        push_regular=True,
-    ) == PAPER_RANDOMISATION
+    assert (
+        Randomisation(
+            friction=(0.5, 1.25),
+            base_com=0.1,
+            mass=0.2,
+            gains=0.25,
+            delay=(0.020, 0.040),
+            push=0.5,
+            push_interval=10.0,
+            push_regular=True,
+        )
+        == PAPER_RANDOMISATION
+    )
     assert PAPER_TASK.terrain.rough == 0.5
     assert (PAPER_TASK.threshold_start, PAPER_TASK.threshold_end) == (0.8, 0.3)
 

@@ -77,7 +77,7 @@ def test_the_lift_is_the_mean_height_around_a_place() -> None:
 
 
 def test_robots_stand_on_it_and_are_seen_as_on_flat_ground(model: mujoco.MjModel) -> None:
-    """No sole starts in the ground; the feet come to carry the weight, and the offset of place and height is taken off."""
+    """No sole starts in the ground; feet come to carry the weight; the offset of place and height is taken off."""
     env = make(model)
     soles = [
         g for g in range(model.ngeom) if model.geom(g).name.endswith("collision") and "_foot" in model.geom(g).name
