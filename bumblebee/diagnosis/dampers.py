@@ -1,7 +1,7 @@
 """A joint's position servo and its velocity servo as one: the declared kd then stands where every effect looks for it.
 
-MJCF files of before `position kv=` give a joint a `position` and a `velocity` actuator. A log has one command a joint, so
-the velocity servo is told to stand still and only damps.
+MJCF files of before `position kv=` give a joint a `position` and a `velocity` actuator. A log has one command a joint,
+so the velocity servo is told to stand still and only damps.
 """
 
 import mujoco
@@ -14,8 +14,9 @@ _AFFINE = mujoco.mjtBias.mjBIAS_AFFINE
 def fold_dampers(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, list[str]]:
     """A copy in which each position servo has the gain of the velocity servos on its joint, and these have none.
 
-    Also the names of the joints; where there are none the spec itself comes back. Actuators keep their number and order.
-    A velocity servo's own force limit is dropped: that of the position servo holds for both.
+    Also the names of the joints; where there are none the spec itself comes back. Actuators keep their number and
+    order. A force limit of the position servo now holds for the sum, as a drive's current limit does; the velocity
+    servo's own is dropped.
     """
     pairs = [(i, k) for i, a in enumerate(spec.actuators) if _follows_position(a) for k in _dampers_on(spec, a.target)]
     if not pairs:

@@ -107,7 +107,7 @@ def make_session(
         notes.append(f"{len(warnings) - _MOST_WARNINGS} more findings that do not stop a file")
     spec, folded = fold_dampers(spec)
     if folded:
-        notes.append(f"position and velocity actuators taken as one servo: {', '.join(folded[:6])}")
+        notes.append(f"position and velocity actuators taken as one servo of one limit: {', '.join(folded[:6])}")
     plant = make_plant(spec, long[0], model)
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)

@@ -74,5 +74,7 @@ def servos_of(model: mujoco.MjModel, joints: list[int]) -> Servos:
 
 def actuator_of(model: mujoco.MjModel, joint: int) -> int:
     """The actuator that drives a joint: the first that follows a position, else the first on it, -1 if none."""
-    there = [a for a in range(model.nu) if model.actuator_trntype[a] in ON_JOINT and model.actuator_trnid[a, 0] == joint]
+    there = [
+        a for a in range(model.nu) if model.actuator_trntype[a] in ON_JOINT and model.actuator_trnid[a, 0] == joint
+    ]
     return next((a for a in there if model.actuator_biasprm[a, 1] != 0), there[0] if there else -1)
