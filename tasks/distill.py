@@ -25,6 +25,7 @@ from bumblebee.sim.engines import make_engine
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.env import TrackingEnv, action_scale
 from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.model import task_model
 from tasks.sections import loop
 from tasks.stage import load, log_run, output_folder, run_stage
 
@@ -40,7 +41,7 @@ def main() -> None:
         i: load_policy(Path(f"models/experts/r{shape.final_round}/{name}")) for i, name in enumerate(shape.clusters)
     }
     model, hooks = simulator(shape.final_round, config.env.physics_hz)
-    env = environment(clips, cluster, model, hooks, config)
+    env = environment(clips, cluster, shape.final_round, hooks, config)
     env.action_adapter = deltas(env, cluster, shape.clusters, shape.final_round)
     total = config.iterations * config.steps * config.env.num_worlds
     with progress(total, "distil the generalist", "frames") as bar:
@@ -74,16 +75,21 @@ def simulator(final_round: int, physics_hz: float) -> tuple[mujoco.MjModel, Runt
     """The model that the last round corrected; the declared one if there was no round."""
     if final_round == 0:
         return load_model(physics_hz=physics_hz), None
-    folder = Path(f"data/diagnosis/r{final_round}")
-    model = load_model(folder / "model.xml", physics_hz)
-    return model, runtime_hooks(read_effects(folder / "effects.yaml"), model)
+    model = load_model(corrected(final_round), physics_hz)
+    return model, runtime_hooks(read_effects(Path(f"data/diagnosis/r{final_round}/effects.yaml")), model)
+
+
+def corrected(final_round: int) -> Path | None:
+    """MJCF of the robot as the last round corrected it; None before any round."""
+    return Path(f"data/diagnosis/r{final_round}/model.xml") if final_round else None
 
 
 def environment(
-    clips: list[Clip], cluster: list[int], model: mujoco.MjModel, hooks: RuntimeHooks | None, config: DistillConfig
+    clips: list[Clip], cluster: list[int], final_round: int, hooks: RuntimeHooks | None, config: DistillConfig
 ) -> TrackingEnv:
     """The tracking task over all clusters, each with the same share of the frames."""
     library = MotionLibrary(clips, config.env.ahead)
+    model = task_model(config.env, corrected(final_round))
     engine = make_engine("mujoco", model, config.env.num_worlds, config.env.threads, hooks)
     return TrackingEnv(library, engine, config.env, config.seed, clip_share=equal_shares(library.length, cluster))
 

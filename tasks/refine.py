@@ -44,6 +44,7 @@ def main(round: int, cluster: str) -> None:
         parent=Path(f"models/experts/r{parent_of(round)}") / cluster,
         cluster=cluster,
         round=round,
+        model=Path(f"data/diagnosis/r{round}/model.xml"),
     )
     train_policy(job, config)
 

@@ -25,6 +25,7 @@ from bumblebee.sim.engines import make_engine
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.model import task_model
 from tasks.stage import log_run, output_folder, scratch
 
 FILTERED, LABELS = Path("data/filtered"), Path("data/clusters/labels.parquet")
@@ -65,6 +66,8 @@ class Job:
     """Folder of the policy to start from."""
     cluster: str | None = None
     round: int | None = None
+    model: Path | None = None
+    """MJCF of the corrected robot that is trained on, the declared one without; the task adds its ground and delays."""
 
 
 def training_clips() -> list[Clip]:
@@ -116,7 +119,8 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
         return _train_together(job, config)
     ranks = join() if config.gpus > 1 else Ranks()
     world, buffers = job.world, own.buffers
-    engine = make_engine(own.engine, world.model, own.num_worlds, own.threads, world.hooks, buffers, ranks.device)
+    model = task_model(own, job.model)
+    engine = make_engine(own.engine, model, own.num_worlds, own.threads, world.hooks, buffers, ranks.device)
     library = MotionLibrary(job.clips, own.ahead, device=engine.device)
     env = TrackingEnv(library, engine, own, ranks.seed(config.seed), world.action_adapter, job.share)
     trainer = Trainer(env, config.ppo, folder, config.seed, job.parent, ranks)

@@ -148,12 +148,13 @@ def distill(
         if enough():
             break
     student.eval()
-    return Policy(student.cpu(), base.critic_state if base else {}, shape), pd.DataFrame(rows)
+    critic = base.critic_state if base is not None and _group(env) == "policy" else {}
+    return Policy(student.cpu(), critic, shape), pd.DataFrame(rows)
 
 
 def _student(env: TrackingEnv, base: Policy | None, config: DistillConfig) -> tuple[MLPModel, Shape]:
     """Who learns, on the environment's device, and its shape."""
-    if base is None:
+    if base is None or _group(env) == "student":
         shape = shape_of(env, config.hidden, _group(env))
         return new_actor(shape).to(env.device).train(), shape
     shape = replace(base.shape, hidden=tuple(config.hidden)) if config.init == "scratch" else base.shape

@@ -86,7 +86,7 @@ def test_a_parent_that_looks_elsewhere_is_bad_input(workspace: Path) -> None:
     content = yaml.safe_load(Path("params.yaml").read_text())
     content["base"] |= {"init": "pretrained", "env": TINY["env"] | {"ahead": [0.2]}}
     Path("params.yaml").write_text(yaml.safe_dump(content))
-    with pytest.raises(BadInput, match="looks ahead"):
+    with pytest.raises(BadInput, match="ahead: expected"):
         base.main()
     assert not Path("models/base").exists()
 
