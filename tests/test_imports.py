@@ -14,7 +14,7 @@ FLOORS = [
     {"motion", "sim", "measured"},
     {"clustering", "tracking", "diagnosis"},
     {"learning", "evaluation"},
-    {"deploy"},
+    {"deploy", "baselines"},
     {"report"},
 ]
 ONLY = {"clustering": {"motion"}, "tracking": {"motion", "sim"}, "diagnosis": {"sim", "measured"}}

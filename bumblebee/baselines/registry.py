@@ -1,0 +1,23 @@
+"""The baselines by their names."""
+
+from collections.abc import Callable
+
+from bumblebee.baselines.exbody2 import exbody2
+from bumblebee.baselines.hover import hover
+from bumblebee.baselines.omnih2o import omnih2o
+from bumblebee.baselines.spec import Baseline
+from bumblebee.errors import BadInput
+
+BASELINES: dict[str, Callable[[], Baseline]] = {"omnih2o": omnih2o, "exbody2": exbody2, "hover": hover}
+"""What makes each."""
+
+
+def baseline(name: str) -> Baseline:
+    """The baseline of that name.
+
+    Raises:
+        BadInput: if there is none.
+    """
+    if name not in BASELINES:
+        raise BadInput("baseline", " or ".join(BASELINES), repr(name))
+    return BASELINES[name]()

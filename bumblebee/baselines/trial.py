@@ -1,0 +1,96 @@
+"""How well any policy follows clips in MuJoCo C: success, MPJPE and MPKPE, in the world and over the robot's own place.
+
+The same rule for every policy, whatever ended its episodes in training: from the first frame to the last, without
+noise; lost where a key body is farther from its reference than the family's threshold, or the robot has fallen.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import pandas as pd
+import torch
+from torch import Tensor
+
+from bumblebee.baselines import env as _registered  # noqa: F401, the terms of the baselines
+from bumblebee.baselines.exbody2_terms import over_robot
+from bumblebee.baselines.library import MovingLibrary
+from bumblebee.learning.policy import Policy
+from bumblebee.motion.clip import Clip
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.engines import make_engine
+from bumblebee.tracking.config import ObservationConfig
+from bumblebee.tracking.env import action_scale, start_state
+from bumblebee.tracking.groups import Group
+from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.observations import action_middle, joint_targets
+from bumblebee.tracking.rows import Rows
+from bumblebee.tracking.terminations import fallen, success_threshold
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How a policy is run: what it is shown, and the factor [rad] on its actions, one for all or our own by joint."""
+
+    seen: ObservationConfig
+    scale: float | None = None
+
+
+@torch.inference_mode()
+def follow(
+    policy: Policy, manner: Manner, clips: Sequence[Clip], model: mujoco.MjModel, threads: int = 1
+) -> pd.DataFrame:
+    """Roll out each clip once.
+
+    Returns:
+        a row a clip: name, family, split, seconds; success and lost_at [s]; success_local, by distances after the
+        reference's root was moved over the robot's, which forgives drift; mpjpe_rad, mpkpe_mm and mpkpe_local_mm over
+        the frames before the loss.
+    """
+    n = len(clips)
+    library = MovingLibrary(clips, policy.shape.ahead)
+    engine = make_engine("mujoco", model, n, min(threads, n))
+    ids, dt = torch.arange(n), engine.control_dt
+    scale = action_scale() if manner.scale is None else torch.full((library.num_joints,), manner.scale)
+    middle = action_middle(policy.shape.action)
+    group = Group(manner.seen, (n, library.num_joints, len(library.ahead)), 0.0, engine.device)
+    generator = torch.Generator().manual_seed(0)
+    limit = torch.tensor([success_threshold(clip.family) for clip in clips])
+    first = library.frames(ids, torch.zeros(n))
+    engine.reset(ids, *start_state(first, 0.0, generator), first.hold_pos)
+    engine.settle()
+    action = torch.zeros(n, library.num_joints)
+    alive, alive_local = torch.ones(n, dtype=torch.bool), torch.ones(n, dtype=torch.bool)
+    sums = torch.zeros(4, n)  # frames before the loss, and the three errors over them
+    for frame in range(int(library.length.max()) - 1):
+        ref = library.frames(ids, torch.full((n,), (frame + 1) * dt))
+        group.look(engine.state(), ref, action, Rows(torch.full((n,), frame == 0), by_mask=False), generator)
+        action = policy(group.exact)
+        engine.step(joint_targets(ref, action, scale, middle))
+        state = engine.state()
+        running = frame + 1 < library.length
+        world, local = key_errors(state, ref)
+        down = fallen(state, ref) | engine.unstable()
+        alive &= ((world.amax(-1) <= limit) & ~down) | ~running
+        alive_local &= ((local.amax(-1) <= limit) & ~down) | ~running
+        joints = (state.joint_pos - ref.joint_pos).abs().mean(-1)
+        counted = (alive & running).float()
+        errors = torch.stack((torch.ones(n), joints, world.mean(-1), local.mean(-1)))
+        sums += counted * torch.nan_to_num(errors)
+        if not bool(((alive | alive_local) & running).any()):
+            break
+    frames = sums[0].clamp(min=1)
+    about = [(clip.name, clip.family, clip.split, clip.duration) for clip in clips]
+    table = pd.DataFrame(about, columns=["name", "family", "split", "seconds"])
+    table["success"], table["success_local"] = alive.numpy(), alive_local.numpy()
+    table["lost_at"] = torch.where(alive, torch.nan, sums[0] * dt).numpy()
+    table["mpjpe_rad"] = (sums[1] / frames).numpy()
+    table["mpkpe_mm"] = (1000 * sums[2] / frames).numpy()
+    table["mpkpe_local_mm"] = (1000 * sums[3] / frames).numpy()
+    return table
+
+
+def key_errors(state: RobotState, ref: ReferenceFrame) -> tuple[Tensor, Tensor]:
+    """Distances (B, K) [m] of the key bodies from the reference: in the world, and with its root over the robot's."""
+    world = (state.key_pos_w - ref.key_pos_w).norm(dim=-1)
+    return world, (state.key_pos_w - over_robot(ref, state.root_pos_w)).norm(dim=-1)
