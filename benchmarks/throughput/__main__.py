@@ -11,11 +11,12 @@ What counts are the ratios.
 
 import argparse
 import sys
+from pathlib import Path
 
 import torch
 
 from benchmarks.throughput.growth import print_growth
-from benchmarks.throughput.measure import loop_rate, make_env, physics_and_environment, used_memory
+from benchmarks.throughput.measure import loop_rate, make_env, physics_and_environment, started, used_memory
 from benchmarks.throughput.peer import Peer, mjlab_rates, print_beside
 from benchmarks.throughput.several import print_several
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
@@ -23,18 +24,21 @@ from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.ranks import check_gpus
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.sim.effects import Effect, read_effects
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.library import MotionLibrary
 
 GOALS = {"mujoco": {"environment": 0.8}, "mujoco_warp": {"environment": 0.75}}
 
 
-def print_rows(config: EnvConfig, clips: list[Clip], ppo: PpoConfig, seconds: float) -> tuple[float, float]:
+def print_rows(
+    config: EnvConfig, clips: list[Clip], ppo: PpoConfig, seconds: float, effects: list[Effect]
+) -> tuple[float, float]:
     """Three rows of the table; the environment's and the loop's rates."""
     before = used_memory("cpu" if config.engine == "mujoco" else "cuda:0")
-    env = make_env(config, lambda device: MotionLibrary(clips, config.ahead, device=device))
+    env = make_env(config, lambda device: MotionLibrary(clips, config.ahead, device=device), effects=effects)
     alone, whole = physics_and_environment(env, seconds)
-    loop = loop_rate(env, ppo, seconds)
+    loop = loop_rate(started(env, ppo), seconds)
     worlds, hz = config.num_worlds, config.physics_hz
     for name, value in {"physics": alone, "environment": whole, "PPO loop": loop.frames}.items():
         goal = GOALS[config.engine].get(name, "")
@@ -57,6 +61,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--compile", action="store_true", help="observations and rewards by torch's compiler")
     parser.add_argument("--steps", type=int, default=24, help="of an iteration of PPO")
     parser.add_argument("--hidden", type=int, nargs="+", default=[512, 256, 128])
+    parser.add_argument("--effects", type=Path, help="an effects.yaml that the robot has")
     parser.add_argument("--against", choices=("mjlab",), help="its own tracking task on the same GPU, same worlds")
     parser.add_argument("--mjlab-python", default=sys.executable, help="the interpreter that has mjlab")
     parser.add_argument("--mjlab-site", default="", help="folders of packages to put before that interpreter's own")
@@ -83,9 +88,10 @@ def main() -> None:
         print_growth(configs[0], make_library(EmbeddedConfig()), ppo, options.seconds)
         return
     clips = make_library(EmbeddedConfig(limit=7))
+    effects = read_effects(options.effects) if options.effects else []
     print("worlds  physics   row          control steps/s  of physics  goal")
     for config in configs:
-        environment, loop = print_rows(config, clips, ppo, options.seconds)
+        environment, loop = print_rows(config, clips, ppo, options.seconds, effects)
         if options.against:
             peer = Peer(options.mjlab_python, options.mjlab_site)
             device = "cpu" if options.engine == "mujoco" else "cuda:0"

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import torch
 
-from benchmarks.throughput.measure import environment_rate, loop_rate, make_env, used_memory
+from benchmarks.throughput.measure import environment_rate, loop_rate, make_env, started, used_memory
 from bumblebee.learning.config import PpoConfig
 from bumblebee.motion.clip import Clip
 from bumblebee.tracking.config import EnvConfig, ObservationConfig
@@ -41,7 +41,7 @@ def row(config: EnvConfig, clips: list[Clip], motions: int, ppo: PpoConfig, seco
     before = used_memory(device)
     env = make_env(config, lambda where: copies(clips, motions, config.ahead, where))
     env_rate = environment_rate(env, seconds)
-    loop = loop_rate(env, ppo, seconds)
+    loop = loop_rate(started(env, ppo), seconds)
     used = used_memory(device) - before
     motion_memory = env.library._rows.nelement() * env.library._rows.element_size() / 2**30
     history = config.observation.history

@@ -8,7 +8,7 @@ reference, so that robots fall and are reset.
 import gc
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +17,9 @@ import torch
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.ppo import Trainer
 from bumblebee.learning.ranks import Ranks
+from bumblebee.sim.effects import Effect, add_to_spec, runtime_hooks
 from bumblebee.sim.engines import make_engine
+from bumblebee.sim.sensors import load_spec
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
@@ -40,12 +42,20 @@ class Loop:
 
 
 def make_env(
-    config: EnvConfig, library_on: Callable[[torch.device], MotionLibrary], ranks: Ranks | None = None
+    config: EnvConfig,
+    library_on: Callable[[torch.device], MotionLibrary],
+    ranks: Ranks | None = None,
+    effects: Sequence[Effect] = (),
 ) -> TrackingEnv:
-    """An environment of its own, so that rows share no states."""
+    """An environment of its own, so that rows share no states; its robot has `effects`."""
     alone = ranks or Ranks()
-    model = task_model(config)
-    engine = make_engine(config.engine, model, config.num_worlds, config.threads, None, config.buffers, alone.device)
+    model, hooks = task_model(config), None
+    if effects:
+        spec = load_spec(None, config.physics_hz)
+        add_to_spec(spec, effects)
+        model = spec.compile()
+        hooks = runtime_hooks(effects, model)
+    engine = make_engine(config.engine, model, config.num_worlds, config.threads, hooks, config.buffers, alone.device)
     return TrackingEnv(library_on(engine.device), engine, config, alone.seed(0))
 
 
@@ -120,11 +130,16 @@ def random_actions(env: TrackingEnv) -> list[torch.Tensor]:
     return [ACTION * torch.randn(shape, generator=generator, device=env.device) for _ in range(ROUND)]
 
 
-def loop_rate(env: TrackingEnv, ppo: PpoConfig, seconds: float, ranks: Ranks | None = None) -> Loop:
-    """The PPO loop for at least `seconds`, after three iterations that are not counted; all ranks call it together."""
-    together = ranks or Ranks()
-    trainer = Trainer(env, ppo, Path(tempfile.mkdtemp()), ranks=together)
+def started(env: TrackingEnv, ppo: PpoConfig, ranks: Ranks | None = None) -> Trainer:
+    """A trainer around the environment."""
+    trainer = Trainer(env, ppo, Path(tempfile.mkdtemp()), ranks=ranks)
     trainer.algorithm.train_mode()
+    return trainer
+
+
+def loop_rate(trainer: Trainer, seconds: float) -> Loop:
+    """The PPO loop for at least `seconds`, after three iterations that are not counted; all ranks call it together."""
+    env, ppo, together = trainer.env, trainer.config, trainer.ranks
     for _ in range(3):
         trainer._iterate()
     updates, update = [0.0], trainer.algorithm.update

@@ -2,14 +2,18 @@
 
     python -m benchmarks.throughput.several WORLDS SECONDS STEPS COMPILE LAYER...      # one of the processes
 
-The first of the processes prints its result as a line of JSON.
+The first of the processes prints its result as a line of JSON, and how far the networks of the processes are apart at
+the end, which is nothing.
 """
 
 import json
+import socket
 import subprocess
 import sys
 
-from benchmarks.throughput.measure import Loop, loop_rate, make_env
+from torch.nn.utils import parameters_to_vector
+
+from benchmarks.throughput.measure import Loop, loop_rate, make_env, started
 from bumblebee.errors import BadInput
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.ranks import join, leave
@@ -28,14 +32,24 @@ def measured(gpus: int, config: EnvConfig, ppo: PpoConfig, seconds: float) -> Lo
         BadInput: if it did not come to an end, with its last line.
     """
     own = [str(value) for value in (config.num_worlds, seconds, ppo.steps, int(config.compile), *ppo.hidden)]
-    start = ["-m", TORCHRUN, "--standalone", "--nproc-per-node", str(gpus)]
+    start = ["-m", TORCHRUN, "--nproc-per-node", str(gpus), "--master-addr", "127.0.0.1", "--master-port", free_port()]
     module = ["-m", "benchmarks.throughput.several", *own]
     done = subprocess.run([sys.executable, *start, *module], capture_output=True, text=True)
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     if done.returncode or not lines:
         told = [line for line in done.stderr.splitlines() if "expected" in line or "Error" in line]
         raise BadInput(f"{gpus} GPUs", "a measured loop", (told or done.stderr.splitlines() or ["nothing"])[0])
-    return Loop(**json.loads(lines[-1]))
+    result = json.loads(lines[-1])
+    if apart := result.pop("apart"):
+        raise BadInput(f"{gpus} GPUs", "one network on all", f"some that are {apart:g} apart")
+    return Loop(**result)
+
+
+def free_port() -> str:
+    """A port of this machine that nobody uses now."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return str(free.getsockname()[1])
 
 
 def print_several(counts: list[int], config: EnvConfig, ppo: PpoConfig, seconds: float) -> None:
@@ -60,9 +74,12 @@ def main() -> None:
     ppo = PpoConfig(steps=int(steps), epochs=5, mini_batches=4, hidden=tuple(map(int, hidden)))
     clips = make_library(EmbeddedConfig(limit=7))
     env = make_env(config, lambda device: MotionLibrary(clips, config.ahead, device=device), ranks)
-    loop = loop_rate(env, ppo, float(seconds), ranks)
-    if ranks.first:
-        print(json.dumps(vars(loop)), flush=True)
+    trainer = started(env, ppo, ranks)
+    loop = loop_rate(trainer, float(seconds))
+    networks = ranks.gather(parameters_to_vector(trainer.algorithm.actor.parameters()).detach().cpu())
+    if networks is not None:
+        apart = max(float((one - networks[0]).abs().max()) for one in networks)
+        print(json.dumps(vars(loop) | {"apart": apart}), flush=True)
     leave()
 
 

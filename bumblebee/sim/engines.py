@@ -28,8 +28,10 @@ def make_engine(
         BadInput: for a model or a machine that the engine cannot use.
     """
     if name == "mujoco":
-        kind = EffectsCpu if needs_effects(model, hooks) else MujocoCpu
-        return kind(model, num_worlds, threads=threads, hooks=hooks)
+        on_cpu = EffectsCpu if needs_effects(model, hooks) else MujocoCpu
+        return on_cpu(model, num_worlds, threads=threads, hooks=hooks)
     from bumblebee.sim.mujoco_warp import MujocoWarp
+    from bumblebee.sim.warp_effects import EffectsWarp
 
-    return MujocoWarp(model, num_worlds, hooks=hooks, buffers=buffers, device=device)
+    on_gpu = EffectsWarp if needs_effects(model, hooks) else MujocoWarp
+    return on_gpu(model, num_worlds, hooks=hooks, buffers=buffers, device=device)

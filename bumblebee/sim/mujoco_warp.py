@@ -18,7 +18,7 @@ from bumblebee.sim.effect_hooks import RuntimeHooks
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.mujoco_cpu import foot_sensor_columns, history_template, substeps_of
 from bumblebee.sim.rotations import rotate_inverse
-from bumblebee.sim.warp_limits import Buffers, fitting, overflow_line, refuse_hooks, warp_modules
+from bumblebee.sim.warp_limits import Buffers, fitting, overflow_line, warp_modules
 from bumblebee.sim.world_fields import with_constants
 
 _LARGEST = 1e10  # as in MuJoCo: a state beyond it, or no number, is bad
@@ -31,7 +31,8 @@ class MujocoWarp:
         model: free base first, then hinges with one position servo each, and the foot sensors of `sim.sensors`.
         num_worlds: how many robots.
         control_hz: rate of the policy; a whole number of physics steps must fit.
-        hooks: effects outside the model, see `bumblebee.sim.effects.runtime_hooks`.
+        hooks: effects outside the model, see `bumblebee.sim.effects.runtime_hooks`; here the encoders' offset alone,
+            the others are those of `sim.warp_effects.EffectsWarp`.
         device: a CUDA device ("cuda", "cuda:1"), or "cpu".
         buffers: room for contacts and constraints.
 
@@ -52,7 +53,6 @@ class MujocoWarp:
         buffers: Buffers | None = None,
     ) -> None:
         self._wp, self._mjw = warp_modules(device)
-        refuse_hooks(model, hooks)
         self.model, self.num_worlds, self.control_dt = model, num_worlds, 1.0 / control_hz
         self.device = torch.device(device)
         self.substeps = substeps_of(model, control_hz)
@@ -209,12 +209,19 @@ class MujocoWarp:
         self.settle()
 
     def _advance(self) -> None:
-        """A control period; what sensors say is asked for at its end only."""
+        """A control period."""
+        for _ in range(self.substeps - 1):
+            self._inner()
+        self._last_step()
+
+    def _inner(self) -> None:
+        """A physics step but the last of a control period, at whose end alone sensors are asked."""
         option, flags = self._model.opt, self._model.opt.disableflags
         option.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
-        for _ in range(self.substeps - 1):
-            self._mjw.step(self._model, self._data)
+        self._mjw.step(self._model, self._data)
         option.disableflags = flags
+
+    def _last_step(self) -> None:
         self._mjw.step(self._model, self._data)
         self._kinematics()
 

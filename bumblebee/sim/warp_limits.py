@@ -8,8 +8,6 @@ import numpy as np
 import torch
 
 from bumblebee.errors import BadInput
-from bumblebee.sim.effect_engine import needs_effects
-from bumblebee.sim.effect_hooks import RuntimeHooks
 
 _SHARE = 0.9  # of the free memory that the worlds may fill
 _SAMPLE = 64  # worlds from which the memory a world is measured
@@ -56,17 +54,6 @@ def _no_gpu(blind: str) -> BadInput:
 
 
 _INSTALL = "Install them in the checkout with `pip install -e '.[gpu]'`."
-
-
-def refuse_hooks(model: mujoco.MjModel, hooks: RuntimeHooks | None) -> None:
-    """Effects that only the CPU engine can add: those written before each physics step, play, flexible shafts.
-
-    Raises:
-        BadInput: if there are any.
-    """
-    if needs_effects(model, hooks):
-        came, do = "others", "Train with the engine `mujoco`, or without them."
-        raise BadInput("effects.yaml", "effects that MJCF carries, and encoder offsets", came, do)
 
 
 def fitting(model: mujoco.MjModel, num_worlds: int, buffers: Buffers, device: str) -> Any:

@@ -223,13 +223,6 @@ def test_a_model_that_warp_does_not_know_is_one_line(device: str) -> None:
         MujocoWarp(spec.compile(), WORLDS, device=device)
 
 
-def test_an_effect_that_warp_cannot_have_is_one_line(model: mujoco.MjModel, device: str) -> None:
-    """Effects written before every physics step need the CPU engine."""
-    hooks = runtime_hooks([single("torque_lag", "left_knee_joint", 0.01)], model)
-    with pytest.raises(BadInput, match="effects that MJCF carries"):
-        MujocoWarp(model, WORLDS, hooks=hooks, device=device)
-
-
 @pytest.mark.skipif(HAS_GPU, reason="there is a GPU")
 def test_without_a_gpu_one_line_says_so(model: mujoco.MjModel) -> None:
     """Before anything is allocated, with what to do."""
