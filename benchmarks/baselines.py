@@ -1,0 +1,278 @@
+"""Train one way of whole-body control on one GPU for some minutes, and try it in MuJoCo C.
+
+    python -m benchmarks.motion_pack g1_moves asap_g1 --out motions.npz
+    python -m benchmarks.baselines --method omnih2o --motions motions.npz --minutes 20 --out results/omnih2o
+
+`ours` is the task of this repository (`bumblebee.tracking`), `paper` the BumbleBee paper's teacher and student without
+clusters, experts and delta actions (its "General Init"), the others are those of `bumblebee.baselines`. All learn from
+the same motions for the same time on the same engine; a method with a student gives it 30 % of that time. The
+curriculum follows the time. `--call-minutes` ends a run early; the same command goes on from `resume.pt` in the output
+folder, with new episodes. `--set env.threshold_end=0.3 ppo.entropy=0.003` changes single settings.
+"""
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import torch
+
+from benchmarks.baselines_methods import METHODS, RANDOMISATIONS, Method, changed, method
+from benchmarks.baselines_trial import Tried, report
+from benchmarks.motion_pack import Packed, read_pack, whole_motions
+from bumblebee.baselines.dagger import Distiller
+from bumblebee.baselines.env import BaselineEnv
+from bumblebee.baselines.library import MovingLibrary
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.files import save_tensors
+from bumblebee.learning.distill import DistillConfig, distill
+from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.ppo import CURVE, Trainer
+from bumblebee.motion.pieces import motion_of
+from bumblebee.sim.engines import make_engine
+from bumblebee.tracking.config import ObservationConfig
+from bumblebee.tracking.env import TrackingEnv
+from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.model import task_model
+
+STUDENT_SHARE = 0.3
+RESUME, STUDENT_FOLDER, SETTINGS = "resume.pt", "student", "settings.json"
+_ENDLESS = 10**9
+_SAVE_EVERY, _TELL_EVERY = 120.0, 20.0  # s
+
+
+def training_clips(rows: list[Packed]) -> list[Packed]:
+    """What is learned from: whole motions, and the kept pieces of those with a gap; none that is held out."""
+    whole = whole_motions(rows)
+    complete = {(row.group, row.clip.name) for row in whole}
+    rest = [row for row in rows if row.kept and (row.group, motion_of(row.clip.name)) not in complete]
+    return [row for row in [*whole, *rest] if row.clip.split == "train"]
+
+
+def make_env(own: Method, rows: list[Packed], seed: int, share: float) -> TrackingEnv:
+    """The method's task; embedded motions are drawn `share` times as often for their length."""
+    task = own.env
+    engine = make_engine(task.engine, task_model(task), task.num_worlds, task.threads, buffers=task.buffers)
+    clips = [row.clip for row in rows]
+    shares = torch.tensor([share if row.group == "embedded" else 1.0 for row in rows])
+    if own.baseline is None:
+        return TrackingEnv(MotionLibrary(clips, task.ahead, device=engine.device), engine, task, seed, None, shares)
+    library = MovingLibrary(clips, task.ahead, device=engine.device)
+    return BaselineEnv(library, engine, replace(own.baseline, env=task), seed, shares)
+
+
+class Clock:
+    """When to stop: the call's end, and lines now and then.
+
+    Args:
+        minutes: how long this call may train; None for as long as it takes.
+    """
+
+    def __init__(self, minutes: float | None) -> None:
+        self.began = time.monotonic()
+        self.limit = None if minutes is None else 60 * minutes
+        self._marks = {"tell": self.began, "save": self.began}
+
+    @property
+    def over(self) -> bool:
+        """Whether the call's time is up."""
+        return self.limit is not None and time.monotonic() - self.began > self.limit
+
+    def due(self, what: str, every: float) -> bool:
+        """Whether so many seconds have gone by since this was last due."""
+        if time.monotonic() - self._marks[what] < every:
+            return False
+        self._marks[what] = time.monotonic()
+        return True
+
+
+def train_teacher(
+    own: Method, rows: list[Packed], options: argparse.Namespace, clock: Clock, minutes: float
+) -> Trainer:
+    """Train, or go on, until `minutes` of training are done or the call is over."""
+    alone = replace(
+        own, env=replace(own.env, student=ObservationConfig(terms=()))
+    )  # nobody sees the student's part yet
+    env = make_env(alone, rows, options.seed, options.embedded)
+    config = replace(own.ppo, iterations=_ENDLESS, checkpoint_every=_ENDLESS)
+    trainer = Trainer(env, config, options.out, options.seed, options.parent)
+    if (options.out / RESUME).exists():
+        _resume(trainer, options.out / RESUME)
+    elif options.std:
+        trainer.algorithm.actor.distribution.std_param.data.fill_(options.std)
+
+    def enough() -> bool:
+        if trainer.iteration:
+            each = trainer._seconds / trainer.iteration
+            trainer.config = replace(trainer.config, iterations=max(round(60 * minutes / each), trainer.iteration + 1))
+        if clock.due("tell", _TELL_EVERY):
+            _tell(options.out / CURVE)
+        if clock.due("save", _SAVE_EVERY):
+            _save(trainer, options.out / RESUME)
+        return trainer._seconds >= 60 * minutes or clock.over
+
+    if not enough():
+        trainer.train(own.name, enough)
+    _save(trainer, options.out / RESUME)
+    return trainer
+
+
+def _save(trainer: Trainer, path: Path) -> None:
+    env = trainer.env
+    score = env.score.kept() if isinstance(env, BaselineEnv) else {}
+    content = {
+        "algorithm": trainer.algorithm.save(),
+        "learning_rate": trainer.algorithm.learning_rate,
+        "iteration": trainer.iteration,
+        "seconds": trainer._seconds,
+        "failure": env.sampler.failure.cpu(),
+        "score": {name: score[name].cpu() for name in ("factor", "mean_length") if score},
+    }
+    save_tensors(path, content)
+
+
+def _resume(trainer: Trainer, path: Path) -> None:
+    content = torch.load(path, weights_only=True, map_location="cpu")
+    trainer.algorithm.load(content["algorithm"], None, True)
+    trainer.algorithm.learning_rate = content["learning_rate"]
+    trainer.iteration, trainer._seconds = content["iteration"], content["seconds"]
+    trainer.env.sampler.failure.copy_(content["failure"])
+    if isinstance(trainer.env, BaselineEnv):
+        for name, value in content["score"].items():
+            trainer.env.score.kept()[name].copy_(value)
+    print(f"goes on after {trainer.iteration} iterations, {trainer._seconds / 60:.1f} min", flush=True)
+
+
+def _tell(curve: Path) -> None:
+    if curve.exists():
+        lines = curve.read_text().splitlines()
+        names, values = lines[0].split(","), lines[-1].split(",")
+        row = dict(zip(names, values, strict=False))
+        wanted = ("frames", "seconds", "reward", "success", "key_error", "episode_length", "unstable", "action_std")
+        print(
+            "  ".join(f"{name} {row[name]}" for name in (*wanted, "learning_rate", "threshold") if name in row),
+            flush=True,
+        )
+
+
+def train_student(
+    own: Method, rows: list[Packed], teacher: Policy, options: argparse.Namespace, clock: Clock
+) -> Policy | None:
+    """The student of a finished teacher, or None if the call is over before it is done."""
+    quiet = replace(own, env=replace(own.env, observation=replace(own.env.observation, noise=0.0)))
+    env, seconds = make_env(quiet, rows, options.seed + 1, options.embedded), 60 * STUDENT_SHARE * options.minutes
+    if isinstance(own.student, DistillConfig):
+        return _aggregated(env, own.student, teacher, seconds)
+    distiller = Distiller(env, teacher, own.student, options.out / STUDENT_FOLDER, options.seed)
+
+    def enough() -> bool:
+        if clock.due("tell", _TELL_EVERY):
+            _tell(options.out / STUDENT_FOLDER / "student.csv")
+        return distiller.seconds >= seconds or clock.over
+
+    distiller.train(enough)
+    distiller.save_checkpoint()
+    return distiller.policy() if distiller.seconds >= seconds else None
+
+
+def _aggregated(env: TrackingEnv, config: DistillConfig, teacher: Policy, seconds: float) -> Policy:
+    """The paper's DAgger over all that was gathered; it starts over when a call ends in it."""
+    began, done = time.monotonic(), [0]
+
+    def enough() -> bool:
+        done[0] += 1
+        return time.monotonic() - began > seconds
+
+    # The experts' share of the steps falls over the first half of the iterations: as many as will fit.
+    each = _seconds_a_step(env)
+    config = replace(config, iterations=max(round(seconds / (config.steps * each)), 1))
+    student, curve = distill(env, {0: teacher}, [0] * len(env.library), config, enough=enough)
+    print(f"{done[0]} rounds of DAgger, KL {float(curve['kl'].iloc[-1]):.3f}", flush=True)
+    return student
+
+
+def _seconds_a_step(env: TrackingEnv, steps: int = 50) -> float:
+    """Time of a control step, about doubled by the learning that goes with it [s]."""
+    still = torch.zeros(env.num_envs, env.num_actions, device=env.device)
+    env.step(still)
+    began = time.monotonic()
+    for _ in range(steps):
+        env.step(still)
+    env.engine.check()  # waits for the device
+    return 2 * (time.monotonic() - began) / steps
+
+
+def run(options: argparse.Namespace) -> int:
+    """Train and try; 0 when done, also if the call was over before."""
+    own = method(options.method)
+    if options.randomisation:
+        own = replace(own, env=replace(own.env, randomisation=RANDOMISATIONS[options.randomisation]))
+    sizes = {"engine": options.engine, "num_worlds": options.worlds, "physics_hz": 200.0, "threads": options.threads}
+    own = changed(replace(own, env=replace(own.env, **sizes)), options.set)
+    rows = read_pack(options.motions)
+    options.out.mkdir(parents=True, exist_ok=True)
+    settings = {"method": own.name, "minutes": options.minutes, "env": asdict(own.env), "ppo": asdict(own.ppo)}
+    settings |= {"student": asdict(own.student) if own.student else None, "parent": str(options.parent or "")}
+    (options.out / SETTINGS).write_text(json.dumps(settings, indent=1) + "\n")
+    torch.set_num_threads(options.threads)
+    clock, learned = Clock(options.call_minutes), training_clips(rows)
+    share = STUDENT_SHARE if own.student else 0.0
+    trainer = train_teacher(own, learned, options, clock, (1 - share) * options.minutes)
+    policy: Policy | None = trainer.policy()
+    # Who has a student is nobody's parent: its critic is not kept.
+    (Policy(policy.actor, {}, policy.shape) if own.student else policy).save(options.out)
+    if trainer._seconds < 60 * (1 - share) * options.minutes:
+        print("the call is over: the same command goes on", flush=True)
+        return 0
+    print(f"trained {trainer.frames / 1e6:.1f} M steps in {trainer._seconds / 60:.1f} min", flush=True)
+    del trainer
+    folders = {"teacher" if own.student else own.name: (options.out, own.first)}
+    if own.student:
+        target = options.out / STUDENT_FOLDER
+        target.mkdir(exist_ok=True)
+        if not (target / "policy.pt").exists():
+            policy = train_student(own, learned, load_policy(options.out), options, clock)
+            if policy is None:
+                print("the call is over: the same command goes on", flush=True)
+                return 0
+            policy.save(target)
+        folders[own.name] = (target, own.tried)
+    tried = [Tried(name, folder, manner) for name, (folder, manner) in folders.items()]
+    report(tried, options.motions, options.out, options.jobs)
+    return 0
+
+
+def parse(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--method", choices=METHODS, required=True)
+    parser.add_argument("--motions", type=Path, required=True, help="file of benchmarks.motion_pack")
+    parser.add_argument("--out", type=Path, required=True, help="folder for results; a run found there goes on")
+    parser.add_argument("--minutes", type=float, default=20.0, help="training in all, the student's included")
+    parser.add_argument("--call-minutes", type=float, help="end this call after so long")
+    parser.add_argument("--engine", choices=("mujoco", "mujoco_warp"), default="mujoco_warp")
+    parser.add_argument("--worlds", type=int, default=8192)
+    parser.add_argument("--threads", type=int, default=2, help="CPU threads")
+    parser.add_argument("--jobs", type=int, default=12, help="processes that try the policy")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--embedded", type=float, default=1.0, help="factor on how often embedded motions are drawn")
+    parser.add_argument("--randomisation", choices=tuple(RANDOMISATIONS), help="instead of the method's own")
+    parser.add_argument("--parent", type=Path, help="folder of a policy to start from")
+    parser.add_argument("--std", type=float, default=0.0, help="the actions' first deviation, instead of the parent's")
+    parser.add_argument("--set", nargs="*", default=[], metavar="PATH=VALUE")
+    return parser.parse_args(arguments)
+
+
+def main(work: Callable[[argparse.Namespace], int] = run) -> None:
+    """Run; bad input is one line and status 2."""
+    try:
+        raise SystemExit(work(parse()))
+    except BadInput as error:
+        print(error, flush=True)
+        raise SystemExit(EXIT_BAD_INPUT) from None
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+"""Packed motions, methods by name, settings by path, and a training of a second that ends and goes on."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from benchmarks.baselines import RESUME, parse, run, training_clips
+from benchmarks.baselines_methods import METHODS, changed, method
+from benchmarks.baselines_trial import RESULTS, TABLE, TRIALS, summary, table_of
+from benchmarks.motion_pack import Packed, read_pack, whole_motions, write_pack
+from bumblebee.errors import BadInput
+from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.motion.pieces import split_long
+
+CLIPS = make_library(EmbeddedConfig(limit=3))
+
+
+def pieces(name: str, group: str = "real", dropped: int | None = None, split: str = "train") -> list[Packed]:
+    """A motion in pieces of about 3 s; the filter dropped one of them, if any."""
+    cut = split_long(replace(CLIPS[0], name=name, split=split), 3.0)
+    return [Packed(group, i != dropped, clip) for i, clip in enumerate(cut)]
+
+
+def test_a_pack_comes_back_as_it_was(tmp_path: Path):
+    rows = pieces("a", dropped=1) + pieces("b", split="test")
+    write_pack(tmp_path / "m.npz", rows)
+    again = read_pack(tmp_path / "m.npz")
+    assert [(r.group, r.kept, r.clip.name, r.clip.split, r.clip.family) for r in again] == [
+        (r.group, r.kept, r.clip.name, r.clip.split, r.clip.family) for r in rows
+    ]
+    for old, new in zip(rows, again, strict=True):
+        assert np.allclose(old.clip.joint_pos, new.clip.joint_pos) and np.allclose(
+            old.clip.key_pos, new.clip.key_pos, atol=1e-5
+        )
+
+
+@pytest.mark.parametrize("content", [None, b"no archive"])
+def test_what_is_no_pack_is_one_line(tmp_path: Path, content: bytes | None):
+    path = tmp_path / "m.npz"
+    if content:
+        path.write_bytes(content)
+    with pytest.raises(BadInput, match=r"expected a file of benchmarks.motion_pack"):
+        read_pack(path)
+
+
+def test_whole_motions_are_their_pieces_in_order_and_those_with_a_gap_are_left_out():
+    rows = pieces("whole") + pieces("gap", dropped=0)
+    joined = whole_motions(list(reversed(rows)))
+    assert [row.clip.name for row in joined] == ["whole"]
+    assert np.array_equal(joined[0].clip.joint_pos, CLIPS[0].joint_pos)
+
+
+def test_training_takes_whole_motions_the_pieces_beside_gaps_and_nothing_held_out():
+    rows = pieces("whole") + pieces("gap", dropped=0) + pieces("held", split="test")
+    assert [row.clip.name for row in training_clips(rows)] == ["whole", "gap_p1"]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_has_settings_of_its_own(name: str):
+    own = method(name)
+    assert own.name == name and (own.student is None) == (name == "ours")
+    assert own.tried.scale == (None if name in ("ours", "paper") else 0.25)
+
+
+def test_settings_are_changed_by_path():
+    own = changed(method("ours"), ["env.threshold_end=0.25", "ppo.hidden=[8, 8]", "env.randomisation.push=1"])
+    own = changed(own, ["ppo.learning_rate_range=[1e-5, 2e-3]", "ppo.learning_rate=3e-4"])
+    assert own.ppo.learning_rate_range == (1e-5, 2e-3) and own.ppo.learning_rate == 3e-4
+    assert own.env.threshold_end == 0.25 and own.ppo.hidden == (8, 8) and own.env.randomisation.push == 1.0
+    with pytest.raises(BadInput, match=r"--set env.thresold=1: expected engine or .*, came thresold"):
+        changed(own, ["env.thresold=1"])
+    with pytest.raises(BadInput, match="came deeper"):
+        changed(own, ["ppo.entropy.deeper=1"])
+
+
+def test_the_table_counts_motions_and_not_pieces():
+    rows = [("a_p0", True), ("a_p1", True), ("b", False)]
+    table = pd.DataFrame(rows, columns=["name", "success"]).assign(
+        policy="x",
+        kind="pieces",
+        group="asap",
+        split="train",
+        success_local=True,
+        mpjpe_rad=0.1,
+        mpkpe_mm=[10.0, 20.0, 60.0],
+    )
+    table["mpkpe_local_mm"] = 5.0
+    results = summary(table)
+    assert [entry["group"] for entry in results] == ["asap", "real"]
+    assert results[0]["n"] == 3 and results[0]["success"]["value"] == pytest.approx(2 / 3)
+    assert results[0]["success"]["motions"] == 2 and results[0]["mpkpe_mm"]["value"] == pytest.approx((15 + 60) / 2)
+    assert results[0]["mpkpe_mm_successful"]["value"] == 15.0
+    assert "| x | asap, pieces | train | 3 | 0.67 [" in table_of(results)
+
+
+def test_a_call_that_is_over_goes_on_to_the_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    write_pack(tmp_path / "m.npz", [Packed("real", True, clip) for clip in CLIPS[:2]])
+    command = ["--method", "omnih2o", "--motions", str(tmp_path / "m.npz"), "--out", str(tmp_path / "out")]
+    command += ["--engine", "mujoco", "--worlds", "4", "--threads", "1", "--jobs", "1", "--minutes", "0.05"]
+    command += ["--set", "ppo.hidden=[8]", "ppo.steps=4", "student.hidden=[8]"]
+    assert run(parse([*command, "--call-minutes", "0.01"])) == 0
+    assert "the same command goes on" in capsys.readouterr().out
+    first = torch.load(tmp_path / "out" / RESUME, weights_only=True)
+    assert not (tmp_path / "out" / TABLE).exists()
+    assert run(parse(command)) == 0
+    assert "goes on after" in capsys.readouterr().out
+    last = torch.load(tmp_path / "out" / RESUME, weights_only=True)
+    assert last["iteration"] > first["iteration"] > 0 and last["seconds"] >= 0.7 * 3.0
+    trials = pd.read_csv(tmp_path / "out" / TRIALS)
+    assert set(trials["policy"]) == {"teacher", "omnih2o"} and set(trials["name"]) == {c.name for c in CLIPS[:2]}
+    assert (tmp_path / "out" / RESULTS).exists() and (tmp_path / "out" / TABLE).exists()
