@@ -52,7 +52,12 @@ def mjlab_rates(
         motion = Path(folder) / "motion.npz"
         write_motion(motion, clips)
         command = [peer.python, str(SCRIPT), str(motion), str(worlds), str(seconds), device]
-        own = os.environ | {"PYTHONPATH": peer.site, "MJLAB_WARP_QUIET": "1", "WANDB_MODE": "disabled"}
+        own = os.environ | {
+            "PYTHONPATH": peer.site,
+            "MJLAB_WARP_QUIET": "1",
+            "WANDB_MODE": "disabled",
+            "MUJOCO_GL": "disable",
+        }
         try:
             done = subprocess.run(command, capture_output=True, text=True, env=own, timeout=limit, cwd=folder)
         except (OSError, subprocess.TimeoutExpired) as error:

@@ -9,6 +9,7 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from torch import distributed as dist
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 
 T = TypeVar("T")
+_LAUNCHED = "BUMBLEBEE_LAUNCHED"
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,7 @@ def join(on_gpu: bool = True) -> Ranks:
     """
     if not started_together():
         return Ranks()
+    end_with_launcher()
     rank, count = int(os.environ["RANK"]), int(os.environ["WORLD_SIZE"])
     if on_gpu:
         try:
@@ -105,6 +108,17 @@ def join(on_gpu: bool = True) -> Ranks:
     if not dist.is_initialized():
         dist.init_process_group("cpu:gloo,cuda:nccl" if on_gpu else "gloo", rank=rank, world_size=count)
     return Ranks(rank, count, f"cuda:{rank}")
+
+
+def end_with_launcher() -> None:
+    """Where `launch` started this process: end it, whatever it does, when that one is gone."""
+    if os.environ.get(_LAUNCHED):
+        threading.Thread(target=_wait_for_end, daemon=True, name="launcher").start()
+
+
+def _wait_for_end() -> None:
+    os.read(0, 1)  # nothing is ever written there; it ends when the other end is closed
+    os._exit(1)
 
 
 def leave() -> None:
@@ -139,9 +153,9 @@ def launch(count: int, command: Sequence[str]) -> int:
     for rank in range(count):
         where = {"RANK": rank, "LOCAL_RANK": rank, "WORLD_SIZE": count, "LOCAL_WORLD_SIZE": count}
         where |= {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port}
-        own = os.environ | {name: str(value) for name, value in where.items()}
+        own = os.environ | {name: str(value) for name, value in where.items()} | {_LAUNCHED: "1"}
         out = None if rank == 0 else subprocess.DEVNULL
-        ranks.append(subprocess.Popen([sys.executable, *command], env=own, stdout=out))
+        ranks.append(subprocess.Popen([sys.executable, *command], env=own, stdin=subprocess.PIPE, stdout=out))
     try:
         while True:
             codes = [process.poll() for process in ranks]

@@ -1,10 +1,17 @@
 """Training by several processes: one policy, worlds of their own, one curve, and going on after a death."""
 
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import psutil
 import pytest
 import torch
 
@@ -63,6 +70,43 @@ def test_it_goes_on_where_it_was_when_one_process_died(whole: Path, tmp_path: Pa
         assert torch.equal(a["frame"], b["frame"])
     curves = [pd.read_csv(folder / CURVE).drop(columns="seconds") for folder in (whole, tmp_path)]
     pd.testing.assert_frame_equal(*curves)
+
+
+SLEEPER = """
+import os, sys, time
+from bumblebee.learning.ranks import end_with_launcher
+end_with_launcher()
+with open(sys.argv[1] + os.environ["RANK"], "w") as file:
+    file.write(str(os.getpid()))
+time.sleep(100)
+"""
+
+
+def test_no_process_outlives_the_one_that_started_them(tmp_path: Path) -> None:
+    """Killed without a chance to end them itself."""
+    start = f"from bumblebee.learning.ranks import launch; launch(2, ['-c', {SLEEPER!r}, {str(tmp_path) + '/'!r}])"
+    launcher = subprocess.Popen([sys.executable, "-c", start])
+    files = [tmp_path / "0", tmp_path / "1"]
+    _until(lambda: all(file.exists() and file.read_text() for file in files))
+    launcher.send_signal(signal.SIGKILL)
+    launcher.wait()
+    _until(lambda: not any(_runs(int(file.read_text())) for file in files))
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+        return psutil.Process(process).status() != psutil.STATUS_ZOMBIE
+    except (ProcessLookupError, psutil.NoSuchProcess):
+        return False
+
+
+def _until(true: Callable[[], bool]) -> None:
+    for _ in range(1200):
+        if true():
+            return
+        time.sleep(0.05)
+    raise AssertionError("not within a minute")
 
 
 def test_more_ranks_than_gpus_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
