@@ -214,5 +214,5 @@ def _errors(session: Session, effects: Sequence[Effect], config: DiagnosisConfig
     return {
         "before": error_block(*common, whiteners, before, fine, config.seed),
         "after": error_block(*common, whiteners, after, fine, config.seed),
-        "floor": floor_block(*common, whiteners, after, session.sigma, fine, config.seed),
+        "floor": floor_block(*common, whiteners, session.sigma, config.seed),
     }

@@ -12,16 +12,15 @@ from scipy.stats import t as student
 
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.signals import Layout
-from bumblebee.diagnosis.simulate import Starts, residuals
+from bumblebee.diagnosis.simulate import residuals
 from bumblebee.diagnosis.variation import Variation
-from bumblebee.diagnosis.whiten import Whitener, fit_whitener, perturbed_starts
+from bumblebee.diagnosis.whiten import Whitener, fit_whitener
 from bumblebee.diagnosis.windows import Windows, choose_starts, cut, select
 from bumblebee.measured.rollout import Rollout
 
 HORIZONS = ("0.02", "0.2", "1.0")
 _RESAMPLES = 400
 _WHITENED = {"0.02": 60, "0.2": 40, "1.0": 12}
-_FLOOR_STARTS = 8
 
 
 def horizon_windows(
@@ -83,23 +82,19 @@ def floor_block(
     layout: Layout,
     windows: dict[str, Windows],
     whiteners: dict[str, tuple[np.ndarray, Whitener]],
-    variation: Variation,
     sigma: np.ndarray,
-    step: float,
     seed: int = 0,
 ) -> dict[str, Any]:
-    """What sensor noise alone leaves of the errors, in the same form."""
+    """What sensor noise alone leaves of the errors, in the same form, from the starts that the whiteners simulated."""
     rng = np.random.default_rng(seed)
     block = {}
     for name, every in windows.items():
         keep, whitener = whiteners[name]
         part = select(every, keep)
-        starts = perturbed_starts(plant, layout, part, sigma, rng)
-        some = rng.permutation(len(starts.qpos))[:_FLOOR_STARTS]
-        centre = residuals(plant, layout, part, [variation], step)[0]
-        moved = residuals(plant, layout, part, [variation], step, Starts(starts.qpos[some], starts.qvel[some]))
-        error = moved - centre + sigma * rng.standard_normal(moved.shape)
-        good = np.isfinite(error).all(axis=(2, 3))
+        moved = np.linalg.solve(whitener.factor[None], (whitener.moved + whitener.curvature)[..., None])[..., 0]
+        error = moved.reshape(len(moved), *part.measured.shape)
+        error = error + sigma * rng.standard_normal(error.shape)
+        good = np.broadcast_to(whitener.valid, error.shape[:2])
         chi = (whitener(error, centre=False) ** 2).mean(axis=2)[good]
         groups = np.broadcast_to(part.rollout, good.shape)[good]
         block[name] = _measures(plant, layout, error[good][:, 0], groups, chi, groups, rng)

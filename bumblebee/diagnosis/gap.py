@@ -46,7 +46,7 @@ def gap(session: Session, budget: int = 120, seed: int = 0) -> Gap:
         "seconds": float(sum(r.time[-1] - r.time[0] for r in session.rollouts)),
         "commands": "torques" if session.plant.torque_input else "position targets",
         "error": error_block(*common, whiteners, model, session.steps[0], seed),
-        "floor": floor_block(*common, whiteners, model, session.sigma, session.steps[0], seed),
+        "floor": floor_block(*common, whiteners, session.sigma, seed),
         "missing_torque": _torques(found, train, held),
         "reported_torque": reported_torque(session.plant, session.rollouts),
         "motions": _by_motion(session, windows),

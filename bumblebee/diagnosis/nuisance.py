@@ -8,7 +8,8 @@ the step and the same for every joint, so each kind is one column with one coeff
 - velocity clock: velocities are read a little before positions;
 - height, only where the base's height is not measured but taken from stance: all heights shifted, 1 for a millimetre.
 
-A coefficient of 1 stands for one millisecond; that is also its prior's standard deviation.
+A coefficient of 1 stands for one millisecond; that is also its prior's standard deviation. A problem has one nuisance
+more, the curvature of the start's noise (`whiten`).
 """
 
 import copy
@@ -20,7 +21,7 @@ from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.signals import Layout
 from bumblebee.diagnosis.simulate import Starts, residuals
 from bumblebee.diagnosis.variation import Variation
-from bumblebee.diagnosis.windows import Windows, select
+from bumblebee.diagnosis.windows import Windows
 
 NAMES = ("integrator", "position_loop", "velocity_loop", "velocity_clock", "height")
 _UNIT = 0.001  # [s]
@@ -29,10 +30,15 @@ _HEIGHT = 0.001  # [m]
 
 def nuisance_columns(plant: Plant, layout: Layout, windows: Windows, variation: Variation, step: float) -> np.ndarray:
     """Change of the prediction for coefficient 1 of each nuisance, (4 or 5, W, N, D); diverged windows are NaN."""
-    base = residuals(plant, layout, windows, [variation], step)[0]
+    ticks = windows.out_time
+    # One simulation, read at the ticks, a little before them, and just after the start.
+    every = residuals(plant, layout, _read_thrice(windows, 2 * step), [variation], step)[0]
+    base, early, first = np.split(every, [ticks.shape[1], 2 * ticks.shape[1]], axis=1)
     double = residuals(plant, layout, windows, [variation], 2 * step)[0]
     late = residuals(plant, layout, windows, [_late_loop(plant, variation, part) for part in ("kp", "kd")], step)
-    clock = _clock(plant, layout, windows, variation, step, base)
+    start = _faster(plant, layout, windows, windows.measured[:, 0] - first[:, 0], 2 * step)
+    clock = base - residuals(plant, layout, windows, [variation], step, start)[0]
+    clock[..., layout.slices["joint_vel"]] += (base - early)[..., layout.slices["joint_vel"]]
     columns = [(base - double) * (_UNIT / step), base - late[0], base - late[1], clock]
     if plant.floating and "base_pos" not in layout.slices:
         higher = windows.qpos.copy()
@@ -58,34 +64,19 @@ def _late_loop(plant: Plant, variation: Variation, part: str) -> Variation:
     return replace(variation, model=model)
 
 
-def _clock(
-    plant: Plant, layout: Layout, windows: Windows, variation: Variation, step: float, base: np.ndarray
-) -> np.ndarray:
-    """Start faster by the acceleration times e and read the velocities e earlier."""
-    early = _joint_velocities(plant, layout, windows, variation, step, -_UNIT)
-    now = _joint_velocities(plant, layout, windows, variation, step, 0.0)
-    first = _joint_velocities(plant, layout, windows, variation, step, 2 * step, at_start=True)
+def _read_thrice(windows: Windows, after: float) -> Windows:
+    """The same windows (N ticks) compared at their ticks, a millisecond before each, and `after` s from the start."""
+    ticks = windows.out_time
+    times = np.concatenate((ticks, ticks - _UNIT, np.full((len(windows), 1), after)), axis=1)
+    measured, quat = (
+        None if x is None else np.concatenate((x, x, x[:, :1]), axis=1) for x in (windows.measured, windows.quat)
+    )
+    return replace(windows, out_time=times, measured=measured, quat=quat)
+
+
+def _faster(plant: Plant, layout: Layout, windows: Windows, readings: np.ndarray, after: float) -> Starts:
+    """Starts whose joints are faster by a millisecond of their acceleration, from simulated readings (W, D)."""
     start = windows.qvel.copy()
-    acceleration = (first[:, 0] - start[:, plant.dof]) / (2 * step)
-    start[:, plant.dof] += _UNIT * acceleration
-    moved = residuals(plant, layout, windows, [variation], step, Starts(windows.qpos[None], start[None]))[0]
-    out = base - moved
-    out[..., layout.slices["joint_vel"]] += early - now
-    return out
-
-
-def _joint_velocities(
-    plant: Plant,
-    layout: Layout,
-    windows: Windows,
-    variation: Variation,
-    step: float,
-    shift: float,
-    at_start: bool = False,
-) -> np.ndarray:
-    """Simulated joint velocities (W, N, J) at the compared ticks plus `shift` s, or `shift` s after the start."""
-    times = np.full_like(windows.out_time, shift) if at_start else windows.out_time + shift
-    moved = select(windows, np.arange(len(windows)))
-    object.__setattr__(moved, "out_time", times)
-    part = layout.slices["joint_vel"]
-    return moved.measured[..., part] - residuals(plant, layout, moved, [variation], step)[0][..., part]
+    gained = readings[:, layout.slices["joint_vel"]] - start[:, plant.dof]
+    start[:, plant.dof] += _UNIT * gained / after
+    return Starts(windows.qpos[None], start[None])

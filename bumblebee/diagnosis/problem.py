@@ -8,6 +8,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.nuisance import nuisance_columns
 from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.restart import restarted, start_moves
 from bumblebee.diagnosis.signals import Layout
 from bumblebee.diagnosis.simulate import Starts, residuals
 from bumblebee.diagnosis.variation import vary
@@ -36,7 +37,9 @@ class Problem:
     """Step [s] for sensitivities of many candidates."""
     whitener: Whitener = field(repr=False)
     nuisance: np.ndarray = field(repr=False)
-    """(4 or 5, W, M) whitened."""
+    """(5 or 6, W, M) whitened: numerical differences, and last the start noise's curvature."""
+    read: Windows = field(repr=False)
+    """The windows with their starts as measured."""
 
     def residual(self, effects: Sequence[Sequence[Effect]], coarse: bool = False) -> np.ndarray:
         """Whitened residuals of several models, (V, W, M)."""
@@ -86,15 +89,16 @@ class Problem:
         with the declared model's columns a delay of 13 ms came out 0.1 ms short, five standard errors.
         """
         raw = nuisance_columns(self.plant, self.layout, self.windows, vary(self.plant, effects), self.fine)
-        fresh = self.whitener(raw, centre=False)
+        fresh = _columns(self.whitener, raw)
         bad = ~np.isfinite(raw).all(axis=(0, 2, 3))
         fresh[:, bad] = self.nuisance[:, bad]
         return replace(self, nuisance=fresh)
 
     def part(self, keep: np.ndarray) -> "Problem":
         """The problem on the windows `keep`."""
+        windows, read = select(self.windows, keep), select(self.read, keep)
         return replace(
-            self, windows=select(self.windows, keep), whitener=self.whitener.part(keep), nuisance=self.nuisance[:, keep]
+            self, windows=windows, whitener=self.whitener.part(keep), nuisance=self.nuisance[:, keep], read=read
         )
 
 
@@ -118,10 +122,15 @@ def make_problem(
     effects: Sequence[Effect],
     rng: np.random.Generator,
 ) -> Problem:
-    """Whiten `windows` around the declared model with `effects`; windows that diverge are dropped."""
+    """Whiten `windows` around the declared model with `effects`; windows that diverge are dropped.
+
+    The windows start as measured; the problem's start where the readings after that say they did.
+    """
     fine, coarse = steps
-    variation = vary(plant, effects)
-    whitener = fit_whitener(plant, layout, windows, variation, sigma, coarse, rng)
+    variation, read = vary(plant, effects), windows
+    move = start_moves(plant, layout, read, variation, sigma, coarse, rng)
+    windows = restarted(plant, layout, read, move)
+    whitener = fit_whitener(plant, layout, windows, variation, sigma, coarse, rng, move)
     raw = nuisance_columns(plant, layout, windows, variation, fine)
     keep = whitener.valid & np.isfinite(raw).all(axis=(0, 2, 3))
     if keep.mean() < 0.5:
@@ -132,7 +141,13 @@ def make_problem(
             "Look at gains, time step and units of the declared model.",
         )
     windows, raw, whitener = select(windows, keep), raw[:, keep], whitener.part(keep)
-    return Problem(plant, layout, windows, sigma, fine, coarse, whitener, whitener(raw, centre=False))
+    columns = _columns(whitener, raw)
+    return Problem(plant, layout, windows, sigma, fine, coarse, whitener, columns, select(read, keep))
+
+
+def _columns(whitener: Whitener, raw: np.ndarray) -> np.ndarray:
+    """Nuisances (B + 1, W, M) of B numerical differences (B, W, N, D) and the start noise's curvature."""
+    return np.concatenate((whitener(raw, centre=False), whitener.curvature[None]))
 
 
 def window_weights(residual: np.ndarray) -> np.ndarray:

@@ -23,8 +23,10 @@ class Refined:
 
 
 def refine(problem: Problem, fit: Fit, rng: np.random.Generator) -> Refined:
-    """Whiten and linearise around `fit`, and fit again."""
-    plant, layout, windows = problem.plant, problem.layout, problem.windows
+    """Whiten and linearise around `fit`, and fit again; a fit of nothing is as it should be already."""
+    if not fit.chosen:
+        return Refined(problem, fit, window_weights(fit.clean(problem)), np.empty(0))
+    plant, layout, windows = problem.plant, problem.layout, problem.read
     problem = make_problem(plant, layout, windows, problem.sigma, (problem.fine, problem.coarse), fit.effects, rng)
     residual = problem.residual([fit.effects])[0]
     _, nuisance = cost_of(problem, residual, window_weights(residual))

@@ -98,7 +98,8 @@ def torque_residual(
     variation = vary(plant, effects)
     left = residuals(plant, layout, windows, [variation], steps[0])[0]
     if np.any(nuisance):
-        left = left - np.tensordot(nuisance, nuisance_columns(plant, layout, windows, variation, steps[0]), axes=1)
+        columns = nuisance_columns(plant, layout, windows, variation, steps[0])
+        left = left - np.tensordot(nuisance[: len(columns)], columns, axes=1)
     change = _answers(plant, layout, windows, effects, steps[1])
     part = layout.slices["joint_vel"]
     good = np.isfinite(left).all(axis=(1, 2)) & np.isfinite(change).all(axis=(1, 2))

@@ -4,8 +4,11 @@ The residual of a window has the noise of its readings and, larger by far in con
 The second part is sampled: K perturbed starts give K differences. Their signs come from a Hadamard matrix, each start
 coordinate one of its columns: all coordinates move at once, by one standard deviation, yet where the simulation is
 linear the K differences have the propagated covariance exactly, without the error of a random sample. Where it is not
-(contact), a part of the covariance is shrunk to its diagonal. The differences' mean is the bias that a noisy start
-leaves behind kinks and contacts; it is taken out of the residual.
+(contact), a part of the covariance is shrunk to its diagonal.
+
+The differences' mean is what curvature makes of noise. Seen from the measured start the true one is `start - noise`, so
+the residual's mean has the opposite sign, and less of it where the true state is known to be milder than a measured one
+(feet rest on the floor). How much is left to the fit: the mean is one of its nuisances, it is not subtracted.
 """
 
 from dataclasses import dataclass
@@ -30,8 +33,10 @@ class Whitener:
 
     factor: np.ndarray
     """(W, M, M) lower triangular: whitened = factor @ residual."""
-    bias: np.ndarray
-    """(W, M) mean residual that noise in the start leaves."""
+    offset: np.ndarray
+    """(W, M) residual that the starts' distance from the measured ones makes; 0 for measured starts."""
+    curvature: np.ndarray
+    """(W, M) whitened mean change of the residual from noise in the start."""
     valid: np.ndarray
     """(W,) windows whose simulations stayed finite."""
     moved: np.ndarray
@@ -39,42 +44,44 @@ class Whitener:
 
     def part(self, keep: np.ndarray) -> "Whitener":
         """The whitener of the windows at the indices or mask `keep`."""
-        return Whitener(self.factor[keep], self.bias[keep], self.valid[keep], self.moved[:, keep])
+        return Whitener(
+            self.factor[keep], self.offset[keep], self.curvature[keep], self.valid[keep], self.moved[:, keep]
+        )
 
     def __call__(self, residual: np.ndarray, centre: bool = True) -> np.ndarray:
         """Whiten residuals (..., W, N, D) -> (..., W, M); differences of residuals are whitened with centre=False."""
         flat = residual.reshape(*residual.shape[:-2], -1)
         flat = np.nan_to_num(flat, nan=0.0)
         if centre:
-            flat = flat - self.bias
+            flat = flat - self.offset
         return np.matmul(self.factor, flat[..., None])[..., 0]
 
 
-def perturbed_starts(
-    plant: Plant, layout: Layout, windows: Windows, sigma: np.ndarray, rng: np.random.Generator
-) -> Starts:
-    """Start states as the sensors might have read them, (K, W, .), K a power of two."""
-    sources = [*layout.slices] + (["height"] if plant.floating and "base_pos" not in layout.slices else [])
-    widths = [layout.slices[s].stop - layout.slices[s].start if s in layout.slices else 1 for s in sources]
-    signs = _balanced_signs(len(windows), sum(widths), rng)
-    parts = dict(zip(sources, np.split(signs, np.cumsum(widths)[:-1], axis=-1), strict=True))
-    move = {s: parts[s] * (sigma[layout.slices[s]] if s in layout.slices else _HEIGHT_NOISE) for s in sources}
-    qpos = np.repeat(windows.qpos[None], len(signs), axis=0)
-    qvel = np.repeat(windows.qvel[None], len(signs), axis=0)
-    qpos[..., plant.qpos] += move["joint_pos"]
-    qvel[..., plant.dof] += move["joint_vel"]
+def start_noise(plant: Plant, layout: Layout, sigma: np.ndarray) -> np.ndarray:
+    """Standard deviations (C,) of a measured start's coordinates: the signals', and the height's if it is not one."""
+    unmeasured = plant.floating and "base_pos" not in layout.slices
+    return np.concatenate((sigma, [_HEIGHT_NOISE])) if unmeasured else sigma
+
+
+def displaced(plant: Plant, layout: Layout, windows: Windows, move: np.ndarray) -> Starts:
+    """The windows' starts moved by `move` (K, W, C), coordinates as `start_noise` has them: (K, W, .)."""
+    parts = {name: move[..., part] for name, part in layout.slices.items()}
+    qpos = np.repeat(windows.qpos[None], len(move), axis=0)
+    qvel = np.repeat(windows.qvel[None], len(move), axis=0)
+    qpos[..., plant.qpos] += parts["joint_pos"]
+    qvel[..., plant.dof] += parts["joint_vel"]
     if plant.floating:
         q, v = plant.base_qpos, plant.base_dof
         quat = qpos[..., q + 3 : q + 7]
-        speed_b = rotate(conjugate(quat), qvel[..., v : v + 3]) + move["base_lin_vel"]
-        quat = multiply(quat, from_rotation_vector(move["base_rot"]))
+        speed_b = rotate(conjugate(quat), qvel[..., v : v + 3]) + parts["base_lin_vel"]
+        quat = multiply(quat, from_rotation_vector(parts["base_rot"]))
         qpos[..., q + 3 : q + 7] = quat
         qvel[..., v : v + 3] = rotate(quat, speed_b)
-        qvel[..., v + 3 : v + 6] += move["base_ang_vel"]
-        if "base_pos" in move:
-            qpos[..., q : q + 3] += move["base_pos"]
+        qvel[..., v + 3 : v + 6] += parts["base_ang_vel"]
+        if "base_pos" in parts:
+            qpos[..., q : q + 3] += parts["base_pos"]
         else:
-            qpos[..., q + 2 : q + 3] += move["height"]
+            qpos[..., q + 2] += move[..., -1]
     return Starts(qpos, qvel)
 
 
@@ -87,6 +94,42 @@ def _balanced_signs(windows: int, count: int, rng: np.random.Generator) -> np.nd
     return table[:, columns] * flips
 
 
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """What noise in the starts of W windows makes of their residuals."""
+
+    moved: np.ndarray
+    """(K, W, M) change of the residual from K perturbed starts."""
+    signs: np.ndarray
+    """(K, W, C) by which coordinates were moved, in standard deviations."""
+    valid: np.ndarray
+    """(W,) windows whose simulations stayed finite."""
+
+    @property
+    def slopes(self) -> np.ndarray:
+        """(W, C, M) change of the residual for a standard deviation of each coordinate."""
+        return np.einsum("kwc,kwm->wcm", self.signs, self.moved, optimize=True) / len(self.signs)
+
+
+def sample(
+    plant: Plant,
+    layout: Layout,
+    windows: Windows,
+    variation: Variation,
+    sigma: np.ndarray,
+    step: float,
+    rng: np.random.Generator,
+) -> Sampled:
+    """Simulate perturbed starts of `windows` with sensor noise `sigma` (D,)."""
+    noise = start_noise(plant, layout, sigma)
+    signs = _balanced_signs(len(windows), len(noise), rng)
+    starts = displaced(plant, layout, windows, signs * noise)
+    base = residuals(plant, layout, windows, [variation], step)[0]
+    moved = residuals(plant, layout, windows, [variation], step, starts) - base
+    valid = np.isfinite(moved).all(axis=(0, 2, 3)) & np.isfinite(base).all(axis=(1, 2))
+    return Sampled(np.nan_to_num(moved).reshape(len(moved), len(windows), -1), signs, valid)
+
+
 def fit_whitener(
     plant: Plant,
     layout: Layout,
@@ -95,18 +138,21 @@ def fit_whitener(
     sigma: np.ndarray,
     step: float,
     rng: np.random.Generator,
+    move: np.ndarray | None = None,
 ) -> Whitener:
-    """The whitener of `windows` for the model `variation` and sensor noise `sigma` (D,)."""
-    starts = perturbed_starts(plant, layout, windows, sigma, rng)
-    base = residuals(plant, layout, windows, [variation], step)[0]
-    moved = residuals(plant, layout, windows, [variation], step, starts) - base
-    valid = np.isfinite(moved).all(axis=(0, 2, 3)) & np.isfinite(base).all(axis=(1, 2))
-    moved = np.nan_to_num(moved).reshape(len(moved), len(windows), -1)
-    bias = moved.mean(axis=0)
-    reading = np.broadcast_to(np.tile(sigma**2, windows.measured.shape[1]), bias.shape)
-    factor = _factors(moved - bias, reading)
-    white = np.matmul(factor, (moved - bias).transpose(1, 2, 0)).transpose(2, 0, 1).astype(np.float32)
-    return Whitener(factor, bias, valid, white)
+    """The whitener of `windows` for the model `variation` and sensor noise `sigma` (D,).
+
+    `move` (W, C) is by how much their starts have been displaced from the measured ones, if they have.
+    """
+    found = sample(plant, layout, windows, variation, sigma, step, rng)
+    mean = found.moved.mean(axis=0)
+    away = found.moved - mean
+    factor = factors_of(away, sigma)
+    white = np.matmul(factor, away.transpose(1, 2, 0)).transpose(2, 0, 1).astype(np.float32)
+    offset = np.zeros_like(mean)
+    if move is not None:
+        offset = np.einsum("wc,wcm->wm", move / start_noise(plant, layout, sigma), found.slopes)
+    return Whitener(factor, offset, np.matmul(factor, mean[..., None])[..., 0], found.valid, white)
 
 
 def null_draws(whitener: Whitener, sigma: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -121,16 +167,17 @@ def null_draws(whitener: Whitener, sigma: np.ndarray, rng: np.random.Generator) 
     return starts + np.matmul(whitener.factor, reading.transpose(1, 2, 0)).transpose(2, 0, 1)
 
 
-def _factors(moved: np.ndarray, reading: np.ndarray) -> np.ndarray:
-    """Inverse Cholesky factors (W, M, M) of shrunk covariance of `moved` (K, W, M) plus diag(`reading`) (W, M)."""
+def factors_of(moved: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Inverse Cholesky factors (W, M, M) of the shrunk covariance of `moved` (K, W, M) plus that of readings."""
     samples, windows, size = moved.shape
+    reading = np.tile(sigma**2, size // len(sigma))
     out = np.empty((windows, size, size))
     for w in range(windows):
         # Scale first: signals of different units would spoil the factor's condition.
-        scale = np.sqrt(reading[w] + moved[:, w].var(axis=0))
+        scale = np.sqrt(reading + moved[:, w].var(axis=0))
         x = moved[:, w] / scale
         covariance = _SHRINK * (x.T @ x) / samples
-        diagonal = (1 - _SHRINK) * (x**2).sum(axis=0) / samples + reading[w] / scale**2
+        diagonal = (1 - _SHRINK) * (x**2).sum(axis=0) / samples + reading / scale**2
         covariance[np.diag_indices(size)] += diagonal
         out[w] = np.linalg.inv(np.linalg.cholesky(covariance)) / scale
     return out
