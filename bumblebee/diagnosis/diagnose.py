@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from bumblebee.diagnosis.arrivals import loss_entries
 from bumblebee.diagnosis.candidates import INVERSE, Candidate, all_candidates, scales_of, still_joints
 from bumblebee.diagnosis.classes import EXPERIMENTS, alike, detectable, label, rivals
 from bumblebee.diagnosis.discover import NOT_TESTED, discover, structure_table
@@ -104,7 +105,8 @@ def diagnose(
         document["effects"] += beyond.entries
         document["structure"] = structure_table(beyond)
     rounded, steps = entries(grids(session.rollouts), holdout.problem or last.problem, last.fit)
-    effects, document["effects"] = [*effects, *steps], document["effects"] + rounded
+    lost, losses = loss_entries(found.loss)
+    effects, document["effects"] = [*effects, *steps, *losses], document["effects"] + rounded + lost
     document["error"] = _errors(session, effects, config)
     document["unidentifiable"] = [
         {"where": [name], "why": "the joint moves no more than its sensor's noise"} for name in still

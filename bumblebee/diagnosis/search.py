@@ -6,13 +6,25 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import norm
 
+from bumblebee.diagnosis.arrivals import Loss, find_loss
 from bumblebee.diagnosis.candidates import Candidate, shortlisted
-from bumblebee.diagnosis.fit import Fit, cost_of, effects_at, gauss_newton, resolved, standard_covariance
+from bumblebee.diagnosis.fit import (
+    Fit,
+    cost_of,
+    effects_at,
+    expected_covariance,
+    gauss_newton,
+    resolved,
+    standard_covariance,
+)
+from bumblebee.diagnosis.gains import plain_gains
 from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.limits import KINDS as LIMITS
+from bumblebee.diagnosis.limits import limit_trials, pays_where_felt
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.scores import Columns, Scores, as_z, null_maxima, score_tests
 from bumblebee.diagnosis.screen import pulse_sizes, restless, screen, screening_windows
-from bumblebee.diagnosis.trials import Trial, far_trials, limit_trials, simplest, try_one
+from bumblebee.diagnosis.trials import Trial, far_trials, simplest, try_one
 from bumblebee.diagnosis.whiten import null_draws
 from bumblebee.sim.effects import Effect
 
@@ -73,6 +85,8 @@ class Search:
     count: int
     """Candidates among which the false alarms are shared."""
     rejected: list[str] = field(default_factory=list)
+    loss: Loss | None = None
+    """Commands that never arrived; the windows then have those that did."""
 
 
 _ANEW = 0.1  # share of the cost left, below which all candidates are screened anew
@@ -102,6 +116,7 @@ class _Run:
         self.closed: set[Candidate] = set()
         self.steps: list[Step] = []
         self.rejected: list[str] = []
+        self.loss: Loss | None = None
 
     def rescreen(self) -> None:
         """Candidates with steps for the present fit, and the columns of all of them around it."""
@@ -190,7 +205,10 @@ class _Run:
         fit = gauss_newton(self.problem, chosen, start, weights, iterations=2, coarse=True)
         z = wald(self.problem, fit, weights, len(fit.chosen) - 1)
         p = min(1.0, 2 * norm.sf(z) * len(self.candidates))
-        if z < self.bound or not self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain):
+        pays = self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain) or (
+            candidate.effect in LIMITS and pays_where_felt(self.problem, self.holdout, self.fit, fit)
+        )
+        if z < self.bound or not pays:
             self.closed.add(candidate)
             self.rejected.append(f"{candidate.effect} on {candidate.where or 'the whole robot'}")
             return False
@@ -210,6 +228,20 @@ class _Run:
         if self.fit.cost < _ANEW * self.screened_cost:
             self.rescreen()
 
+    def find_loss(self) -> bool:
+        """Look for commands that never arrived; if some did not, go on with those that did."""
+        found = None if self.loss else find_loss(self.problem, self.holdout, self.fit)
+        if found is None:
+            return False
+        self.loss, self.problem, self.holdout = found
+        self.say(f"found lost commands on {self.loss.where or 'the whole robot'}: {self.loss.share:.4f}")
+        self.closed.clear()
+        chosen, values = self.fit.chosen, self.fit.values
+        self.fit = gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True)
+        self.renew(self.fit)
+        self.rescreen()
+        return True
+
     def prune(self) -> None:
         """Drop effects that the others have made needless, worst first, refitting each time."""
         while self.fit.chosen:
@@ -223,6 +255,14 @@ class _Run:
             chosen = [self.fit.chosen[i] for i in keep]
             values = np.concatenate(values) if values else []
             self.fit = gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True)
+
+    def plain(self) -> None:
+        """Effects on a servo's gains in their plainest form, with evidence for those that are new."""
+        self.fit = plain_gains(self.problem, self.fit, self.candidates, self.weights, self.bound, self.say)
+        for i, c in enumerate(self.fit.chosen):
+            if c not in {s.candidate for s in self.steps}:
+                z = wald(self.problem, self.fit, self.weights, i)
+                self.steps.append(Step(c, z, min(1.0, 2 * norm.sf(z) * len(self.candidates))))
 
 
 def _can_move(c: Candidate, steps: np.ndarray) -> list[bool]:
@@ -242,7 +282,9 @@ def wald(problem: Problem, fit: Fit, weights: np.ndarray, index: int) -> float:
     """The z of one chosen effect's free parameters in the joint fit."""
     candidate, part = fit.chosen[index], fit.slices[index]
     free = part.start + np.array(candidate.free)
-    covariance = standard_covariance(problem, fit, weights)[np.ix_(free, free)]
+    # Windows that feel a limit are too few for a variance between windows.
+    of = expected_covariance if candidate.effect in LIMITS else standard_covariance
+    covariance = of(problem, fit, weights)[np.ix_(free, free)]
     away = fit.values[free] - np.array(candidate.nominal)[list(candidate.free)]
     value = float(away @ np.linalg.pinv(covariance, rcond=1e-9, hermitian=True) @ away)
     return as_z(value, len(free), len(weights))
@@ -260,22 +302,11 @@ def search(
     `remake` gives the candidates with steps for a model with some effects, and its joints' typical torques (J,) [N m].
     """
     run = _Run(problem, holdout, remake, config, say)
-    vain = 0
-    while len(run.fit.chosen) < config.most and vain < config.patience:
-        tried, looked = limit_trials(run.problem, run.fit, run.candidates), []
-        tried = tried or far_trials(run.problem, run.fit, run.candidates, run.weights, config.far)
-        tried = [t for t in tried if t.candidate not in run.closed]
-        if not tried:
-            tried, looked = run.trials()
-        if not tried and not looked:
-            break
-        if not tried:
-            run.closed |= set(looked)
-            vain += 1
-            continue
-        best = simplest(tried, run.fit.cost)
-        vain += not run.accept(best.candidate, best.values)
+    _select(run, config)
+    if run.find_loss():
+        _select(run, config)
     run.prune()
+    run.plain()
     steps = [s for s in run.steps if s.candidate in run.fit.chosen]
     return Search(
         run.fit,
@@ -288,4 +319,27 @@ def search(
         run.bound,
         len(run.candidates),
         run.rejected,
+        run.loss,
     )
+
+
+def _select(run: _Run, config: SearchConfig) -> None:
+    """Forward selection until nothing is worth a trial, or too many were in vain."""
+    vain = 0
+    while len(run.fit.chosen) < config.most and vain < config.patience:
+        tried, looked = far_trials(run.problem, run.fit, run.candidates, run.weights, config.far), []
+        tried = [t for t in tried if t.candidate not in run.closed]
+        if not tried:
+            tried, looked = run.trials()
+        limits = limit_trials(run.problem, run.fit, run.candidates, run.weights)
+        tried += [t for t in limits if t.candidate not in run.closed]
+        if not tried and not looked:
+            break
+        if not tried:
+            run.closed |= set(looked)
+            vain += 1
+            continue
+        best = simplest(tried, run.fit.cost)
+        if best.candidate.effect in LIMITS and run.find_loss():
+            continue  # a lost command, too, spoils a few windows
+        vain += not run.accept(best.candidate, best.values)

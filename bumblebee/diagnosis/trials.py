@@ -27,7 +27,7 @@ class Trial:
     """(W, M) what it does to the prediction, beside what the chosen ones could."""
 
 
-class _Beside:
+class Beside:
     """Costs of residuals, nuisances and chosen effects free to move linearly."""
 
     def __init__(self, problem: Problem, fit: Fit, weights: np.ndarray) -> None:
@@ -35,10 +35,12 @@ class _Beside:
         self.weights = weights
 
     def left(self, residual: np.ndarray) -> np.ndarray:
+        """What is left of a residual (W, M)."""
         move = solve(self._basis, self._inverse, residual, self.weights)
         return residual - np.tensordot(move, self._basis, axes=1)
 
     def cost(self, residual: np.ndarray) -> float:
+        """Weighted square of what is left of a residual (W, M)."""
         left = self.left(residual)
         return float((self.weights[:, None] * left**2).sum())
 
@@ -48,7 +50,7 @@ def try_one(problem: Problem, fit: Fit, candidate: Candidate, steps: np.ndarray,
 
     The change is simulated in coarse steps and added to the fit's own residual, which is of fine ones.
     """
-    beside = _Beside(problem, fit, weights)
+    beside = Beside(problem, fit, weights)
     coarse = rough([candidate.effect, *(e.effect for e in fit.effects)])
     declared = problem.residual([fit.effects], coarse=coarse)[0]
     before = beside.left(fit.residual)
@@ -90,7 +92,7 @@ def far_trials(
         return []
     chosen = {(c.effect, c.where) for c in fit.chosen}
     kinds = [c for c in candidates if c.effect in ("motor_strength", "kp") and (c.effect, c.where) not in chosen]
-    beside = _Beside(problem, fit, weights)
+    beside = Beside(problem, fit, weights)
     start = beside.cost(fit.residual)
     declared = problem.residual([fit.effects], coarse=True)[0]
     found = []
@@ -102,39 +104,6 @@ def far_trials(
             change = beside.left(declared - moved[best])
             found.append(Trial(c, np.array([_FACTORS[best]]), costs[best], change))
     return found
-
-
-# A limit acts in few windows: there it decides everything, elsewhere nothing.
-_LIMITS = ("torque_limit", "torque_speed_limit")
-_ODD, _FEW, _WORTH = 9.0, 3, 15.0  # times the median power; such windows; fall of the log-likelihood
-
-
-def limit_trials(problem: Problem, fit: Fit, candidates: Sequence[Candidate]) -> list[Trial]:
-    """Limits of torque, tried on the windows that are far worse than the others.
-
-    Those windows weigh little in a fit, and are too few for a variance between windows to call them significant. Here a
-    limit is worth a trial if the sum of log(1 + chi-square) over them falls by much.
-    """
-    clean = fit.clean(problem)
-    power = (clean**2).mean(axis=1)
-    odd = np.flatnonzero(power > _ODD * max(float(np.median(power)), 1.0))
-    kinds = [c for c in candidates if c.effect in _LIMITS and (c.effect, c.where) not in _places(fit)]
-    if len(odd) < _FEW or not kinds:
-        return []
-    part = problem.part(odd)
-    declared = part.residual([fit.effects], coarse=True)[0]
-    found = []
-    for c in kinds:
-        moved = part.residual([[*fit.effects, c.at(c.start)]], coarse=True)[0]
-        left = clean[odd] - (declared - moved)
-        gain = float((np.log1p(power[odd]) - np.log1p((left**2).mean(axis=1))).sum())
-        if gain > _WORTH:
-            found.append(Trial(c, c.clip(c.start), fit.cost - gain, np.zeros_like(clean)))
-    return sorted(found, key=lambda t: t.cost)[:1]
-
-
-def _places(fit: Fit) -> set[tuple[str, str]]:
-    return {(c.effect, c.where) for c in fit.chosen}
 
 
 # Of effects that fit the same the one that is met most often is named; the others are its class.

@@ -1,0 +1,203 @@
+"""Limits of torque, tried at many sizes on just the windows that they reach.
+
+A limit acts in few windows: there it decides everything, elsewhere nothing. It has no slope where it does not reach,
+the windows that it spoils weigh little in a fit, and they are too few for a variance between windows to call them
+significant. So every limit is simulated at sizes that reach the few hardest driven windows, some more, and so on; its
+gain is the fall of the fit's robust cost, 2 s M log(1 + power / s) summed over windows with s their median power, of
+which `problem.window_weights` are the weights.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.fit import Fit
+from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.trials import Beside, Trial
+from bumblebee.diagnosis.variation import vary
+from bumblebee.diagnosis.windows import Windows, command_inputs
+from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effects import Effect
+from bumblebee.sim.servo import Servos, servos_of
+
+KINDS = ("torque_limit", "torque_speed_limit")
+_ODD, _FIRST = 3.0, 4  # power of a window that is off; windows that a limit reaches first
+_WORTH = 15.0  # fall of the cost
+_REACHED = (2, 4, 7, 12, 20, 35, 60, 100, 200)  # windows that the sizes tried reach
+_CLOSER = 4  # halvings of the interval around the best of them
+_FELT, _NEARLY, _CLEAR = 0.1, 0.8, 0.5  # change of a window's log(1 + power); share of these that gain; their sum
+_SEVERAL, _MOSTLY = 4, 0.5  # windows that speak for themselves; share of the excess that fewer must lose
+
+
+@dataclass(frozen=True, eq=False)
+class _Demand:
+    """What the servos were asked for in each of W windows."""
+
+    peak: np.ndarray
+    """(W, J) largest torque asked for [N m]."""
+    slowest: np.ndarray
+    """(W, J) least inverse no-load speed [s/rad] that would have been felt; infinite where nothing would."""
+
+    def reach(self, kind: str, j: int) -> np.ndarray:
+        """Sizes (W,) from which on the windows feel a limit; what is hardest driven feels it first."""
+        return -self.peak[:, j] if kind == "torque_limit" else self.slowest[:, j]
+
+
+def limit_trials(problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray) -> list[Trial]:
+    """The limit that explains most of the windows that are far off; none where no limit does.
+
+    Of the four windows that a limit reaches first one must be off, or it is not simulated. Where it acts in a few only
+    it must bring them down to noise, which one number does not do by chance.
+    """
+    clean = fit.clean(problem)
+    power = (clean**2).mean(axis=1)
+    usual = max(float(np.median(power)), 1.0)
+    taken = {(c.effect, c.where) for c in fit.chosen}
+    kinds = [c for c in candidates if c.effect in KINDS and (c.effect, c.where) not in taken]
+    odd = power > _ODD
+    if not odd.any() or not kinds:
+        return []
+    demand = _demand(problem, fit.effects)
+    beside = Beside(problem, fit, weights)
+    found = []
+    for kind, where in dict.fromkeys((c.effect, c.where) for c in kinds):
+        own = [c for c in kinds if (c.effect, c.where) == (kind, where)]
+        reach = demand.reach(kind, problem.plant.joints.index(where))
+        if not odd[np.argsort(reach)[:_FIRST]].any():
+            continue
+        best = _profile(problem, fit, clean, usual, own[0], reach)
+        if best is not None and best[1] > _WORTH:
+            nearest = min(own, key=lambda c: abs(c.start[0] - best[0]))
+            change = _change(problem, fit, nearest, best[0], np.isfinite(reach))
+            if not _plausible(clean, change):
+                continue
+            found.append(Trial(nearest, np.array([best[0]]), beside.cost(fit.residual - change), beside.left(change)))
+    return sorted(found, key=lambda t: t.cost)[:1]
+
+
+def _plausible(clean: np.ndarray, change: np.ndarray) -> bool:
+    """Whether a change (W, M) that few windows feel takes nearly all of their excess of log(1 + power) over noise."""
+    before, after = (np.log1p((x**2).mean(axis=1)) for x in (clean, clean - change))
+    felt = np.abs(before - after) > _FELT
+    excess = np.maximum(before[felt] - np.log(2.0), 0.0).sum()
+    return felt.sum() >= _SEVERAL or float((before - after)[felt].sum()) > _MOSTLY * excess
+
+
+def pays_where_felt(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bool:
+    """Whether `after` is better on nearly all windows that the two fits predict differently, held-out ones included.
+
+    The rest of the windows, most of them, knows nothing of a limit: a mean gain over all of them would need many more
+    windows that feel it than a limit reaches.
+    """
+    sides = [(problem, before.clean(problem), after.clean(problem))]
+    if holdout.problem is not None:
+        raw = holdout.problem.residual([before.effects, after.effects])
+        parts = zip(raw, (before, after), strict=True)
+        sides.append((holdout.problem, *(r - np.tensordot(f.nuisance, holdout.problem.nuisance, 1) for r, f in parts)))
+    logs = [np.log1p((np.stack(x) ** 2).mean(axis=2)) for x in ([old, new] for _, old, new in sides)]
+    gains = np.concatenate([g[0] - g[1] for g in logs])
+    felt = gains[np.abs(gains) > _FELT]
+    better = int((felt > 0).sum())
+    return better > 0 and better >= _NEARLY * len(felt) and float(felt.sum()) > _CLEAR
+
+
+def _profile(
+    problem: Problem, fit: Fit, clean: np.ndarray, usual: float, candidate: Candidate, reach: np.ndarray
+) -> tuple[float, float] | None:
+    """Size and gain of the best of the sizes tried, `reach` (W,) being where each window begins to feel it."""
+    order = np.argsort(reach)
+    felt = reach[order][np.isfinite(reach[order])]
+    counts = sorted({min(n, len(felt) - 1) for n in _REACHED if len(felt) >= 2} - {0})
+    if not counts:
+        return None
+    sizes = [float(0.5 * (felt[n - 1] + felt[n])) for n in counts]
+    gains = [_gain(problem, fit, clean, usual, candidate, size, reach) for size in sizes]
+    best = int(np.argmax(gains))
+    if gains[best] <= 0:
+        return None
+    low, high = sizes[max(best - 1, 0)], sizes[min(best + 1, len(sizes) - 1)]
+    at = _closer(lambda x: _gain(problem, fit, clean, usual, candidate, x, reach), low, sizes[best], high, gains[best])
+    return (_value(candidate, at[0]), at[1])
+
+
+def _closer(gain: Callable[[float], float], low: float, middle: float, high: float, best: float) -> tuple[float, float]:
+    """The best of a few more sizes, halving the wider side of the interval around the best so far."""
+    for _ in range(_CLOSER):
+        left = middle - low >= high - middle
+        new = 0.5 * (low + middle) if left else 0.5 * (middle + high)
+        value = gain(new)
+        if value > best:
+            low, middle, high, best = (low, new, middle, value) if left else (middle, new, high, value)
+        elif left:
+            low = new
+        else:
+            high = new
+    return middle, best
+
+
+def _value(candidate: Candidate, size: float) -> float:
+    """The fitted parameter of a size: the torque is the size with the other sign."""
+    return -size if candidate.effect == "torque_limit" else size
+
+
+def _gain(
+    problem: Problem, fit: Fit, clean: np.ndarray, usual: float, candidate: Candidate, size: float, reach: np.ndarray
+) -> float:
+    """Fall of the robust cost; only windows that may feel the limit are simulated."""
+    felt = reach <= size + 0.05 * abs(size)
+    left = clean[felt] - _change(problem, fit, candidate, _value(candidate, size), felt)[felt]
+    before, after = (np.log1p((x**2).mean(axis=1) / usual) for x in (clean[felt], left))
+    return float(2.0 * usual * clean.shape[1] * (before - after).sum())
+
+
+def _change(problem: Problem, fit: Fit, candidate: Candidate, value: float, felt: np.ndarray) -> np.ndarray:
+    """What a limit does to the prediction (W, M), simulated on the windows `felt` (W,) alone."""
+    out = np.zeros_like(fit.residual)
+    moved = [*fit.effects, candidate.at(candidate.clip([value]))]
+    one, other = problem.part(np.flatnonzero(felt)).residual([fit.effects, moved], coarse=True)
+    out[felt] = one - other
+    return out
+
+
+def _demand(problem: Problem, effects: Sequence[Effect]) -> _Demand:
+    """By the servos of the model with `effects`, at the logged states and commands."""
+    windows, plant = problem.windows, problem.plant
+    varied = vary(plant, effects)
+    own = varied.plant or plant
+    servos = servos_of(varied.model, [int(own.model.joint(name).id) for name in plant.joints])
+    tables = {i: _asked(plant, servos, windows.source[i]) for i in np.unique(windows.rollout)}
+    peak = np.empty((len(windows), len(plant.joints)))
+    slowest = np.empty_like(peak)
+    for w, (i, first) in enumerate(zip(windows.rollout, windows.start, strict=True)):
+        last = first + _ticks(windows, w)
+        torque, inverse = tables[i]
+        peak[w], slowest[w] = torque[first:last].max(axis=0), inverse[first:last].min(axis=0)
+    return _Demand(peak, slowest)
+
+
+def _ticks(windows: Windows, w: int) -> int:
+    """Rows of the log that window `w` spans."""
+    time = windows.source[windows.rollout[w]].time
+    return max(
+        1, int(np.searchsorted(time, time[windows.start[w]] + windows.out_time[w, -1] + 1e-9) - windows.start[w])
+    )
+
+
+def _asked(plant: Plant, servos: Servos, rollout: Rollout) -> tuple[np.ndarray, np.ndarray]:
+    """Largest torque asked for (T, J) at each tick, and least inverse no-load speed (T, J) that would be felt there."""
+    command = servos.controls(command_inputs(plant, rollout))
+    held = np.concatenate((command[:1], command[:-1]))
+    place, speed = rollout.joint_pos - plant.offset, rollout.joint_vel
+    free = np.full(len(servos.dof), np.inf)
+    peak, inverse = np.zeros_like(place), np.full_like(place, np.inf)
+    for control in (held, command):
+        asked = servos.torque(place, speed, control, free)
+        drives = (asked * speed > 0) & np.isfinite(servos.limit)
+        share = np.clip(1.0 - np.abs(asked) / servos.limit, 0.0, 1.0)
+        felt = np.where(drives, share / np.maximum(np.abs(speed), 1e-6), np.inf)
+        peak, inverse = np.maximum(peak, np.abs(asked)), np.minimum(inverse, felt)
+    return peak, inverse
