@@ -113,7 +113,7 @@ def train_teacher(
             _save(trainer, options.out / RESUME)
         return trainer._seconds >= 60 * minutes or clock.over
 
-    if not enough():
+    if trainer._seconds < 60 * minutes:
         trainer.train(own.name, enough)
     _save(trainer, options.out / RESUME)
     return trainer

@@ -1,5 +1,11 @@
-"""Policies on whole motions and on pieces in MuJoCo C: by motion, and as a table with intervals."""
+"""Policies on whole motions and on pieces in MuJoCo C: by motion, and as a table with intervals.
 
+    python -m benchmarks.baselines_trial FOLDER --motions motions.npz --out results/name
+
+tries any policy of this repository alone; `benchmarks.baselines` does it for what it has trained.
+"""
+
+import argparse
 import json
 import multiprocessing
 from collections.abc import Sequence
@@ -11,6 +17,7 @@ import torch
 
 from benchmarks.motion_pack import read_pack, whole_motions
 from bumblebee.baselines.trial import Manner, follow
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.intervals import mean_by_motion, success_rate
 from bumblebee.learning.policy import load_policy
 from bumblebee.sim.sensors import load_model
@@ -87,13 +94,14 @@ def table_of(results: Sequence[dict]) -> str:
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for entry in results:
         cells = [entry["policy"], f"{entry['group']}, {entry['kind']}", entry["split"], str(entry["n"])]
-        cells += [_rate(entry[name]) for name in ("success", "success_local")]
+        cells += [rate(entry[name]) for name in ("success", "success_local")]
         cells += [_number(entry[name], 3 if name == "mpjpe_rad" else 0) for name in METRICS]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def _rate(estimate: dict) -> str:
+def rate(estimate: dict) -> str:
+    """A share with its interval."""
     low, high = estimate["ci95"]
     return f"{estimate['value']:.2f} [{low:.2f}, {high:.2f}]"
 
@@ -104,3 +112,26 @@ def _number(estimate: dict, digits: int) -> str:
         return "-"
     span = "" if low is None else f" [{low:.{digits}f}, {high:.{digits}f}]"
     return f"{estimate['value']:.{digits}f}{span}"
+
+
+def main() -> None:
+    """Try the policy in a folder as its shape says that it sees and acts."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, help="with policy.pt")
+    parser.add_argument("--motions", type=Path, required=True, help="file of benchmarks.motion_pack")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    options = parser.parse_args()
+    try:
+        seen = load_policy(options.folder).shape.seen
+        options.out.mkdir(parents=True, exist_ok=True)
+        name = options.out.name
+        report([Tried(name, options.folder, Manner(seen))], options.motions, options.out, options.jobs)
+        (options.out / "settings.json").write_text(json.dumps({"method": name}) + "\n")
+    except BadInput as error:
+        print(error)
+        raise SystemExit(EXIT_BAD_INPUT) from None
+
+
+if __name__ == "__main__":
+    main()

@@ -34,6 +34,7 @@ PRIVILEGED = ("ex_key_errors", "key_pos_b", "root_lin_vel_b")
 
 AIR_TIME = 0.5  # s
 FORCE = 500.0  # N
+DRIFT = 10.0  # m: how far key bodies may be from the reference in the world, which is as good as any distance
 LOST_KEYS = 0.2  # the key body kernel below which an episode is lost
 _ANKLES = tuple(i for i, name in enumerate(joint_names()) if "ankle" in name)
 _WAIST = tuple(i for i, name in enumerate(joint_names()) if name in ("waist_roll_joint", "waist_pitch_joint"))
@@ -197,8 +198,8 @@ def exbody2() -> Baseline:
         student=ObservationConfig(terms=PROPRIOCEPTION, history=25, now=GOAL),
         reward=RewardConfig(soft_limit=0.95),
         randomisation=PAPER_RANDOMISATION,
-        threshold_start=1e6,
-        threshold_end=1e6,
+        threshold_start=DRIFT,
+        threshold_end=DRIFT,
     )
     student = StudentConfig(
         steps=24, epochs=1, mini_batches=4, learning_rate=1e-4, grad_norm=1.0, hidden=(1024, 1024, 512), loss="mse"

@@ -1,5 +1,6 @@
 """Packed motions, methods by name, settings by path, and a training of a second that ends and goes on."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pandas as pd
 import pytest
 import torch
 
+from benchmarks import baselines_table
 from benchmarks.baselines import RESUME, parse, run, training_clips
 from benchmarks.baselines_methods import METHODS, changed, method
 from benchmarks.baselines_trial import RESULTS, TABLE, TRIALS, summary, table_of
@@ -113,3 +115,37 @@ def test_a_call_that_is_over_goes_on_to_the_end(tmp_path: Path, capsys: pytest.C
     trials = pd.read_csv(tmp_path / "out" / TRIALS)
     assert set(trials["policy"]) == {"teacher", "omnih2o"} and set(trials["name"]) == {c.name for c in CLIPS[:2]}
     assert (tmp_path / "out" / RESULTS).exists() and (tmp_path / "out" / TABLE).exists()
+
+
+def results(folder: Path, success: list[bool], mpkpe: list[float], method: str = "x") -> Path:
+    """A folder as `benchmarks.baselines` leaves it, with a teacher who is not to count."""
+    rows = pd.DataFrame({"name": list("abcdefgh"), "success": success, "mpkpe_mm": mpkpe})
+    rows = rows.assign(policy=method, kind="whole", group="asap", split="train", success_local=True, mpjpe_rad=0.1)
+    rows["mpkpe_local_mm"] = 5.0
+    folder.mkdir()
+    pd.concat([rows, rows.assign(policy="teacher", success=False)]).to_csv(folder / TRIALS, index=False)
+    (folder / "settings.json").write_text(json.dumps({"method": method}))
+    return folder
+
+
+def test_methods_are_compared_motion_by_motion(tmp_path: Path):
+    first = results(tmp_path / "first", [True] * 8, [10.0] * 8)
+    other = results(tmp_path / "other", [False] * 6 + [True] * 2, [30.0] * 8)
+    entries = baselines_table.compared([baselines_table.read(f) for f in (first, other)], "first")
+    assert [(e["policy"], e["success"]["value"]) for e in entries] == [("first", 1.0), ("other", 0.25)]
+    # 6 motions that only the first follows: 2 / 2^6; of the 2 that both follow, all flips of two equal signs
+    assert entries[1]["p_success"] == pytest.approx(2 / 64) and entries[1]["both"] == 2
+    assert entries[1]["p_mpkpe"] == pytest.approx(0.5)
+    text = baselines_table.table_of(entries, "first")
+    assert "| other | real | train | 8 | 0.25 [" in text and "0.031; MPKPE 0.500 (2)" in text
+
+
+def test_what_cannot_be_compared_is_one_line(tmp_path: Path):
+    first = results(tmp_path / "first", [True] * 8, [10.0] * 8)
+    table = baselines_table.read(first)
+    with pytest.raises(BadInput, match="--against: expected first, came 'ours'"):
+        baselines_table.compared([table], "ours")
+    with pytest.raises(BadInput, match="expected trials of the motions of first, came others"):
+        baselines_table.compared([table, table.iloc[:3].assign(policy="short")], "first")
+    with pytest.raises(BadInput, match=r"expected results of benchmarks.baselines"):
+        baselines_table.read(tmp_path)
