@@ -131,8 +131,8 @@ def check_gpus(count: int) -> None:
     """Raise `BadInput` if this machine has fewer than `count` GPUs that torch can use."""
     have = torch.cuda.device_count()
     if count > have:
-        came = f"{have} that torch can use" if have else "none that torch can use"
-        raise BadInput("gpus", f"{count} NVIDIA GPUs on this machine", came, f"Train on {max(have, 1)} at most.")
+        came, do = f"{have} that torch can use", f"Train on {have} at most." if have else "Train on the CPU."
+        raise BadInput("gpus", f"{count} NVIDIA GPUs on this machine", came, do)
 
 
 def this_command() -> list[str]:
