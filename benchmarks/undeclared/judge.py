@@ -100,7 +100,8 @@ def _outside(truth: Sequence[Entry], document: dict[str, Any]) -> dict[str, bool
     return {"flagged": flagged, "place": flagged and place, "form": flagged and place and form}
 
 
-_WORDS = {"q": "position", "v": "velocity", "u": "command target error", "tau": "torque", "t": "time"}
+_WORDS = {"q": "position", "v": "velocity", "u": "command target error", "tau": "torque", "t": "time",
+          "rested": "history", "slewed": "command target history"}  # fmt: skip
 
 
 def _terms(found: Entry) -> str:

@@ -7,19 +7,21 @@ from typing import Any
 import numpy as np
 
 from bumblebee.diagnosis.arrivals import loss_entries
+from bumblebee.diagnosis.beyond import NOT_TESTED, discovered_entry, structure_table, unexplained
 from bumblebee.diagnosis.candidates import INVERSE, Candidate, all_candidates, scales_of, still_joints
 from bumblebee.diagnosis.classes import EXPERIMENTS, alike, detectable, label, rivals
-from bumblebee.diagnosis.discover import NOT_TESTED, discover, structure_table
+from bumblebee.diagnosis.discover import Discovery, discover
 from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_whiteners, horizon_windows
-from bumblebee.diagnosis.fit import Fit
+from bumblebee.diagnosis.fit import Fit, interval
+from bumblebee.diagnosis.formula import Formula
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.latency import latency_notes
 from bumblebee.diagnosis.nuisance import NAMES
 from bumblebee.diagnosis.plant import Plant
-from bumblebee.diagnosis.problem import Problem, make_problem, without
+from bumblebee.diagnosis.problem import Problem, make_problem, window_weights, without
 from bumblebee.diagnosis.quantised import entries, grids
 from bumblebee.diagnosis.refine import Refined, refine
-from bumblebee.diagnosis.search import Search, SearchConfig, search
+from bumblebee.diagnosis.search import Search, SearchConfig, search, wald
 from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.variation import declared_values, vary
 from bumblebee.diagnosis.windows import choose_starts, cut
@@ -93,17 +95,21 @@ def diagnose(
     last = refine(found.problem, found.fit, rng)
     if last.fit.chosen:
         holdout = holdout.relinearised(last.fit.effects)
-    say(f"{len(last.fit.chosen)} effects; error before and after")
-    document = {"schema": 1, "train": session.ids(session.train), "holdout": session.ids(session.holdout)}
-    document["accept"] = session.ids(session.accept)
-    document["effects"] = _effects(found, last, holdout)
-    effects, document["unexplained"] = last.fit.effects, NOT_TESTED
+    document: dict[str, Any] = {"schema": 1, "train": session.ids(session.train)}
+    document |= {"holdout": session.ids(session.holdout), "accept": session.ids(session.accept)}
+    beyond = None
     if config.beyond:
         say("what is left")
-        beyond = discover(session, last.problem, holdout.problem, effects, last.fit.nuisance)
-        effects, document["unexplained"] = [*effects, *beyond.effects], beyond.block
-        document["effects"] += beyond.entries
+        typical = scales_of(session.plant, session.rollouts).torque
+        beyond = discover(last.problem, holdout, last.fit, typical, still, say)
+        last, holdout = _with(beyond, last), beyond.holdout
+    say(f"{len(last.fit.chosen)} effects; error before and after")
+    document["effects"] = _effects(found, last, holdout, beyond)
+    effects = last.fit.effects
+    document["unexplained"] = NOT_TESTED if beyond is None else unexplained(beyond)
+    if beyond is not None:
         document["structure"] = structure_table(beyond)
+        session.notes.extend(f"withdrawn for a discovered effect: {name}" for name in beyond.withdrawn)
     rounded, steps = entries(grids(session.rollouts), holdout.problem or last.problem, last.fit)
     lost, losses = loss_entries(found.loss)
     effects, document["effects"] = [*effects, *steps, *losses], document["effects"] + rounded + lost
@@ -151,7 +157,15 @@ def _problem(session: Session, ids: Sequence[int], budget: int, horizon: float, 
     return make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
 
 
-def _effects(found: Search, last: Refined, holdout: Holdout) -> list[dict[str, Any]]:
+def _with(beyond: Discovery, last: Refined) -> Refined:
+    """The fit with what was discovered and its intervals; the last one where nothing was."""
+    if beyond.fit.chosen == last.fit.chosen:
+        return last
+    weights = window_weights(beyond.fit.clean(beyond.problem))
+    return Refined(beyond.problem, beyond.fit, weights, interval(beyond.problem, beyond.fit, weights))
+
+
+def _effects(found: Search, last: Refined, holdout: Holdout, beyond: Discovery | None) -> list[dict[str, Any]]:
     """The contract's list, most explaining first."""
     if not last.fit.chosen:
         return []
@@ -160,6 +174,11 @@ def _effects(found: Search, last: Refined, holdout: Holdout) -> list[dict[str, A
     steps = {s.candidate: s for s in found.steps}
     entries = []
     for i, (c, part) in enumerate(zip(last.fit.chosen, last.fit.slices, strict=True)):
+        if isinstance(c, Formula):
+            z, kind = wald(last.problem, last.fit, last.weights, i), beyond.kinds[c.where] if beyond else ""
+            values, half = last.fit.values[part], last.half[part]
+            entries.append(discovered_entry(c, values, half, float(shares[i]), z, kind))
+            continue
         others = classes[c]
         entry = label(c) | {
             "parameters": _parameters(last.problem.plant, c, last.fit.values[part], last.half[part]),

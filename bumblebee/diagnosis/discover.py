@@ -1,255 +1,202 @@
 """Beyond the catalogue: what remains after the best fit, its form, and that form refitted in the simulator.
 
-A form is found in the missing torque; whether it is real is decided as for every other effect: its coefficients are
-refitted on the fitted rollouts' windows, simulated with it, and it is kept if the held-out windows are better by more
-than two standard errors. What is not kept is described, never forced into a name.
+A law is found in the whitened windows (`diagnosis/seek.py`), with and without the catalogue's effects on its joint: a
+strange effect is often half explained by a name that it has not. Its terms then join the fit like any other effect,
+and what they make needless is dropped. The form is kept if the windows that took no part in the fit are better with it
+by more than two standard errors, and if it explains most of what the joint lacked. What is not kept is described, never
+forced into a name.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
 
-from bumblebee.diagnosis.curves import joint_curves
-from bumblebee.diagnosis.form import Form, examine
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, resolved
+from bumblebee.diagnosis.formula import DISCOVERED, Formula, formula, in_terms, related
+from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.laws import joined
 from bumblebee.diagnosis.problem import Problem, window_weights
-from bumblebee.diagnosis.session import Session
-from bumblebee.diagnosis.structure import JointStructure
-from bumblebee.diagnosis.torque_residual import TorqueResidual, torque_residual
-from bumblebee.sim.effects import Effect
+from bumblebee.diagnosis.remains import Remains, remains
+from bumblebee.diagnosis.scene import fitted_scene
+from bumblebee.diagnosis.search import wald
+from bumblebee.diagnosis.seek import Found, library, seek
 
 _JOINTS = 3  # joints at most that get a form
-_Z = 2.0
-_LEAST = 0.01  # held-out gain of log chi-square below which a form is not worth its place
-_PASSES = 3
-NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
+_SURE = 4.0  # z below which an effect beside a form is needless
+_Z, _LEAST = 2.0, 0.01  # of the judging windows' gain, and its least share
+_MOST = 0.5  # share of a joint's excess that may remain where its form was found
+_PARAMETER = 4.0  # log-likelihood that a parameter must bring
+_LAWS, _WORTH, _SHARE = 3, 12.0, 0.03  # laws in a form; what a further one must bring, and as a share of the first's
+_PART = 0.2  # an effect of the catalogue is a part of a law that is at least this share of it
 
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """What lies beyond the catalogue."""
+    """The fit with what was discovered, and what it leaves."""
 
-    block: dict[str, Any]
-    """The contract's `unexplained`, about what is left after `effects` too."""
-    entries: list[dict[str, Any]]
-    """Entries of the contract's list of effects."""
-    effects: list[Effect]
-    """The discovered effects, to be added to those of the catalogue."""
-    left: list[JointStructure]
-    """Every joint with all effects in force."""
-    curves: dict[str, dict[str, list[list[float]]]] = field(default_factory=dict)
-    """Joint with structure -> quantity -> measured curve of what is left, see `curves.measured_curve`."""
+    problem: Problem
+    """Its nuisances around the fit."""
+    holdout: Holdout
+    fit: Fit
+    left: Remains
+    unconfirmed: dict[str, dict[str, float]]
+    """Joint -> terms that were found and not kept."""
+    kinds: dict[str, str]
+    """Joint with a form -> "formula" or "curve"."""
+    withdrawn: list[str]
+    """Effects of the catalogue that a form made needless."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Form:
+    """One way to explain a joint."""
+
+    fit: Fit
+    score: float
+    kind: str
+    terms: dict[str, float]
 
 
 def discover(
-    session: Session, problem: Problem, holdout: Problem | None, effects: Sequence[Effect], nuisance: np.ndarray
+    problem: Problem,
+    holdout: Holdout,
+    fit: Fit,
+    typical: np.ndarray,
+    still: Sequence[str] = (),
+    say: Callable[[str], None] = lambda text: None,
 ) -> Discovery:
-    """Test, name and refit what `effects` leave behind.
-
-    Args:
-        session: data and model.
-        problem: fitted windows.
-        holdout: windows to accept by; None for a single rollout.
-        effects: the catalogue's effects that were found.
-        nuisance: (B,) the fit's coefficients of numerical differences.
-    """
-    train, held = missing_torques(session, effects, nuisance)
-    if train is None or held is None:
-        block = _block([], [], [])
-        block["description"] = "too few windows to look for structure"
-        return Discovery(block, [], [], [])
-    seen = [examine(train, held, j) for j in range(len(train.joints))]
-    forms: list[Form] = []
-    kept: list[Effect] = []
-    entries: list[dict[str, Any]] = []
-    left = [s for s, _ in seen]
-    for one, _ in sorted((x for x in seen if x[0].significant), key=lambda x: (-x[0].share, x[0].joint))[:_JOINTS]:
-        form = examine(train, held, train.joints.index(one.joint))[1]
-        forms.append(form)
-        if not form.terms:
+    """Test, name and refit what `fit` leaves; arguments as of `remains`."""
+    left = remains(problem, holdout.problem, fit, typical, still)
+    tried: list[str] = []
+    unconfirmed: dict[str, dict[str, float]] = {}
+    kinds: dict[str, str] = {}
+    before = fit
+    while len(tried) < _JOINTS:
+        worst = left.worst(tried)
+        if worst is None:
+            break
+        tried.append(worst.joint)
+        form = _best_form(problem, fit, left, worst.joint, typical)
+        if form is None:
             continue
-        refitted = _refit(problem, holdout, [*effects, *kept], form, nuisance)
-        if refitted is None:
+        if not holdout.gains(fit, form.fit, _Z, _LEAST):
+            unconfirmed[worst.joint] = form.terms
             continue
-        effect, entry = refitted
-        kept.append(effect)
-        entries.append(entry)
-        train, held = missing_torques(session, [*effects, *kept], nuisance)
-        if train is None or held is None:
+        moved = problem.relinearised(form.fit.effects)
+        new = resolved(moved, form.fit, window_weights(form.fit.clean(moved)))
+        judged = holdout.relinearised(new.effects)
+        rest = remains(moved, judged.problem, new, typical, still)
+        column = problem.plant.joints.index(worst.joint)
+        if rest.joints[column].excess > max(_MOST * worst.excess, 2.0):
+            unconfirmed[worst.joint] = form.terms
+            continue
+        say(f"discovered on {worst.joint}: {' + '.join(f'{v:.3g} {t}' for t, v in form.terms.items())[:100]}")
+        problem, holdout, fit, left, kinds[worst.joint] = moved, judged, new, rest, form.kind
+    gone = [c for c in before.chosen if c not in fit.chosen]
+    names = [f"{c.effect} on {c.where or 'the whole robot'}" for c in gone]
+    return Discovery(problem, holdout, fit, left, unconfirmed, kinds, names)
+
+
+def _best_form(problem: Problem, fit: Fit, left: Remains, joint: str, typical: np.ndarray) -> _Form | None:
+    """The form that explains the fitted windows best for its parameters; None where no strange law was found."""
+    column = problem.plant.joints.index(joint)
+    ways: list[tuple[Fit, list[Found]]] = [(fit, [f for f in left.sought.found if f.joint == column])]
+    own = [c for c in fit.chosen if c.where == joint]
+    if own:
+        bare = _less(problem, fit, own)
+        scene = fitted_scene(problem, bare, typical)
+        some = library(scene.data, [column])
+        sought = seek(problem, scene.evidence, scene.residual, scene.columns, some, most=_LAWS)
+        ways += [(bare, sought.found), (fit, sought.found), *((bare, [rival]) for rival in sought.rivals)]
+    forms = [_growing(problem, base, joint, found) for base, found in ways]
+    return max((f for f in forms if f is not None), key=lambda f: f.score, default=None)
+
+
+def _growing(problem: Problem, base: Fit, joint: str, found: Sequence[Found]) -> _Form | None:
+    """The form of as many of the laws as are worth it, in the order in which they were found."""
+    there = {c.effect for c in base.chosen if c.where == joint}
+    strange = [f for f in found if not f.law.known or f.law.known in there]
+    best, start = None, _score(base.clean(problem), len(base.values))
+    for count in range(1, min(len(strange), _LAWS) + 1):
+        form = _form(problem, base, joint, strange[:count])
+        if form is None:
             break
-    if kept and train is not None and held is not None:
-        left = [examine(train, held, j)[0] for j in range(len(train.joints))]
-    curves = {}
-    if train is not None:
-        curves = {s.joint: joint_curves(train, train.joints.index(s.joint)) for s in left if s.significant}
-    return Discovery(_block(left, forms, kept), entries, kept, left, curves)
-
-
-def missing_torques(
-    session: Session, effects: Sequence[Effect], nuisance: np.ndarray
-) -> tuple[TorqueResidual | None, TorqueResidual | None]:
-    """Missing torques of the fitted and of the accepting rollouts; of a lone one its first two thirds and the rest."""
-
-    def lacking(ids: Sequence[int], most: int) -> TorqueResidual | None:
-        plant, layout, rollouts = session.plant, session.layout, session.rollouts
-        return torque_residual(plant, layout, rollouts, ids, effects, nuisance, session.sigma, session.steps, most)
-
-    train = lacking([i for i in session.train if i not in session.accept], 4000)
-    if session.accept:
-        return train, lacking(session.accept, 2000)
-    if train is None:
-        return None, None
-    late = train.t > np.quantile(train.t, 2 / 3)
-    return _part(train, ~late), _part(train, late)
-
-
-def _part(data: TorqueResidual, rows: np.ndarray) -> TorqueResidual:
-    fixed = ("joints", "creep")
-    parts = {n: getattr(data, n) for n in data.__dataclass_fields__}
-    return TorqueResidual(**{n: v if n in fixed else v[rows] for n, v in parts.items()})
-
-
-def _refit(
-    problem: Problem, holdout: Problem | None, effects: Sequence[Effect], form: Form, nuisance: np.ndarray
-) -> tuple[Effect, dict[str, Any]] | None:
-    """The form's coefficients in the simulator, or None where the held-out windows are not better with it."""
-    names = list(form.terms)
-    values = np.array([form.terms[n] for n in names])
-    scale = np.abs(values) + 1e-12
-    without = _clean(problem, effects, nuisance)
-    weights = window_weights(without)
-
-    def effect(x: np.ndarray) -> Effect:
-        return Effect("discovered", (form.joint,), dict(zip(names, map(float, x), strict=True)))
-
-    def cost(left: np.ndarray) -> float:
-        return float((weights[:, None] * left**2).sum())
-
-    best, left = values, _clean(problem, [*effects, effect(values)], nuisance)
-    columns = np.zeros((len(values), *left.shape))
-    for _ in range(_PASSES):
-        moved = [best + 0.2 * scale * row for row in np.eye(len(best))]
-        columns = np.stack([(left - _clean(problem, [*effects, effect(x)], nuisance)) / 0.2 for x in moved])
-        basis, inverse = inverse_normal(problem.nuisance, columns, weights)
-        move = (inverse @ np.einsum("bwm,wm->b", basis, left * weights[:, None]))[len(problem.nuisance) :]
-        trial = best + np.clip(move, -3, 3) * scale
-        tried = _clean(problem, [*effects, effect(trial)], nuisance)
-        if cost(tried) >= cost(left):
+        if best is not None and form.score - best.score < max(_WORTH, _SHARE * (best.score - start)):
             break
-        small, best, left = np.all(np.abs(move) < 0.02), trial, tried
-        if small:
-            break
-    judged = holdout or problem
-    pair = [_clean(judged, chosen, nuisance) for chosen in (effects, [*effects, effect(best)])]
-    before, after = ((r**2).mean(axis=1) for r in pair)
-    gain = np.log1p(before) - np.log1p(after)
-    z = float(gain.mean() / (gain.std(ddof=1) / np.sqrt(len(gain)) + 1e-30))
-    if z < _Z or gain.mean() < _LEAST or (holdout is None and cost(left) > cost(without)):
+        best = form
+    return best
+
+
+def _score(left: np.ndarray, parameters: int) -> float:
+    """Log-likelihood of whitened windows (W, M) with long tails, less what the parameters cost."""
+    return -0.5 * left.shape[1] * float(np.log1p((left**2).mean(axis=1)).sum()) - _PARAMETER * parameters
+
+
+def _form(problem: Problem, base: Fit, joint: str, strange: Sequence[Found]) -> _Form | None:
+    """`base` with strange laws, refitted; effects that became needless are dropped."""
+    terms: dict[str, float] = {}
+    for one in strange:
+        for text, size in zip(*joined(list(one.law.texts), one.verdict.size), strict=True):
+            terms[text] = float(size)
+    kind = "curve" if any(one.law.table for one in strange) else "formula"
+    chosen, values = base.chosen, base.values
+    for c in [c for c in chosen if c.where == joint and related(list(terms), c.effect)]:
+        parts = in_terms(problem.plant, base, c)
+        if parts and max(map(abs, terms.values())) > _PART * max(map(abs, parts.values())):
+            chosen, values = _without(chosen, values, c)
+            terms = parts | terms
+    own = formula(joint, terms)
+    fit = _refitted(problem, (*chosen, own), np.concatenate((values, list(terms.values()))))
+    fit = _pruned(problem, fit, own)
+    if own not in fit.chosen:
         return None
-    half = 1.96 * np.sqrt(np.diag(_covariance(problem, columns, left, weights))) * scale
-    return effect(best), _entry(form, names, best, half, gain, before, after, z)
+    score = _score(fit.clean(problem), len(fit.values))
+    return _Form(fit, score, kind, dict(zip(own.texts, map(float, fit.of(own)), strict=True)))
 
 
-def _clean(problem: Problem, effects: Sequence[Effect], nuisance: np.ndarray) -> np.ndarray:
-    """Whitened residual (W, M) with the numerical differences taken out."""
-    return problem.residual([list(effects)])[0] - np.tensordot(nuisance, problem.nuisance, axes=1)
+def _refitted(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
+    """All effects at their best, windows weighed as the first trial leaves them."""
+    start = gauss_newton(problem, chosen, values, np.ones(len(problem.windows)), iterations=0)
+    return gauss_newton(problem, chosen, values, window_weights(start.clean(problem)), iterations=3, coarse=True)
 
 
-def inverse_normal(nuisance: np.ndarray, columns: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nuisances and columns (B, W, M), and the inverse of their normal matrix with the nuisances' prior."""
-    basis = np.concatenate((nuisance, columns))
-    flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
-    normal, count = flat @ flat.T, len(nuisance)
-    normal[np.arange(count), np.arange(count)] += 1.0
-    # A term that does nothing in these windows must not make the matrix singular.
-    normal[np.arange(count, len(normal)), np.arange(count, len(normal))] += 1e-9 * np.diag(normal).max()
-    return basis, np.linalg.inv(normal)
+def _pruned(problem: Problem, fit: Fit, form: Formula) -> Fit:
+    """Less the effects of the catalogue that the form has made needless, the least sure first."""
+    while True:
+        weights = window_weights(fit.clean(problem))
+        z = [np.inf if c is form else wald(problem, fit, weights, i) for i, c in enumerate(fit.chosen)]
+        worst = int(np.argmin(z))
+        if z[worst] >= _SURE:
+            return fit
+        chosen, values = _without(fit.chosen, fit.values, fit.chosen[worst])
+        fit = gauss_newton(problem, chosen, values, weights, iterations=2, coarse=True)
 
 
-def _covariance(problem: Problem, columns: np.ndarray, left: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Sandwich covariance (B, B) of the coefficients, in units of their scales, windows as clusters."""
-    basis, inverse = inverse_normal(problem.nuisance, columns, weights)
-    scores = np.einsum("bwm,wm->wb", basis, left * weights[:, None])
-    return (inverse @ (scores.T @ scores) @ inverse)[len(problem.nuisance) :, len(problem.nuisance) :]
+def _without(
+    chosen: Sequence[Candidate], values: np.ndarray, gone: Candidate
+) -> tuple[tuple[Candidate, ...], np.ndarray]:
+    """The chosen effects and their values less one."""
+    keep, at = [], 0
+    for c in chosen:
+        if c is not gone:
+            keep += list(range(at, at + len(c.nominal)))
+        at += len(c.nominal)
+    return tuple(c for c in chosen if c is not gone), values[keep]
 
 
-def _entry(
-    form: Form,
-    names: Sequence[str],
-    values: np.ndarray,
-    half: np.ndarray,
-    gain: np.ndarray,
-    before: np.ndarray,
-    after: np.ndarray,
-    z: float,
-) -> dict[str, Any]:
-    terms = [
-        {"term": name, "coefficient": float(value), "ci95": [float(value - h), float(value + h)]}
-        for name, value, h in zip(names, values, half, strict=True)
-    ]
-    return {
-        "effect": "discovered",
-        "where": [form.joint],
-        "parameters": {"terms": terms},
-        "equivalent": [],
-        "explains": float(np.clip(1.0 - np.median(after) / max(np.median(before), 1e-30), 0.0, 1.0)),
-        "evidence": {
-            "p": float(norm.sf(z)),
-            "test": f"{form.kind} for the missing torque; accepting windows simulated with it: log chi-square falls by "
-            f"{gain.mean():.3g}, z = {z:.1f}",
-        },
-        "native": False,
-    }
+def _less(problem: Problem, fit: Fit, gone: Sequence[Candidate]) -> Fit:
+    """The fit less some effects, the others where they are."""
+    chosen, values = fit.chosen, fit.values
+    for c in gone:
+        chosen, values = _without(chosen, values, c)
+    ones = np.ones(len(problem.windows))
+    bare = gauss_newton(problem, chosen, values, ones, iterations=0)
+    weights = window_weights(bare.clean(problem))
+    return replace(bare, nuisance=cost_of(problem, bare.residual, weights)[1])
 
 
-def _block(left: Sequence[JointStructure], forms: Sequence[Form], kept: Sequence[Effect]) -> dict[str, Any]:
-    """The contract's `unexplained` of what is left."""
-    found = sorted((s for s in left if s.significant), key=lambda s: -s.rms / s.typical)
-    named = {place for effect in kept for place in effect.where}
-    return {
-        "significant": bool(found),
-        "p": min((s.p for s in left), default=1.0),
-        "where": [s.joint for s in found],
-        "depends_on": list(dict.fromkeys(d for s in found for d in s.depends_on)),
-        "description": _describe(found, [f for f in forms if f.terms and f.joint not in named]),
-    }
-
-
-def structure_table(found: Discovery) -> dict[str, dict[str, Any]]:
-    """Joint -> what its test said, with measured curves where there is structure, for `diagnosis.json`."""
-    return {
-        s.joint: {
-            "p": s.p,
-            "significant": s.significant,
-            "share": s.share,
-            "torque_rms": s.rms,
-            "typical_torque": s.typical,
-            "depends_on": list(s.depends_on),
-            "ljung_box_p": s.ljung_box,
-        }
-        | ({"curves": found.curves[s.joint]} if s.joint in found.curves else {})
-        for s in found.left
-    }
-
-
-def _describe(found: Sequence[JointStructure], forms: Sequence[Form]) -> str:
-    """One sentence a joint: what depends on what, how much it is, and a form that the simulator did not confirm."""
-    lines = []
-    for s in found[:3]:
-        on = ", ".join(s.depends_on) or "no single quantity"
-        part = f"{s.rms:.2g} N m RMS ({100 * s.rms / s.typical:.0f} % of its drive's)"
-        line = f"{s.joint}: a torque of {part} depends on {on}"
-        form = next((f for f in forms if f.joint == s.joint), None)
-        if form is not None:
-            terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in form.terms.items())
-            line += f"; near {_shortened(terms)}, which the held-out windows did not confirm"
-        lines.append(line)
-    if len(found) > 3:
-        lines.append(f"and {len(found) - 3} joints more")
-    return "; ".join(lines)
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= 100 else f"{text[:80]} ..."
+def is_discovered(candidate: Candidate) -> bool:
+    """Whether it is a form and not an effect of the catalogue."""
+    return candidate.effect == DISCOVERED

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from bumblebee.diagnosis.candidates import still_joints
-from bumblebee.diagnosis.discover import missing_torques
 from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_whiteners, horizon_windows
 from bumblebee.diagnosis.example import examples
 from bumblebee.diagnosis.form import examine
@@ -15,7 +14,7 @@ from bumblebee.diagnosis.reported import reported_torque
 from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.simulate import residuals
 from bumblebee.diagnosis.structure import JointStructure
-from bumblebee.diagnosis.torque_residual import TorqueResidual
+from bumblebee.diagnosis.torque_residual import TorqueResidual, missing_torques
 from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.windows import Windows
 

@@ -5,6 +5,7 @@ the readings and commands since the rollout began.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,10 @@ from bumblebee.diagnosis.windows import Windows, command_inputs
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effect_forces import Memory, history_length
 from bumblebee.sim.effect_hooks import RuntimeHooks
+from bumblebee.sim.effect_states import State, states_of
 from bumblebee.sim.servo import Servos, servos_of
+
+_SMOOTH = 3  # ticks to either side
 
 
 def plant_servos(plant: Plant) -> Servos:
@@ -59,7 +63,34 @@ def remember(plant: Plant, windows: Windows, hooks: RuntimeHooks, step: float) -
         torque=at_starts(windows, lambda r: lagged(plant, r, order, hooks.torque_lag)) if late else None,
         position=None if past is None else past[0] - hooks.encoder_offset,
         velocity=None if past is None else past[1],
+        states=_states(plant, windows, hooks, order),
     )
+
+
+def _states(plant: Plant, windows: Windows, hooks: RuntimeHooks, order: Sequence[int]) -> np.ndarray | None:
+    """What discovered terms remember (W, C)."""
+    kept = states_of(hooks.terms)
+    if not kept:
+        return None
+    return np.stack([state_before(plant, windows, replace(s, column=order[s.column])) for s in kept], axis=1)
+
+
+def state_before(plant: Plant, windows: Windows, state: State) -> np.ndarray:
+    """A state (W,) of a joint (the column in the log) at the windows' starts, followed since the rollout began.
+
+    Speeds are means over a few ticks: what a sensor's noise would wear off is no motion.
+    """
+    servos = plant_servos(plant)
+
+    def of(rollout: Rollout) -> np.ndarray:
+        wide = np.ones(2 * _SMOOTH + 1)
+        known = np.convolve(np.ones(len(rollout.time)), wide, mode="same")
+        speed = np.convolve(rollout.joint_vel[:, state.column], wide, mode="same") / known
+        target = servos.given(servos.controls(command_inputs(plant, rollout)))[:, state.column]
+        clock, steps = rollout.time - rollout.time[0], np.diff(rollout.time, append=rollout.time[-1])
+        return state.followed(clock, steps, speed, target)
+
+    return at_starts(windows, of)
 
 
 def lagged(plant: Plant, rollout: Rollout, order: Sequence[int], time: np.ndarray) -> np.ndarray:

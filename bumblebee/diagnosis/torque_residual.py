@@ -13,6 +13,7 @@ import numpy as np
 
 from bumblebee.diagnosis.nuisance import nuisance_columns
 from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.signals import Layout
 from bumblebee.diagnosis.simulate import residuals
 from bumblebee.diagnosis.variation import declared_values, vary
@@ -106,6 +107,30 @@ def torque_residual(
     missing = _solve(change[good], left[good, 0, part])
     kept = [s for s, g in zip(starts, good, strict=True) if g]
     return _described(plant, rollouts, kept, missing, sigma[layout.slices["joint_pos"]])
+
+
+def missing_torques(
+    session: Session, effects: Sequence[Effect], nuisance: np.ndarray
+) -> tuple[TorqueResidual | None, TorqueResidual | None]:
+    """Missing torques of the fitted and of the accepting rollouts; of a lone one its first two thirds and the rest."""
+
+    def lacking(ids: Sequence[int], most: int) -> TorqueResidual | None:
+        plant, layout, rollouts = session.plant, session.layout, session.rollouts
+        return torque_residual(plant, layout, rollouts, ids, effects, nuisance, session.sigma, session.steps, most)
+
+    train = lacking([i for i in session.train if i not in session.accept], 4000)
+    if session.accept:
+        return train, lacking(session.accept, 2000)
+    if train is None:
+        return None, None
+    late = train.t > np.quantile(train.t, 2 / 3)
+    return _part(train, ~late), _part(train, late)
+
+
+def _part(data: TorqueResidual, rows: np.ndarray) -> TorqueResidual:
+    fixed = ("joints", "creep")
+    parts = {n: getattr(data, n) for n in data.__dataclass_fields__}
+    return TorqueResidual(**{n: v if n in fixed else v[rows] for n, v in parts.items()})
 
 
 def _answers(plant: Plant, layout: Layout, windows: Windows, effects: Sequence[Effect], step: float) -> np.ndarray:

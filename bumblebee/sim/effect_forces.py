@@ -24,6 +24,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from bumblebee.sim.effect_hooks import RuntimeHooks, hook_joints
+from bumblebee.sim.effect_states import states_of
 from bumblebee.sim.servo import servos_of
 
 
@@ -41,9 +42,11 @@ class Memory:
     """(n, L, J): readings at the steps before, the newest last."""
     velocity: np.ndarray | None = None
     """(n, L, J)."""
+    states: np.ndarray | None = None
+    """(n, C): those of discovered terms, see `effect_states.states_of`."""
 
 
-_REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v")
+_REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states")
 
 
 def history_length(hooks: RuntimeHooks, step: float) -> int:
@@ -66,9 +69,12 @@ class StepHooks:
         self._back = history_length(hooks, self._step)
         self._past_q = np.zeros((count, self._back, joints))
         self._past_v = np.zeros((count, self._back, joints))
+        self._kept = states_of(hooks.terms)
+        self._states = np.zeros((count, len(self._kept)))
         self._fading = bool(hooks.thermal.any() or hooks.drift.any())
         self._rubbing = bool(hooks.stiction[:, 0].any() or hooks.load_friction.any())
         self._rubbing |= any(term.rubs for _, _, term in hooks.terms)
+        self._driving = any(term.drives for _, _, term in hooks.terms)
         self._running_out = bool(np.isfinite(hooks.speed_limit).any())
         self._late = bool(hooks.encoder_delay.any() or hooks.encoder_step.any() or hooks.torque_lag.any())
         self._pushing = self._late or bool(hooks.cogging) or any(not term.rubs for _, _, term in hooks.terms)
@@ -98,6 +104,11 @@ class StepHooks:
         self._past_q[ids], self._past_v[ids] = q[ids][:, None], v[ids][:, None]
         if memory is not None and memory.position is not None and self._back > 0:
             self._past_q[ids], self._past_v[ids] = memory.position, memory.velocity
+        target = self.servos.given(self.servos.controls(self._batch.bind("ctrl")))[ids]
+        for k, s in enumerate(self._kept):
+            self._states[ids, k] = s.first(target[:, s.column])
+        if memory is not None and memory.states is not None:
+            self._states[ids] = memory.states
         self._fresh[ids] = memory is None or memory.torque is None
         if memory is not None and memory.torque is not None:
             self._lagged[ids] = memory.torque
@@ -139,36 +150,48 @@ class StepHooks:
         h, servos = self._h, self.servos
         q, v = self._readings()
         u = servos.controls(self._batch.bind("ctrl"))
+        for k, s in enumerate(self._kept):
+            self._states[:, k] = s.at(self._states[:, k], servos.given(u)[:, s.column], self._time, self._step)
         strength = self._fade() if self._fading else 1.0
         limit = self._torque_limit(v) if self._running_out else servos.limit
         now = strength * servos.torque(q, v, u, limit / np.maximum(strength, 1e-9))
         torque = self._delayed(q, v, u, strength, limit, now) if self._late else now
         if self._rubbing:
             extra = h.stiction[:, 0] * np.exp(-((v / h.stiction[:, 1]) ** 2)) + h.load_friction * np.abs(torque)
-            self._loss[:, servos.dof] = self._loss0 + extra + self._discovered(q, v, u, torque, rubs=True)
+            loss = self._loss0 + extra + self._discovered(q, v, u, torque, rubs=True)
+            self._loss[:, servos.dof] = np.maximum(loss, 0.0)
         if self._pushing:
             applied = torque - now + self._discovered(q, v, u, torque, rubs=False)
+            if self._driving:
+                wanted = self.servos.torque(q, v, u, limit + np.inf)
+                asked = wanted + self._discovered(q, v, u, torque, rubs=False, drives=True)
+                applied += np.clip(asked, -limit, limit) - np.clip(wanted, -limit, limit)
             for column, sine, cosine, periods in h.cogging:
                 angle = periods * q[:, column]
                 applied[:, column] += sine * np.sin(angle) + cosine * np.cos(angle)
             self._batch.bind("qfrc_applied")[:, servos.dof] = applied
+        for k, s in enumerate(self._kept):
+            self._states[:, k] = s.after(self._states[:, k], v[:, s.column], self._step)
         self._time += self._step
         self._heat += self._step * (torque / np.where(np.isfinite(servos.limit), servos.limit, 1.0)) ** 2
 
-    def _discovered(self, q: np.ndarray, v: np.ndarray, u: np.ndarray, torque: np.ndarray, rubs: bool) -> np.ndarray:
-        """Sum (n, J) of the discovered terms that are losses, or of those that are torques."""
+    def _discovered(
+        self, q: np.ndarray, v: np.ndarray, u: np.ndarray, torque: np.ndarray, rubs: bool, drives: bool = False
+    ) -> np.ndarray:
+        """Sum (n, J) of the discovered terms that are losses, of those that act in the drive, or of other torques."""
         out = np.zeros_like(q)
         given = self.servos.given(u)
         names = self._h.joints
         for column, coefficient, term in self._h.terms:
-            if term.rubs != rubs:
+            if (term.rubs, term.drives) != (rubs, drives):
                 continue
             values = {"q": q[:, column], "v": v[:, column], "u": given[:, column], "tau": torque[:, column]}
             values["t"] = self._time
+            values |= {s.key: self._states[:, k] for k, s in enumerate(self._kept) if s.column == column}
             for other in term.others:
-                values[f"q[{other}]"], values[f"v[{other}]"] = q[:, names.index(other)], v[:, names.index(other)]
-            part = coefficient * term(values)
-            out[:, column] += np.maximum(part, 0.0) if rubs else part
+                k = names.index(other)
+                values |= {f"q[{other}]": q[:, k], f"v[{other}]": v[:, k], f"tau[{other}]": torque[:, k]}
+            out[:, column] += coefficient * term(values)
         return out
 
     def _fade(self) -> np.ndarray:

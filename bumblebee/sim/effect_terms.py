@@ -6,19 +6,24 @@ may use these names, each an array (n,) over worlds:
 | name | meaning |
 |---|---|
 | `q`, `v` | the joint's position [rad], velocity [rad/s] |
-| `q[name]`, `v[name]` | those of another joint; a name that is no word goes in quotes |
+| `q[name]`, `v[name]`, `tau[name]` | those of another joint; a name that is no word goes in quotes |
 | `u` | the servo's target [rad], or the commanded torque [N m] |
 | `tau` | the servo's torque [N m] |
 | `t` | time since the rollout began [s] |
+| `rested(T, d)` | 0 to 1: how long the joint has rested, see `sim.effect_states` |
+| `slewed(r, T)` | the target at a limited rate r [rad/s], moved every T seconds |
 
-and `+ - * / ^`, numbers, `sin cos exp tanh sign abs relu`, and `curve(x, x0, y0, x1, y1, ...)`: straight lines between
-points, constant beyond them. `friction(term)` alone is dry friction: not a torque but a loss, `coefficient * term` of
-it (nothing where negative), that the solver opposes to the motion and that can hold the joint still.
+and `+ - * / ^`, numbers, `sin cos exp tanh sign abs relu`, `stair(x, s)`: x rounded to multiples of s, `bound(x, b)`: x
+kept between -b and b, and `curve(x, x0, y0, x1, y1, ...)`: straight lines between points, constant beyond them. A term
+with `u` in it acts in the drive, whose limit holds for its torque and the term's together. `friction(term)` alone is
+dry friction: not a torque but a loss that the solver opposes to the motion and that can hold the joint still. The
+losses of a joint, each `coefficient * term`, add up with the one that it has; there is none where the sum is negative.
 """
 
 import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -36,6 +41,11 @@ _FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "abs": np.abs,
     "relu": lambda x: np.maximum(x, 0.0),
 }
+_SHAPED: dict[str, Callable[[Any, float], Any]] = {
+    "stair": lambda x, s: s * np.round(x / s),
+    "bound": lambda x, b: np.clip(x, -b, b),
+}
+STATES = ("rested", "slewed")  # of two numbers each
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,
@@ -56,13 +66,21 @@ class Term:
     """Names of the other joints that it uses."""
     names: frozenset[str]
     """Those of the joint's own names that it uses."""
+    states: tuple[tuple[str, tuple[float, ...]], ...]
+    """What it remembers: (name in `values`, numbers)."""
     _tree: ast.expr
 
+    @property
+    def drives(self) -> bool:
+        """Whether it acts in the drive, on what is asked of it, before the drive's limit: it speaks of the target."""
+        return not self.rubs and "u" in self.names
+
     def __call__(self, values: Mapping[str, np.ndarray]) -> np.ndarray:
-        """The term's value (n,); `values` has q, v, u, tau, t and, for other joints, `q[name]` and `v[name]`."""
+        """The term's value (n,); `values` has q, v, u, tau, t, and of other joints' and states what is used."""
         return np.asarray(_value(self._tree, values))
 
 
+@lru_cache(maxsize=1 << 15)
 def read_term(text: str) -> Term:
     """Parse a term; a formula that uses anything but the names, functions and signs above is a `BadInput`."""
     try:
@@ -76,12 +94,14 @@ def read_term(text: str) -> Term:
         others: list[str] = []
         _check(tree, others)
     except (ValueError, SyntaxError, RecursionError, MemoryError) as error:
-        names = ", ".join((*OWN, *_FUNCTIONS, "curve", "friction"))
+        names = ", ".join((*OWN, *_FUNCTIONS, *_SHAPED, *STATES, "curve", "friction"))
         raise BadInput(f"term {text[:60]!r}", f"a formula of {names}", str(error)[:80]) from None
     inside = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Subscript)}
     inside |= {id(n.slice) for n in ast.walk(tree) if isinstance(n, ast.Subscript)}
     used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in OWN and id(n) not in inside}
-    return Term(text, rubs, tuple(dict.fromkeys(others)), frozenset(used), tree)
+    calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)]
+    states = {_state(n): tuple(_number(a) for a in n.args) for n in calls if n.func.id in STATES}
+    return Term(text, rubs, tuple(dict.fromkeys(others)), frozenset(used), tuple(states.items()), tree)
 
 
 def _check(node: ast.expr, others: list[str]) -> None:
@@ -115,10 +135,24 @@ def _check_call(name: str, arguments: list[ast.expr], others: list[str]) -> None
         if any(b <= a for a, b in zip(points[::2], points[2::2], strict=False)):
             raise ValueError("curve whose points do not ascend")
         arguments = arguments[:1]
+    elif name in STATES:
+        if len(arguments) != 2 or min(_number(a) for a in arguments) <= 0:
+            raise ValueError(f"{name} without two positive numbers")
+        arguments = []
+    elif name in _SHAPED:
+        if len(arguments) != 2 or _number(arguments[1]) <= 0:
+            raise ValueError(f"{name} without a quantity and a positive number")
+        arguments = arguments[:1]
     elif name not in _FUNCTIONS or len(arguments) != 1:
         raise ValueError(f"the function {name} of {len(arguments)}")
     for argument in arguments:
         _check(argument, others)
+
+
+def _state(node: ast.Call) -> str:
+    """How a state is called in `values`."""
+    assert isinstance(node.func, ast.Name)
+    return f"{node.func.id}({', '.join(f'{_number(a):g}' for a in node.args)})"
 
 
 def _number(node: ast.expr) -> float:
@@ -132,8 +166,8 @@ def _number(node: ast.expr) -> float:
 
 def _other(node: ast.Subscript) -> str:
     name = node.slice
-    if not isinstance(node.value, ast.Name) or node.value.id not in ("q", "v"):
-        raise ValueError("brackets behind anything but q and v")
+    if not isinstance(node.value, ast.Name) or node.value.id not in ("q", "v", "tau"):
+        raise ValueError("brackets behind anything but q, v and tau")
     if isinstance(name, ast.Name):
         return name.id
     if isinstance(name, ast.Constant) and isinstance(name.value, str):
@@ -154,7 +188,11 @@ def _value(node: ast.expr, values: Mapping[str, np.ndarray]) -> Any:
     if isinstance(node, ast.BinOp):
         return _BINARY[type(node.op)](_value(node.left, values), _value(node.right, values))
     assert isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    if node.func.id in STATES:
+        return values[_state(node)]
     if node.func.id == "curve":
         points = [_number(a) for a in node.args[1:]]
         return np.interp(_value(node.args[0], values), points[::2], points[1::2])
+    if node.func.id in _SHAPED:
+        return _SHAPED[node.func.id](_value(node.args[0], values), _number(node.args[1]))
     return _FUNCTIONS[node.func.id](_value(node.args[0], values))

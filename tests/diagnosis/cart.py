@@ -46,6 +46,7 @@ def record(
     latency: float = 0.0,
     reported: bool = False,
     cubic: float = 0.0,
+    drag: float = 0.0,
     seed: int = 0,
 ) -> list[Rollout]:
     """Rollouts under multisine commands.
@@ -60,6 +61,7 @@ def record(
         latency: the logger's states are this old [s].
         reported: the drive's torque is logged too.
         cubic: stiffness of a spring on the pole that the model lacks and no catalogue names, -k q^3 [N m/rad^3].
+        drag: of the pole, -c v abs(v) [N m s^2/rad^2]; the catalogue's nearest name is viscous friction.
         seed: of commands and noise.
     """
     rng = np.random.default_rng(seed)
@@ -104,5 +106,5 @@ def _drive(data: mujoco.MjData, command: np.ndarray, torque: bool) -> np.ndarray
 def _force(data: mujoco.MjData, command: np.ndarray, given: dict) -> np.ndarray:
     force = _drive(data, command, given["torque"])
     force = force - np.array(given["friction"]) * np.tanh(data.qvel / 0.002)
-    force[1] -= given["cubic"] * data.qpos[1] ** 3
+    force[1] -= given["cubic"] * data.qpos[1] ** 3 + given["drag"] * data.qvel[1] * abs(data.qvel[1])
     return force

@@ -1,18 +1,23 @@
-"""Beyond the catalogue from end to end: a spring that no effect names is found, refitted and kept; nothing else is."""
+"""Beyond the catalogue from end to end: what no effect names is found, refitted and kept; nothing else is."""
 
 import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.discover import discover, inverse_normal
-from bumblebee.diagnosis.problem import Problem, make_problem
+from bumblebee.diagnosis.beyond import discovered_entry, structure_table, unexplained
+from bumblebee.diagnosis.candidates import Candidate, scales_of
+from bumblebee.diagnosis.discover import Discovery, discover
+from bumblebee.diagnosis.fit import gauss_newton
+from bumblebee.diagnosis.formula import formula, related
+from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.session import Session, make_session
 from bumblebee.diagnosis.windows import choose_starts, cut
 from tests.diagnosis import cart
 
 
-def prepared(cubic: float) -> tuple[Session, Problem, Problem]:
-    rollouts = cart.record(count=4, seconds=8.0, cubic=cubic)
+def prepared(**truth: float) -> tuple[Session, Problem, Problem]:
+    rollouts = cart.record(count=4, seconds=8.0, **truth)
     session = make_session(mujoco.MjSpec.from_string(cart.xml()), rollouts, "cart", "memory")
     problems = []
     for ids in ([i for i in session.train if i not in session.accept], session.accept):
@@ -22,27 +27,63 @@ def prepared(cubic: float) -> tuple[Session, Problem, Problem]:
     return session, problems[0], problems[1]
 
 
+def discovered(chosen: tuple[Candidate, ...] = (), **truth: float) -> Discovery:
+    """What is discovered beside the catalogue's effects `chosen`, fitted from their first trial."""
+    session, problem, judge = prepared(**truth)
+    ones = np.ones(len(problem.windows))
+    start = np.concatenate([c.start for c in chosen]) if chosen else []
+    fit = gauss_newton(problem, chosen, start, window_weights(gauss_newton(problem, (), (), ones).clean(problem)))
+    return discover(problem, Holdout(judge), fit, scales_of(session.plant, session.rollouts).torque)
+
+
 def test_a_cubic_spring_is_found_with_its_form_and_size() -> None:
-    session, problem, holdout = prepared(cubic=0.6)
-    found = discover(session, problem, holdout, [], np.zeros(len(problem.nuisance)))
-    assert [e.where for e in found.effects] == [("pole",)]
-    terms = found.entries[0]["parameters"]["terms"]
-    assert [t["term"] for t in terms] == ["q^3"]
-    assert terms[0]["coefficient"] == pytest.approx(-0.6, rel=0.02)
-    assert terms[0]["ci95"][0] < terms[0]["coefficient"] < terms[0]["ci95"][1]
-    assert not found.block["significant"]
+    found = discovered(cubic=0.6)
+    (form,) = found.fit.chosen
+    assert (form.where, form.texts) == ("pole", ("q^3",))
+    assert found.fit.of(form)[0] == pytest.approx(-0.6, rel=0.02)
+    assert not unexplained(found)["significant"]
 
 
 def test_a_complete_model_leaves_nothing() -> None:
-    session, problem, holdout = prepared(cubic=0.0)
-    found = discover(session, problem, holdout, [], np.zeros(len(problem.nuisance)))
-    assert found.effects == [] and not found.block["significant"]
+    found = discovered()
+    assert found.fit.chosen == () and not unexplained(found)["significant"]
+    assert not any(row["significant"] for row in structure_table(found).values())
 
 
-def test_a_term_that_does_nothing_has_no_size_and_breaks_nothing() -> None:
-    """Its column of zeros leaves the other's coefficient alone."""
-    rng = np.random.default_rng(0)
-    column, nuisance = rng.standard_normal((12, 5)), rng.standard_normal((2, 12, 5))
-    basis, inverse = inverse_normal(nuisance, np.stack((column, np.zeros((12, 5)))), np.ones(12))
-    move = inverse @ np.einsum("bwm,wm->b", basis, 3.0 * column)
-    np.testing.assert_allclose(move[2:], [3.0, 0.0], atol=1e-3)
+def test_a_name_that_half_explains_a_strange_effect_is_withdrawn() -> None:
+    viscous = Candidate("viscous_friction", "pole", (0.02,), (0.02,))
+    found = discovered((viscous,), drag=0.05)
+    (form,) = found.fit.chosen
+    assert form.texts == ("v*abs(v)",)
+    assert found.fit.of(form)[0] == pytest.approx(-0.05, rel=0.03)
+    assert found.withdrawn == ["viscous_friction on pole"]
+
+
+def test_a_true_name_is_neither_withdrawn_nor_joined_by_another() -> None:
+    found = discovered((Candidate("coulomb_friction", "pole", (0.0,), (0.02,)),), friction=(0.0, 0.05))
+    assert [c.effect for c in found.fit.chosen] == ["coulomb_friction"]
+    assert found.fit.values[0] == pytest.approx(0.05, rel=0.05)
+
+
+def test_an_entry_has_a_coefficient_and_an_interval_for_each_term() -> None:
+    form = formula("pole", {"sin(3*q)": 0.5, "cos(3*q)": -0.1})
+    entry = discovered_entry(form, np.array([0.5, -0.1]), np.array([0.1, 0.2]), 0.9, 8.0, "formula")
+    terms = entry["parameters"]["terms"]
+    assert [t["term"] for t in terms] == ["sin(3*q)", "cos(3*q)"]
+    assert terms[0]["ci95"] == pytest.approx([0.4, 0.6]) and entry["where"] == ["pole"]
+
+
+@pytest.mark.parametrize(
+    ("texts", "effect", "same"),
+    [
+        (["friction(sin(3*q))"], "coulomb_friction", True),
+        (["friction(sin(3*q))"], "cogging", False),
+        (["sin(15*q)"], "cogging", True),
+        (["v*abs(v)"], "viscous_friction", True),
+        (["q[other]"], "joint_spring", False),
+        (["tau*sin(1.5*t)"], "joint_spring", False),
+        (["bound(u - q, 0.1)"], "joint_spring", False),
+    ],
+)
+def test_a_constant_part_belongs_to_a_law_of_its_family(texts: list[str], effect: str, same: bool) -> None:
+    assert related(texts, effect) is same

@@ -26,6 +26,8 @@ TORQUES = (
     single("cogging", "waist_yaw_joint", 3.0, 1.0, 12.0),
     Effect("discovered", ("left_shoulder_roll_joint",), {"v * abs(v)": -0.4, "curve(q, -1, 2, 0, 0, 1, -1)": 0.5}),
     Effect("discovered", ("right_shoulder_roll_joint",), {"friction(1 + tanh(tau))": 0.3}),
+    Effect("discovered", ("left_shoulder_yaw_joint",), {"slewed(1.5, 0.02) - u": 10.0, "bound(u - q, 0.05)": -4.0}),
+    Effect("discovered", ("right_shoulder_yaw_joint",), {"friction(rested(0.3, 0.02))": 0.4}),
     single("external_wrench", "torso_link", 8.0, 0.0, 0.0, 0.0, 0.0, 0.5),
 )
 READINGS = (

@@ -1,0 +1,103 @@
+"""The document's part on what lies beyond the catalogue: entries of discovered effects, and what is unexplained."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from bumblebee.diagnosis.curves import measured_curve
+from bumblebee.diagnosis.discover import Discovery
+from bumblebee.diagnosis.formula import Formula
+from bumblebee.diagnosis.laws import Law
+from bumblebee.diagnosis.remains import JointRemains
+
+NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
+_NAMED = 3  # joints that get a sentence
+
+
+def discovered_entry(
+    c: Formula, values: np.ndarray, half: np.ndarray, explains: float, z: float, kind: str
+) -> dict[str, Any]:
+    """The contract's entry of a form with `values` (P,) and half-widths (P,) of its intervals.
+
+    `z` is that of Wald's test in the joint fit, `kind` "formula" or "curve".
+    """
+    terms = [
+        {"term": text, "coefficient": float(v), "ci95": [float(v - h), float(v + h)]}
+        for text, v, h in zip(c.texts, values, half, strict=True)
+    ]
+    p = float(2 * norm.sf(z))
+    test = f"{kind} sought among thousands in the whitened windows; Wald test in the joint fit, z = {z:.1f}; better on "
+    return {
+        "effect": c.effect,
+        "where": [c.where],
+        "parameters": {"terms": terms},
+        "equivalent": [],
+        "explains": explains,
+        "evidence": {"p": p, "test": test + "windows that took no part"},
+        "native": False,
+    }
+
+
+def unexplained(found: Discovery) -> dict[str, Any]:
+    """The contract's `unexplained`: what is left with all effects in force."""
+    left = sorted((j for j in found.left.joints if j.significant), key=lambda j: -j.excess)
+    return {
+        "significant": bool(left),
+        "p": min((j.p for j in found.left.joints), default=1.0),
+        "where": [j.joint for j in left],
+        "depends_on": list(dict.fromkeys(on for j in left for on in j.depends_on)),
+        "description": _described(left, found.unconfirmed),
+    }
+
+
+def _described(left: Sequence[JointRemains], forms: Mapping[str, Mapping[str, float]]) -> str:
+    """One sentence a joint: how much is left, on what it depends, and a form that was not kept."""
+    lines = []
+    for j in left[:_NAMED]:
+        on = ", ".join(j.depends_on) or "no single quantity"
+        line = f"{j.joint}: torques that depend on {on}"
+        if j.laws:
+            share = 100 * j.rms / max(j.typical, 1e-12)
+            line = f"{j.joint}: a torque of {j.rms:.2g} N m RMS ({share:.0f} % of its drive's) depends on {on}"
+        if j.joint in forms:
+            terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in forms[j.joint].items())
+            line += f"; near {terms if len(terms) <= 100 else terms[:80] + ' ...'}, which was not confirmed"
+        lines.append(line)
+    if len(left) > _NAMED:
+        lines.append(f"and {len(left) - _NAMED} joints more")
+    return "; ".join(lines)
+
+
+def structure_table(found: Discovery) -> dict[str, dict[str, Any]]:
+    """Joint -> what its tests said, with measured curves where there is structure, for `diagnosis.json`."""
+    return {
+        j.joint: {
+            "p": j.p,
+            "significant": j.significant,
+            "excess": j.excess,
+            "torque_rms": j.rms,
+            "typical_torque": j.typical,
+            "depends_on": list(j.depends_on),
+            "laws": [_law(law, size) for law, size in j.laws],
+        }
+        | ({"curves": _curves(found, index)} if j.significant else {})
+        for index, j in enumerate(found.left.joints)
+    }
+
+
+def _law(law: Law, size: np.ndarray) -> list[dict[str, Any]]:
+    return [{"term": t, "coefficient": float(s)} for t, s in zip(law.texts, size, strict=True)]
+
+
+def _curves(found: Discovery, joint: int) -> dict[str, list[list[float]]]:
+    """Measured curves of what a joint lacks over its own quantities, by their name and unit."""
+    scene = found.left.scene
+    data, path, lacks = scene.data, scene.data.path, scene.evidence.lacking(joint)
+    block = np.repeat(np.arange(len(lacks)), lacks.shape[1])
+    over = {"velocity [rad/s]": data.v, "position [rad]": data.q, "torque [N m]": data.tau}
+    means = {name: path.mean(x[..., joint]).ravel() for name, x in over.items()} | {
+        "time [s]": path.mean(data.t).ravel()
+    }
+    return {name: measured_curve(x, lacks.ravel(), block) for name, x in means.items() if np.ptp(x) > 0}

@@ -1,0 +1,73 @@
+"""A discovered effect as a candidate: terms on a joint whose coefficients are fitted like any effect's parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.fit import Fit
+from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.variation import declared_values
+from bumblebee.sim.effects import Effect
+
+DISCOVERED = "discovered"
+
+
+@dataclass(frozen=True)
+class Formula(Candidate):
+    """Terms of `sim.effect_terms` on one joint; parameters (P,) are their coefficients, absent at 0."""
+
+    texts: tuple[str, ...] = ()
+
+    def at(self, values: Sequence[float] | np.ndarray) -> Effect:
+        """The effect with its coefficients at `values` (P,)."""
+        return Effect(DISCOVERED, (self.where,), dict(zip(self.texts, map(float, values), strict=True)))
+
+    def clip(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
+        """`values` as they are: a coefficient has no bounds."""
+        return np.asarray(values, dtype=float)
+
+
+def formula(joint: str, terms: dict[str, float]) -> Formula:
+    """The candidate of `terms`, term -> coefficient that matters."""
+    sizes = tuple(max(abs(x), 1e-9) for x in terms.values())
+    return Formula(DISCOVERED, joint, (0.0,) * len(terms), sizes, tuple(range(len(terms))), texts=tuple(terms))
+
+
+def in_terms(plant: Plant, fit: Fit, candidate: Candidate) -> dict[str, float]:
+    """Terms that are the same torque as a chosen effect of the catalogue; {} where the language has none."""
+    values, nominal = fit.of(candidate), declared_values(plant, candidate.effect, candidate.where)
+    first = float(values[0] - nominal[0])
+    if candidate.effect == "coulomb_friction":
+        return {"friction(1)": first}
+    if candidate.effect == "viscous_friction":
+        return {"v": -first}
+    if candidate.effect == "joint_spring":
+        return {"q": -first, "1": float(values[1] - nominal[1])}
+    if candidate.effect == "cogging":
+        return {f"{f}({values[2]:.4g}*q)": float(x) for f, x in zip(("sin", "cos"), values[:2], strict=True)}
+    if candidate.effect == "stribeck_friction":
+        return {f"friction(exp(-(v/{values[1]:.3g})^2))": float(values[0])}
+    if candidate.effect == "load_dependent_friction":
+        return {"friction(abs(tau))": float(values[0])}
+    return {}
+
+
+# Effects of the catalogue that are of one family with a law: its constant part, its linear part, its first harmonic.
+_FAMILY = {
+    "friction(": ("coulomb_friction", "stribeck_friction", "load_dependent_friction"),
+    "q": ("joint_spring", "cogging"),
+    "v": ("viscous_friction",),
+}
+
+
+def related(texts: Sequence[str], effect: str) -> bool:
+    """Whether a catalogue's effect is of the family of the laws `texts`: of friction, position or velocity."""
+    kinds = set()
+    for text in texts:
+        if text.startswith("friction("):
+            kinds.add("friction(")
+        elif "[" not in text and "u" not in text.replace("curve", "") and "t" not in text.replace("tanh", ""):
+            kinds |= {name for name in ("q", "v") if name in text.replace("curve", "")}
+    return any(effect in _FAMILY[kind] for kind in kinds)

@@ -1,0 +1,140 @@
+"""What a fit leaves unexplained, joint by joint: how much, on what it depends, by which law; or nothing.
+
+Two tests, both on the fitted windows and again on those that took no part in the fit. Laws: whether one of several
+thousand, each with its few coefficients, explains what is left (`diagnosis/seek.py`). Power: whether the torques that a
+joint lacks, free in every fifth of every window, are larger than sensor noise makes them; it sees what no law names.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm, wilcoxon
+
+from bumblebee.diagnosis.fit import Fit, solve
+from bumblebee.diagnosis.laws import Law
+from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.scene import Scene, fitted_scene, judged_scene
+from bumblebee.diagnosis.seek import Found, Sought, closest, library, seek
+
+_LEAST = 0.01  # share of a joint's typical torque below which structure is not worth a word
+_CONFIRMED = 2.0  # standard errors by which windows that were not fitted must be better
+_POWER, _AGAIN, _ALONE = 4.0, 1.5, 6.0  # standard errors of a joint's power: fitted, judged, fitted without judges
+_HINT = 3.0  # z from which a law says what a power that no law explains depends on
+_MOST = 8  # joints that laws are sought on, those that lack most
+
+
+@dataclass(frozen=True)
+class JointRemains:
+    """What is left in one joint."""
+
+    joint: str
+    p: float
+    """Of the surer test, shared among all laws or joints."""
+    excess: float
+    """Standard errors by which its torques are larger than noise makes them."""
+    laws: tuple[tuple[Law, np.ndarray], ...]
+    """Laws with their sizes, each confirmed on the judging windows."""
+    rms: float
+    """RMS torque of the laws [N m]."""
+    typical: float
+    """RMS torque of the joint's servo [N m]."""
+    depends_on: tuple[str, ...]
+    """Quantities of `laws.QUANTITIES` and "another joint (NAME)", the most important first."""
+    significant: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Remains:
+    """Of all joints."""
+
+    joints: list[JointRemains]
+    scene: Scene
+    judged: Scene | None
+    sought: Sought
+
+    def worst(self, beside: Sequence[str] = ()) -> JointRemains | None:
+        """The joint with most that is significant, those in `beside` left out."""
+        some = [j for j in self.joints if j.significant and j.joint not in beside]
+        return max(some, key=lambda j: (j.excess, j.rms / j.typical), default=None)
+
+
+def remains(
+    problem: Problem, judge: Problem | None, fit: Fit, typical: np.ndarray, still: Sequence[str] = ()
+) -> Remains:
+    """Test what `fit` leaves.
+
+    Args:
+        problem: the fitted windows.
+        judge: windows that took no part; None if there are none.
+        fit: of the effects found so far.
+        typical: (J,) RMS torques of the joints [N m].
+        still: joints that never move.
+    """
+    scene = fitted_scene(problem, fit, typical)
+    judged = None if judge is None else judged_scene(judge, fit, typical)
+    excess, again = scene.excess(), None if judged is None else judged.excess()
+    names = problem.plant.joints
+    moving = [j for j in np.argsort(-excess) if names[j] not in still][:_MOST]
+    some = library(scene.data, moving)
+    sought = seek(problem, scene.evidence, scene.residual, scene.columns, some)
+    kept = confirmed(scene, sought, judged)
+    found = []
+    for j, name in enumerate(names):
+        own = [(one, size) for one, size in kept if one.joint == j]
+        lacks = [np.einsum("fws,f->ws", one.torque, size) for one, size in own]
+        rms = float(np.sqrt((np.sum(lacks, axis=0) ** 2).mean())) if own else 0.0
+        loud = excess[j] > (_ALONE if again is None else _POWER)
+        loud &= again is None or again[j] > _AGAIN or _in_two(scene, j)
+        real = bool(own) and rms > _LEAST * typical[j]
+        p = [2 * norm.sf(one.verdict.z) * some.count for one, _ in own]
+        p.append(float(norm.sf(excess[j])) * len(names))
+        on = list(dict.fromkeys(quantity for one, _ in own for quantity in one.law.on))
+        if loud and not on:
+            on = list(dict.fromkeys(quantity for one in sought.found if one.joint == j for quantity in one.law.on))
+        if loud and not on:
+            hint = closest(sought.evidence, some, j, _HINT)
+            on = list(hint.law.on) if hint is not None else []
+        found.append(
+            JointRemains(
+                name, float(min(1.0, *p)), float(excess[j]), tuple((one.law, size) for one, size in own), rms,
+                float(typical[j]), tuple(on), bool(real or (loud and name not in still)),
+            )
+        )  # fmt: skip
+    return Remains(found, scene, judged, sought)
+
+
+def _in_two(scene: Scene, joint: int) -> bool:
+    """Whether a joint's power is too large in each of two rollouts: what one rollout shows may be an accident."""
+    rollouts = scene.problem.windows.rollout
+    values = [scene.evidence.free(joint, rollouts == i) for i in np.unique(rollouts)]
+    return sum((value - count) / np.sqrt(2.0 * max(count, 1)) > _POWER for value, count in values) > 1
+
+
+def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[Found, np.ndarray]]:
+    """The laws with their sizes, in the joint fit of all; each that the judging windows are better with."""
+    evidence, found = sought.evidence, sought.found
+    sizes = solve(evidence.basis, evidence.inverse, scene.residual, evidence.weights)
+    sizes = sizes[len(sizes) - sum(len(one.torque) for one in found) :]
+    kept, left, at = [], None if judged is None else judged.evidence.left.copy(), 0
+    for one in found:
+        size = sizes[at : at + len(one.torque)]
+        at += len(one.torque)
+        if judged is not None:
+            moved = judged.evidence.column(one.joint, one.law.torque(judged.data, one.joint))
+            after = left - np.tensordot(size, moved, axes=1)
+            if not better(left, after):
+                continue
+            left = after
+        kept.append((one, size))
+    return kept
+
+
+def better(before: np.ndarray, after: np.ndarray) -> bool:
+    """Whether windows (W, M) are better `after`: log(1 + chi-square) falls beyond doubt by its mean or by ranks."""
+    gain = np.log1p((before**2).mean(axis=1)) - np.log1p((after**2).mean(axis=1))
+    if gain.mean() <= 0:
+        return False
+    spread = gain.std(ddof=1) / np.sqrt(len(gain)) + 1e-30
+    ranks = wilcoxon(gain, alternative="greater").pvalue if len(gain) > 8 else 1.0
+    return bool(gain.mean() > _CONFIRMED * spread or ranks < norm.sf(_CONFIRMED))

@@ -1,0 +1,71 @@
+"""One set of windows around one fit, ready to be asked what torques the fit lacks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bumblebee.diagnosis.evidence import Evidence, joint_answers, make_evidence
+from bumblebee.diagnosis.fit import Fit
+from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.pulses import answers_of
+from bumblebee.diagnosis.quantities import Quantities, quantities
+from bumblebee.diagnosis.screen import pulse_sizes
+from bumblebee.diagnosis.variation import Variation, vary
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """W windows."""
+
+    problem: Problem
+    residual: np.ndarray
+    """(W, M) whitened, nuisances not taken out."""
+    columns: np.ndarray
+    """(F, W, M) of the chosen effects; none on windows that take no part in the fit."""
+    evidence: Evidence
+    data: Quantities
+
+    def excess(self) -> np.ndarray:
+        """(J,) by how many standard errors a joint's torques are larger than noise makes them."""
+        found = []
+        for j in range(self.evidence.joints):
+            value, count = self.evidence.free(j)
+            found.append((value - count) / np.sqrt(2.0 * max(count, 1)))
+        return np.array(found)
+
+    def power(self) -> tuple[float, float]:
+        """Mean square of what is left, 1 for noise, and its standard error for noise."""
+        left = self.evidence.left
+        return float((left**2).mean()), float(np.sqrt(2.0 / left.size))
+
+
+def fitted_scene(problem: Problem, fit: Fit, torque: np.ndarray) -> Scene:
+    """The windows of a fit; `torque` (J,) [N m] is typical of the joints."""
+    return _scene(problem, fit.residual, fit.columns, fit.effects, window_weights(fit.clean(problem)), torque)
+
+
+def judged_scene(problem: Problem, fit: Fit, torque: np.ndarray) -> Scene:
+    """Windows that took no part in `fit`: its effects as they are, its numerical differences taken out."""
+    residual = problem.residual([fit.effects])[0]
+    residual = residual - np.tensordot(fit.nuisance, problem.nuisance, axes=1)
+    return _scene(problem, residual, np.empty((0, *residual.shape)), fit.effects, np.ones(len(residual)), torque)
+
+
+def _scene(
+    problem: Problem,
+    residual: np.ndarray,
+    columns: np.ndarray,
+    effects: Sequence,
+    weights: np.ndarray,
+    torque: np.ndarray,
+) -> Scene:
+    plant, layout, windows = problem.plant, problem.layout, problem.windows
+    variation = vary(plant, effects)
+    if variation.plant is None:
+        variation = Variation(variation.model, variation.delay, variation.offset)
+    else:
+        variation = vary(plant, [])
+    answers = answers_of(plant, layout, windows, variation, problem.coarse, pulse_sizes(problem, torque))
+    evidence = make_evidence(problem, joint_answers(problem, answers), residual, columns, weights)
+    return Scene(problem, residual, columns, evidence, quantities(plant, windows, answers.path, variation.model))

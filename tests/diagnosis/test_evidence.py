@@ -1,0 +1,94 @@
+"""Evidence on missing torques: sizes and gains as a fit would find them, laws whose text and torque are the same."""
+
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.candidates import scales_of
+from bumblebee.diagnosis.evidence import Evidence
+from bumblebee.diagnosis.fit import cost_of, gauss_newton
+from bumblebee.diagnosis.laws import all_laws, joined
+from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.remains import better
+from bumblebee.diagnosis.scene import Scene, fitted_scene
+from bumblebee.diagnosis.seek import library, seek
+from bumblebee.sim.effect_terms import read_term
+from tests.diagnosis.test_discover import prepared
+
+_made: list[tuple[Problem, Scene]] = []
+
+
+def null() -> tuple[Problem, Scene]:
+    """The windows of a complete model, made once."""
+    if not _made:
+        session, problem, _ = prepared()
+        fit = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+        _made.append((problem, fitted_scene(problem, fit, scales_of(session.plant, session.rollouts).torque)))
+    return _made[0]
+
+
+def planted(size: float) -> tuple[Problem, Scene, Evidence, np.ndarray]:
+    """The evidence where the pole lacks `size` times its target's distance, to first order."""
+    problem, scene = null()
+    torque = np.stack([scene.data.torque(read_term("sin(4*q)"), 1)])
+    residual = scene.residual + size * scene.evidence.column(1, torque)[0]
+    return problem, scene, scene.evidence.with_columns(problem, residual, scene.columns), torque
+
+
+def test_a_planted_torque_comes_back_with_its_size() -> None:
+    _, _, evidence, torque = planted(0.2)
+    verdict = evidence.test(1, torque)
+    assert abs(verdict.size[0] - 0.2) < 3 * verdict.error[0]
+    assert verdict.z > 10
+
+
+def test_a_gain_is_the_fall_of_the_cost_of_a_fit_with_the_column() -> None:
+    problem, scene, evidence, torque = planted(0.2)
+    residual = scene.residual + 0.2 * evidence.column(1, torque)[0]
+    before, _ = cost_of(problem, residual, evidence.weights)
+    more = np.concatenate((problem.nuisance, evidence.column(1, torque)))
+    flat = (more * np.sqrt(evidence.weights)[:, None]).reshape(len(more), -1)
+    prior = np.diag([1.0] * len(problem.nuisance) + [0.0])
+    best = np.linalg.solve(flat @ flat.T + prior, flat @ (residual * np.sqrt(evidence.weights)[:, None]).ravel())
+    left = residual - np.tensordot(best, more, axes=1)
+    after = float((evidence.weights[:, None] * left**2).sum() + best[:-1] @ best[:-1])
+    gain = evidence.gains(1, torque, [slice(0, 1)])[0] * max(evidence.spread, 1.0)
+    assert gain == pytest.approx(before - after, rel=1e-4)
+
+
+def test_noise_follows_no_law_and_is_no_louder_than_noise() -> None:
+    problem, scene = null()
+    found = seek(problem, scene.evidence, scene.residual, scene.columns, library(scene.data, range(2)))
+    assert found.found == []
+    assert scene.excess().max() < 3.0
+
+
+def test_the_right_law_is_found_among_thousands() -> None:
+    problem, scene, evidence, torque = planted(0.2)
+    residual = scene.residual + 0.2 * evidence.column(1, torque)[0]
+    found = seek(problem, evidence, residual, scene.columns, library(scene.data, range(2))).found
+    assert [(one.joint, one.law.known) for one in found] == [(1, "cogging")]
+    assert found[0].law.at == pytest.approx(4.0, abs=0.2)
+
+
+def test_every_law_can_be_read_and_is_finite() -> None:
+    _, scene = null()
+    for joint in range(2):
+        for law in all_laws(scene.data, joint):
+            assert np.isfinite(law.torque(scene.data, joint)).all(), law.texts
+
+
+def test_a_table_becomes_one_curve_of_the_same_torque() -> None:
+    _, scene = null()
+    for law in (law for law in all_laws(scene.data, 1) if law.table):
+        sizes = np.linspace(-1.0, 2.0, len(law.texts))
+        (text,), _ = joined(list(law.texts), sizes)
+        wanted = np.tensordot(sizes, law.torque(scene.data, 1), axes=1)
+        np.testing.assert_allclose(scene.data.torque(read_term(text), 1), wanted, atol=2e-4)
+
+
+def test_better_is_beyond_doubt_or_not_at_all() -> None:
+    rng = np.random.default_rng(0)
+    before = rng.standard_normal((30, 40))
+    assert better(2.0 * before, before)
+    assert not better(before, 2.0 * before)
+    assert not better(before, before)
