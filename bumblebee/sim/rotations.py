@@ -6,17 +6,11 @@ from torch import Tensor
 
 def multiply(a: Tensor, b: Tensor) -> Tensor:
     """Hamilton product of (..., 4) with (..., 4)."""
-    aw, ax, ay, az = a.unbind(-1)
-    bw, bx, by, bz = b.unbind(-1)
-    return torch.stack(
-        (
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ),
-        dim=-1,
-    )
+    # All sixteen products at once: small operations cost a CPU more than their arithmetic.
+    products = (a[..., :, None] * b[..., None, :]).flatten(-2).unbind(-1)
+    ww, wx, wy, wz, xw, xx, xy, xz, yw, yx, yy, yz, zw, zx, zy, zz = products
+    parts = (ww - xx - yy - zz, wx + xw + yz - zy, wy - xz + yw + zx, wz + xy - yx + zw)
+    return torch.stack(parts, dim=-1)
 
 
 def conjugate(q: Tensor) -> Tensor:
@@ -26,25 +20,19 @@ def conjugate(q: Tensor) -> Tensor:
 
 def matrix(q: Tensor) -> Tensor:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4); columns are the rotated axes."""
-    w, x, y, z = q.unbind(-1)
-    rows = (
-        1 - 2 * (y * y + z * z),
-        2 * (x * y - w * z),
-        2 * (x * z + w * y),
-        2 * (x * y + w * z),
-        1 - 2 * (x * x + z * z),
-        2 * (y * z - w * x),
-        2 * (x * z - w * y),
-        2 * (y * z + w * x),
-        1 - 2 * (x * x + y * y),
-    )
+    w, x, y, z = q.movedim(-1, 0).contiguous().unbind(0)  # columns of their own: twice as fast on a CPU
+    x2, y2, z2 = x + x, y + y, z + z
+    wx, wy, wz = w * x2, w * y2, w * z2
+    xx, xy, xz, yy, yz, zz = x * x2, x * y2, x * z2, y * y2, y * z2, z * z2
+    rows = (1 - (yy + zz), xy - wz, xz + wy, xy + wz, 1 - (xx + zz), yz - wx, xz - wy, yz + wx, 1 - (xx + yy))
     return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
 
 
 def rotate(q: Tensor, v: Tensor) -> Tensor:
     """Vectors (..., 3) rotated by q (..., 4): base to world if q is the base's orientation."""
     axis = q[..., 1:]
-    t = 2 * torch.linalg.cross(axis, v)
+    half = torch.linalg.cross(axis, v)
+    t = half + half
     return v + q[..., :1] * t + torch.linalg.cross(axis, t)
 
 

@@ -51,9 +51,14 @@ def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tens
     quat = state.root_quat_w
     inverse = conjugate(quat)
     to_base = matrix(inverse)  # (B, 3, 3)
+    root = state.root_pos_w[:, None]
     keys = state.key_pos_w if state.read_key_pos_w is None else state.read_key_pos_w
-    keys_b = (keys - state.root_pos_w[:, None]) @ to_base.mT
-    error_b = (ref.key_pos_w - keys) @ to_base.mT
+    count = len(KEY_BODIES)
+    # One product for all vectors and one for all rotations: small operations cost a CPU more than their arithmetic.
+    vectors_w = torch.cat((keys - root, ref.key_pos_w - keys, ref.ahead_root_pos_w - root), dim=1)
+    vectors_b = vectors_w @ to_base.mT
+    wanted = torch.cat((ref.root_quat_w[:, None], ref.ahead_root_quat_w), dim=1)
+    turns = _six(multiply(inverse[:, None], wanted))
     parts = [
         -to_base[:, :, 2],
         state.root_lin_vel_b,
@@ -62,9 +67,9 @@ def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tens
         state.joint_pos,
         state.joint_vel,
         last_action,
-        torch.cat((keys_b[:, :_PELVIS], keys_b[:, _PELVIS + 1 :]), dim=1).flatten(1),
-        error_b.flatten(1),
-        _six(multiply(inverse, ref.root_quat_w)),
+        vectors_b[:, :_PELVIS].flatten(1),
+        vectors_b[:, _PELVIS + 1 : 2 * count].flatten(1),
+        turns[:, 0],
         rotate_inverse(quat, ref.root_lin_vel_w),
         ref.root_ang_vel_b,
         ref.root_pos_w[:, 2:],
@@ -72,8 +77,7 @@ def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tens
         ref.joint_vel,
     ]
     for i in range(ref.ahead):
-        shift_b = ((ref.ahead_root_pos_w[:, i] - state.root_pos_w)[:, None] @ to_base.mT)[:, 0]
-        parts += [shift_b, _six(multiply(inverse, ref.ahead_root_quat_w[:, i])), ref.ahead_joint_pos[:, i]]
+        parts += [vectors_b[:, 2 * count + i], turns[:, 1 + i], ref.ahead_joint_pos[:, i]]
     return torch.cat(parts, dim=-1)
 
 
