@@ -48,11 +48,13 @@ def remember(plant: Plant, windows: Windows, hooks: RuntimeHooks, step: float) -
     order = [plant.joints.index(name) for name in hooks.joints]
     limit = plant_servos(plant).limit
     scale = np.where(np.isfinite(limit), limit, 1.0)
+    thermal, drift = np.zeros(len(order)), np.zeros(len(order))
+    thermal[order], drift[order] = hooks.thermal, hooks.drift
 
     def heat(rollout: Rollout) -> np.ndarray:
-        before, after = logged_torques(plant, rollout)
-        power = 0.5 * ((before[1:] / scale) ** 2 + (after[:-1] / scale) ** 2) * np.diff(rollout.time)[:, None]
-        return np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)))
+        before, after = (x / scale for x in logged_torques(plant, rollout))
+        time = rollout.time - rollout.time[0]
+        return heated(time, before, after, thermal, drift)
 
     back = history_length(hooks, step)
     late = bool(hooks.torque_lag.any())
@@ -91,6 +93,24 @@ def state_before(plant: Plant, windows: Windows, state: State) -> np.ndarray:
         return state.followed(clock, steps, speed, target)
 
     return at_starts(windows, of)
+
+
+def heated(
+    time: np.ndarray, before: np.ndarray, after: np.ndarray, thermal: np.ndarray, drift: np.ndarray
+) -> np.ndarray:
+    """Heat (T, J) [s] at the ticks `time` (T,) of a rollout: the integral of the square of what the drives gave.
+
+    Torques (T, J) are shares of the limit at full strength just before and just after each tick. A drive of strength
+    1 - thermal (J,) heat - drift (J,) time gives less than it is asked for, and heats the less.
+    """
+    power = 0.5 * (before[1:] ** 2 + after[:-1] ** 2) * np.diff(time)[:, None]
+    out = np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)))
+    if not (thermal.any() or drift.any()):
+        return out
+    for k, own in enumerate(power):
+        strength = np.maximum(1.0 - thermal * out[k] - drift * time[k], 0.0)
+        out[k + 1] = out[k] + strength**2 * own
+    return out
 
 
 def lagged(plant: Plant, rollout: Rollout, order: Sequence[int], time: np.ndarray) -> np.ndarray:
