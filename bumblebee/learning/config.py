@@ -42,6 +42,8 @@ class PpoConfig:
     """Widths of the actor's and the critic's layers, ELU."""
     initial_std: float = 0.8
     """First standard deviation of the action; 0.3 was a dead end."""
+    symmetry: bool = False
+    """Learn from every sample's reflection too, left and right exchanged; doubles the batch."""
     checkpoint_every: int = 25
     """Iterations between checkpoints, from which a killed training goes on."""
 

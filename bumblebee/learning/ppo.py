@@ -24,6 +24,7 @@ from bumblebee.learning.policy import Policy, load_policy, model_config, new_act
 from bumblebee.learning.ranks import Ranks
 from bumblebee.progress import progress
 from bumblebee.tracking.env import TrackingEnv
+from bumblebee.tracking.mirror import augmentation
 
 CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
 
@@ -104,6 +105,9 @@ class Trainer:
             torch.set_float32_matmul_precision("high")
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
             settings = runner_config(config) | {"multi_gpu": self.ranks.settings}
+            if config.symmetry:
+                mirror = {"use_data_augmentation": True, "data_augmentation_func": augmentation(env)}
+                settings["algorithm"]["symmetry_cfg"] = mirror
             built = BoundedPpo.construct_algorithm(env.get_observations(), env, settings, env.device)
         assert isinstance(built, BoundedPpo)
         self.algorithm = built
