@@ -2,7 +2,7 @@
 
 Suffixes name frames: `_b` the robot's base, `_g` the axes of the world with the robot's root as origin. The paper's
 targets "in the global coordinates" are taken in the latter: nothing may depend on where in the world a clip plays.
-`docs/decisions/observations.md` says what else the paper leaves open.
+`docs/decisions/paper-task.md` says what else the paper leaves open.
 """
 
 from collections.abc import Callable, Mapping, Sequence
