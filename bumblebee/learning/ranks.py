@@ -151,7 +151,7 @@ def launch(count: int, command: Sequence[str]) -> int:
         port = free.getsockname()[1]
     ranks = []
     for rank in range(count):
-        where = {"RANK": rank, "LOCAL_RANK": rank, "WORLD_SIZE": count, "LOCAL_WORLD_SIZE": count}
+        where: dict[str, object] = {"RANK": rank, "LOCAL_RANK": rank, "WORLD_SIZE": count, "LOCAL_WORLD_SIZE": count}
         where |= {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port}
         own = os.environ | {name: str(value) for name, value in where.items()} | {_LAUNCHED: "1"}
         out = None if rank == 0 else subprocess.DEVNULL

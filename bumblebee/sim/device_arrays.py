@@ -150,7 +150,7 @@ def _clip(values: Any, low: Any, high: Any) -> DeviceArray:
 def _interp(x: Any, xp: Any, fp: Any) -> DeviceArray:
     """Straight lines between the points, constant beyond them."""
     at = x.tensor
-    points, values = constant(np.asarray(xp, float), at.device), constant(np.asarray(fp, float), at.device)
+    points, values = (constant(np.asarray(one, float), at.device).to(at.dtype) for one in (xp, fp))
     place = torch.searchsorted(points, at.contiguous(), right=True).clamp(1, len(points) - 1)
     low, high = points[place - 1], points[place]
     share = ((at - low) / (high - low)).clamp(0.0, 1.0)

@@ -108,7 +108,7 @@ class EffectsWarp(MujocoWarp):
         quat = seen = qpos[:, 3:7]
         joint_pos = qpos[:, self._q[_ROOT_Q:]]
         if self._running is not None and self._effects is not None:
-            joint_pos = self._running.read().tensor
+            joint_pos = self._running.readings()
             if self._effects.imu.any():
                 seen = multiply(quat, from_rotation_vector(self._tilt).expand_as(quat))
         return RobotState(
@@ -126,7 +126,7 @@ class EffectsWarp(MujocoWarp):
         """Put the bodies of `_believed` where the encoders say that they are."""
         if self._offset is None or self._running is None:
             return
-        self._believed_qpos.copy_(self._qpos.index_copy(1, self._q[_ROOT_Q:], self._running.read().tensor))
+        self._believed_qpos.copy_(self._qpos.index_copy(1, self._q[_ROOT_Q:], self._running.readings()))
         self._run("read", lambda: self._mjw.kinematics(self._model, self._believed))
 
     def torque(self) -> Tensor:
@@ -134,7 +134,7 @@ class EffectsWarp(MujocoWarp):
         force = super().torque()
         if self._running is None or self._effects is None or not self._effects.each_step:
             return force
-        return force + self._running.applied.tensor
+        return force + self._running.torques()
 
     def state_dict(self) -> dict[str, Tensor]:
         """All that the next step depends on, to go on later from here."""

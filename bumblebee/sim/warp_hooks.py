@@ -25,6 +25,9 @@ _WRITTEN = {
 }
 
 
+_KINDS = {"fresh": torch.bool, "time": torch.float64}  # clocks that strike on time are sums of thousands of steps
+
+
 class WarpBatch:
     """Warp's model and data of `nsim` worlds under the names and in the shapes of `MjModel` and `MjData`."""
 
@@ -59,7 +62,7 @@ class _DeviceTerm:
         return getattr(self._term, name)
 
     def __call__(self, values: dict[str, DeviceArray]) -> Any:
-        return _value(self._term._tree, values)
+        return _value(self._term._tree, values)  # type: ignore[arg-type]
 
 
 class WarpHooks(StepHooks):
@@ -71,7 +74,7 @@ class WarpHooks(StepHooks):
         self.own: dict[str, Tensor] = {}
         for name in _REMEMBERED:
             start = torch.as_tensor(getattr(self, f"_{name}"))
-            kind = torch.bool if start.dtype == torch.bool else torch.float32
+            kind = _KINDS.get(name, torch.float32)
             self.own[name] = start.to(batch.device, kind)
             setattr(self, f"_{name}", DeviceArray(self.own[name]))
 
@@ -79,6 +82,14 @@ class WarpHooks(StepHooks):
         """Write everything that the next physics step needs."""
         super().apply()
         self._put_back()
+
+    def readings(self) -> Tensor:
+        """Positions (B, J) [rad] as the encoders read them now."""
+        return _tensor(self.read())
+
+    def torques(self) -> Tensor:
+        """Torques (B, J) [N m] beside Warp's own servos in the last step."""
+        return _tensor(self.applied)
 
     def restart(self, rows: Tensor) -> None:
         """The worlds `rows` (B,) bool begin anew, at rest."""
@@ -103,3 +114,7 @@ class WarpHooks(StepHooks):
             if now.tensor is not tensor:
                 tensor.copy_(now.tensor)
                 setattr(self, f"_{name}", DeviceArray(tensor))
+
+
+def _tensor(values: Any) -> Tensor:
+    return values.tensor

@@ -26,6 +26,10 @@ TORQUES = (
     single("cogging", "waist_yaw_joint", 3.0, 1.0, 12.0),
     Effect("discovered", ("left_shoulder_roll_joint",), {"v * abs(v)": -0.4, "curve(q, -1, 2, 0, 0, 1, -1)": 0.5}),
     Effect("discovered", ("right_shoulder_roll_joint",), {"friction(1 + tanh(tau))": 0.3}),
+    Effect(
+        "discovered", ("right_shoulder_pitch_joint",), {"friction(rested(0.1, 0.05))": 0.5, "slewed(2, 0.02) - q": 1.0}
+    ),
+    Effect("discovered", ("left_shoulder_pitch_joint",), {"bound(u - q, 0.05)": 4.0, "curve(t, 0, 0, 0.1, 1)": -1.0}),
     Effect("discovered", ("left_shoulder_yaw_joint",), {"slewed(1.5, 0.02) - u": 10.0, "bound(u - q, 0.05)": -4.0}),
     Effect("discovered", ("right_shoulder_yaw_joint",), {"friction(rested(0.3, 0.02))": 0.4}),
     single("external_wrench", "torso_link", 8.0, 0.0, 0.0, 0.0, 0.0, 0.5),
@@ -102,7 +106,7 @@ def test_a_restart_forgets_what_hooks_remember(device: str) -> None:
     warp.reset(rows, qpos, torch.zeros(WORLDS, 29, device=warp.device), STAND.repeat(WORLDS, 1).to(warp.device))
     time, heat = warp.state_dict()["hook_time"], warp.state_dict()["hook_heat"]
     assert time[1] == 0 and (heat[1] == 0).all()
-    torch.testing.assert_close(time[[0, 2, 3]], torch.full((3,), 0.06))
+    torch.testing.assert_close(time[[0, 2, 3]], torch.full((3,), 0.06, dtype=torch.float64))
     assert torch.equal(heat[[0, 2, 3]], saved["hook_heat"][[0, 2, 3]])
     after = []
     for _ in range(2):

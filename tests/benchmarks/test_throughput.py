@@ -1,0 +1,48 @@
+"""The throughput benchmark: copies of motions are what they are copies of, and its rows are rates."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from benchmarks.throughput.growth import FRAMES, copies
+from benchmarks.throughput.measure import environment_rate, loop_rate, make_env, physics_and_environment, started
+from benchmarks.throughput.peer import write_motion
+from bumblebee.learning.config import PpoConfig
+from bumblebee.sim.effects import single
+from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.library import MotionLibrary
+from tests.tracking.clips import waving
+
+CLIPS = [waving("a", 60), waving("b", 90)]
+
+
+def test_copies_are_found_where_their_motions_are() -> None:
+    """Every lookup gives what the motion itself gives, its last frame at rest where it is shorter than the copy."""
+    one = MotionLibrary(CLIPS, (0.1,), feed_forward=False)
+    many = copies(CLIPS, 7, (0.1,), torch.device("cpu"))
+    assert many.length.tolist() == [FRAMES] * 7 and len(many._rows) == 7 * FRAMES
+    ids, time = torch.tensor([0, 3, 6, 5]), torch.tensor([0.5, 1.21, 7.9, 2.0])
+    ours, own = many.frames(ids, time), one.frames(ids % 2, time)
+    for name in ("root_pos_w", "root_quat_w", "joint_pos", "joint_vel", "key_pos_w", "ahead_joint_pos"):
+        torch.testing.assert_close(getattr(ours, name), getattr(own, name))
+
+
+def test_the_rows_are_rates() -> None:
+    """Of the physics, which is the fastest, of the environment and of the loop; also with a hook at every step."""
+    config = EnvConfig(num_worlds=4, threads=1, physics_hz=100.0)
+    ppo = PpoConfig(steps=2, epochs=1, mini_batches=1, hidden=(8,))
+    for effects in ((), (single("torque_lag", "left_knee_joint", 0.01),)):
+        env = make_env(config, lambda device: MotionLibrary(CLIPS, config.ahead, device=device), effects=effects)
+        physics, environment = physics_and_environment(env, 0.05)
+        loop = loop_rate(started(env, ppo), 0.05)
+        assert physics > environment > 0 and environment_rate(env, 0.05) > 0
+        assert 0 < loop.update < loop.iteration
+        np.testing.assert_allclose(loop.frames * loop.iteration, 2 * 4, rtol=1e-6)
+
+
+def test_the_motion_for_mjlab_is_the_longest(tmp_path: Path) -> None:
+    """With the names of its joints, since mjlab's robot has other ones too."""
+    assert write_motion(tmp_path / "m.npz", CLIPS).name == "b"
+    given = np.load(tmp_path / "m.npz")
+    assert given["joint_pos"].shape == (90, 23) == (len(given["root_quat"]), len(given["joint_names"]))
