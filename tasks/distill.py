@@ -106,11 +106,11 @@ def deltas(
         return None
     of_clip = torch.as_tensor(cluster)
 
-    def adapt(state: RobotState, observation: Tensor, action: Tensor) -> Tensor:
+    def adapt(state: RobotState, middle: Tensor, action: Tensor) -> Tensor:
         now, changed = of_clip[env.clip], action.clone()
         for index, adapter in adapters.items():
             own = (now == index).nonzero()[:, 0]
-            changed[own] = adapter(state[own], observation[own], action[own])
+            changed[own] = adapter(state[own], middle[own], action[own])
         return changed
 
     return adapt

@@ -20,7 +20,6 @@ from bumblebee.learning.delta_rewards import DeltaRewardConfig
 from bumblebee.robot.facts import ANKLE_JOINTS, joint_names
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, matrix
-from bumblebee.tracking.observations import layout as tracking_layout
 
 WEIGHTS, CARD = "delta.pt", "card.json"
 
@@ -163,20 +162,15 @@ def make_network(hidden: tuple[int, ...], outputs: int) -> torch.nn.Sequential:
 
 
 def action_adapter(delta: DeltaAction, scale: Tensor) -> Callable[[RobotState, Tensor, Tensor], Tensor]:
-    """The correction as `TrackingEnv` takes it: on actions, around the reference that stands in the observation.
+    """The correction as `TrackingEnv` takes it: on actions, around the targets of an action of zero.
 
     Args:
         delta: the trained correction of targets.
         scale: (J,) [rad] of target for a unit of action.
     """
-    first = 0
-    for name, size in tracking_layout():
-        if name == "ref_joint_pos":
-            break
-        first += size
 
-    def adapt(state: RobotState, observation: Tensor, action: Tensor) -> Tensor:
-        targets = observation[:, first : first + len(scale)] + scale * action
+    def adapt(state: RobotState, middle: Tensor, action: Tensor) -> Tensor:
+        targets = middle + scale * action
         return action + (delta(state, targets) - targets) / scale
 
     return adapt

@@ -15,7 +15,7 @@ from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import ActionAdapter, action_scale, start_state
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.observations import action_middle, joint_targets
+from bumblebee.tracking.observations import action_middle, middle_targets
 from bumblebee.tracking.rows import Rows
 from bumblebee.tracking.terminations import fallen, key_distance, success_threshold
 
@@ -96,8 +96,9 @@ def _try_some(
         state = engine.state()
         group.look(state, ref, action, Rows(torch.full((n,), frame == 0), by_mask=False), generator)
         action = policy(group.noisy)
-        motor = action if world.action_adapter is None else world.action_adapter(state, group.exact, action)
-        engine.step(joint_targets(ref, motor, scale, middle))
+        zero, adapter = middle_targets(ref, middle), world.action_adapter
+        motor = action if adapter is None else adapter(state, zero, action)
+        engine.step(zero + scale * motor)
         state = engine.state()
         running = frame + 1 < library.length
         good = (key_distance(state, ref) <= limit) & ~fallen(state, ref) & ~engine.unstable()

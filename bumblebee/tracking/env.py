@@ -22,7 +22,7 @@ from bumblebee.sim.rotations import from_rotation_vector, multiply
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
-from bumblebee.tracking.observations import action_middle, joint_targets
+from bumblebee.tracking.observations import action_middle, middle_targets
 from bumblebee.tracking.randomisation import draw_push, push_phase, randomise_worlds, regular_push
 from bumblebee.tracking.rewards import Limits, Reward, Step
 from bumblebee.tracking.rows import Rows
@@ -33,7 +33,7 @@ from bumblebee.tracking.terminations import fallen, key_distance, threshold_at
 from bumblebee.tracking.terrain import Ground
 
 ActionAdapter = Callable[[RobotState, Tensor, Tensor], Tensor]
-"""(state, exact observation (B, D), action (B, J)) -> the action that the motors execute, (B, J)."""
+"""(state, joint targets (B, J) [rad] of an action of zero, action (B, J)) -> what the motors execute, (B, J)."""
 
 
 def action_scale() -> Tensor:
@@ -139,10 +139,10 @@ class TrackingEnv(VecEnv):
 
     def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
         """One control period: observations, rewards (B,), dones (B,) and `extras["time_outs"]` (B,)."""
-        adapter, exact = self.action_adapter, self.groups["policy"].exact
-        motor = actions if adapter is None else adapter(self._state, exact, actions)
+        middle, adapter = middle_targets(self._ref, self._middle), self.action_adapter
+        motor = actions if adapter is None else adapter(self._state, middle, actions)
         self._command.copy_(actions)
-        self.engine.step(joint_targets(self._ref, motor, self.scale, self._middle))
+        self.engine.step(middle + self.scale * motor)
         self._judge_recorded()
         self.engine.settle()
         self._look_recorded()

@@ -86,7 +86,12 @@ def joint_targets(ref: ReferenceFrame, action: Tensor, scale: Tensor, middle: Te
 
     What holds the reference one step ahead against gravity, or `middle` (J,) [rad], plus scale (J,) [rad] times action.
     """
-    return (ref.hold_pos if middle is None else middle) + scale * action
+    return middle_targets(ref, middle) + scale * action
+
+
+def middle_targets(ref: ReferenceFrame, middle: Tensor | None) -> Tensor:
+    """Targets (B, J) [rad] of an action of zero: what holds the reference, or `middle` (J,) for all."""
+    return ref.hold_pos if middle is None else middle.expand_as(ref.joint_pos)
 
 
 def action_middle(kind: str) -> Tensor | None:
