@@ -5,6 +5,7 @@ the four ankle joints before they reach the simulator: s' = f_sim(s, a + delta(s
 world are hidden from it. The correction is in radians of target, so no action scale can be forgotten on it.
 """
 
+import copy
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -103,6 +104,12 @@ class DeltaAction:
             raw = self.network(observe(state, targets))
         return targets + correction(raw, self.limit) @ self._placement
 
+    def on(self, device: torch.device) -> "DeltaAction":
+        """The same on a device, as a copy."""
+        twin = DeltaAction(copy.deepcopy(self.network).to(device), self.joints, self.limit)
+        twin._placement = self._placement.to(device)
+        return twin
+
 
 def correction(raw: Tensor, limit: float) -> Tensor:
     """Correction [rad] of a raw output: linear near 0, never beyond `limit`."""
@@ -168,10 +175,15 @@ def action_adapter(delta: DeltaAction, scale: Tensor) -> Callable[[RobotState, T
         delta: the trained correction of targets.
         scale: (J,) [rad] of target for a unit of action.
     """
+    there: dict[torch.device, tuple[DeltaAction, Tensor]] = {}
 
     def adapt(state: RobotState, middle: Tensor, action: Tensor) -> Tensor:
-        targets = middle + scale * action
-        return action + (delta(state, targets) - targets) / scale
+        device = action.device
+        if device not in there:
+            there[device] = (delta.on(device), scale.to(device))
+        correct, unit = there[device]
+        targets = middle + unit * action
+        return action + (correct(state, targets) - targets) / unit
 
     return adapt
 

@@ -128,6 +128,16 @@ def test_the_adapter_changes_actions_by_the_same_targets() -> None:
     torch.testing.assert_close(adapted, delta(state, reference + scale * action))
 
 
+def test_the_adapter_works_where_the_actions_are() -> None:
+    """On any device, the delta's own tensors staying where they were; `meta` stands for a GPU here."""
+    delta = DeltaAction(make_network((16,), 4), ANKLE_JOINTS, 0.1)
+    shapes = ((3,), (4,), (3,), (3,), (23,), (23,), (14, 3))
+    state = RobotState(*(torch.empty(2, *shape, device="meta") for shape in shapes))
+    adapt = action_adapter(delta, torch.ones(23))
+    there = adapt(state, torch.empty(2, 23, device="meta"), torch.empty(2, 23, device="meta"))
+    assert there.device.type == "meta" and next(delta.network.parameters()).device.type == "cpu"
+
+
 def test_saved_and_loaded_alike_and_withheld_unless_promoted(tmp_path: Path) -> None:
     network = make_network((16, 8), 4)
     torch.nn.init.normal_(network[-1].weight)
