@@ -1,7 +1,8 @@
 """Whether an effect pays on windows that took no part in its fit, at 0.2 s and, where the data reach, at 1 s.
 
-Gains are differences of log(1 + chi-square) by window: as linear as chi-square where a model is nearly right, and the
-log of the error where it is far off, so that a few windows beside an unstable pose do not outvote the rest.
+Near the truth an effect is looked for in its own direction, where nearly all of the noise is orthogonal to it. Far from
+it gains are differences of log(1 + chi-square) by window, so that a few windows beside an unstable pose do not outvote
+the rest.
 """
 
 from collections.abc import Sequence
@@ -10,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm, wilcoxon
 
-from bumblebee.diagnosis.fit import Fit
-from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.fit import Fit, cost_of
+from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.simulate import residuals
 from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.windows import Windows
@@ -45,18 +46,26 @@ class Holdout:
         return np.log1p((left**2).mean(axis=2))
 
     def gains(self, before: Fit, after: Fit, z: float, least: float) -> bool:
-        """Whether `after` is better by the share `least` of chi-square and beyond doubt, and no worse after 1 s.
+        """Whether what `after` changes is there in the held-out windows, too, and not a trifle; and no worse after 1 s.
 
-        Beyond doubt is `z` standard errors of the mean or as much by signed ranks, which a few odd windows do not sway.
+        The held-out residual of `before` is compared with the change that `after` predicts there, and with nothing
+        else: in a robot of many joints an effect of one is a small share of the whole chi-square, and none of its
+        noise. `after` must gain the share `least` of what it and all effects before it gain together: where one law
+        stands for a slightly different one, the rest is significant, too.
         """
         if self.problem is None:
             return True
-        logs = self.logs([before, after])
-        gain = logs[0] - logs[1]
-        spread = gain.std(ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
-        ranks = wilcoxon(gain, alternative="greater").pvalue if np.count_nonzero(gain) > _FEW else 1.0
-        least *= float(-np.expm1(-logs[0]).mean())  # a share of chi-square, as a difference of its log(1 + .)
-        if gain.mean() < least or (gain.mean() < z * spread and ranks > norm.sf(z)):
+        problem = self.problem
+        raw = problem.residual([[], before.effects, after.effects])
+        old, new = (
+            r - np.tensordot(f.nuisance, problem.nuisance, 1) for r, f in zip(raw[1:], (before, after), strict=True)
+        )
+        weights = window_weights(new)
+        bare = raw[0] - np.tensordot(cost_of(problem, raw[0], weights)[1], problem.nuisance, axes=1)
+        powers = [float((weights[:, None] * r**2).sum()) for r in (bare, old, new)]
+        if powers[1] - powers[2] < least * (powers[0] - powers[2]):
+            return False
+        if not (_there(old, new, weights, z) or _better(old, new, z)):
             return False
         return not self.worse_later(before.effects, after.effects)
 
@@ -76,3 +85,28 @@ class Holdout:
         if len(growth) < 3:
             return False
         return bool(growth.mean() > max(_WORSE, 2.0 * growth.std(ddof=1) / np.sqrt(len(growth))))
+
+
+def _there(old: np.ndarray, new: np.ndarray, weights: np.ndarray, z: float) -> bool:
+    """Whether the change from residuals `old` to `new` (W, M) is found in `old`: its regression on the change.
+
+    1 is the whole of it; from a half on the weighted chi-square falls.
+    """
+    change = old - new
+    size = weights * (change**2).sum(axis=1)
+    share = float((weights * (change * old).sum(axis=1)).sum() / max(size.sum(), 1e-12))
+    scores = weights * (change * old).sum(axis=1) - share * size
+    error = float(np.sqrt((scores**2).sum()) / max(size.sum(), 1e-12))
+    error = max(error, 1.0 / np.sqrt(max(size.sum(), 1e-12)))  # few windows: no surer than the noise allows
+    return share > 0.5 and share > z * error
+
+
+def _better(old: np.ndarray, new: np.ndarray, z: float) -> bool:
+    """Whether log(1 + chi-square) falls beyond doubt: `z` standard errors, or as much by signed ranks.
+
+    The ranks are not swayed by a few odd windows, nor the logarithm where the model is far off.
+    """
+    gain = np.log1p((old**2).mean(axis=1)) - np.log1p((new**2).mean(axis=1))
+    spread = gain.std(ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else np.inf
+    ranks = wilcoxon(gain, alternative="greater").pvalue if np.count_nonzero(gain) > _FEW else 1.0
+    return bool(gain.mean() > 0 and (gain.mean() >= z * spread or ranks <= norm.sf(z)))

@@ -1,0 +1,62 @@
+"""Whether an effect is more than what another simulator would do.
+
+The truth has an integrator and a step of its own. With enough data the difference is significant, beside the nuisances
+too, and takes the name of an effect: with 30 rollouts it was called armature on three light joints. The size of that
+difference does not grow with the data, so it is simulated: the same model by other integrators. An effect counts if
+what it changes is clearly more than what these would feign of it.
+"""
+
+import copy
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from bumblebee.diagnosis.fit import Fit, project, solve
+from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.simulate import residuals
+from bumblebee.diagnosis.variation import Variation, vary
+
+_FEIGNED = 0.4  # share of an effect that another integrator may feign
+_FINITE = 0.8  # share of the windows that it must get through
+
+
+def feigned(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> float:
+    """Share of the change from `before` to `after` that other integrators would make, the largest of those tried.
+
+    Both are compared beside the nuisances and the columns of `before`; 0 where no other integrator runs.
+    """
+    variation = vary(problem.plant, before.effects)
+    basis, inverse = project(problem, before.columns, weights)
+
+    def left(values: np.ndarray) -> np.ndarray:
+        return values - np.tensordot(solve(basis, inverse, values, weights), basis, axes=1)
+
+    change = left(before.residual - after.residual)
+    shares = [0.0]
+    for other in _others(variation):
+        raw = residuals(problem.plant, problem.layout, problem.windows, [other], problem.fine)[0]
+        good = np.isfinite(raw).all(axis=(1, 2))
+        if good.mean() < _FINITE:
+            continue
+        differs = np.where(good[:, None], problem.whitener(raw) - before.residual, 0.0)
+        weight = weights[:, None] * change
+        shares.append(abs(float((weight * left(differs)).sum() / max((weight * change).sum(), 1e-12))))
+    return max(shares)
+
+
+def beyond_numerics(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> bool:
+    """Whether the change from `before` to `after` is clearly more than another integrator's."""
+    return feigned(problem, before, after, weights) < _FEIGNED
+
+
+def _others(variation: Variation) -> list[Variation]:
+    """The model by Euler steps with explicit servos, and by fully implicit steps."""
+    integrators = (mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtIntegrator.mjINT_IMPLICIT)
+    return [_with_integrator(variation, i) for i in integrators if int(variation.model.opt.integrator) != int(i)]
+
+
+def _with_integrator(variation: Variation, integrator: mujoco.mjtIntegrator) -> Variation:
+    model = copy.copy(variation.model)
+    model.opt.integrator = int(integrator)
+    return replace(variation, model=model)
