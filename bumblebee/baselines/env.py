@@ -39,7 +39,7 @@ class BaselineEnv(TrackingEnv):
         super().__init__(library, engine, baseline.env, seed, clip_share=clip_share)
         self.baseline = baseline
         self.scale = torch.full_like(self.scale, baseline.scale)
-        self._fallen = baseline.lost
+        self._fallen = baseline.lost  # type: ignore[assignment]
         self.score = Score(baseline.scoring, self.dt, self.episode_length_buf, self._lost)
         self._earned = self.score
 

@@ -97,7 +97,7 @@ def energy(j: Judged) -> Tensor:
 
 def leg_deviation(j: Judged) -> Tensor:
     """Squares of the legs' distances from the stand [rad^2]."""
-    return sum((j.state.joint_pos[:, i] - stand).square() for i, stand in enumerate(stand_pose()[:_LEGS]))  # type: ignore[return-value]
+    return sum((j.state.joint_pos[:, i] - stand).square() for i, stand in enumerate(stand_pose()[:_LEGS]))
 
 
 def feet_drag(j: Judged) -> Tensor:
