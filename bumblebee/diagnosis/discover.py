@@ -16,7 +16,7 @@ from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, resolved
 from bumblebee.diagnosis.formula import DISCOVERED, Formula, formula, in_terms, related
 from bumblebee.diagnosis.holdout import Holdout
-from bumblebee.diagnosis.laws import joined
+from bumblebee.diagnosis.laws import beside, joined
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.remains import Remains, remains
 from bumblebee.diagnosis.scene import fitted_scene
@@ -123,10 +123,27 @@ def _growing(problem: Problem, base: Fit, joint: str, found: Sequence[Found]) ->
         form = _form(problem, base, joint, strange[:count])
         if form is None:
             break
+        if count == 1:
+            form = _climbed(problem, base, joint, strange[0], form)
         if best is not None and form.score - best.score < max(_WORTH, _SHARE * (best.score - start)):
             break
         best = form
     return best
+
+
+def _climbed(problem: Problem, base: Fit, joint: str, one: Found, form: _Form) -> _Form:
+    """The form at the best of the law's two inner numbers, from neighbour to neighbour."""
+    seen, law = {one.law.texts}, one.law
+    while True:
+        tried = {}
+        for other in beside(law):
+            if other.texts not in seen:
+                seen.add(other.texts)
+                tried[other] = _form(problem, base, joint, [replace(one, law=other)])
+        best = max((f for f in tried.values() if f is not None), key=lambda f: f.score, default=None)
+        if best is None or best.score < form.score + _PARAMETER:
+            return form
+        law, form = next(other for other, f in tried.items() if f is best), best
 
 
 def _score(left: np.ndarray, parameters: int) -> float:

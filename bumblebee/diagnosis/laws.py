@@ -5,6 +5,7 @@ gains ...). They compete with the others, so that what the search did not accept
 discovered effect is made of them alone.
 """
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -103,7 +104,23 @@ def _friction(data: Quantities, j: int) -> Iterator[Law]:
     yield Law(("friction(t)",), _TIME, 3)
     for time in (0.1, 0.3, 1.0):
         for way in (0.005, 0.02, 0.08):
-            yield Law((f"friction(rested({time:g}, {way:g}))",), _HISTORY, 3)
+            yield _rest(time, way)
+
+
+def _rest(time: float, way: float) -> Law:
+    return Law((f"friction(rested({time:.3g}, {way:.3g}))",), _HISTORY, 3)
+
+
+def beside(law: Law) -> list[Law]:
+    """Laws with other inner numbers next to those of a law that has two; [] for others.
+
+    Friction that holds a joint is far from linear: which of them is best, only the simulator tells.
+    """
+    found = re.fullmatch(r"friction\(rested\(([^,]+), ([^)]+)\)\)", law.texts[0])
+    if found is None:
+        return []
+    time, way = float(found[1]), float(found[2])
+    return [_rest(time * f, way * g) for f, g in ((3.0, 1.0), (1 / 3.0, 1.0), (1.0, 4.0), (1.0, 0.25))]
 
 
 def _position(data: Quantities, j: int) -> Iterator[Law]:

@@ -20,6 +20,7 @@ from bumblebee.diagnosis.seek import Found, Sought, closest, library, seek
 _LEAST = 0.01  # share of a joint's typical torque below which structure is not worth a word
 _CONFIRMED = 2.0  # standard errors by which windows that were not fitted must be better
 _POWER, _AGAIN, _ALONE = 4.0, 1.5, 6.0  # standard errors of a joint's power: fitted, judged, fitted without judges
+_FELT, _PAYS = 9.0, 25.0  # chi-square of a law on judging windows that do not meet it; its gain on half of the fitted
 _HINT = 3.0  # z from which a law says what a power that no law explains depends on
 _MOST = 8  # joints that laws are sought on, those that lack most
 
@@ -122,12 +123,26 @@ def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[
         at += len(one.torque)
         if judged is not None:
             moved = judged.evidence.column(one.joint, one.law.torque(judged.data, one.joint))
-            after = left - np.tensordot(size, moved, axes=1)
-            if not better(left, after):
+            change = np.tensordot(size, moved, axes=1)
+            if not better(left, left - change) and ((change**2).sum() > _FELT or not _repeats(scene, one)):
                 continue
-            left = after
+            left = left - change
         kept.append((one, size))
     return kept
+
+
+def _repeats(scene: Scene, one: Found) -> bool:
+    """Whether a law fitted to every other window pays on those between, both ways: what the judges never meet."""
+    evidence, torque = scene.evidence, one.torque
+    own = np.einsum("fws,ws->wf", torque, evidence.score[one.joint])
+    normal = np.einsum("fws,wst,gwt->wfg", torque, evidence.power[one.joint], torque, optimize=True)
+    halves = np.arange(len(own)) % 2 == 0
+    for fitted in (halves, ~halves):
+        size = np.linalg.lstsq(normal[fitted].sum(axis=0), own[fitted].sum(axis=0), rcond=None)[0]
+        gain = 2 * size @ own[~fitted].sum(axis=0) - size @ normal[~fitted].sum(axis=0) @ size
+        if gain < _PAYS * max(evidence.spread, 1.0):
+            return False
+    return True
 
 
 def better(before: np.ndarray, after: np.ndarray) -> bool:

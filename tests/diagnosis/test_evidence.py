@@ -6,7 +6,7 @@ import pytest
 from bumblebee.diagnosis.candidates import scales_of
 from bumblebee.diagnosis.evidence import Evidence
 from bumblebee.diagnosis.fit import cost_of, gauss_newton
-from bumblebee.diagnosis.laws import all_laws, joined
+from bumblebee.diagnosis.laws import Law, all_laws, beside, joined
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.remains import better
 from bumblebee.diagnosis.scene import Scene, fitted_scene
@@ -92,3 +92,10 @@ def test_better_is_beyond_doubt_or_not_at_all() -> None:
     assert better(2.0 * before, before)
     assert not better(before, 2.0 * before)
     assert not better(before, before)
+
+
+def test_a_law_of_two_inner_numbers_has_neighbours_and_others_have_none() -> None:
+    rest = Law(("friction(rested(0.3, 0.02))",), ("history",), 3)
+    texts = {law.texts[0] for law in beside(rest)}
+    assert texts == {f"friction(rested({a}))" for a in ("0.9, 0.02", "0.1, 0.02", "0.3, 0.08", "0.3, 0.005")}
+    assert beside(Law(("q^3",), ("position",), 2)) == []
