@@ -3,26 +3,35 @@
 Where a model's gains are off by factors, residuals are so far from linear that no slope and no test says anything, and
 every effect helps. Published gains are often another firmware's, and the joints of a robot often share one type of
 servo: so factors on kp and kd of all servos at once are tried first, over orders of magnitude, then every servo's own
-gains and dry friction beside the others'. Friction is there because a joint that sticks looks like one of large damping
-as long as it may not stick. The score is the mean of log(1 + power) over windows: as linear as chi-square where a model
-is nearly right, and the log of the error where it is far off, so that a few windows do not decide alone.
+gains and dry friction. Friction is there because a joint that sticks looks like one of large damping as long as it may
+not stick.
+
+Windows of a second are compared, for in a short one gain, damping and friction can stand for each other. The score of a
+joint is the mean of log(error^2 + (3 noise)^2), so that no few windows decide alone; a servo pays a little for gains
+unlike the others' (log of the factor, squared), which only matters where its own data say next to nothing. Joints are
+scored one by one: each tries its options while the others try theirs, and what they chose together must be better.
 """
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.simulate import residuals
+from bumblebee.diagnosis.variation import vary
+from bumblebee.diagnosis.windows import Windows, choose_starts, cut
 from bumblebee.sim.effects import Effect, single
+from bumblebee.sim.servo import servos_of
 
 KINDS = ("kp", "kd", "coulomb_friction")
-_SHARED = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 2.0, 5.0)
-_WINDOWS = 48
-_SWEEPS = ((0.4, 2.5), (0.4, 2.5), (0.4, 2.5), (0.65, 1.5), (0.8, 1.25))  # factors that each number is moved by
-_RUBS = (0.1, 0.4, 1.0)  # dry friction tried first, in steps of its candidate
+_SHARED = (1.0, 0.3, 0.1, 0.03, 0.01, 3.0)
+_LONG, _WINDOWS = 1.0, 36  # [s]; windows of it
+_SWEEPS = ((0.3, 0.6, 1.6, 3.0), (0.3, 0.6, 1.6, 3.0), (0.5, 0.8, 1.25, 2.0), (0.7, 0.9, 1.1, 1.4), (0.85, 1.15))
+_RUBS = (0.01, 0.03, 0.1)  # dry friction tried first, as shares of the servo's torque limit
+_UNLIKE = 0.02  # score of a gain that is e times the others'
 _BETTER = 0.1  # fall of the score
 _LEAST = 1e-3  # smallest factor tried
 _STEP = 0.1  # share of a value that matters
@@ -31,69 +40,96 @@ Servo = tuple[float, float, float]
 """Factors on kp and kd, dry friction [N m]."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """What servos are compared by."""
+
+    problem: Problem
+    windows: Windows
+    names: tuple[str, ...]
+    columns: np.ndarray
+    """(S,) of the servos' joints among the logged ones."""
+    limit: np.ndarray
+    """(S,) the servos' torque limit [N m]."""
+
+    def scores(self, several: Sequence[Sequence[Servo]]) -> np.ndarray:
+        """(V, S) score of every joint under each of V sets of servos; lower is better."""
+        p, part = self.problem, self.problem.layout.slices["joint_pos"]
+        models = [vary(p.plant, _effects(self.names, servos)) for servos in several]
+        error = residuals(p.plant, p.layout, self.windows, models, p.coarse)[..., part][..., self.columns]
+        noise = p.sigma[part][self.columns]
+        square = np.where(np.isfinite(error), error, 10.0) ** 2
+        score = np.log(square.mean(axis=2) + (3.0 * noise) ** 2).mean(axis=1)
+        logs = np.log(np.maximum(np.array(several)[..., :2], _LEAST))
+        return score + _UNLIKE * ((logs - np.median(logs, axis=1, keepdims=True)) ** 2).sum(axis=2)
+
+
 def far_servos(problem: Problem, candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     """Candidates of `KINDS` with values, all servos together; empty where none makes the model much better.
 
     Their steps are a tenth of the values: at a hundredth of the declared gain a tenth of it is no small change.
     """
     table = {(c.effect, c.where): c for c in candidates if c.effect in KINDS}
-    names = [where for effect, where in table if effect == "kp" and ("kd", where) in table]
-    if not names:
+    names = tuple(where for effect, where in table if effect == "kp" and ("kd", where) in table)
+    course = _course(problem, names) if names else None
+    if course is None:
         return []
-    declared = {where: (1.0, 1.0, table["coulomb_friction", where].nominal[0]) for where in names}
-    part = problem.part(np.unique(np.linspace(0, len(problem.windows) - 1, _WINDOWS).round().astype(int)))
-    servos = _shared(part, declared)
+    declared: list[Servo] = [(1.0, 1.0, table["coulomb_friction", where].nominal[0]) for where in names]
+    servos = _shared(course, declared)
     for factors in _SWEEPS:
-        servos = _swept(part, servos, factors, {w: abs(table["coulomb_friction", w].step[0]) for w in names})
-    before, after = _scores(part, [declared, servos])
+        servos = _swept(course, servos, factors)
+    before, after = course.scores([declared, servos]).mean(axis=1)
     if before - after < _BETTER:
         return []
     found = []
-    for where, values in servos.items():
-        for effect, value, old in zip(KINDS, values, declared[where], strict=True):
-            if value != old:
-                found.append((replace(table[effect, where], step=(np.sign(value - old) * _STEP * value,)), value))
+    for where, values, old in zip(names, servos, declared, strict=True):
+        for effect, value, was in zip(KINDS, values, old, strict=True):
+            if value != was:
+                step = float(np.sign(value - was)) * _STEP * value
+                found.append((replace(table[effect, where], step=(step,)), value))
     return found
 
 
-def _shared(problem: Problem, declared: dict[str, Servo]) -> dict[str, Servo]:
+def _course(problem: Problem, names: tuple[str, ...]) -> _Course | None:
+    """Windows of a second of the fitted rollouts; None where these are shorter."""
+    windows, plant = problem.windows, problem.plant
+    ids = [int(i) for i in np.unique(windows.rollout)]
+    starts = choose_starts(windows.source, ids, _LONG, _WINDOWS)
+    if not starts:
+        return None
+    long = cut(plant, problem.layout, windows.source, starts, outputs=5)
+    limit = servos_of(plant.model, [int(plant.model.joint(name).id) for name in names]).limit
+    return _Course(problem, long, names, np.array([plant.joints.index(name) for name in names]), limit)
+
+
+def _shared(course: _Course, declared: list[Servo]) -> list[Servo]:
     """The best of all factors on every servo's gains at once."""
-    options = [{w: (p, d, s[2]) for w, s in declared.items()} for p, d in itertools.product(_SHARED, _SHARED)]
-    return options[int(np.argmin(_scores(problem, options)))]
+    options = [[(p, d, s[2]) for s in declared] for p, d in itertools.product(_SHARED, _SHARED)]
+    return options[int(np.argmin(course.scores(options).mean(axis=1)))]
 
 
-def _swept(
-    problem: Problem, servos: dict[str, Servo], factors: Sequence[float], rub: dict[str, float]
-) -> dict[str, Servo]:
-    """Each servo moved to the best of some options beside the others as they were."""
-    options = [(w, o) for w in servos for o in _options(servos[w], factors, rub[w])]
-    scores = _scores(problem, [servos, *({**servos, w: o} for w, o in options)])
-    own: dict[str, Servo] = {}
-    for where in servos:
-        better = [(s, o) for s, (at, o) in zip(scores[1:], options, strict=True) if at == where and s < scores[0]]
-        if better:
-            own[where] = min(better)[1]
-    if not own:
-        return servos
-    together, best = {**servos, **own}, int(np.argmin(scores))
-    where, option = options[best - 1]
-    return together if _scores(problem, [together])[0] <= scores[best] else {**servos, where: option}
+def _swept(course: _Course, servos: list[Servo], factors: Sequence[float]) -> list[Servo]:
+    """Every servo at its best option, if that is better for all of them together."""
+    options = [_options(s, factors, limit) for s, limit in zip(servos, course.limit, strict=True)]
+    sets = [servos, *([o[k] for o in options] for k in range(len(options[0])))]
+    best = np.argmin(course.scores(sets), axis=0)
+    chosen = [sets[k][j] for j, k in enumerate(best)]
+    old, new = course.scores([servos, chosen]).mean(axis=1)
+    return chosen if new < old else servos
 
 
-def _options(servo: Servo, factors: Sequence[float], rub: float) -> list[Servo]:
+def _options(servo: Servo, factors: Sequence[float], limit: float) -> list[Servo]:
     kp, kd, dry = servo
+    most = 0.5 * limit
+    rub = limit if np.isfinite(limit) else max(dry, 1.0)
     out = [(max(kp * f, _LEAST), kd, dry) for f in factors]
     out += [(kp, max(kd * f, _LEAST), dry) for f in factors]
     out += [(max(kp * f, _LEAST), max(kd * f, _LEAST), dry) for f in factors]
-    out += [(kp, max(kd * f, _LEAST), dry + rub * r) for f in (1.0, factors[0]) for r in _RUBS]
-    return out + [(kp, kd, dry * f) for f in factors if dry > 0]
+    out += [(kp, kd, min(dry * f, most)) for f in factors]
+    return out + [(kp, max(kd * f, _LEAST), min(dry + rub * r, most)) for f in (1.0, factors[0]) for r in _RUBS]
 
 
-def _scores(problem: Problem, several: Sequence[dict[str, Servo]]) -> np.ndarray:
-    """Mean of log(1 + whitened power) over the windows for each set of servos, in coarse steps."""
-    residual = problem.residual([_effects(servos) for servos in several], coarse=True)
-    return np.log1p((residual**2).mean(axis=2)).mean(axis=1)
-
-
-def _effects(servos: dict[str, Servo]) -> list[Effect]:
-    return [single(kind, w, value) for w, values in servos.items() for kind, value in zip(KINDS, values, strict=True)]
+def _effects(names: Sequence[str], servos: Sequence[Servo]) -> list[Effect]:
+    return [
+        single(kind, w, value) for w, s in zip(names, servos, strict=True) for kind, value in zip(KINDS, s, strict=True)
+    ]

@@ -8,6 +8,7 @@ from scipy.stats import norm
 
 from bumblebee.diagnosis.arrivals import Loss, find_loss
 from bumblebee.diagnosis.candidates import Candidate, shortlisted
+from bumblebee.diagnosis.far import far_servos
 from bumblebee.diagnosis.fit import (
     Fit,
     cost_of,
@@ -113,12 +114,15 @@ class _Run:
         self.weights = window_weights(start)
         self.fit = gauss_newton(problem, (), (), self.weights)
         self.keep = screening_windows(problem, config.screen_windows)
-        self.rescreen()
-        self.bound = self._bound()
         self.closed: set[Candidate] = set()
         self.steps: list[Step] = []
         self.rejected: list[str] = []
         self.loss: Loss | None = None
+        self.given = 0
+        self.candidates, _ = remake([])
+        self.start_far()
+        self.rescreen()
+        self.bound = self._bound()
 
     def rescreen(self) -> None:
         """Candidates with steps for the present fit, and the columns of all of them around it."""
@@ -236,6 +240,27 @@ class _Run:
         if self.fit.cost < _ANEW * self.screened_cost:
             self.rescreen()
 
+    def start_far(self) -> bool:
+        """Begin with servos far from the declared ones, where the data are that far from the model."""
+        if float(np.median((self.fit.residual**2).mean(axis=1))) < self.config.far:
+            return False
+        found = far_servos(self.problem, self.candidates)
+        if not found:
+            return False
+        chosen, values = [c for c, _ in found], np.array([v for _, v in found])
+        weights = window_weights(self.problem.residual([effects_at(chosen, values)])[0])
+        fit = gauss_newton(self.problem, chosen, values, weights, iterations=0, coarse=True)
+        if not self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain):
+            return False
+        for i, c in enumerate(fit.chosen):
+            z = wald(self.problem, fit, weights, i)
+            self.steps.append(Step(c, z, min(1.0, 2 * norm.sf(z) * len(self.candidates))))
+            self.say(f"found {c.effect} on {c.where}, far from the declared: {fit.of(c).round(5)}")
+        self.screened_cost = 0.0
+        self.renew(fit)
+        self.given = len(fit.chosen)
+        return True
+
     def find_loss(self) -> bool:
         """Look for commands that never arrived; if some did not, go on with those that did."""
         found = None if self.loss else find_loss(self.problem, self.holdout, self.fit)
@@ -334,9 +359,11 @@ def search(
 def _select(run: _Run, config: SearchConfig) -> None:
     """Forward selection until nothing is worth a trial, or too many were in vain."""
     vain = 0
-    while len(run.fit.chosen) < config.most and vain < config.patience:
-        tried, looked = far_trials(run.problem, run.fit, run.candidates, run.weights, config.far), []
-        tried = [t for t in tried if t.candidate not in run.closed]
+    while len(run.fit.chosen) < config.most + run.given and vain < config.patience:
+        tried, looked = [], []
+        if not run.given:
+            tried = far_trials(run.problem, run.fit, run.candidates, run.weights, config.far)
+            tried = [t for t in tried if t.candidate not in run.closed]
         if not tried:
             tried, looked = run.trials()
         limits = limit_trials(run.problem, run.fit, run.candidates, run.weights)
