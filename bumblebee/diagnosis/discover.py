@@ -103,6 +103,7 @@ def _best_form(problem: Problem, fit: Fit, left: Remains, joint: str, typical: n
     """The form that explains the fitted windows best for its parameters; None where no strange law was found."""
     column = problem.plant.joints.index(joint)
     ways: list[tuple[Fit, list[Found]]] = [(fit, [f for f in left.sought.found if f.joint == column])]
+    ways += [(fit, [rival]) for rival in left.sought.rivals if rival.joint == column]
     own = [c for c in fit.chosen if c.where == joint]
     if own:
         bare = _less(problem, fit, own)

@@ -128,12 +128,12 @@ def _seen(evidence: Evidence, some: Library, found: Sequence[Found], bound: floa
 
 
 def _rivals(one: Found, seen: Sequence[Found]) -> list[Found]:
-    """The best of every other kind of dependence on the same joint."""
-    kinds: dict[tuple[str, ...], Found] = {}
+    """The best of every other kind of dependence on the same joint; a formula beside a table is one, too."""
+    kinds: dict[tuple[tuple[str, ...], bool], Found] = {(one.law.on, one.law.table): one}
     for f in sorted(seen, key=_worth, reverse=True):
-        if f.joint == one.joint and f.law.on != one.law.on and _worth(f) > _RIVAL * _worth(one):
-            kinds.setdefault(f.law.on, f)
-    return list(kinds.values())[:2]
+        if f.joint == one.joint and _worth(f) > _RIVAL * _worth(one):
+            kinds.setdefault((f.law.on, f.law.table), f)
+    return list(kinds.values())[1:3]
 
 
 def _simplest(seen: Sequence[Found]) -> Found:
