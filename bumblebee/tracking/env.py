@@ -31,6 +31,7 @@ from bumblebee.tracking.statistics import Statistics
 from bumblebee.tracking.stretches import StretchSampler
 from bumblebee.tracking.terminations import fallen, key_distance, threshold_at
 from bumblebee.tracking.terrain import Ground
+from bumblebee.tracking.threads import one_thread
 
 ActionAdapter = Callable[[RobotState, Tensor, Tensor], Tensor]
 """(state, joint targets (B, J) [rad] of an action of zero, action (B, J)) -> what the motors execute, (B, J)."""
@@ -139,13 +140,14 @@ class TrackingEnv(VecEnv):
 
     def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
         """One control period: observations, rewards (B,), dones (B,) and `extras["time_outs"]` (B,)."""
-        middle, adapter = middle_targets(self._ref, self._middle), self.action_adapter
-        motor = actions if adapter is None else adapter(self._state, middle, actions)
-        self._command.copy_(actions)
-        self.engine.step(middle + self.scale * motor)
-        self._judge_recorded()
-        self.engine.settle()
-        self._look_recorded()
+        with one_thread():
+            middle, adapter = middle_targets(self._ref, self._middle), self.action_adapter
+            motor = actions if adapter is None else adapter(self._state, middle, actions)
+            self._command.copy_(actions)
+            self.engine.step(middle + self.scale * motor)
+            self._judge_recorded()
+            self.engine.settle()
+            self._look_recorded()
         extras = {"time_outs": self._time_outs.float()}
         return self.get_observations(), self._rewards.clone(), self._dones.clone(), extras
 

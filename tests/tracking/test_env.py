@@ -133,6 +133,20 @@ def test_saved_and_loaded_it_goes_on_alike(model: mujoco.MjModel) -> None:
     assert torch.equal(rollout(env, 10), rollout(other, 10))
 
 
+def test_a_step_leaves_torchs_threads_as_they_were(model: mujoco.MjModel) -> None:
+    """The step itself has one; whoever trains keeps theirs, also when the step fails."""
+    before, seen = torch.get_num_threads(), []
+    env = make(model, action_adapter=lambda state, middle, action: seen.append(torch.get_num_threads()) or action)
+    try:
+        torch.set_num_threads(2)
+        env.step(torch.zeros(6, 23))
+        with pytest.raises(RuntimeError):
+            env.step(torch.zeros(6, 5))
+        assert torch.get_num_threads() == 2 and seen == [1, 1]
+    finally:
+        torch.set_num_threads(before)
+
+
 def test_worlds_differ_as_much_as_asked(model: mujoco.MjModel) -> None:
     """Gains, masses and friction lie within their ranges and are not all the same; quiet settings change nothing."""
     engine = MujocoCpu(model, 8, threads=1)
