@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 import torch
 
-from benchmarks import baselines_table
-from benchmarks.baselines import RESUME, parse, run, training_clips
-from benchmarks.baselines_methods import METHODS, changed, method
-from benchmarks.baselines_trial import RESULTS, TABLE, TRIALS, summary, table_of
+from benchmarks.baselines import table as tables
+from benchmarks.baselines.__main__ import RESUME, parse, run, training_clips
+from benchmarks.baselines.methods import METHODS, changed, method
+from benchmarks.baselines.trial import RESULTS, TABLE, TRIALS, summary, table_of
 from benchmarks.motion_pack import Packed, read_pack, whole_motions, write_pack
 from bumblebee.errors import BadInput
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
@@ -131,21 +131,21 @@ def results(folder: Path, success: list[bool], mpkpe: list[float], method: str =
 def test_methods_are_compared_motion_by_motion(tmp_path: Path):
     first = results(tmp_path / "first", [True] * 8, [10.0] * 8)
     other = results(tmp_path / "other", [False] * 6 + [True] * 2, [30.0] * 8)
-    entries = baselines_table.compared([baselines_table.read(f) for f in (first, other)], "first")
+    entries = tables.compared([tables.read(f) for f in (first, other)], "first")
     assert [(e["policy"], e["success"]["value"]) for e in entries] == [("first", 1.0), ("other", 0.25)]
     # 6 motions that only the first follows: 2 / 2^6; of the 2 that both follow, all flips of two equal signs
     assert entries[1]["p_success"] == pytest.approx(2 / 64) and entries[1]["both"] == 2
     assert entries[1]["p_mpkpe"] == pytest.approx(0.5)
-    text = baselines_table.table_of(entries, "first")
+    text = tables.table_of(entries, "first")
     assert "| other | real | train | 8 | 0.25 [" in text and "0.031; MPKPE 0.500 (2)" in text
 
 
 def test_what_cannot_be_compared_is_one_line(tmp_path: Path):
     first = results(tmp_path / "first", [True] * 8, [10.0] * 8)
-    table = baselines_table.read(first)
+    table = tables.read(first)
     with pytest.raises(BadInput, match="--against: expected first, came 'ours'"):
-        baselines_table.compared([table], "ours")
+        tables.compared([table], "ours")
     with pytest.raises(BadInput, match="expected trials of the motions of first, came others"):
-        baselines_table.compared([table, table.iloc[:3].assign(policy="short")], "first")
+        tables.compared([table, table.iloc[:3].assign(policy="short")], "first")
     with pytest.raises(BadInput, match=r"expected results of benchmarks.baselines"):
-        baselines_table.read(tmp_path)
+        tables.read(tmp_path)

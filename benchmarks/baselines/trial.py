@@ -1,6 +1,6 @@
 """Policies on whole motions and on pieces in MuJoCo C: by motion, and as a table with intervals.
 
-    python -m benchmarks.baselines_trial FOLDER --motions motions.npz --out results/name
+    python -m benchmarks.baselines.trial FOLDER --motions motions.npz --out results/name
 
 tries any policy of this repository alone; `benchmarks.baselines` does it for what it has trained.
 """

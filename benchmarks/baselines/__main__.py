@@ -19,8 +19,8 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.baselines_methods import METHODS, RANDOMISATIONS, Method, changed, method
-from benchmarks.baselines_trial import Tried, report
+from benchmarks.baselines.methods import METHODS, RANDOMISATIONS, Method, changed, method
+from benchmarks.baselines.trial import Tried, report
 from benchmarks.motion_pack import Packed, read_pack, whole_motions
 from bumblebee.baselines.dagger import Distiller
 from bumblebee.baselines.env import BaselineEnv

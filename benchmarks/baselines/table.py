@@ -1,6 +1,6 @@
 """Several ways of whole-body control beside each other, motion by motion.
 
-    python -m benchmarks.baselines_table results/ours results/omnih2o results/hover --against ours
+    python -m benchmarks.baselines.table results/ours results/omnih2o results/hover --against ours
 
 Each folder holds `trials.csv` of `benchmarks.baselines`; what it calls its own method counts, its teacher does not. All
 must have been tried on the same motions. p-values are paired by motion: McNemar's for success, sign flips for MPKPE
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.baselines_trial import REAL, TRIALS, rate, summary
+from benchmarks.baselines.trial import REAL, TRIALS, rate, summary
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.intervals import mcnemar_test, sign_flip_test
 
