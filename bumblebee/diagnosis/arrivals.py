@@ -28,6 +28,7 @@ from bumblebee.sim.effects import Effect
 _LONGEST = 3  # ticks in a row
 _MOST_TICKS = 11  # of a window; of more the patterns are too many, and single ticks too short to matter
 _ODD = 1.6  # whitened power of a window that a lost command may have spoilt
+_ALL_OFF = 10.0  # median power of a model that lacks something in every window: that comes first
 _WORTH = 8.0  # log-likelihood on the fitted windows
 _PAYS = 2.0  # log-likelihood on the held-out windows
 _SURE, _RARE = 30.0, -3.0  # of a fit so sure the held-out windows need only not contradict: few of them may have any
@@ -102,7 +103,8 @@ def find_loss(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, Probl
     clean = fit.clean(problem)
     ticks = _ticks(problem.windows)
     driven = [j for j, a in zip(problem.plant.joints, problem.plant.actuator, strict=True) if a >= 0]
-    if not driven or not 1 <= ticks <= _MOST_TICKS or ((clean**2).mean(axis=1) > _ODD).sum() < 2:
+    power = (clean**2).mean(axis=1)
+    if not driven or not 1 <= ticks <= _MOST_TICKS or (power > _ODD).sum() < 2 or np.median(power) > _ALL_OFF:
         return None
     places = [""] + (driven if 1 < len(driven) <= _FEW_JOINTS else [])
     tried = [(losses_of(problem, fit.effects, clean, place), place) for place in places]
@@ -155,7 +157,7 @@ def arrived(problem: Problem, lost: np.ndarray, place: str) -> Problem:
         for t in np.flatnonzero(lost[w]):
             k = first[w] + t
             command[w, k, columns] = command[w, k - 1, columns]
-    return replace(problem, windows=replace(windows, command=command))
+    return replace(problem, windows=replace(windows, command=command), read=replace(problem.read, command=command))
 
 
 def _changes(problem: Problem, effects: Sequence[Effect], place: str, ticks: int) -> np.ndarray:

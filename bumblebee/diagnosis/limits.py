@@ -26,9 +26,9 @@ from bumblebee.sim.servo import Servos, servos_of
 
 KINDS = ("torque_limit", "torque_speed_limit")
 _ODD, _FIRST = 3.0, 4  # power of a window that is off; windows that a limit reaches first
-_WORTH = 15.0  # fall of the cost
-_REACHED = (2, 4, 7, 12, 20, 35, 60, 100, 200)  # windows that the sizes tried reach
-_CLOSER = 4  # halvings of the interval around the best of them
+_WORTH, _SHARE = 15.0, 2e-3  # fall of the cost; share of it that a size must gain to be looked at closer
+_REACHED = (2, 5, 12, 30, 75, 180)  # windows that the sizes tried reach
+_CLOSER = 5  # halvings of the interval around the best of them
 _FELT, _NEARLY, _CLEAR = 0.1, 0.8, 0.5  # change of a window's log(1 + power); share of these that gain; their sum
 _SEVERAL, _MOSTLY = 4, 0.5  # windows that speak for themselves; share of the excess that fewer must lose
 
@@ -117,7 +117,7 @@ def _profile(
     sizes = [float(0.5 * (felt[n - 1] + felt[n])) for n in counts]
     gains = [_gain(problem, fit, clean, usual, candidate, size, reach) for size in sizes]
     best = int(np.argmax(gains))
-    if gains[best] <= 0:
+    if gains[best] <= _SHARE * fit.cost:
         return None
     low, high = sizes[max(best - 1, 0)], sizes[min(best + 1, len(sizes) - 1)]
     at = _closer(lambda x: _gain(problem, fit, clean, usual, candidate, x, reach), low, sizes[best], high, gains[best])

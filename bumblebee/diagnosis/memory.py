@@ -6,6 +6,7 @@ the readings and commands since the rollout began.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from bumblebee.sim.effect_states import State, states_of
 from bumblebee.sim.servo import Servos, servos_of
 
 _SMOOTH = 3  # ticks to either side
+_FORGOTTEN = 20.0  # time constants after which a lag knows nothing of its start
 
 
 def plant_servos(plant: Plant) -> Servos:
@@ -25,6 +27,7 @@ def plant_servos(plant: Plant) -> Servos:
     return servos_of(plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
 
 
+@lru_cache(maxsize=256)
 def logged_torques(plant: Plant, rollout: Rollout) -> tuple[np.ndarray, np.ndarray]:
     """Servo torque (T, J) [N m] by the declared gains just before each tick and just after it."""
     servos = plant_servos(plant)
@@ -101,26 +104,32 @@ def heated(
     """Heat (T, J) [s] at the ticks `time` (T,) of a rollout: the integral of the square of what the drives gave.
 
     Torques (T, J) are shares of the limit at full strength just before and just after each tick. A drive of strength
-    1 - thermal (J,) heat - drift (J,) time gives less than it is asked for, and heats the less.
+    1 - thermal (J,) heat - drift (J,) time, here at most 1, gives less than it is asked for and heats the less.
     """
     power = 0.5 * (before[1:] ** 2 + after[:-1] ** 2) * np.diff(time)[:, None]
     out = np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)))
     if not (thermal.any() or drift.any()):
         return out
     for k, own in enumerate(power):
-        strength = np.maximum(1.0 - thermal * out[k] - drift * time[k], 0.0)
+        strength = np.clip(1.0 - thermal * out[k] - drift * time[k], 0.0, 1.0)
         out[k + 1] = out[k] + strength**2 * own
     return out
 
 
 def lagged(plant: Plant, rollout: Rollout, order: Sequence[int], time: np.ndarray) -> np.ndarray:
-    """State (T, J) of a first-order lag of the logged torque, whose course between ticks is linear."""
+    """State (T, J) of a first-order lag of the logged torque, whose course between ticks is linear.
+
+    Every tick's state follows from that of the tick before; so many passes over all ticks are made as it takes the
+    start to be forgotten.
+    """
     before, after = (x[:, order] for x in logged_torques(plant, rollout))
-    out, safe = before.copy(), np.maximum(time, 1e-6)
-    for k, dt in enumerate(np.diff(rollout.time)):
-        keep = np.exp(-dt / safe)
-        slope = (before[k + 1] - after[k]) / dt
-        out[k + 1] = keep * out[k] + (1 - keep) * after[k] + slope * (dt - safe * (1 - keep))
+    dt, safe = np.diff(rollout.time)[:, None], np.maximum(time, 1e-6)
+    keep = np.exp(-dt / safe)
+    fed = (1 - keep) * after[:-1] + (before[1:] - after[:-1]) / dt * (dt - safe * (1 - keep))
+    out = before.copy()
+    passes = int(np.ceil(_FORGOTTEN * float(safe.max()) / float(np.median(dt))))
+    for _ in range(min(passes, len(out))):
+        out[1:] = keep * out[:-1] + fed
     return out
 
 

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, interval
+from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
-from bumblebee.diagnosis.search import wald
+from bumblebee.diagnosis.search import is_worse, wald
 
 _SURE = 3.0  # standard errors
 
@@ -22,7 +24,7 @@ class Refined:
     """(P,) of 95 % intervals; 0 for parameters that were not fitted."""
 
 
-def refine(problem: Problem, fit: Fit, rng: np.random.Generator) -> Refined:
+def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdout | None = None) -> Refined:
     """Whiten and linearise around `fit`, and fit again; a fit of nothing is as it should be already."""
     if not fit.chosen:
         return Refined(problem, fit, window_weights(fit.clean(problem)), np.empty(0))
@@ -31,23 +33,27 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator) -> Refined:
     residual = problem.residual([fit.effects])[0]
     _, nuisance = cost_of(problem, residual, window_weights(residual))
     weights = window_weights(residual - np.tensordot(nuisance, problem.nuisance, axes=1))
-    fit = gauss_newton(problem, fit.chosen, fit.values, weights, iterations=3, coarse=True)
-    fit = gauss_newton(problem, fit.chosen, fit.values, weights, iterations=1)
-    if not fit.chosen:
-        return Refined(problem, fit, weights, np.empty(0))
-    fit = _needed(problem, fit, weights)
-    return Refined(problem, fit, weights, interval(problem, fit, weights))
+    found, fit = fit, gauss_newton(problem, fit.chosen, fit.values, weights, iterations=3, coarse=True)
+    fit = _needed(problem, gauss_newton(problem, fit.chosen, fit.values, weights, iterations=1), weights)
+    if holdout is not None and holdout.worse_later(found.effects, fit.effects):  # short windows alone led it astray
+        fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
+    return Refined(problem, fit, weights, interval(problem, fit, weights) if fit.chosen else np.empty(0))
 
 
 def _needed(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
     """The fit less effects that have come back to nothing, the least sure one at a time."""
-    while fit.chosen:
-        z = [wald(problem, fit, weights, i) for i in range(len(fit.chosen))]
+    kept: set[Candidate] = set()
+    while len(kept) < len(fit.chosen):
+        z = [np.inf if c in kept else wald(problem, fit, weights, i) for i, c in enumerate(fit.chosen)]
         worst = int(np.argmin(z))
         if z[worst] >= _SURE:
             break
         keep = [i for i in range(len(fit.chosen)) if i != worst]
         values = [fit.values[fit.slices[i]] for i in keep]
         chosen = [fit.chosen[i] for i in keep]
-        fit = gauss_newton(problem, chosen, np.concatenate(values) if values else [], weights, iterations=1)
+        less = gauss_newton(problem, chosen, np.concatenate(values) if values else [], weights, iterations=1)
+        if is_worse(problem, fit, less, _SURE):
+            kept.add(fit.chosen[worst])
+        else:
+            fit = less
     return fit

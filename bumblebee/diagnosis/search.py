@@ -276,21 +276,33 @@ class _Run:
         return True
 
     def prune(self) -> None:
-        """Drop effects that the others have made needless, worst first, refitting each time."""
-        while self.fit.chosen:
-            z = [wald(self.problem, self.fit, self.weights, i) for i in range(len(self.fit.chosen))]
+        """Drop effects that the others have made needless, worst first, refitting each time.
+
+        One whose loss the others cannot make up for stays, however little the slopes at the fit say of it: far from
+        the declared value they say nothing of the way back.
+        """
+        kept: set[Candidate] = set()
+        while len(kept) < len(self.fit.chosen):
+            fit = self.fit
+            z = [np.inf if c in kept else wald(self.problem, fit, self.weights, i) for i, c in enumerate(fit.chosen)]
             worst = int(np.argmin(z))
             if z[worst] >= self.bound:
                 break
-            self.say(f"needless: {self.fit.chosen[worst].effect} on {self.fit.chosen[worst].where}")
-            keep = [i for i in range(len(self.fit.chosen)) if i != worst]
-            values = [self.fit.values[self.fit.slices[i]] for i in keep]
-            chosen = [self.fit.chosen[i] for i in keep]
+            keep = [i for i in range(len(fit.chosen)) if i != worst]
+            values = [fit.values[fit.slices[i]] for i in keep]
+            chosen = [fit.chosen[i] for i in keep]
             values = np.concatenate(values) if values else []
-            self.fit = gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True)
+            less = gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True)
+            if is_worse(self.problem, fit, less, self.bound) or self.holdout.worse_later(fit.effects, less.effects):
+                kept.add(fit.chosen[worst])
+                continue
+            self.say(f"needless: {fit.chosen[worst].effect} on {fit.chosen[worst].where}")
+            self.fit = less
 
     def plain(self) -> None:
         """Effects on a servo's gains in their plainest form, with evidence for those that are new."""
+        if self.given:  # kp and kd apart from the start on
+            return
         self.fit = plain_gains(self.problem, self.fit, self.candidates, self.weights, self.bound, self.say)
         for i, c in enumerate(self.fit.chosen):
             if c not in {s.candidate for s in self.steps}:
@@ -309,6 +321,12 @@ def _can_move(c: Candidate, steps: np.ndarray) -> list[bool]:
 def _like(c: Candidate, others: Sequence[Candidate]) -> bool:
     """Whether two of the same kind on the same place are already there, in other shapes."""
     return sum((c.effect, c.where) == (o.effect, o.where) for o in others) >= 2
+
+
+def is_worse(problem: Problem, fit: Fit, less: Fit, z: float) -> bool:
+    """Whether an effect less costs more than one of `z` standard errors is worth, at the residual's power."""
+    power = max(float(np.median((fit.clean(problem) ** 2).mean(axis=1))), 1.0)
+    return less.cost - fit.cost > 2.0 * z**2 * power
 
 
 def wald(problem: Problem, fit: Fit, weights: np.ndarray, index: int) -> float:
