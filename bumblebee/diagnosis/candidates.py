@@ -213,14 +213,15 @@ def _on_whole(plant: Plant) -> list[Candidate]:
 
 
 def _on_body(plant: Plant, body: str, total: float) -> list[Candidate]:
-    mass = declared_values(plant, "link_mass", body)[0]
+    mass, alone = declared_values(plant, "link_mass", body)
     index = plant.model.body(body).id
     moments = plant.model.body_inertia[index]
     size = float(np.sqrt(1.5 * moments.sum() / mass))  # of a ball of this inertia, twice
     heavy = max(0.2 * mass, 0.01 * total)
     weight = 9.81 * heavy
     return [
-        Candidate("link_mass", body, (mass,), (heavy,)),
+        Candidate("link_mass", body, (mass, alone), (heavy, 0.0)),
+        Candidate("link_mass", body, (mass, alone), (heavy, 1.0)),
         Candidate("link_com", body, declared_values(plant, "link_com", body), (max(0.1 * size, 0.01),) * 3, (0, 1, 2)),
         Candidate("link_inertia", body, tuple(map(float, moments)), tuple(0.3 * moments + 1e-5), (0, 1, 2)),
         Candidate("external_wrench", body, (0.0,) * 6, (*(weight,) * 3, 0.0, 0.0, 0.0), (0, 1, 2)),

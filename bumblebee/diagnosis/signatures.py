@@ -18,7 +18,7 @@ from bumblebee.diagnosis.simulate import inputs_of
 from bumblebee.diagnosis.variation import Variation
 from bumblebee.diagnosis.windows import Windows
 from bumblebee.sim.effect_hooks import runtime_hooks
-from bumblebee.sim.effect_native import sloped
+from bumblebee.sim.effect_native import sloped, spread_inertia
 from bumblebee.sim.effects import Effect
 from bumblebee.sim.servo import servos_of
 
@@ -135,7 +135,9 @@ class Signatures:
             model = self._copy()
             table = getattr(model, name)
             if c.effect == "link_mass":
-                table[body] += c.step[f]
+                factor = 1 + c.step[f] / table[body]
+                model.body_inertia[body] = spread_inertia(model.body_inertia[body], factor, c.start[1])
+                table[body] *= factor
             else:
                 table[body, f] += c.step[f]
             out.append(base - self._inverse_dynamics(model))

@@ -173,7 +173,10 @@ def _set_spring(model: mujoco.MjModel, joint: int, stiffness: float, preload: fl
 def _apply_to_body(model: mujoco.MjModel, kind: str, place: str, values: tuple[float, ...]) -> bool:
     body = model.body(place).id
     if kind == "link_mass":
-        model.body_mass[body] = values[0]
+        mass, spread = values
+        factor = mass / model.body_mass[body]
+        model.body_inertia[body] = native.spread_inertia(model.body_inertia[body], factor, spread)
+        model.body_mass[body] = mass
     elif kind == "link_com":
         model.body_ipos[body] = values
     elif kind == "link_inertia":
@@ -205,7 +208,8 @@ def declared_values(plant: Plant, kind: str, place: str) -> tuple[float, ...]:
     if kind in ("link_mass", "link_com", "link_inertia"):
         body = model.body(place).id
         fields = {"link_mass": model.body_mass, "link_com": model.body_ipos, "link_inertia": model.body_inertia}
-        return tuple(float(x) for x in np.atleast_1d(fields[kind][body]))
+        declared = tuple(float(x) for x in np.atleast_1d(fields[kind][body]))
+        return (*declared, 0.0) if kind == "link_mass" else declared
     if kind == "ground_friction":
         ground = int(model.geom(place).id)
         others = [model.geom_friction[g, 0] for g in touching(model, ground)]

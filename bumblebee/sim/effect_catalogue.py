@@ -21,6 +21,8 @@ class Parameter:
     """Smallest value that is physical."""
     upper: float
     """Largest value that is sensible; infinite where only the data can tell."""
+    default: float | None = None
+    """Its value where an effect does not give it, and then not written either; None: it must be given."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ def _joint(*parameters: tuple[str, str, float, float], whole: bool = False, nati
     return Kind("joint", tuple(Parameter(*p) for p in parameters), whole, native)
 
 
-def _body(*parameters: tuple[str, str, float, float], native: bool = True) -> Kind:
+def _body(*parameters: tuple[str, str, float, float, *tuple[float, ...]], native: bool = True) -> Kind:
     return Kind("body", tuple(Parameter(*p) for p in parameters), False, native)
 
 
@@ -99,7 +101,8 @@ CATALOGUE: dict[str, Kind] = {
     ),
     "backlash": _joint(("gap", "rad", 0.0, 0.5)),
     "series_elasticity": _joint(("stiffness", "N m/rad", 1e-2, _INF)),
-    "link_mass": _body(("mass", "kg", 1e-3, _INF)),
+    # spread 0: what is added sits at the centre of mass; 1: the moments of inertia grow as the mass does.
+    "link_mass": _body(("mass", "kg", 1e-3, _INF), ("spread", "", 0.0, 1.0, 0.0)),
     "link_com": _body(*((axis, "m", -2.0, 2.0) for axis in _AXES)),
     "link_inertia": _body(*((axis + axis, "kg m^2", 1e-9, _INF) for axis in _AXES)),
     "ground_friction": Kind("geom", (Parameter("friction", "", 0.0, 5.0),)),
@@ -130,13 +133,21 @@ class Effect:
         return self.parameters[CATALOGUE[self.effect].parameter]
 
     def values(self) -> tuple[float, ...]:
-        """All its parameters, in the catalogue's order."""
-        return tuple(self.parameters[name] for name in CATALOGUE[self.effect].names)
+        """All its parameters, in the catalogue's order; those that are not given at their defaults."""
+        given = self.parameters
+        return tuple(
+            given[p.name] if p.default is None else given.get(p.name, p.default)
+            for p in CATALOGUE[self.effect].parameters
+        )
 
 
 def single(effect: str, where: str, *values: float) -> Effect:
-    """The effect `effect` on the one place `where` ("" for the whole robot), its parameters at `values` in order."""
-    names = CATALOGUE[effect].names
-    if len(values) != len(names):
-        raise ValueError(f"{effect} has the parameters {names}, got {len(values)} values")
-    return Effect(effect, (where,) if where else (), dict(zip(names, map(float, values), strict=True)))
+    """The effect `effect` on the one place `where` ("" for the whole robot), its parameters at `values` in order.
+
+    Last parameters that have defaults may be left out; one at its default is not written into the effect.
+    """
+    kinds = CATALOGUE[effect].parameters
+    if not sum(p.default is None for p in kinds) <= len(values) <= len(kinds):
+        raise ValueError(f"{effect} has the parameters {CATALOGUE[effect].names}, got {len(values)} values")
+    given = {p.name: float(v) for p, v in zip(kinds, values, strict=False) if p.default is None or v != p.default}
+    return Effect(effect, (where,) if where else (), given)

@@ -29,6 +29,14 @@ def physical_inertia(moments: Sequence[float]) -> np.ndarray:
     return out
 
 
+def spread_inertia(moments: Sequence[float], factor: float, spread: float) -> np.ndarray:
+    """Principal moments (3,) [kg m^2] of a body whose mass has grown by `factor`.
+
+    At spread 0 what was added sits at the centre of mass; at 1 the mass is distributed as before.
+    """
+    return np.asarray(moments, dtype=float) * (1 + spread * (factor - 1))
+
+
 def sloped(gravity: Sequence[float], x: float, y: float) -> np.ndarray:
     """Gravity (3,) turned by the rotation vector (x, y, 0) [rad]."""
     axis = np.array([x, y, 0.0])

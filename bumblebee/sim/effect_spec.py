@@ -10,7 +10,7 @@
 | encoder_offset | biasprm[0] = biasprm[1] * offset: the servo's part; the reading's part is a runtime hook |
 | joint_spring, hysteresis | joint stiffness with springref; with springyield |
 | backlash, series_elasticity | a second hinge on the same axis, with a range; with a stiffness. nq grows |
-| link_mass, link_com, link_inertia | the body's inertial, one of the three at a time |
+| link_mass, link_com, link_inertia | the body's inertial; the moments with the mass where `spread` says so |
 | ground_friction, ground_compliance | friction, solref of the geometry and of what can touch it |
 | ground_slope | gravity |
 
@@ -205,8 +205,11 @@ def _body(spec: mujoco.MjSpec, name: str) -> Any:
     return body
 
 
-def _mass(spec: mujoco.MjSpec, name: str, value: float) -> None:
-    _body(spec, name).mass = value
+def _mass(spec: mujoco.MjSpec, name: str, value: float, spread: float) -> None:
+    body = _body(spec, name)
+    if spread:
+        body.inertia = native.spread_inertia(body.inertia, value / body.mass, spread)
+    body.mass = value
 
 
 def _com(spec: mujoco.MjSpec, name: str, *centre: float) -> None:

@@ -84,8 +84,9 @@ def _effect(where: str, entry: Any) -> Effect:
     if name == "discovered":
         return Effect(name, tuple(places), _terms(f"{where}: parameters", entry.get("parameters")))
     _only_keys(f"{where}: parameters", entry.get("parameters"), set(kind.names))
-    values = {p.name: _value(where, entry["parameters"].get(p.name), p) for p in kind.parameters}
-    return Effect(name, tuple(places), values)
+    given = entry["parameters"]
+    wanted = [p for p in kind.parameters if p.default is None or p.name in given]
+    return Effect(name, tuple(places), {p.name: _value(where, given.get(p.name), p) for p in wanted})
 
 
 def _terms(where: str, table: Any) -> dict[str, float]:

@@ -95,6 +95,12 @@ def test_an_encoder_offset_moves_where_the_servo_rests() -> None:
     assert position + runtime_hooks([effect], model).encoder_offset[0] == pytest.approx(0.4, abs=1e-3)
 
 
+def test_a_heavier_link_grows_in_inertia_only_where_its_mass_is_spread() -> None:
+    declared = model_with().body("link").inertia
+    assert model_with(single("link_mass", "link", 2 * MASS)).body("link").inertia == pytest.approx(declared)
+    assert model_with(single("link_mass", "link", 2 * MASS, 1.0)).body("link").inertia == pytest.approx(2 * declared)
+
+
 def test_a_heavier_link_sags_by_its_weight() -> None:
     """The servo's kp (u - q) balances m g l cos q."""
     q = run(model_with(single("link_mass", "link", 1.2), gravity=True), 5.0)[0]
