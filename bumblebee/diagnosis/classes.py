@@ -15,7 +15,7 @@ from bumblebee.sim.effects import CATALOGUE
 
 _SAME = 0.95
 _KIN = 0.7  # whitened sensitivities this parallel are worth trying in each other's place
-_RIVALS = 4
+_RIVALS, _ALL_RIVALS = 4, 16  # tried in an effect's place; in all effects' places together, but one each
 _POWER_Z = 4.0  # seen four times out of five at a bound of about three standard errors
 
 # What a person would do to tell an effect from those that look the same.
@@ -119,10 +119,11 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
     fit (on the fitted ones where nothing is held out).
     """
     fit, problem = found.fit, found.problem
+    most = min(_RIVALS, max(1, _ALL_RIVALS // max(1, len(fit.chosen))))
     out = []
     for i, kin in enumerate(ranked):
         same = [c for c, share in kin if share > _SAME]
-        near = [c for c, share in kin if _KIN < share <= _SAME][:_RIVALS]
+        near = [c for c, share in kin if _KIN < share <= _SAME][:most]
         rest = _less(fit, i)
         for rival in near:
             columns = Columns([rival], problem.sensitivities([rival], rest.effects))

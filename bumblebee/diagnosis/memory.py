@@ -19,6 +19,7 @@ from bumblebee.sim.effect_states import State, states_of
 from bumblebee.sim.servo import Servos, servos_of
 
 _SMOOTH = 3  # ticks to either side
+_PASSES = 60  # at most, until the heat and the strength that it leaves agree
 _FORGOTTEN = 20.0  # time constants after which a lag knows nothing of its start
 
 
@@ -108,11 +109,14 @@ def heated(
     """
     power = 0.5 * (before[1:] ** 2 + after[:-1] ** 2) * np.diff(time)[:, None]
     out = np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)))
-    if not (thermal.any() or drift.any()):
-        return out
-    for k, own in enumerate(power):
-        strength = np.clip(1.0 - thermal * out[k] - drift * time[k], 0.0, 1.0)
-        out[k + 1] = out[k] + strength**2 * own
+    some = np.flatnonzero((thermal != 0) | (drift != 0))
+    for _ in range(_PASSES if len(some) else 0):
+        strength = np.clip(1.0 - thermal[some] * out[:-1, some] - drift[some] * time[:-1, None], 0.0, 1.0)
+        new = np.cumsum(strength**2 * power[:, some], axis=0)
+        settled = np.abs(new - out[1:, some]).max(initial=0.0) < 1e-9
+        out[1:, some] = new
+        if settled:
+            break
     return out
 
 
