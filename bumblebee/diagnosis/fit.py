@@ -160,7 +160,7 @@ def _columns(
         sets.append(effects_at(chosen, moved))
     if coarse and rough(c.effect for c in chosen):
         several = problem.residual([effects_at(chosen, values), *sets], coarse=True)
-        return (several[0] - several[1:]) / np.array(sizes)[:, None, None]
+        return problem.tamed(several[0] - several[1:]) / np.array(sizes)[:, None, None]
     return (residual - problem.residual(sets)) / np.array(sizes)[:, None, None]
 
 

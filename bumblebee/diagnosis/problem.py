@@ -18,6 +18,7 @@ from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
 _GROUP = 24  # models held at once
+_MANY, _LARGEST = 12, 0.2  # windows; share of the others' power that one may have
 # In coarse steps play hits too softly, and late feedback, computed beside the integrator, moves a servo by itself.
 _FINE_ONLY = ("torque_lag", "encoder_delay", "encoder_quantisation", "backlash", "series_elasticity")
 
@@ -79,8 +80,21 @@ class Problem:
                 sets = [
                     [*without(base, moves[k][0]), moves[k][0].at(moves[k][0].moved(moves[k][1], 1.0))] for k in part
                 ]
-                out[part] = reference - self.residual(sets, coarse=few)
+                change = reference - self.residual(sets, coarse=few)
+                out[part] = self.tamed(change) if few else change
         return out
+
+    def tamed(self, change: np.ndarray) -> np.ndarray:
+        """Changes (..., W, M) that were simulated in coarse steps, on a floating base no window far above the others.
+
+        A foot that touches a coarse step earlier moves one window by more than all the others together: an offset of
+        0.010 rad in a hip came out as 0.002.
+        """
+        if not self.plant.floating or change.shape[-2] < _MANY:
+            return change
+        power = (change**2).sum(axis=-1)
+        most = _LARGEST * np.sort(power, axis=-1)[..., :-2].sum(axis=-1, keepdims=True)
+        return change * np.sqrt(np.minimum(1.0, most / np.maximum(power, 1e-30)))[..., None]
 
     def relinearised(self, effects: Sequence[Effect]) -> "Problem":
         """The same windows with nuisance columns around the model with `effects`.

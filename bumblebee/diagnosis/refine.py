@@ -11,6 +11,7 @@ from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.search import is_worse, wald
 
 _SURE = 3.0  # standard errors
+_CHANGED = 0.85  # share of the cost that is left, below which the declared model was not nearly right
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +26,17 @@ class Refined:
 
 
 def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdout | None = None) -> Refined:
-    """Whiten and linearise around `fit`, and fit again; a fit of nothing is as it should be already."""
+    """Whiten and linearise around `fit`, and fit again; a fit of nothing is as it should be already.
+
+    A model that was nearly right before is whitened well enough: there only the nuisances are computed anew.
+    """
     if not fit.chosen:
         return Refined(problem, fit, window_weights(fit.clean(problem)), np.empty(0))
-    plant, layout, windows = problem.plant, problem.layout, problem.read
-    problem = make_problem(plant, layout, windows, problem.sigma, (problem.fine, problem.coarse), fit.effects, rng)
+    if fit.cost < _CHANGED * cost_of(problem, problem.residual([[]])[0], window_weights(fit.clean(problem)))[0]:
+        plant, layout, windows = problem.plant, problem.layout, problem.read
+        problem = make_problem(plant, layout, windows, problem.sigma, (problem.fine, problem.coarse), fit.effects, rng)
+    else:
+        problem = problem.relinearised(fit.effects)
     residual = problem.residual([fit.effects])[0]
     _, nuisance = cost_of(problem, residual, window_weights(residual))
     weights = window_weights(residual - np.tensordot(nuisance, problem.nuisance, axes=1))

@@ -61,9 +61,10 @@ def try_one(problem: Problem, fit: Fit, candidate: Candidate, steps: np.ndarray,
     values = candidate.clip(values)
     best: Trial | None = None
     for _ in range(_SECANTS):
-        moved = problem.residual([[*fit.effects, candidate.at(values)]], coarse=coarse)[0]
-        change = beside.left(declared - moved)
-        cost = beside.cost(fit.residual - (declared - moved))
+        raw = declared - problem.residual([[*fit.effects, candidate.at(values)]], coarse=coarse)[0]
+        raw = problem.tamed(raw) if coarse else raw
+        change = beside.left(raw)
+        cost = beside.cost(fit.residual - raw)
         if best is None or cost < best.cost:
             best = Trial(candidate, values, cost, change)
         size = (weights[:, None] * change**2).sum()
