@@ -89,7 +89,7 @@ class Scales:
     """Typical sizes of the data, from which first steps follow; J joints."""
 
     torque: np.ndarray
-    """(J,) RMS servo torque [N m]."""
+    """(J,) RMS servo torque [N m], of a joint without a drive that of gravity and speeds."""
     peak: np.ndarray
     """(J,) largest servo torque [N m]."""
     speed: np.ndarray
@@ -259,6 +259,7 @@ def scales_of(plant: Plant, rollouts: Sequence[Rollout], model: mujoco.MjModel |
         for r in rollouts
     ]
     rms = np.sqrt(np.mean([(t**2).mean(axis=0) for t in torques], axis=0))
+    rms = np.where(plant.actuator < 0, np.maximum(rms, _bias(plant, rollouts)), rms)
     torque = np.maximum(rms, 0.05 * rms.max() + 1e-9)
     speeds = np.sqrt(np.mean([(r.joint_vel**2).mean(axis=0) for r in rollouts], axis=0))
     return Scales(
@@ -270,6 +271,17 @@ def scales_of(plant: Plant, rollouts: Sequence[Rollout], model: mujoco.MjModel |
         inertia=_inertia(plant),
         duration=float(max(r.time[-1] - r.time[0] for r in rollouts)),
     )
+
+
+def _bias(plant: Plant, rollouts: Sequence[Rollout], rows: int = 50) -> np.ndarray:
+    """RMS torque (J,) [N m] of gravity and of speeds along the rollouts: what a joint without a drive moves under."""
+    data, found = mujoco.MjData(plant.model), []
+    for r in rollouts:
+        for k in np.linspace(0, r.frames - 1, rows).astype(int):
+            data.qpos[plant.qpos], data.qvel[plant.dof] = r.joint_pos[k], r.joint_vel[k]
+            mujoco.mj_forward(plant.model, data)
+            found.append(data.qfrc_bias[plant.dof])
+    return np.sqrt(np.mean(np.square(found), axis=0))
 
 
 def _inertia(plant: Plant) -> np.ndarray:
