@@ -204,6 +204,8 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
     # A limit is tried from the largest torque in the data on, which is not where the model has it.
     declared = declared_values(plant, c.effect, c.where) if c.effect == "torque_limit" else c.nominal
     for p, value, nominal, wide in zip(CATALOGUE[c.effect].parameters, values, declared, half, strict=True):
+        if p.default is not None and value == p.default:
+            continue
         ends = [float(value - wide), float(value + wide)]
         if c.effect in INVERSE:
             # The fit moves the inverse; an interval that reaches zero has no upper end.
