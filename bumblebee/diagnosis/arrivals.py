@@ -122,7 +122,8 @@ def find_loss(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, Probl
         left = _clean(holdout.problem, fit)
         seen = losses_of(holdout.problem, fit.effects, left, place)
         paid = seen.total(share)
-        if paid < _PAYS and not (gain > _SURE and paid > _RARE):
+        # A bus that loses whole rows is usual, a joint that loses its own is not: that must be seen again.
+        if paid < _PAYS and (place or gain < _SURE or paid < _RARE):
             return None
         kept = arrived(holdout.problem, seen.likely(share), place)
         explains = _explained(left, _clean(kept, fit))
