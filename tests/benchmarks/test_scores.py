@@ -42,6 +42,12 @@ def test_sizes_are_relative_to_the_change_and_where_it_is_infinite_to_the_value(
     assert marks["sizes"][0]["relative"] == pytest.approx(0.1)
 
 
+def test_an_interval_without_an_upper_end_covers_all_above_its_lower_one():
+    marks = score([_truth()], {"effects": [_found(ci=(1.05, None))]})
+    assert not marks["sizes"][0]["covered"]
+    assert score([_truth()], {"effects": [_found(ci=(0.5, None))]})["sizes"][0]["covered"]
+
+
 def test_a_member_of_a_stated_class_counts_and_another_joint_does_not():
     same = score([_truth()], {"effects": [_found("kd", same=[("coulomb_friction", "elbow")])]})
     assert same["top"] and same["found"] == [True] and same["exact"] == [False]
