@@ -110,7 +110,8 @@ def diagnose(
     if beyond is not None:
         document["structure"] = structure_table(beyond)
         session.notes.extend(f"withdrawn for a discovered effect: {name}" for name in beyond.withdrawn)
-    rounded, steps = entries(grids(session.rollouts), holdout.problem or last.problem, last.fit)
+    readings = grids(session.rollouts, session.sigma[: len(session.plant.joints)])
+    rounded, steps = entries(readings, holdout.problem or last.problem, last.fit)
     lost, losses = loss_entries(found.loss)
     effects, document["effects"] = [*effects, *steps, *losses], document["effects"] + rounded + lost
     document["error"] = _errors(session, effects, config)

@@ -29,6 +29,7 @@ _Z, _LEAST = 2.0, 0.01  # of the judging windows' gain, and its least share
 _MOST = 0.5  # share of a joint's excess that may remain where its form was found
 _PARAMETER = 4.0  # log-likelihood that a parameter must bring
 _LAWS, _WORTH, _SHARE = 3, 12.0, 0.03  # laws in a form; what a further one must bring, and as a share of the first's
+_RUNAWAY = 10.0  # coefficients so many times as large as the windows asked for: a law that the simulator hardly meets
 _PART = 0.2  # an effect of the catalogue is a part of a law that is at least this share of it
 
 
@@ -168,7 +169,7 @@ def _form(problem: Problem, base: Fit, joint: str, strange: Sequence[Found]) -> 
     own = formula(joint, terms)
     fit = _refitted(problem, (*chosen, own), np.concatenate((values, list(terms.values()))))
     fit = _pruned(problem, fit, own)
-    if own not in fit.chosen:
+    if own not in fit.chosen or np.linalg.norm(fit.of(own)) > _RUNAWAY * np.linalg.norm(list(terms.values())):
         return None
     score = _score(fit.clean(problem), len(fit.values))
     return _Form(fit, score, kind, dict(zip(own.texts, map(float, fit.of(own)), strict=True)))

@@ -18,6 +18,7 @@ from bumblebee.sim.effects import Effect, single
 _SAMPLES = 1500
 _SMALLEST, _CELLS = 5e-4, 20  # a step is at least half a milliradian, and the joint crosses at least so many
 _IN_PHASE = 0.5
+_ON_GRID = 0.8  # of the resultant that the noise leaves of a grid
 _ABOVE = 4.0  # times the typical resultant of other frequencies
 _DENSE = 0.25  # of the width of a peak
 
@@ -35,12 +36,17 @@ class Grid:
     """Rayleigh's test, times the number of frequencies looked at."""
 
 
-def grids(rollouts: Sequence[Rollout]) -> list[Grid]:
-    """The joints whose positions were read in steps, with the step."""
+def grids(rollouts: Sequence[Rollout], noise: Sequence[float] | np.ndarray | None = None) -> list[Grid]:
+    """The joints whose positions were read in steps, with the step.
+
+    `noise` (J,) [rad] is that of the readings: where it is much smaller than a step the readings must lie on the grid,
+    and not merely prefer it, as the turning points of a motion do that is repeated.
+    """
     joints = rollouts[0].joints
     every = np.concatenate([r.joint_pos for r in rollouts])
     some = every[np.unique(np.linspace(0, len(every) - 1, _SAMPLES).round().astype(int))]
-    found = [_grid(name, some[:, j]) for j, name in enumerate(joints)]
+    most = np.full(len(joints), np.inf) if noise is None else np.asarray(noise, dtype=float)
+    found = [_grid(name, some[:, j], float(most[j])) for j, name in enumerate(joints)]
     return [g for g in found if g is not None]
 
 
@@ -78,7 +84,7 @@ def entries(found: Sequence[Grid], problem: Problem, fit: Fit) -> tuple[list[dic
     return out, effects
 
 
-def _grid(joint: str, x: np.ndarray) -> Grid | None:
+def _grid(joint: str, x: np.ndarray, noise: float) -> Grid | None:
     span = float(np.ptp(x))
     if span < _CELLS * _SMALLEST:
         return None
@@ -100,6 +106,8 @@ def _grid(joint: str, x: np.ndarray) -> Grid | None:
     near = np.linspace(best - width, best + width, 41)
     fine = np.abs(_mean_phase(x, near))
     value, top = float(near[np.argmax(fine)]), float(fine.max())
+    if top < _ON_GRID * np.exp(-2.0 * (np.pi * noise * value) ** 2):
+        return None
     # Phase noise of each reading, and how well a slope of phase over x is known from them.
     spread = np.sqrt(-2.0 * np.log(min(top, 1 - 1e-6)))
     error = spread / (2 * np.pi * np.sqrt(len(x)) * x.std())

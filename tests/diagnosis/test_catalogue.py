@@ -50,6 +50,17 @@ def test_an_encoders_steps_are_seen_in_its_readings(noise: float) -> None:
         q = rollout.joint_pos.copy()
         q[:, 0] = np.round(q[:, 0] / steps[0]) * steps[0] + noise * rng.standard_normal(len(q))
         rounded.append(replace(rollout, joint_pos=q))
-    (found,) = grids(rounded)
+    (found,) = grids(rounded, noise=[max(noise, 1e-4)] * 3)
     assert found.joint == "j1"
     assert found.step == pytest.approx(0.004, abs=max(4 * found.error, 1e-9))
+
+
+def test_a_motion_that_comes_back_to_the_same_places_is_no_grid() -> None:
+    """It prefers some angles by far more than its readings' noise leaves open; without the noise none can tell."""
+    rng = np.random.default_rng(0)
+    places = 0.145 * rng.integers(-10, 11, 1200)[:, None] + 0.02 * rng.standard_normal((1200, 3))
+    (rollout,) = arm.simulate({}, count=1, seconds=1.0)
+    time, rest = np.arange(1200) / 50, np.zeros((1200, 3))
+    readings = [replace(rollout, time=time, joint_pos=places, joint_vel=rest, joint_target=rest)]
+    assert len(grids(readings)) == 3
+    assert grids(readings, noise=[1e-3] * 3) == []

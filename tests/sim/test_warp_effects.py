@@ -79,8 +79,8 @@ def test_play_and_shafts_are_alike_on_both_engines(device: str) -> None:
     """Joints that no encoder reads, and a spring that yields; the task sees 23 joints."""
     plain, warp = both(SHAFTS, device)
     assert warp.model.nq > 30
+    qpos = torch.tensor(plain.model.key_qpos[0], dtype=torch.float32)[plain._q].repeat(WORLDS, 1)
     for engine in (plain, warp):
-        qpos = torch.tensor(engine.model.key_qpos[0], dtype=torch.float32)[engine._q.cpu()].repeat(WORLDS, 1)
         rows = torch.ones(WORLDS, dtype=torch.bool, device=engine.device)
         where = engine.device
         engine.reset(rows, qpos.to(where), torch.zeros(WORLDS, 29, device=where), STAND.repeat(WORLDS, 1).to(where))
