@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bumblebee.diagnosis.acceptance import wald
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, resolved
-from bumblebee.diagnosis.formula import DISCOVERED, Formula, formula, in_terms, related
+from bumblebee.diagnosis.formula import DISCOVERED, Formula, formula, in_terms, related, stiffer_than_the_drive
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.laws import beside, joined
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.remains import Remains, remains
 from bumblebee.diagnosis.scene import fitted_scene
-from bumblebee.diagnosis.search import wald
 from bumblebee.diagnosis.seek import Found, library, seek
 
 _JOINTS = 3  # joints at most that get a form
@@ -29,7 +29,6 @@ _Z, _LEAST = 2.0, 0.01  # of the judging windows' gain, and its least share
 _MOST = 0.5  # share of a joint's excess that may remain where its form was found
 _PARAMETER = 4.0  # log-likelihood that a parameter must bring
 _LAWS, _WORTH, _SHARE = 3, 12.0, 0.03  # laws in a form; what a further one must bring, and as a share of the first's
-_RUNAWAY = 10.0  # coefficients so many times as large as the windows asked for: a law that the simulator hardly meets
 _PART = 0.2  # an effect of the catalogue is a part of a law that is at least this share of it
 
 
@@ -169,7 +168,7 @@ def _form(problem: Problem, base: Fit, joint: str, strange: Sequence[Found]) -> 
     own = formula(joint, terms)
     fit = _refitted(problem, (*chosen, own), np.concatenate((values, list(terms.values()))))
     fit = _pruned(problem, fit, own)
-    if own not in fit.chosen or np.linalg.norm(fit.of(own)) > _RUNAWAY * np.linalg.norm(list(terms.values())):
+    if own not in fit.chosen or stiffer_than_the_drive(problem.plant, own, fit.of(own)):
         return None
     score = _score(fit.clean(problem), len(fit.values))
     return _Form(fit, score, kind, dict(zip(own.texts, map(float, fit.of(own)), strict=True)))

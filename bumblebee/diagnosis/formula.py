@@ -9,9 +9,12 @@ from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.variation import declared_values
+from bumblebee.sim.effect_terms import read_term
 from bumblebee.sim.effects import Effect
+from bumblebee.sim.servo import servos_of
 
 DISCOVERED = "discovered"
+_STIFF = 2.0
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,18 @@ def formula(joint: str, terms: dict[str, float]) -> Formula:
     """The candidate of `terms`, term -> coefficient that matters."""
     sizes = tuple(max(abs(x), 1e-9) for x in terms.values())
     return Formula(DISCOVERED, joint, (0.0,) * len(terms), sizes, tuple(range(len(terms))), texts=tuple(terms))
+
+
+def stiffer_than_the_drive(plant: Plant, own: Formula, values: np.ndarray) -> bool:
+    """Whether a term that acts on the target asks for more than `_STIFF` times the servo's own gain.
+
+    A target that is changed on its way cannot do more than the servo makes of it. Such a coefficient belongs to a term
+    that is nearly always zero in the data, and would throw the robot where it is not.
+    """
+    servo = servos_of(plant.model, [int(plant.model.joint(own.where).id)])
+    gain = float(abs(servo.bias[0, 1]))
+    acts = [abs(v) for text, v in zip(own.texts, values, strict=True) if read_term(text).drives]
+    return bool(gain > 0 and acts and max(acts) > _STIFF * gain)
 
 
 def in_terms(plant: Plant, fit: Fit, candidate: Candidate) -> dict[str, float]:

@@ -8,12 +8,12 @@ from bumblebee.diagnosis.beyond import discovered_entry, structure_table, unexpl
 from bumblebee.diagnosis.candidates import Candidate, scales_of
 from bumblebee.diagnosis.discover import Discovery, discover
 from bumblebee.diagnosis.fit import gauss_newton
-from bumblebee.diagnosis.formula import formula, related
+from bumblebee.diagnosis.formula import formula, related, stiffer_than_the_drive
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.session import Session, make_session
 from bumblebee.diagnosis.windows import choose_starts, cut
-from tests.diagnosis import cart
+from tests.diagnosis import arm, cart
 
 
 def prepared(**truth: float) -> tuple[Session, Problem, Problem]:
@@ -87,3 +87,13 @@ def test_an_entry_has_a_coefficient_and_an_interval_for_each_term() -> None:
 )
 def test_a_constant_part_belongs_to_a_law_of_its_family(texts: list[str], effect: str, same: bool) -> None:
     assert related(texts, effect) is same
+
+
+def test_a_target_changed_on_its_way_cannot_push_harder_than_the_servo() -> None:
+    """kp is 60 on j2; terms without the target have no such bound."""
+    rollouts = arm.simulate({}, count=1, seconds=1.0)
+    plant = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory").plant
+    late = formula("j2", {"slewed(0.5, 0.02) - u": 60.0})
+    assert not stiffer_than_the_drive(plant, late, np.array([60.0]))
+    assert stiffer_than_the_drive(plant, late, np.array([-600.0]))
+    assert not stiffer_than_the_drive(plant, formula("j2", {"q^3": 600.0}), np.array([600.0]))
