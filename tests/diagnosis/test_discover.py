@@ -90,7 +90,7 @@ def test_a_constant_part_belongs_to_a_law_of_its_family(texts: list[str], effect
 
 
 def test_a_target_changed_on_its_way_cannot_push_harder_than_the_servo() -> None:
-    """kp is 60 on j2; terms without the target have no such bound."""
+    """The servo has a kp of 60 on j2; terms without the target have no such bound."""
     rollouts = arm.simulate({}, count=1, seconds=1.0)
     plant = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory").plant
     late = formula("j2", {"slewed(0.5, 0.02) - u": 60.0})
