@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from bumblebee.diagnosis.acceptance import wald
 from bumblebee.diagnosis.arrivals import loss_entries
 from bumblebee.diagnosis.beyond import NOT_TESTED, discovered_entry, structure_table, unexplained
 from bumblebee.diagnosis.candidates import INVERSE, Candidate, all_candidates, scales_of, still_joints
@@ -21,7 +22,7 @@ from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights, without
 from bumblebee.diagnosis.quantised import entries, grids
 from bumblebee.diagnosis.refine import Refined, refine
-from bumblebee.diagnosis.search import Search, SearchConfig, search, wald
+from bumblebee.diagnosis.search import Search, SearchConfig, search
 from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.variation import declared_values, vary
 from bumblebee.diagnosis.windows import choose_starts, cut

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bumblebee.diagnosis.acceptance import is_worse, wald
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, interval
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
-from bumblebee.diagnosis.search import is_worse, wald
 
 _SURE = 3.0  # standard errors
 _CHANGED = 0.85  # share of the cost that is left, below which the declared model was not nearly right

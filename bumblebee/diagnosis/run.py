@@ -1,0 +1,212 @@
+"""The state of one search: what is chosen, what is left to try, and the moves from one state to the next."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bumblebee.diagnosis.acceptance import Step, evidence, is_physical, least_z, pruned, wald
+from bumblebee.diagnosis.arrivals import Loss, find_loss
+from bumblebee.diagnosis.candidates import Candidate, shortlisted
+from bumblebee.diagnosis.eligible import is_chosen, is_like, is_promising
+from bumblebee.diagnosis.far import far_servos
+from bumblebee.diagnosis.fit import Fit, cost_of, effects_at, gauss_newton, resolved
+from bumblebee.diagnosis.gains import plain_gains
+from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.limits import KINDS as LIMITS
+from bumblebee.diagnosis.limits import pays_where_felt
+from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.scores import Columns, Scores, score_tests
+from bumblebee.diagnosis.screen import pulse_sizes, restless, screen, screening_windows
+from bumblebee.diagnosis.trials import Trial, try_one
+from bumblebee.sim.effects import Effect
+
+_ANEW = 0.1  # share of the cost left, below which all candidates are screened anew
+_CHANGED = 0.8  # share of the cost that a fit must leave less of, to be worth linearising around
+
+
+@dataclass(frozen=True)
+class SearchConfig:
+    """How strict and how long the search is."""
+
+    level: float = 0.005
+    """False alarms allowed for a whole null dataset, shared among the candidates (Bonferroni, or by simulation)."""
+    screen_windows: int = 40
+    """Windows that all candidates are screened on."""
+    simulated: int = 10
+    """Best candidates of the screening a round, whose sensitivities are simulated on all windows."""
+    trials: int = 4
+    """Candidates a round that are tried at their size in the simulator."""
+    shortlist: int = 2
+    """Joints a round on which play and flexible shafts are tried."""
+    most: int = 12
+    """Effects at most."""
+    patience: int = 4
+    """Rounds that may fail before the search ends."""
+    holdout_z: float = 2.0
+    """Held-out gain must exceed this many of its standard errors."""
+    least_gain: float = 0.01
+    """Held-out gain must exceed this share of what all effects gain together: no law is exactly the catalogue's."""
+    far: float = 30.0
+    """Median chi-square above which gains far from the declared ones are tried first."""
+
+
+class Run:
+    """The state of one search."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        holdout: Holdout,
+        remake: Callable[[Sequence[Effect]], tuple[list[Candidate], np.ndarray]],
+        config: SearchConfig,
+        say: Callable[[str], None],
+    ) -> None:
+        self.problem, self.holdout, self.remake, self.config, self.say = problem, holdout, remake, config, say
+        start = problem.residual([[]])[0]
+        self.weights = window_weights(start)
+        self.fit = gauss_newton(problem, (), (), self.weights)
+        self.keep = screening_windows(problem, config.screen_windows)
+        self.closed: set[Candidate] = set()
+        self.steps: list[Step] = []
+        self.rejected: list[str] = []
+        self.loss: Loss | None = None
+        self.given = 0
+        self.candidates, _ = remake([])
+        self.start_far()
+        self.rescreen()
+        self.bound = least_z(self.small, self.columns, self.small_fit(), len(self.candidates), config.level)
+
+    def rescreen(self) -> None:
+        """Candidates with steps for the present fit, and the columns of all of them around it."""
+        self.small = self.problem.part(self.keep)
+        self.candidates, torque = self.remake(self.fit.effects)
+        self.columns, self.answers = screen(
+            self.small, self.candidates, self.fit.effects, pulse_sizes(self.problem, torque)
+        )
+        self.screened_cost = self.fit.cost
+
+    def small_fit(self) -> Fit:
+        """The fit on the screening windows."""
+        return replace(self.fit, residual=self.fit.residual[self.keep], columns=self.fit.columns[:, self.keep])
+
+    def tests(self) -> Scores:
+        """Score tests of all candidates on the screening windows."""
+        return score_tests(self.small, self.columns, self.small_fit(), self.weights[self.keep])
+
+    def promising(self) -> list[Candidate]:
+        """The best of the screening, and play and shafts of the joints that are worst explained."""
+        tests = self.tests()
+        share = np.sqrt(len(self.keep) / len(self.problem.windows))
+        found = []
+        for k in np.argsort(-tests.gain):
+            c = self.columns.candidates[k]
+            if len(found) >= self.config.simulated or tests.gain[k] <= 0:
+                break
+            if self.is_open(c, tests, k, 0.7 * share * self.bound, share**2) and not is_like(c, found):
+                found.append(c)
+        left = self.small_fit().clean(self.small)
+        poor = restless(self.small, self.answers, left, self.config.shortlist)
+        joints = len(self.problem.plant.joints)
+        listed = [c for c in self.candidates if c.where in poor and shortlisted(c, joints)]
+        return found + [c for c in listed if c not in self.closed and not is_chosen(c, self.fit.chosen)]
+
+    def is_open(self, c: Candidate, tests: Scores, k: int, bound: float, share: float) -> bool:
+        """Whether a candidate, number `k` of `tests`, is worth a trial and was not chosen or tried in vain."""
+        if c in self.closed or is_chosen(c, self.fit.chosen):
+            return False
+        return is_promising(c, tests, k, bound, share, self.fit.cost)
+
+    def trials(self) -> tuple[list[Trial], list[Candidate]]:
+        """Candidates tried in the simulator with their costs; and those that were looked at."""
+        looked = self.promising()
+        if not looked:
+            return [], []
+        columns = Columns(looked, self.problem.sensitivities(looked, self.fit.effects))
+        tests = score_tests(self.problem, columns, self.fit, self.weights)
+        order = [k for k in np.argsort(-tests.gain) if self.is_open(looked[k], tests, k, self.bound, 1.0)]
+        tried = [
+            try_one(self.problem, self.fit, looked[k], tests.steps[k], self.weights)
+            for k in order[: self.config.trials]
+        ]
+        return [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2], looked
+
+    def accept(self, candidate: Candidate, values: np.ndarray) -> bool:
+        """Refit with the candidate; keep it if the joint fit and the held-out windows agree."""
+        chosen, start = (*self.fit.chosen, candidate), np.concatenate((self.fit.values, values))
+        # Windows that only this effect explains weighed little so far: weigh them as it leaves them.
+        residual = self.problem.residual([effects_at(chosen, start)])[0]
+        weights = window_weights(residual - np.tensordot(self.fit.nuisance, self.problem.nuisance, axes=1))
+        fit = gauss_newton(self.problem, chosen, start, weights, iterations=2, coarse=True)
+        z = wald(self.problem, fit, weights, len(fit.chosen) - 1)
+        pays = self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain) or (
+            candidate.effect in LIMITS and pays_where_felt(self.problem, self.holdout, self.fit, fit)
+        )
+        if z < self.bound or not pays or not is_physical(self.problem, self.fit, fit, candidate, weights):
+            self.closed.add(candidate)
+            self.rejected.append(f"{candidate.effect} on {candidate.where or 'the whole robot'}")
+            return False
+        self.steps.append(evidence(candidate, z, len(self.candidates)))
+        self.say(f"found {candidate.effect} on {candidate.where or 'the whole robot'}: {fit.of(candidate).round(5)}")
+        self.renew(fit)
+        return True
+
+    def renew(self, fit: Fit) -> None:
+        """Nuisances around what was found, where it is more than a little; weights; candidates, where it is a lot."""
+        if cost_of(self.problem, fit.residual, self.weights)[0] < _CHANGED * self.fit.cost:
+            self.problem = self.problem.relinearised(fit.effects)
+            self.holdout = self.holdout.relinearised(fit.effects)
+        self.weights = window_weights(fit.clean(self.problem))
+        self.fit = resolved(self.problem, fit, self.weights)
+        self.small = self.problem.part(self.keep)
+        if self.fit.cost < _ANEW * self.screened_cost:
+            self.rescreen()
+
+    def start_far(self) -> bool:
+        """Begin with servos far from the declared ones, where the data are that far from the model."""
+        if float(np.median((self.fit.residual**2).mean(axis=1))) < self.config.far:
+            return False
+        found = far_servos(self.problem, self.candidates)
+        if not found:
+            return False
+        chosen, values = [c for c, _ in found], np.array([v for _, v in found])
+        weights = window_weights(self.problem.residual([effects_at(chosen, values)])[0])
+        fit = gauss_newton(self.problem, chosen, values, weights, iterations=0, coarse=True)
+        if not self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain):
+            return False
+        for i, c in enumerate(fit.chosen):
+            z = wald(self.problem, fit, weights, i)
+            self.steps.append(evidence(c, z, len(self.candidates)))
+            self.say(f"found {c.effect} on {c.where}, far from the declared: {fit.of(c).round(5)}")
+        self.screened_cost = 0.0
+        self.renew(fit)
+        self.given = len(fit.chosen)
+        return True
+
+    def find_loss(self) -> bool:
+        """Look for commands that never arrived; if some did not, go on with those that did."""
+        found = None if self.loss else find_loss(self.problem, self.holdout, self.fit)
+        if found is None:
+            return False
+        self.loss, self.problem, self.holdout = found
+        self.say(f"found lost commands on {self.loss.where or 'the whole robot'}: {self.loss.share:.4f}")
+        self.closed.clear()
+        chosen, values = self.fit.chosen, self.fit.values
+        self.fit = gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True)
+        self.renew(self.fit)
+        self.rescreen()
+        return True
+
+    def prune(self) -> None:
+        """Drop effects that the others have made needless."""
+        self.fit = pruned(self.problem, self.holdout, self.fit, self.weights, self.bound, self.say)
+
+    def plain(self) -> None:
+        """Effects on a servo's gains in their plainest form, with evidence for those that are new."""
+        if self.given:  # kp and kd apart from the start on
+            return
+        self.fit = plain_gains(self.problem, self.fit, self.candidates, self.weights, self.bound, self.say)
+        for i, c in enumerate(self.fit.chosen):
+            if c not in {s.candidate for s in self.steps}:
+                z = wald(self.problem, self.fit, self.weights, i)
+                self.steps.append(evidence(c, z, len(self.candidates)))
