@@ -24,6 +24,7 @@ from bumblebee.diagnosis.scene import fitted_scene
 from bumblebee.diagnosis.seek import Found, library, seek
 
 _JOINTS = 3  # joints at most that get a form
+_MANY = 8  # effects in a fit beyond which one joint does, and inner numbers stay as found: every trial refits them all
 _SURE = 4.0  # z below which an effect beside a form is needless
 _Z, _LEAST = 2.0, 0.01  # of the judging windows' gain, and its least share
 _MOST = 0.5  # share of a joint's excess that may remain where its form was found
@@ -73,7 +74,7 @@ def discover(
     unconfirmed: dict[str, dict[str, float]] = {}
     kinds: dict[str, str] = {}
     before = fit
-    while len(tried) < _JOINTS:
+    while len(tried) < (_JOINTS if len(fit.chosen) <= _MANY else 1):
         worst = left.worst(tried)
         if worst is None:
             break
@@ -124,7 +125,7 @@ def _growing(problem: Problem, base: Fit, joint: str, found: Sequence[Found]) ->
         form = _form(problem, base, joint, strange[:count])
         if form is None:
             break
-        if count == 1:
+        if count == 1 and len(base.chosen) <= _MANY:
             form = _climbed(problem, base, joint, strange[0], form)
         if best is not None and form.score - best.score < max(_WORTH, _SHARE * (best.score - start)):
             break

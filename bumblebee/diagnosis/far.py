@@ -65,7 +65,9 @@ class _Course:
 
 
 def far_servos(problem: Problem, candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
-    """Candidates of `KINDS` with values, all servos together; empty where none makes the model much better.
+    """Candidates of `KINDS` with values, all servos together.
+
+    Empty where none makes the model much better, or where fewer than half of the servos are far off.
 
     Their steps are a tenth of the values: at a hundredth of the declared gain a tenth of it is no small change.
     """
@@ -79,7 +81,7 @@ def far_servos(problem: Problem, candidates: Sequence[Candidate]) -> list[tuple[
     for factors in _SWEEPS:
         servos = _swept(course, servos, factors)
     before, after = course.scores([declared, servos]).mean(axis=1)
-    if before - after < _BETTER:
+    if before - after < _BETTER or not _mostly_far(servos):
         return []
     found = []
     for where, values, old in zip(names, servos, declared, strict=True):
@@ -88,6 +90,14 @@ def far_servos(problem: Problem, candidates: Sequence[Candidate]) -> list[tuple[
                 step = float(np.sign(value - was)) * _STEP * value
                 found.append((replace(table[effect, where], step=(step,)), value))
     return found
+
+
+def _mostly_far(servos: Sequence[Servo]) -> bool:
+    """Whether at least half of the servos have a kp that is wrong by a factor of two.
+
+    Else one effect may have carried the residuals that far away, and the search finds it better alone.
+    """
+    return float(np.mean([abs(np.log(max(kp, _LEAST))) >= np.log(2.0) for kp, _, _ in servos])) >= 0.5
 
 
 def _course(problem: Problem, names: tuple[str, ...]) -> _Course | None:

@@ -39,5 +39,4 @@ def test_gains_declared_thirty_and_ten_times_too_large_are_found() -> None:
 
 def test_servos_that_are_right_stay() -> None:
     session, problem = _opened(arm.XML)
-    found = far_servos(problem, all_candidates(session.plant, session.rollouts, []))
-    assert all(value == pytest.approx(1.0, rel=0.2) for c, value in found if c.effect != "coulomb_friction")
+    assert far_servos(problem, all_candidates(session.plant, session.rollouts, [])) == []
