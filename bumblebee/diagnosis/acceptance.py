@@ -1,13 +1,13 @@
 """When an effect is kept: the bound on its z, its Wald test in the joint fit, what else could gain as much, pruning."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.fit import Fit, cost_of, expected_covariance, gauss_newton, standard_covariance
+from bumblebee.diagnosis.fit import Fit, cost_of, expected_covariance, standard_covariance
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.numerics import beyond_numerics
@@ -75,13 +75,24 @@ def is_physical(problem: Problem, fit: Fit, new: Fit, candidate: Candidate, weig
     return beyond_numerics(problem, fit, new, weights)
 
 
+Refit = Callable[[Sequence[Candidate], np.ndarray], Fit]
+"""Fits chosen candidates from their values (P,)."""
+
+
 def pruned(
-    problem: Problem, holdout: Holdout, fit: Fit, weights: np.ndarray, bound: float, say: Callable[[str], None]
+    problem: Problem,
+    fit: Fit,
+    weights: np.ndarray,
+    bound: float,
+    refit: Refit,
+    holdout: Holdout | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Fit:
     """The fit less effects that the others have made needless, worst first, refitting each time.
 
     One whose loss the others cannot make up for stays, however little the slopes at the fit say of it: far from
-    the declared value they say nothing of the way back. `bound` is the z that an effect must reach.
+    the declared value they say nothing of the way back. `bound` is the z that an effect must reach. With `holdout`
+    an effect also stays if held-out windows would be worse after 1 s without it.
     """
     kept: set[Candidate] = set()
     while len(kept) < len(fit.chosen):
@@ -91,10 +102,10 @@ def pruned(
             break
         keep = [i for i in range(len(fit.chosen)) if i != worst]
         values = [fit.values[fit.slices[i]] for i in keep]
-        chosen = [fit.chosen[i] for i in keep]
-        values = np.concatenate(values) if values else []
-        less = gauss_newton(problem, chosen, values, weights, iterations=2, coarse=True)
-        if is_worse(problem, fit, less, bound) or holdout.worse_later(fit.effects, less.effects):
+        less = refit([fit.chosen[i] for i in keep], np.concatenate(values) if values else np.empty(0))
+        if is_worse(problem, fit, less, bound) or (
+            holdout is not None and holdout.worse_later(fit.effects, less.effects)
+        ):
             kept.add(fit.chosen[worst])
             continue
         say(f"needless: {fit.chosen[worst].effect} on {fit.chosen[worst].where}")

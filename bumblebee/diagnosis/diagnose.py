@@ -122,17 +122,24 @@ def diagnose(
     document["smallest_detectable"] = detectable(found)
     document["set_aside"] = session.set_aside
     document["notes"] = session.notes + latency_notes(document["effects"], _driven(session))
-    document["settings"] = {
+    document["settings"] = _settings(session, config, len(problem.windows), len(candidates), found.bound, last)
+    return Diagnosis(document, effects, session, found, last.problem)
+
+
+def _settings(
+    session: Session, config: DiagnosisConfig, windows: int, candidates: int, bound: float, last: Refined
+) -> dict[str, Any]:
+    """What the diagnosis was made with."""
+    return {
         "timestep": session.steps[0],
-        "windows": len(problem.windows),
+        "windows": windows,
         "horizon": config.horizon,
         "seed": config.seed,
-        "candidates": len(candidates),
-        "bound": found.bound,
+        "candidates": candidates,
+        "bound": bound,
         "numerics": dict(zip(NAMES, last.fit.nuisance.tolist(), strict=False)),
         "noise": dict(zip(session.layout.labels(session.plant.joints), session.sigma.tolist(), strict=True)),
     }
-    return Diagnosis(document, effects, session, found, last.problem)
 
 
 def _driven(session: Session) -> list[str]:

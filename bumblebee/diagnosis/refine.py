@@ -1,10 +1,11 @@
 """The last fit: everything whitened and linearised around what was found."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.diagnosis.acceptance import is_worse, wald
+from bumblebee.diagnosis.acceptance import pruned
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, interval
 from bumblebee.diagnosis.holdout import Holdout
@@ -41,26 +42,11 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
     _, nuisance = cost_of(problem, residual, window_weights(residual))
     weights = window_weights(residual - np.tensordot(nuisance, problem.nuisance, axes=1))
     found, fit = fit, gauss_newton(problem, fit.chosen, fit.values, weights, iterations=3, coarse=True)
-    fit = _needed(problem, gauss_newton(problem, fit.chosen, fit.values, weights, iterations=1), weights)
+
+    def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
+        return gauss_newton(problem, chosen, values, weights, iterations=1)
+
+    fit = pruned(problem, refit(fit.chosen, fit.values), weights, _SURE, refit)
     if holdout is not None and holdout.worse_later(found.effects, fit.effects):  # short windows alone led it astray
         fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
     return Refined(problem, fit, weights, interval(problem, fit, weights) if fit.chosen else np.empty(0))
-
-
-def _needed(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
-    """The fit less effects that have come back to nothing, the least sure one at a time."""
-    kept: set[Candidate] = set()
-    while len(kept) < len(fit.chosen):
-        z = [np.inf if c in kept else wald(problem, fit, weights, i) for i, c in enumerate(fit.chosen)]
-        worst = int(np.argmin(z))
-        if z[worst] >= _SURE:
-            break
-        keep = [i for i in range(len(fit.chosen)) if i != worst]
-        values = [fit.values[fit.slices[i]] for i in keep]
-        chosen = [fit.chosen[i] for i in keep]
-        less = gauss_newton(problem, chosen, np.concatenate(values) if values else [], weights, iterations=1)
-        if is_worse(problem, fit, less, _SURE):
-            kept.add(fit.chosen[worst])
-        else:
-            fit = less
-    return fit

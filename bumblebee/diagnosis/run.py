@@ -199,7 +199,11 @@ class Run:
 
     def prune(self) -> None:
         """Drop effects that the others have made needless."""
-        self.fit = pruned(self.problem, self.holdout, self.fit, self.weights, self.bound, self.say)
+
+        def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
+            return gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True)
+
+        self.fit = pruned(self.problem, self.fit, self.weights, self.bound, refit, self.holdout, self.say)
 
     def plain(self) -> None:
         """Effects on a servo's gains in their plainest form, with evidence for those that are new."""
