@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm, wilcoxon
+from scipy.stats import t as student
 
 from bumblebee.diagnosis.fit import Fit, cost_of
 from bumblebee.diagnosis.problem import Problem, window_weights
@@ -20,6 +21,7 @@ from bumblebee.sim.effects import Effect
 
 _FEW = 8  # windows that ranks can be trusted with
 _WORSE = 0.02  # a longer window's error may grow by this share
+_DOUBT = norm.cdf(2.0)  # that it has not grown
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +79,16 @@ class Holdout:
         models = [vary(p.plant, e) for e in (before, after)]
         raw = residuals(p.plant, p.layout, self.long, models, p.fine)
         part = p.layout.slices["joint_pos"]
-        error = (raw[:, :, -1, part] / p.sigma[part]) ** 2
-        diverged = ~np.isfinite(error).all(axis=2)
+        power = (raw[:, :, -1, part] / p.sigma[part]) ** 2
+        diverged = ~np.isfinite(power).all(axis=2)
         if diverged[1].sum() > diverged[0].sum():
             return True
-        growth = np.diff(np.log1p(error[:, ~diverged.any(axis=0)].mean(axis=2)), axis=0)[0]
+        growth = np.diff(np.log1p(power[:, ~diverged.any(axis=0)].mean(axis=2)), axis=0)[0]
         if len(growth) < 3:
             return False
-        return bool(growth.mean() > max(_WORSE, 2.0 * growth.std(ddof=1) / np.sqrt(len(growth))))
+        # Of four windows, two standard errors are one chance in fourteen: a true armature was refused by them.
+        error = student.ppf(_DOUBT, len(growth) - 1) * growth.std(ddof=1) / np.sqrt(len(growth))
+        return bool(growth.mean() > max(_WORSE, error))
 
 
 def _there(old: np.ndarray, new: np.ndarray, weights: np.ndarray, z: float) -> bool:
