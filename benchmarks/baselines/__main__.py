@@ -7,7 +7,8 @@
 clusters, experts and delta actions (its "General Init"), the others are those of `bumblebee.baselines`. All learn from
 the same motions for the same time on the same engine; a method with a student gives it 30 % of that time. The
 curriculum follows the time. `--call-minutes` ends a run early; the same command goes on from `resume.pt` in the output
-folder, with new episodes. `--set env.threshold_end=0.3 ppo.entropy=0.003` changes single settings.
+folder, with new episodes. `--set env.threshold_end=0.3 ppo.entropy=0.003` changes single settings. `--variety 2` adds
+two varied copies of each motion that is learned from, `--snapshots 150` keeps the actor of 150 million steps.
 """
 
 import argparse
@@ -21,6 +22,7 @@ import torch
 
 from benchmarks.baselines.methods import METHODS, RANDOMISATIONS, Method, changed, method
 from benchmarks.baselines.trial import Tried, report
+from benchmarks.baselines.variety import shares, varied
 from benchmarks.motion_pack import Packed, read_pack, whole_motions
 from bumblebee.baselines.dagger import Distiller
 from bumblebee.baselines.env import BaselineEnv
@@ -55,12 +57,11 @@ def make_env(own: Method, rows: list[Packed], seed: int, share: float) -> Tracki
     """The method's task; embedded motions are drawn `share` times as often for their length."""
     task = own.env
     engine = make_engine(task.engine, task_model(task), task.num_worlds, task.threads, buffers=task.buffers)
-    clips = [row.clip for row in rows]
-    shares = torch.tensor([share if row.group == "embedded" else 1.0 for row in rows])
+    clips, factors = [row.clip for row in rows], shares(rows, share)
     if own.baseline is None:
-        return TrackingEnv(MotionLibrary(clips, task.ahead, device=engine.device), engine, task, seed, None, shares)
+        return TrackingEnv(MotionLibrary(clips, task.ahead, device=engine.device), engine, task, seed, None, factors)
     library = MovingLibrary(clips, task.ahead, device=engine.device)
-    return BaselineEnv(library, engine, replace(own.baseline, env=task), seed, shares)
+    return BaselineEnv(library, engine, replace(own.baseline, env=task), seed, factors)
 
 
 class Clock:
@@ -111,12 +112,22 @@ def train_teacher(
             _tell(options.out / CURVE)
         if clock.due("save", _SAVE_EVERY):
             _save(trainer, options.out / RESUME)
+        for mark in options.snapshots:
+            _keep(trainer, mark, options.out / f"at-{mark:g}M")
         return trainer._seconds >= 60 * minutes or clock.over
 
     if trainer._seconds < 60 * minutes:
         trainer.train(own.name, enough)
     _save(trainer, options.out / RESUME)
     return trainer
+
+
+def _keep(trainer: Trainer, mark: float, folder: Path) -> None:
+    """Keep the actor as it is when `mark` million steps have been seen."""
+    if trainer.frames >= 1e6 * mark and not folder.exists():
+        folder.mkdir()
+        policy = trainer.policy()
+        Policy(policy.actor, {}, policy.shape).save(folder)
 
 
 def _save(trainer: Trainer, path: Path) -> None:
@@ -218,6 +229,7 @@ def run(options: argparse.Namespace) -> int:
     (options.out / SETTINGS).write_text(json.dumps(settings, indent=1) + "\n")
     torch.set_num_threads(options.threads)
     clock, learned = Clock(options.call_minutes), training_clips(rows)
+    learned += varied(learned, options.variety)
     share = STUDENT_SHARE if own.student else 0.0
     trainer = train_teacher(own, learned, options, clock, (1 - share) * options.minutes)
     policy: Policy | None = trainer.policy()
@@ -261,6 +273,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--randomisation", choices=tuple(RANDOMISATIONS), help="instead of the method's own")
     parser.add_argument("--parent", type=Path, help="folder of a policy to start from")
     parser.add_argument("--std", type=float, default=0.0, help="the actions' first deviation, instead of the parent's")
+    parser.add_argument("--variety", type=int, default=0, help="varied copies of each motion, drawn as often in all")
+    parser.add_argument("--snapshots", type=float, nargs="*", default=[], help="million steps to keep the actor at")
     parser.add_argument("--set", nargs="*", default=[], metavar="PATH=VALUE")
     return parser.parse_args(arguments)
 

@@ -15,6 +15,7 @@ from benchmarks.baselines.methods import METHODS, changed, method
 from benchmarks.baselines.trial import RESULTS, TABLE, TRIALS, summary, table_of
 from benchmarks.motion_pack import Packed, read_pack, whole_motions, write_pack
 from bumblebee.errors import BadInput
+from bumblebee.learning.policy import load_policy
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.motion.pieces import split_long
 
@@ -103,6 +104,7 @@ def test_a_call_that_is_over_goes_on_to_the_end(tmp_path: Path, capsys: pytest.C
     write_pack(tmp_path / "m.npz", [Packed("real", True, clip) for clip in CLIPS[:2]])
     command = ["--method", "omnih2o", "--motions", str(tmp_path / "m.npz"), "--out", str(tmp_path / "out")]
     command += ["--engine", "mujoco", "--worlds", "4", "--threads", "1", "--jobs", "1", "--minutes", "0.05"]
+    command += ["--variety", "1", "--snapshots", "0.00001", "9"]
     command += ["--set", "ppo.hidden=[8]", "ppo.steps=4", "student.hidden=[8]"]
     assert run(parse([*command, "--call-minutes", "0.01"])) == 0
     assert "the same command goes on" in capsys.readouterr().out
@@ -110,6 +112,8 @@ def test_a_call_that_is_over_goes_on_to_the_end(tmp_path: Path, capsys: pytest.C
     assert not (tmp_path / "out" / TABLE).exists()
     assert run(parse(command)) == 0
     assert "goes on after" in capsys.readouterr().out
+    assert load_policy(tmp_path / "out" / "at-1e-05M").shape.hidden == (8,)  # kept once; the other is not reached
+    assert not (tmp_path / "out" / "at-9M").exists()
     last = torch.load(tmp_path / "out" / RESUME, weights_only=True)
     assert last["iteration"] > first["iteration"] > 0 and last["seconds"] >= 0.7 * 3.0
     trials = pd.read_csv(tmp_path / "out" / TRIALS)
