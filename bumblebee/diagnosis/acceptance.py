@@ -103,9 +103,7 @@ def pruned(
         keep = [i for i in range(len(fit.chosen)) if i != worst]
         values = [fit.values[fit.slices[i]] for i in keep]
         less = refit([fit.chosen[i] for i in keep], np.concatenate(values) if values else np.empty(0))
-        if is_worse(problem, fit, less, bound) or (
-            holdout is not None and holdout.worse_later(fit.effects, less.effects)
-        ):
+        if is_worse(problem, fit, less, bound) or (holdout is not None and holdout.worse_later(fit, less)):
             kept.add(fit.chosen[worst])
             continue
         say(f"needless: {fit.chosen[worst].effect} on {fit.chosen[worst].where}")

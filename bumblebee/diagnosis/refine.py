@@ -47,6 +47,6 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
         return gauss_newton(problem, chosen, values, weights, iterations=1)
 
     fit = pruned(problem, refit(fit.chosen, fit.values), weights, _SURE, refit)
-    if holdout is not None and holdout.worse_later(found.effects, fit.effects):  # short windows alone led it astray
+    if holdout is not None and holdout.worse_later(found, fit):  # short windows alone led it astray
         fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
     return Refined(problem, fit, weights, interval(problem, fit, weights) if fit.chosen else np.empty(0))
