@@ -41,12 +41,12 @@ def nod(name: str = "nod", frames: int = 20, **about: object) -> Clip:
 
 @pytest.fixture
 def policy_folder(tmp_path: Path) -> Callable[..., Path]:
-    """Makes a policy folder; `gain` as in `linear_onnx`."""
+    """Makes a policy folder; `gain` as in `linear_onnx`, `ahead` the look-ahead times [s]."""
 
-    def make(name: str = "policy", gain: float = 0.0) -> Path:
+    def make(name: str = "policy", gain: float = 0.0, ahead: tuple[float, ...] = AHEAD) -> Path:
         folder = tmp_path / name
         folder.mkdir()
-        write_export(folder, linear_onnx(gain), AHEAD)
+        write_export(folder, linear_onnx(gain, len(ahead)), ahead)
         return folder
 
     return make

@@ -15,14 +15,20 @@ from bumblebee.deploy.sensors import NO_NOISE, SensorNoise, Sensors, add_noise, 
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
+from bumblebee.tracking.library import AHEAD
 from bumblebee.tracking.observations import joint_targets, observe
 from tests.deploy.conftest import nod
 
 
-def test_observation_and_motion_equal_the_engines_step_by_step(policy_folder: Callable[..., Path]) -> None:
+@pytest.mark.parametrize("ahead", [AHEAD, (0.1, 0.3, 0.6, 1.0), ()])
+def test_observation_and_motion_equal_the_engines_step_by_step(
+    policy_folder: Callable[..., Path], ahead: tuple[float, ...]
+) -> None:
     """The same policy closed-loop in the training engine and through the runner: equal observations for ten ticks."""
-    clip, policy = nod(), ExportedPolicy.load(policy_folder(gain=0.02))
+    clip, policy = nod(), ExportedPolicy.load(policy_folder(gain=0.02, ahead=ahead))
+    assert policy.ahead == len(ahead)
     library, ids = reference_library(policy, [clip]), torch.zeros(1, dtype=torch.long)
+    assert library.ahead == ahead
     engine = MujocoCpu(load_model(), 1, threads=1)
     robots, runner = NominalRobots(1, threads=1), PolicyRunner(policy, library, [clip.name])
     qpos = np.concatenate([clip.root_pos[:1], clip.root_quat[:1], clip.joint_pos[:1]], axis=1).astype(np.float64)
