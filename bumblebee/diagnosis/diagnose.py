@@ -16,6 +16,7 @@ from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_wh
 from bumblebee.diagnosis.fit import Fit, interval
 from bumblebee.diagnosis.formula import Formula
 from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.instead import offers_of, with_named
 from bumblebee.diagnosis.latency import latency_notes
 from bumblebee.diagnosis.nuisance import NAMES
 from bumblebee.diagnosis.plant import Plant
@@ -102,15 +103,16 @@ def diagnose(
     if config.beyond:
         say("what is left")
         typical = scales_of(session.plant, session.rollouts).torque
-        beyond = discover(last.problem, holdout, last.fit, typical, still, say)
+        beyond = discover(last.problem, holdout, last.fit, typical, still, say, offers_of(found, candidates))
         last, holdout = _with(beyond, last), beyond.holdout
+        found = with_named(found, last.fit)
     say(f"{len(last.fit.chosen)} effects; error before and after")
     document["effects"] = _effects(found, last, holdout, beyond)
     effects = last.fit.effects
     document["unexplained"] = NOT_TESTED if beyond is None else unexplained(beyond)
     if beyond is not None:
         document["structure"] = structure_table(beyond)
-        session.notes.extend(f"withdrawn for a discovered effect: {name}" for name in beyond.withdrawn)
+        session.notes.extend(f"withdrawn for what explains more: {name}" for name in beyond.withdrawn)
     readings = grids(session.rollouts, session.sigma[: len(session.plant.joints)])
     rounded, steps = entries(readings, holdout.problem or last.problem, last.fit)
     lost, losses = loss_entries(found.loss)

@@ -1,0 +1,162 @@
+"""The catalogue in a form's place: before a form is kept, effects that have a name are tried for what it explains.
+
+A form has more freedom than any effect of the catalogue and is sought among thousands: where the true effect was
+refused by a hair, some form explains nearly as much of the fitted windows. A name says more than a formula, so a form
+must be clearly better than the best that names can do, on windows that took no part in either fit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from bumblebee.diagnosis.acceptance import evidence, is_worse, wald
+from bumblebee.diagnosis.candidates import Candidate, shortlisted
+from bumblebee.diagnosis.eligible import is_chosen
+from bumblebee.diagnosis.fit import Fit, gauss_newton, resolved
+from bumblebee.diagnosis.formula import Formula
+from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.refits import SURE, less, parameters, refitted, score, without_needless
+from bumblebee.diagnosis.scores import Columns, score_tests
+from bumblebee.diagnosis.search import Search
+from bumblebee.diagnosis.trials import try_one
+
+_OFFERS, _SHAPES = 5, 2  # effects whose sensitivities are simulated, and shapes of each
+_TRIALS, _FITS = 4, 2  # of these tried at their size, and refitted jointly
+_ROUNDS = 2  # effects of the catalogue that together may take a form's place
+_DOUBT = norm.cdf(2.0)
+_SHARE = 0.1  # of what a form gains; less is what laws differ by whose torques correlate by 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Offers:
+    """The catalogue's candidates with what the search's screening promised of each."""
+
+    candidates: Sequence[Candidate] = ()
+    """The most promising first."""
+
+    def on(self, plant: Plant, joint: str) -> list[Candidate]:
+        """Those that could act on a joint: on it, on what it carries, or on the whole robot; a few shapes of each."""
+        carried = {joint, "", *_carried(plant, joint)}
+        kept: list[Candidate] = []
+        for c in self.candidates:
+            if c.where in carried and sum((c.effect, c.where) == (o.effect, o.where) for o in kept) < _SHAPES:
+                kept.append(c)
+        return kept
+
+
+def offers_of(found: Search, candidates: Sequence[Candidate]) -> Offers:
+    """The search's candidates by their gain beside what was found, and those that are never screened."""
+    order = np.argsort(-found.tests.gain)
+    screened = [found.columns.candidates[k] for k in order if found.tests.gain[k] > 0]
+    return Offers([*screened, *(c for c in candidates if shortlisted(c, len(found.problem.plant.joints)))])
+
+
+def with_named(found: Search, fit: Fit) -> Search:
+    """The search as if it had found what the catalogue's effects of `fit` are, with evidence for those that are new."""
+    chosen = [c for c in fit.chosen if not isinstance(c, Formula)]
+    if set(chosen) <= set(found.fit.chosen):
+        return found
+    values = np.concatenate([fit.of(c) for c in chosen])
+    joint = gauss_newton(found.problem, chosen, values, found.weights, iterations=0, coarse=True)
+    known = {s.candidate: s for s in found.steps}
+    steps = [
+        known.get(c) or evidence(c, wald(found.problem, joint, found.weights, i), found.count)
+        for i, c in enumerate(chosen)
+    ]
+    return replace(found, fit=joint, steps=steps)
+
+
+def named_instead(problem: Problem, holdout: Holdout, fit: Fit, form: Fit, joint: str, offers: Offers) -> Fit | None:
+    """`fit` with one or two more effects of the catalogue that do what a form on `joint` does; None where none can.
+
+    Args:
+        problem: the fitted windows.
+        holdout: the windows that judge.
+        fit: without the form.
+        form: the fit with it.
+        joint: where it is.
+        offers: the catalogue's candidates beside `fit`.
+    """
+    named = fit
+    for _ in range(_ROUNDS):
+        new = _one_more(problem, named, joint, offers)
+        if new is None:
+            return None
+        named = new
+        if not is_better(problem, holdout, form, named):
+            return named
+    return None
+
+
+def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers) -> Fit | None:
+    """The best of the catalogue's effects beside `fit`, if any is worth its parameters."""
+    open_ = [c for c in offers.on(problem.plant, joint) if not is_chosen(c, fit.chosen)]
+    many = len(problem.plant.joints)
+    names = list(dict.fromkeys((c.effect, c.where) for c in open_ if not shortlisted(c, many)))[:_OFFERS]
+    looked = [c for c in open_ if (c.effect, c.where) in names or (shortlisted(c, many) and c.where == joint)]
+    if not looked:
+        return None
+    columns = Columns(looked, problem.sensitivities(looked, fit.effects))
+    weights = window_weights(fit.clean(problem))
+    tests = score_tests(problem, columns, fit, weights)
+    order = [k for k in np.argsort(-tests.gain) if tests.gain[k] > 0][:_TRIALS]
+    trials = [try_one(problem, fit, looked[k], tests.steps[k], weights) for k in order]
+    tried = sorted((t for t in trials if t is not None), key=lambda t: t.cost + 2 * len(t.candidate.free))[:_FITS]
+    fits = []
+    for t in tried:
+        new = refitted(problem, (*fit.chosen, t.candidate), np.concatenate((fit.values, t.values)))
+        new = without_needless(problem, new, t.candidate)
+        if _is_sure(problem, fit, new, t.candidate):
+            fits.append(new)
+    best = max(fits, key=lambda f: score(problem, f), default=None)
+    return best if best is not None and score(problem, best) > score(problem, fit) else None
+
+
+def _is_sure(problem: Problem, fit: Fit, new: Fit, candidate: Candidate) -> bool:
+    """Whether an effect that `new` has beside `fit` is beyond doubt, by its slopes or by what its loss costs."""
+    weights = window_weights(new.clean(problem))
+    if wald(problem, new, weights, new.chosen.index(candidate)) >= SURE:
+        return True
+    return is_worse(problem, resolved(problem, new, weights), resolved(problem, fit, weights), SURE)
+
+
+def is_better(problem: Problem, holdout: Holdout, form: Fit, named: Fit) -> bool:
+    """Whether a form is better than names, window by window, beyond doubt and by a share that matters.
+
+    Judged on windows that took no part in the fits, on the fitted ones where there are none. The share is that of the
+    fall of log(1 + chi-square) from the fit of what both have. Names that need more numbers than the form must be the
+    better ones: enough of them come near anything.
+    """
+    common = less(problem, form, [c for c in form.chosen if c not in named.chosen])
+    left = _logs(problem, holdout, [common, named, form])
+    gain, whole = left[1] - left[2], left[0] - left[2]
+    if parameters(named) > parameters(form) and gain.mean() > 0:
+        return True
+    error = student.ppf(_DOUBT, len(gain) - 1) * gain.std(ddof=1) / np.sqrt(len(gain))
+    return bool(gain.mean() > error and gain.mean() > _SHARE * whole.mean())
+
+
+def _logs(problem: Problem, holdout: Holdout, fits: Sequence[Fit]) -> np.ndarray:
+    """log(1 + chi-square) (F, W) of the windows that judge."""
+    if holdout.problem is not None:
+        return holdout.logs(fits)
+    return np.stack([np.log1p((f.clean(problem) ** 2).mean(axis=1)) for f in fits])
+
+
+def _carried(plant: Plant, joint: str) -> list[str]:
+    """Names of the bodies that a joint moves."""
+    model = plant.model
+    own = int(model.jnt_bodyid[model.joint(joint).id])
+    found = []
+    for name in plant.bodies:
+        body = model.body(name).id
+        while body and body != own:
+            body = int(model.body_parentid[body])
+        if body == own:
+            found.append(name)
+    return found
