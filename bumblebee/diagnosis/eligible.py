@@ -9,6 +9,7 @@ from bumblebee.diagnosis.scores import Scores
 
 _SPRINGS = {"joint_spring", "asymmetric_friction"}
 _MUCH = 0.15  # share of the cost
+_PLAIN = 2.0  # times the chi-square of the bound
 
 
 def is_chosen(c: Candidate, chosen: Sequence[Candidate]) -> bool:
@@ -24,14 +25,15 @@ def is_like(c: Candidate, others: Sequence[Candidate]) -> bool:
     return sum((c.effect, c.where) == (o.effect, o.where) for o in others) >= 2
 
 
-def is_promising(c: Candidate, tests: Scores, k: int, bound: float, share: float, cost: float) -> bool:
+def is_promising(c: Candidate, tests: Scores, k: int, bound: float, share: float, cost: float, power: float) -> bool:
     """Whether a candidate, number `k` of `tests`, is significant and can move the way it wants to.
 
     One that promises much of the whole cost is tried, too: where a few windows are very far off they decide its
-    variance, and only the fit with it, in which they are not, can say how sure it is. `bound` is the z to reach,
-    `share` that of the windows the tests were made on, `cost` the fit's on all windows.
+    variance, and only the fit with it, in which they are not, can say how sure it is. So is one that gains much more
+    than noise of the residual's `power` would give it, for the same reason. `bound` is the z to reach, `share` that of
+    the windows the tests were made on, `cost` the fit's on all windows.
     """
-    much = tests.gain[k] > _MUCH * share * cost
+    much = tests.gain[k] > min(_MUCH * share * cost, _PLAIN * max(power, 1.0) * bound**2)
     return bool(tests.z[k] >= bound or much) and any(_can_move(c, tests.steps[k]))
 
 

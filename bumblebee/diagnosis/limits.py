@@ -2,9 +2,10 @@
 
 A limit acts in few windows: there it decides everything, elsewhere nothing. It has no slope where it does not reach,
 the windows that it spoils weigh little in a fit, and they are too few for a variance between windows to call them
-significant. So every limit is simulated at sizes that reach the few hardest driven windows, some more, and so on; its
-gain is the fall of the fit's robust cost, 2 s M log(1 + power / s) summed over windows with s their median power, of
-which `problem.window_weights` are the weights.
+significant. So every limit is simulated at sizes that reach the hardest driven window, the next one, and so on, in fine
+steps, for a servo that hits its limit a coarse step late errs by more than the limit does. Its gain is the fall of the
+fit's robust cost, 2 s M log(1 + power / s) summed over windows with s their median power, of which
+`problem.window_weights` are the weights.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,9 +26,9 @@ from bumblebee.sim.effects import Effect
 from bumblebee.sim.servo import Servos, servos_of
 
 KINDS = ("torque_limit", "torque_speed_limit")
-_ODD, _FIRST = 3.0, 4  # power of a window that is off; windows that a limit reaches first
+_ODD, _FIRST = 1.6, 4  # power of a window that is off; windows that a limit reaches first
 _WORTH, _SHARE = 15.0, 2e-3  # fall of the cost; share of it that a size must gain to be looked at closer
-_REACHED = (2, 5, 12, 30, 75, 180)  # windows that the sizes tried reach
+_REACHED = (*range(1, 9), 10, 12, 16, 24, 40, 75, 180)  # windows that the sizes tried reach
 _CLOSER = 5  # halvings of the interval around the best of them
 _FELT, _NEARLY, _CLEAR = 0.1, 0.8, 0.5  # change of a window's log(1 + power); share of these that gain; their sum
 _SEVERAL, _MOSTLY = 4, 0.5  # windows that speak for themselves; share of the excess that fewer must lose
@@ -158,8 +159,7 @@ def _change(problem: Problem, fit: Fit, candidate: Candidate, value: float, felt
     """What a limit does to the prediction (W, M), simulated on the windows `felt` (W,) alone."""
     out = np.zeros_like(fit.residual)
     moved = [*fit.effects, candidate.at(candidate.clip([value]))]
-    one, other = problem.part(np.flatnonzero(felt)).residual([fit.effects, moved], coarse=True)
-    out[felt] = one - other
+    out[felt] = fit.residual[felt] - problem.part(np.flatnonzero(felt)).residual([moved])[0]
     return out
 
 

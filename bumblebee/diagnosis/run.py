@@ -115,7 +115,7 @@ class Run:
         """Whether a candidate, number `k` of `tests`, is worth a trial and was not chosen or tried in vain."""
         if c in self.closed or is_chosen(c, self.fit.chosen):
             return False
-        return is_promising(c, tests, k, bound, share, self.fit.cost)
+        return is_promising(c, tests, k, bound, share, self.fit.cost, self.fit.cost / self.fit.residual.size)
 
     def trials(self) -> tuple[list[Trial], list[Candidate]]:
         """Candidates tried in the simulator with their costs; and those that were looked at."""
