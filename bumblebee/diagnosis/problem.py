@@ -8,6 +8,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.nuisance import nuisance_columns
 from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.recall import Recall
 from bumblebee.diagnosis.restart import restarted, start_moves
 from bumblebee.diagnosis.signals import Layout
 from bumblebee.diagnosis.simulate import Starts, residuals
@@ -45,22 +46,33 @@ class Problem:
     """(5 or 6, W, M) whitened: numerical differences, and last the start noise's curvature."""
     read: Windows = field(repr=False)
     """The windows with their starts as measured."""
+    recall: Recall = field(default_factory=Recall, repr=False)
 
     def residual(self, effects: Sequence[Sequence[Effect]], coarse: bool = False) -> np.ndarray:
         """Whitened residuals of several models, (V, W, M)."""
-        variations = [vary(self.plant, e) for e in effects]
         step = self.coarse if coarse else self.fine
-        return self.finite(residuals(self.plant, self.layout, self.windows, variations, step))
+
+        def simulated(new: Sequence[Sequence[Effect]]) -> np.ndarray:
+            variations = [vary(self.plant, e) for e in new]
+            return self.finite(residuals(self.plant, self.layout, self.windows, variations, step))
+
+        return self.recall.get((self.windows, self.whitener), effects, step, simulated)
+
+    def on(self, keep: np.ndarray, effects: Sequence[Effect], coarse: bool = False) -> np.ndarray:
+        """Whitened residuals (K, M) of one model on the windows at the indices `keep` (K,) alone."""
+        some, step = select(self.windows, keep), self.coarse if coarse else self.fine
+        raw = residuals(self.plant, self.layout, some, [vary(self.plant, effects)], step)
+        return self.finite(raw, keep)[0]
 
     def from_starts(self, effects: Sequence[Effect], starts: Starts) -> np.ndarray:
         """Raw residuals (K, W, N, D) of one model from K other starts, in coarse steps where they will do."""
         step = self.coarse if rough(e.effect for e in effects) else self.fine
         return residuals(self.plant, self.layout, self.windows, [vary(self.plant, effects)], step, starts)
 
-    def finite(self, raw: np.ndarray) -> np.ndarray:
-        """Whiten; a window that diverged counts as a very bad one, not as none."""
+    def finite(self, raw: np.ndarray, keep: np.ndarray | None = None) -> np.ndarray:
+        """Whiten, on the windows `keep` if given; a window that diverged counts as a very bad one, not as none."""
         bad = ~np.isfinite(raw).all(axis=(-1, -2))
-        out = self.whitener(raw)
+        out = self.whitener(raw) if keep is None else self.whitener.on(keep, raw)
         if bad.any():
             good = out[~bad]
             out[bad] = 10.0 * (np.sqrt((good**2).mean()) if good.size else 1.0)
@@ -115,9 +127,8 @@ class Problem:
     def part(self, keep: np.ndarray) -> "Problem":
         """The problem on the windows `keep`."""
         windows, read = select(self.windows, keep), select(self.read, keep)
-        return replace(
-            self, windows=windows, whitener=self.whitener.part(keep), nuisance=self.nuisance[:, keep], read=read
-        )
+        whitener, nuisance = self.whitener.part(keep), self.nuisance[:, keep]
+        return replace(self, windows=windows, whitener=whitener, nuisance=nuisance, read=read, recall=Recall())
 
 
 def rough(kinds: Iterable[str]) -> bool:

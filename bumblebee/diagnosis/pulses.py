@@ -13,7 +13,7 @@ from mujoco.batch import Batch
 
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.signals import Layout, difference, simulated_readings
-from bumblebee.diagnosis.simulate import THREADS, at_ticks, inputs_of, with_step
+from bumblebee.diagnosis.simulate import at_ticks, inputs_of, threads, with_step
 from bumblebee.diagnosis.variation import Variation
 from bumblebee.diagnosis.windows import Windows
 
@@ -61,7 +61,7 @@ def answers_of(
     model, size, nv = with_step(variation.model, step), len(windows), plant.model.nv
     qpos = windows.qpos.copy()
     qpos[:, plant.qpos] -= variation.offset
-    plain = Batch(model, size, THREADS)
+    plain = Batch(model, size, threads())
     plain.bind("qpos")[:], plain.bind("qvel")[:] = qpos, windows.qvel
     out = plain.rollout(count, control, record=("qpos", "qvel"))
     path = Path(
@@ -81,7 +81,7 @@ def answers_of(
 
     base, base_quat = readings(path.qpos, path.qvel)
     change = np.zeros((nv, len(edges) - 1, size, *base.shape[2:]))
-    batch = Batch(model, nv * size, THREADS)
+    batch = Batch(model, nv * size, threads())
     for s, (first, last) in enumerate(itertools.pairwise(edges)):
         batch.reset(stage=0)
         batch.bind("qpos")[:] = np.tile(path.qpos[:, first], (nv, 1))

@@ -1,5 +1,6 @@
 """Many windows under many variations at once, on `mujoco.batch`."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -23,7 +24,9 @@ from bumblebee.diagnosis.windows import Windows, controls
 from bumblebee.sim.effect_forces import Memory, StepHooks
 from bumblebee.sim.effect_native import SUFFIX
 
-THREADS = 2
+THREADS: int | None = None
+"""Threads of every simulation; None: see `threads`."""
+_MOST_THREADS = 32
 _CHUNK_BYTES = 48e6
 
 
@@ -33,6 +36,15 @@ class Starts:
 
     qpos: np.ndarray
     qvel: np.ndarray
+
+
+def threads() -> int:
+    """Threads for simulations: `THREADS`, or the processors that this process may use, at most OMP_NUM_THREADS."""
+    if THREADS is not None:
+        return THREADS
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    asked = os.environ.get("OMP_NUM_THREADS", "")
+    return max(1, min(allowed, int(asked) if asked.isdigit() else allowed, _MOST_THREADS))
 
 
 def step_for(windows_period: float, longest: float) -> float:
@@ -109,7 +121,7 @@ def _run(
     lead = chosen[0]
     models = {id(v.model): with_step(v.model, step) for v in chosen}
     own = lead.plant or plant
-    batch = Batch(lead.model, copies * size, THREADS)
+    batch = Batch(lead.model, copies * size, threads())
     if lead.plain:
         batch.set_models([models[id(v.model)] for v in chosen for _ in range(size)])
     offset = np.stack([v.offset for v in chosen])[:, None, :]

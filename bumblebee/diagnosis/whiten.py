@@ -56,6 +56,11 @@ class Whitener:
             flat = flat - self.offset
         return np.matmul(self.factor, flat[..., None])[..., 0]
 
+    def on(self, keep: np.ndarray, residual: np.ndarray) -> np.ndarray:
+        """Whiten residuals (..., K, N, D) of the windows at the indices `keep` (K,), without copying their factors."""
+        flat = np.nan_to_num(residual.reshape(*residual.shape[:-2], -1), nan=0.0) - self.offset[keep]
+        return np.stack([flat[..., k, :] @ self.factor[w].T for k, w in enumerate(keep)], axis=-2)
+
 
 def start_noise(plant: Plant, layout: Layout, sigma: np.ndarray) -> np.ndarray:
     """Standard deviations (C,) of a measured start's coordinates: the signals', and the height's if it is not one."""
