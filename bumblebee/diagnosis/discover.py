@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bumblebee.diagnosis.acceptance import wald
 from bumblebee.diagnosis.fit import Fit, resolved
 from bumblebee.diagnosis.formula import formula, in_terms, related, stiffer_than_the_drive
 from bumblebee.diagnosis.holdout import Holdout
@@ -27,6 +28,7 @@ from bumblebee.diagnosis.seek import Found, library, seek
 _JOINTS = 3  # joints at most that get a form
 _MANY = 8  # effects in a fit beyond which one joint does, and inner numbers stay as found: every trial refits them all
 _Z, _LEAST = 2.0, 0.01  # of the judging windows' gain, and its least share
+_OF_ALL = 0.05  # share of what all effects gain together that a form must, what it replaces being gone
 _MOST = 0.5  # share of a joint's excess that may remain where its form was found
 _LAWS, _WORTH, _SHARE = 3, 12.0, 0.03  # laws in a form; what a further one must bring, and as a share of the first's
 _PART = 0.2  # an effect of the catalogue is a part of a law that is at least this share of it
@@ -82,7 +84,7 @@ def discover(
         form = _best_form(problem, fit, left, worst.joint, typical)
         if form is None:
             continue
-        if not holdout.gains(fit, form.fit, _Z, _LEAST):
+        if not _is_worth_it(problem, holdout, fit, form, left.sought.bound):
             unconfirmed[worst.joint] = form.terms
             continue
         named = named_instead(problem, holdout, fit, form.fit, worst.joint, offers or Offers())
@@ -109,6 +111,17 @@ def discover(
     gone = [c for c in before.chosen if c not in fit.chosen]
     names = [f"{c.effect} on {c.where or 'the whole robot'}" for c in gone]
     return Discovery(problem, holdout, fit, left, unconfirmed, kinds, names)
+
+
+def _is_worth_it(problem: Problem, holdout: Holdout, fit: Fit, form: _Form, bound: float) -> bool:
+    """Whether a form pays on the judging windows, is no trifle, and as sure in the joint fit as its law had to be."""
+    weights = window_weights(form.fit.clean(problem))
+    own = next(c for c in form.fit.chosen if c not in fit.chosen)
+    if wald(problem, form.fit, weights, form.fit.chosen.index(own)) < bound:
+        return False
+    if not holdout.gains(fit, form.fit, _Z, _LEAST):
+        return False
+    return holdout.gains(less(problem, form.fit, [own]), form.fit, _Z, _OF_ALL)
 
 
 def _best_form(problem: Problem, fit: Fit, left: Remains, joint: str, typical: np.ndarray) -> _Form | None:

@@ -28,6 +28,7 @@ from bumblebee.diagnosis.trials import try_one
 _OFFERS, _SHAPES = 5, 2  # effects whose sensitivities are simulated, and shapes of each
 _TRIALS, _FITS = 4, 2  # of these tried at their size, and refitted jointly
 _ROUNDS = 2  # effects of the catalogue that together may take a form's place
+_HOPELESS = 0.5  # share of what a form gains, above which no second name is tried
 _DOUBT = norm.cdf(2.0)
 _SHARE = 0.1  # of what a form gains; less is what laws differ by whose torques correlate by 0.95
 
@@ -88,8 +89,11 @@ def named_instead(problem: Problem, holdout: Holdout, fit: Fit, form: Fit, joint
         if new is None:
             return None
         named = new
-        if not is_better(problem, holdout, form, named):
+        short = lead(problem, holdout, form, named)
+        if short <= (_SHARE if parameters(named) <= parameters(form) else 0.0):
             return named
+        if short > _HOPELESS:
+            return None
     return None
 
 
@@ -125,20 +129,20 @@ def _is_sure(problem: Problem, fit: Fit, new: Fit, candidate: Candidate) -> bool
     return is_worse(problem, resolved(problem, new, weights), resolved(problem, fit, weights), SURE)
 
 
-def is_better(problem: Problem, holdout: Holdout, form: Fit, named: Fit) -> bool:
-    """Whether a form is better than names, window by window, beyond doubt and by a share that matters.
+def lead(problem: Problem, holdout: Holdout, form: Fit, named: Fit) -> float:
+    """Share of what a form gains that names do not; 0 unless the form is better window by window beyond doubt.
 
-    Judged on windows that took no part in the fits, on the fitted ones where there are none. The share is that of the
-    fall of log(1 + chi-square) from the fit of what both have. Names that need more numbers than the form must be the
-    better ones: enough of them come near anything.
+    Judged on windows that took no part in the fits, on the fitted ones where there are none: by the fall of
+    log(1 + chi-square) from the fit of what both have. Names that need more numbers than the form must be the better
+    ones, for enough of them come near anything.
     """
     common = less(problem, form, [c for c in form.chosen if c not in named.chosen])
     left = _logs(problem, holdout, [common, named, form])
     gain, whole = left[1] - left[2], left[0] - left[2]
-    if parameters(named) > parameters(form) and gain.mean() > 0:
-        return True
     error = student.ppf(_DOUBT, len(gain) - 1) * gain.std(ddof=1) / np.sqrt(len(gain))
-    return bool(gain.mean() > error and gain.mean() > _SHARE * whole.mean())
+    if parameters(named) > parameters(form):
+        error = 0.0
+    return float(gain.mean() / max(whole.mean(), gain.mean())) if gain.mean() > error else 0.0
 
 
 def _logs(problem: Problem, holdout: Holdout, fits: Sequence[Fit]) -> np.ndarray:
