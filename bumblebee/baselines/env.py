@@ -10,6 +10,7 @@ from bumblebee.baselines.spec import Baseline
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.rewards import Step
 from bumblebee.tracking.terminations import key_distance
 from bumblebee.tracking.terms import add_terms
 
@@ -39,12 +40,14 @@ class BaselineEnv(TrackingEnv):
         super().__init__(library, engine, baseline.env, seed, clip_share=clip_share)
         self.baseline = baseline
         self.scale = torch.full_like(self.scale, baseline.scale)
-        self._fallen = baseline.lost  # type: ignore[assignment]
         self.score = Score(baseline.scoring, self.dt, self.episode_length_buf, self._lost)
         self._earned = self.score
 
+    def _fallen(self, step: Step) -> Tensor:
+        return self.baseline.lost(step.state, step.ref)
+
     def _lost(self, state: RobotState, ref: ReferenceFrame) -> Tensor:
-        return self._fallen(state, ref) | (key_distance(state, ref) > self._threshold)
+        return self.baseline.lost(state, ref) | (key_distance(state, ref) > self._threshold)
 
     def _kept(self) -> dict[str, Tensor]:
         return super()._kept() | {f"score_{name}": tensor for name, tensor in self.score.kept().items()}

@@ -68,6 +68,7 @@ class MujocoCpu:
         self._keys = [model.body(name).id for name in KEY_BODIES]
         self._feet = [model.body(name).id for name in FEET]
         self._force = foot_sensor_columns(model)
+        self._qpos, self._qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
         self._xpos, self._xquat = self.batch.bind("xpos"), self.batch.bind("xquat")
         self._actuator_force, self._sensordata = self.batch.bind("actuator_force"), self.batch.bind("sensordata")
         self._history, self._held = history_template(model)
@@ -119,25 +120,25 @@ class MujocoCpu:
         self.batch.ctrl[:] = targets.numpy()
         self.batch.step(nstep=self.substeps, stage=_VEL)
         counted = self.batch.warning[:, _BAD, 1].sum(axis=1)  # [last index, number]
-        finite = np.isfinite(self.batch.qpos).all(axis=1) & np.isfinite(self.batch.qvel).all(axis=1)
+        finite = np.isfinite(self._qpos.sum(axis=1) + self._qvel.sum(axis=1))
         self._unstable = torch.from_numpy((counted > self._warnings) | ~finite)
         self._warnings = counted
 
     def state(self) -> RobotState:
         """See `Engine.state`."""
-        qpos = _float(self.batch.qpos)
-        qvel = _float(self.batch.qvel)
-        quat = qpos[:, 3:7]
+        # Parts of their own: work on rows within longer ones is slower.
+        qpos, qvel = self._qpos, self._qvel
+        quat = _float(qpos[:, 3:7])
         read = None if self._offset is None else self._read_qpos()
         return RobotState(
-            root_pos_w=qpos[:, :3],
+            root_pos_w=_float(qpos[:, :3]),
             root_quat_w=quat,
-            root_lin_vel_b=rotate_inverse(quat, qvel[:, :3]),
-            root_ang_vel_b=qvel[:, 3:6],
-            joint_pos=qpos[:, 7:] if read is None else _float(read[:, 7:]),
-            joint_vel=qvel[:, 6:],
-            key_pos_w=_float(self._xpos[:, self._keys]),
-            read_key_pos_w=None if read is None else _float(self._believed_xpos[:, self._keys]),
+            root_lin_vel_b=rotate_inverse(quat, _float(qvel[:, :3])),
+            root_ang_vel_b=_float(qvel[:, 3:6]),
+            joint_pos=_float((qpos if read is None else read)[:, 7:]),
+            joint_vel=_float(qvel[:, 6:]),
+            key_pos_w=_some(self._xpos, self._keys),
+            read_key_pos_w=None if read is None else _some(self._believed_xpos, self._keys),
         )
 
     def _read_qpos(self) -> np.ndarray:
@@ -155,11 +156,11 @@ class MujocoCpu:
     def foot_force_w(self) -> Tensor:
         """See `Engine.foot_force_w`."""
         # The sensor gives the force of the first body on the second: of the foot on the floor.
-        return -_float(self._sensordata[:, self._force]).unflatten(1, (2, 3))
+        return -_some(self._sensordata, self._force).unflatten(1, (2, 3))
 
     def foot_quat_w(self) -> Tensor:
         """See `Engine.foot_quat_w`."""
-        return _float(self._xquat[:, self._feet])
+        return _some(self._xquat, self._feet)
 
     def push(self, velocity_w: Tensor) -> None:
         """See `Engine.push`."""
@@ -194,6 +195,11 @@ def substeps_of(model: mujoco.MjModel, control_hz: float) -> int:
 
 def _float(values: np.ndarray) -> Tensor:
     return torch.from_numpy(values.astype(np.float32))
+
+
+def _some(values: np.ndarray, columns: list[int]) -> Tensor:
+    """Some of the columns (B, n, ...) of values (B, N, ...)."""
+    return _float(values.take(columns, axis=1))
 
 
 def _kinematics_only(model: mujoco.MjModel) -> mujoco.MjModel:

@@ -18,7 +18,6 @@ from bumblebee.robot.facts import joints
 from bumblebee.robot.model import gains
 from bumblebee.sim.cuda_graph import Captured
 from bumblebee.sim.engine import Engine, RobotState
-from bumblebee.sim.rotations import from_rotation_vector, multiply
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
@@ -27,9 +26,10 @@ from bumblebee.tracking.randomisation import draw_push, push_phase, randomise_wo
 from bumblebee.tracking.rewards import Limits, Reward, Step
 from bumblebee.tracking.rows import Rows
 from bumblebee.tracking.sampler import ClipSampler
+from bumblebee.tracking.starts import start_state
 from bumblebee.tracking.statistics import Statistics
 from bumblebee.tracking.stretches import StretchSampler
-from bumblebee.tracking.terminations import fallen, key_distance, threshold_at
+from bumblebee.tracking.terminations import lying, threshold_at
 from bumblebee.tracking.terrain import Ground
 from bumblebee.tracking.threads import one_thread
 
@@ -75,11 +75,10 @@ class TrackingEnv(VecEnv):
         self.max_episode_length = round(config.episode_seconds / self.dt)
         self.scale, middle = action_scale().to(device), action_middle(config.action)
         self._middle = None if middle is None else middle.to(device)
-        self.reward = Reward(config.reward, self.dt)
+        self.reward = Reward(config.reward, self.dt, device)
         self._earned: Callable[[Step], Tensor] = self.reward
-        self._fallen = fallen
         if config.compile:
-            self._earned, self._fallen = (torch.compile(work, dynamic=False) for work in (self.reward.__call__, fallen))
+            self._earned = torch.compile(self.reward.__call__, dynamic=False)
         self.limits = Limits.of_robot(config.reward.soft_limit, device)
         drawing = (config.sampler_floor, config.sampler_memory, config.start_share, clip_share)
         stretch = round(config.sampler_stretch / self.dt)
@@ -108,6 +107,7 @@ class TrackingEnv(VecEnv):
         engine.settle()
         self._state, self._ref = self._read(), self._coming()
         self._privileged = self._extended(self.groups["policy"].exact)
+        self._recorded = device.type == "cuda"
         self._judge_recorded = Captured(self._judge, device, [self._generator])
         self._look_recorded = Captured(self._look, device, [self._generator])
         self._look()
@@ -166,8 +166,7 @@ class TrackingEnv(VecEnv):
         self.progress = saved["progress"]
         for name, tensor in self._kept().items():
             tensor.copy_(saved[name])
-        _copy(self._read(), self._state)
-        _copy(self._coming(), self._ref)
+        self._keep(self._read(), self._coming())
         self._generator.set_state(saved["generator"].cpu())
 
     def _kept(self) -> dict[str, Tensor]:
@@ -203,7 +202,7 @@ class TrackingEnv(VecEnv):
         unstable = self.engine.unstable()
         # A world that blew up holds no meaningful numbers: it neither earns nor is averaged.
         self._rewards.copy_(self._earned(outcome).masked_fill(unstable, 0.0))
-        lost = self._fallen(state, self._ref) | (key_distance(state, self._ref) > self._threshold) | unstable
+        lost = self._fallen(outcome) | (outcome.key_errors.amax(-1) > self._threshold) | unstable
         ended = self._frame >= self.library.length[self._clip] - 1
         if self.ground is not None:
             ended |= self.ground.beyond(state)
@@ -219,6 +218,10 @@ class TrackingEnv(VecEnv):
             self.sampler.update(over.of(self._clip), over.of(lost), over.of(self._dones))
         self._restart(self._dones)
         self._push()
+
+    def _fallen(self, step: Step) -> Tensor:
+        """Robots (B,) bool that a step leaves lying."""
+        return lying(step.state, step.ref, step.root_angle)
 
     def _push(self) -> None:
         """Push whom it hits now."""
@@ -247,19 +250,26 @@ class TrackingEnv(VecEnv):
 
     def _look(self) -> None:
         """The state, the reference of the coming step, and the observations of both."""
-        _copy(self._read(), self._state)
-        _copy(self._coming(), self._ref)
+        self._keep(self._read(), self._coming())
         fresh = Rows(self.episode_length_buf == 0, self.engine.by_mask)
         for group in self.groups.values():
             group.look(self._state, self._ref, self._action, fresh, self._generator)
-        self._privileged.copy_(self._extended(self.groups["policy"].exact))
+        self._extended(self.groups["policy"].exact, self._privileged)
+
+    def _keep(self, state: RobotState, ref: ReferenceFrame) -> None:
+        """State and reference for the coming step; where work is recorded, in the tensors that it was recorded with."""
+        if not self._recorded:
+            self._state, self._ref = state, ref
+            return
+        _copy(state, self._state)
+        _copy(ref, self._ref)
 
     def _coming(self) -> ReferenceFrame:
         """The reference at the end of the coming control period."""
         return self.library.frames(self._clip, (self._frame + 1) * self.dt)
 
-    def _extended(self, exact: Tensor) -> Tensor:
-        """What the critic sees (B, D + extras), from the exact observation (B, D)."""
+    def _extended(self, exact: Tensor, into: Tensor | None = None) -> Tensor:
+        """What the critic sees (B, D + extras), from the exact observation (B, D); written `into` a tensor, if any."""
         left = (self.library.length[self._clip] - self._frame).float() * self.dt
         # What the sensors of a robot that was put anew say belongs to the time before.
         fresh = (self.episode_length_buf == 0)[:, None]
@@ -269,7 +279,7 @@ class TrackingEnv(VecEnv):
             left[:, None].clamp(max=2.0),
             self._threshold.expand(self.num_envs, 1),
         )
-        return torch.cat((exact, *extras), dim=-1)
+        return torch.cat((exact, *extras), dim=-1, out=into)
 
 
 def _copy(source: RobotState | ReferenceFrame, into: RobotState | ReferenceFrame) -> None:
@@ -278,18 +288,3 @@ def _copy(source: RobotState | ReferenceFrame, into: RobotState | ReferenceFrame
         value = getattr(source, item.name)
         if value is not None:
             getattr(into, item.name).copy_(value)
-
-
-def start_state(ref: ReferenceFrame, noise: float, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-    """Start qpos (n, 7 + J) and qvel (n, 6 + J) at the reference, with uniform noise times `noise`."""
-    n, j = ref.joint_pos.shape
-
-    def uniform(columns: int, size: float) -> Tensor:
-        return noise * size * (2 * torch.rand(n, columns, generator=generator, device=generator.device) - 1)
-
-    shift = uniform(3, 0.02)
-    shift[:, 2] = 0.0  # never into the floor
-    quat = multiply(ref.root_quat_w, from_rotation_vector(uniform(3, 0.04)))
-    qpos = torch.cat((ref.root_pos_w + shift, quat, ref.joint_pos + uniform(j, 0.03)), dim=-1)
-    speeds = (ref.root_lin_vel_w + uniform(3, 0.1), ref.root_ang_vel_b + uniform(3, 0.2))
-    return qpos, torch.cat((*speeds, ref.joint_vel + uniform(j, 0.3)), dim=-1)

@@ -67,7 +67,7 @@ class Group:
         rows = [exact]
         if self._levels is not None:
             draws = torch.rand(exact.shape, generator=generator, device=exact.device)
-            rows.append(exact + self._levels * (2 * draws - 1))
+            rows.append((exact - self._levels).addcmul_(draws, 2 * self._levels))
         if self._rings:
             for ring, row in zip(self._rings, rows, strict=True):
                 ring.add(row[:, : self._size], fresh)

@@ -109,13 +109,17 @@ class MotionLibrary:
         low = position.floor().long()
         weight = (position - low)[..., None]
         first = self.start[ids][:, None] + low
-        row = self._rows[first]
+        row = self._at(first)
         # On a CPU a look saves the blending, which whole frames do not need; on a GPU it would stop the device.
         if row.is_cuda or bool((weight > 0).any()):
-            after = self._rows[self.start[ids][:, None] + torch.minimum(low + 1, last)]
+            after = self._at(self.start[ids][:, None] + torch.minimum(low + 1, last))
             row = _blend(row, after, weight)
-        row[..., self._moving :] *= (wanted <= last)[..., None]
+        row[:, 0, self._moving :] *= wanted[:, :1] <= last  # frames further ahead have no velocities
         return self._unpack(row)
+
+    def _at(self, rows: Tensor) -> Tensor:
+        """Rows (B, A, columns) by their indices (B, A)."""
+        return self._rows.index_select(0, rows.flatten()).unflatten(0, rows.shape)
 
     def _unpack(self, row: Tensor) -> ReferenceFrame:
         j, keys = self.num_joints, self.clips[0].key_pos.shape[1]

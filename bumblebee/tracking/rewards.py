@@ -5,14 +5,14 @@ the mean distance of the 14 key bodies. What the table leaves open is decided in
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor
 
 from bumblebee.robot.facts import joints
 from bumblebee.sim.engine import RobotState
-from bumblebee.sim.rotations import angle_between, rotate, rotate_inverse
+from bumblebee.sim.rotations import angle_between, length3, rotate
 from bumblebee.tracking.config import RewardConfig
 from bumblebee.tracking.library import ReferenceFrame
 
@@ -39,7 +39,11 @@ class Limits:
 
 @dataclass(frozen=True)
 class Step:
-    """What the reward of one control step depends on; actions (B, J) are the policy's outputs, newest first."""
+    """What the reward of one control step depends on; actions (B, J) are the policy's outputs, newest first.
+
+    Errors that also end episodes or stand in the learning curve are worked out once: `key_errors` (B, K) [m] of the key
+    bodies, `root_angle` (B,) [rad], `velocity_error` (B,) [m/s] of the root and `joint_error` (B,) [rad], a norm.
+    """
 
     state: RobotState
     ref: ReferenceFrame
@@ -49,6 +53,23 @@ class Step:
     foot_force_w: Tensor
     foot_quat_w: Tensor
     limits: Limits
+    key_errors: Tensor = field(init=False)
+    root_angle: Tensor = field(init=False)
+    velocity_error: Tensor = field(init=False)
+    joint_error: Tensor = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Work out the errors."""
+        state, ref = self.state, self.ref
+        velocity_w = rotate(state.root_quat_w, state.root_lin_vel_b)
+        errors = {
+            "key_errors": length3(state.key_pos_w - ref.key_pos_w),
+            "root_angle": angle_between(state.root_quat_w, ref.root_quat_w),
+            "velocity_error": length3(velocity_w - ref.root_lin_vel_w),
+            "joint_error": (state.joint_pos - ref.joint_pos).norm(dim=-1),
+        }
+        for name, error in errors.items():
+            object.__setattr__(self, name, error)
 
 
 def torque_limits(step: Step) -> Tensor:
@@ -96,19 +117,19 @@ def stumble(step: Step) -> Tensor:
 
 def feet_orientation(step: Step) -> Tensor:
     """Feet orientation: sum over the feet of |gravity_xy| in the foot's frame; 0 when both soles are level."""
-    down = torch.zeros_like(step.foot_force_w)
-    down[..., 2] = -1.0
-    return rotate_inverse(step.foot_quat_w, down)[..., :2].norm(dim=-1).sum(-1)
+    ww, xx, yy, zz = step.foot_quat_w.square().unbind(-1)
+    # The sine of the tilt: (xz - wy)^2 + (yz + wx)^2 = (xx + yy) (zz + ww).
+    return 2 * ((xx + yy) * (zz + ww)).sqrt().sum(-1)
 
 
 def body_position(step: Step) -> Tensor:
     """Body position, the error: |p_body - p_ref|, mean over the key bodies [m]."""
-    return (step.state.key_pos_w - step.ref.key_pos_w).norm(dim=-1).mean(-1)
+    return step.key_errors.mean(-1)
 
 
 def root_rotation(step: Step) -> Tensor:
     """Root rotation, the error: angle between the roots [rad]."""
-    return angle_between(step.state.root_quat_w, step.ref.root_quat_w)
+    return step.root_angle
 
 
 def root_angular_velocity(step: Step) -> Tensor:
@@ -118,13 +139,12 @@ def root_angular_velocity(step: Step) -> Tensor:
 
 def root_velocity(step: Step) -> Tensor:
     """Root velocity, the error: |v - v_ref| in the world [m/s]."""
-    velocity_w = rotate(step.state.root_quat_w, step.state.root_lin_vel_b)
-    return (velocity_w - step.ref.root_lin_vel_w).norm(dim=-1)
+    return step.velocity_error
 
 
 def dof_position(step: Step) -> Tensor:
     """DoF position, the error: |d - d_ref| [rad]."""
-    return (step.state.joint_pos - step.ref.joint_pos).norm(dim=-1)
+    return step.joint_error
 
 
 def dof_velocity(step: Step) -> Tensor:
@@ -205,9 +225,10 @@ class Reward:
     Args:
         config: preset and what replaces its values; an unknown term is an error.
         dt: control period [s].
+        device: where the steps' tensors are.
     """
 
-    def __init__(self, config: RewardConfig, dt: float) -> None:
+    def __init__(self, config: RewardConfig, dt: float, device: torch.device | str = "cpu") -> None:
         paper = config.preset == "paper"
         self.weights = (PAPER_WEIGHTS if paper else DEMO_WEIGHTS) | config.weights
         self.sharpness = (PAPER_SHARPNESS if paper else DEMO_SHARPNESS) | config.sharpness
@@ -216,19 +237,28 @@ class Reward:
             known = ", ".join([*PENALTIES, *ERRORS])
             raise ValueError(f"unknown reward terms {sorted(unknown)}; the terms are {known}")
         self.dt = dt
+        self._penalties = [name for name, weight in self.weights.items() if weight and name in PENALTIES]
+        self._errors = [name for name, weight in self.weights.items() if weight and name in ERRORS]
+        # Columns, so that one product serves all terms.
+        self._weights = _column([self.weights[name] for name in (*self._penalties, *self._errors)], device)
+        self._sharpness = _column([self.sharpness[name] for name in self._errors], device)
 
     def terms(self, step: Step) -> dict[str, Tensor]:
         """Each term with its weight, (B,)."""
-        out = {}
-        for name, weight in self.weights.items():
-            if weight == 0:
-                continue
-            if name in ERRORS:
-                out[name] = weight * torch.exp(-self.sharpness[name] * ERRORS[name](step))
-            else:
-                out[name] = weight * PENALTIES[name](step)
-        return out
+        return dict(zip([*self._penalties, *self._errors], self._weighted(step).unbind(), strict=True))
+
+    def _weighted(self, step: Step) -> Tensor:
+        """All terms with their weights, (terms, B), penalties before errors."""
+        errors = [ERRORS[name](step) for name in self._errors]
+        kernels = [torch.exp(-self._sharpness * torch.stack(errors))] if errors else []
+        penalties = [PENALTIES[name](step)[None] for name in self._penalties]
+        return self._weights * torch.cat(penalties + kernels)
 
     def __call__(self, step: Step) -> Tensor:
         """The reward of the step, (B,)."""
-        return self.dt * torch.stack(list(self.terms(step).values())).sum(0)
+        return self.dt * self._weighted(step).sum(0)
+
+
+def _column(values: list[float], device: torch.device | str) -> Tensor:
+    """Values as a column (n, 1)."""
+    return torch.tensor(values, dtype=torch.float32, device=device)[:, None]

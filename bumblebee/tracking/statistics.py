@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor
 
-from bumblebee.tracking.rewards import Step, body_position, dof_position, root_velocity
+from bumblebee.tracking.rewards import Step, body_position
 
 _MEANS = ("reward", "key_error", "joint_error", "velocity_error")
 
@@ -21,7 +21,7 @@ class Statistics:
 
     def add(self, step: Step, rewards: Tensor, dones: Tensor, lost: Tensor, unstable: Tensor, length: Tensor) -> None:
         """Count one control step of all worlds; those that blew up have no errors that mean anything."""
-        errors = (body_position(step), dof_position(step), root_velocity(step))
+        errors = (body_position(step), step.joint_error, step.velocity_error)
         counted = (
             rewards.mean(),
             *(error.masked_fill(unstable, 0.0).mean() for error in errors),

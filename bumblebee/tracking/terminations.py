@@ -3,7 +3,7 @@
 from torch import Tensor
 
 from bumblebee.sim.engine import RobotState
-from bumblebee.sim.rotations import angle_between
+from bumblebee.sim.rotations import angle_between, length3
 from bumblebee.tracking.library import ReferenceFrame
 
 FALL_HEIGHT = 0.35  # m: the pelvis is this much lower than its reference
@@ -20,13 +20,18 @@ def success_threshold(family: str) -> float:
 
 def fallen(state: RobotState, ref: ReferenceFrame) -> Tensor:
     """Robots (B,) bool that lie or topple where the reference does not."""
+    return lying(state, ref, angle_between(state.root_quat_w, ref.root_quat_w))
+
+
+def lying(state: RobotState, ref: ReferenceFrame, angle: Tensor) -> Tensor:
+    """`fallen`, from the `angle` (B,) [rad] between the roots."""
     low = state.root_pos_w[:, 2] < ref.root_pos_w[:, 2] - FALL_HEIGHT
-    return low | (angle_between(state.root_quat_w, ref.root_quat_w) > FALL_ANGLE)
+    return low | (angle > FALL_ANGLE)
 
 
 def key_distance(state: RobotState, ref: ReferenceFrame) -> Tensor:
     """Distance (B,) [m] of the farthest key body from its reference."""
-    return (state.key_pos_w - ref.key_pos_w).norm(dim=-1).amax(-1)
+    return length3(state.key_pos_w - ref.key_pos_w).amax(-1)
 
 
 def threshold_at(progress: float, start: float, end: float, share: float) -> float:
