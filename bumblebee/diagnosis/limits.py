@@ -29,6 +29,7 @@ KINDS = ("torque_limit", "torque_speed_limit")
 _ODD, _FIRST = 1.6, 4  # power of a window that is off; windows that a limit reaches first
 _WORTH, _SHARE = 15.0, 2e-3  # fall of the cost; share of it that a size must gain to be looked at closer
 _REACHED = (*range(1, 9), 10, 12, 16, 24, 40, 75, 180)  # windows that the sizes tried reach
+_HOPELESS = 0.03  # share of the cost that two sizes one after the other may add before smaller ones are left out
 _CLOSER = 5  # halvings of the interval around the best of them
 _FELT, _NEARLY, _CLEAR = 0.1, 0.8, 0.5  # change of a window's log(1 + power); share of these that gain; their sum
 _SEVERAL, _MOSTLY = 4, 0.5  # windows that speak for themselves; share of the excess that fewer must lose
@@ -116,11 +117,17 @@ def _profile(
     if not counts:
         return None
     sizes = [float(0.5 * (felt[n - 1] + felt[n])) for n in counts]
-    gains = [_gain(problem, fit, clean, usual, candidate, size, reach) for size in sizes]
+    gains: list[float] = []
+    for size in sizes:
+        gains.append(_gain(problem, fit, clean, usual, candidate, size, reach))
+        if (
+            len(gains) > 1 and max(gains[-2:]) < -_HOPELESS * fit.cost
+        ):  # smaller limits spoil these windows further, and others
+            break
     best = int(np.argmax(gains))
     if gains[best] <= _SHARE * fit.cost:
         return None
-    low, high = sizes[max(best - 1, 0)], sizes[min(best + 1, len(sizes) - 1)]
+    low, high = sizes[max(best - 1, 0)], sizes[min(best + 1, len(gains) - 1)]
     at = _closer(lambda x: _gain(problem, fit, clean, usual, candidate, x, reach), low, sizes[best], high, gains[best])
     return (_value(candidate, at[0]), at[1])
 
@@ -159,7 +166,7 @@ def _change(problem: Problem, fit: Fit, candidate: Candidate, value: float, felt
     """What a limit does to the prediction (W, M), simulated on the windows `felt` (W,) alone."""
     out = np.zeros_like(fit.residual)
     moved = [*fit.effects, candidate.at(candidate.clip([value]))]
-    out[felt] = fit.residual[felt] - problem.part(np.flatnonzero(felt)).residual([moved])[0]
+    out[felt] = fit.residual[felt] - problem.on(np.flatnonzero(felt), moved)
     return out
 
 

@@ -109,7 +109,16 @@ class Run:
         poor = restless(self.small, self.answers, left, self.config.shortlist)
         joints = len(self.problem.plant.joints)
         listed = [c for c in self.candidates if c.where in poor and shortlisted(c, joints)]
-        return found + [c for c in listed if c not in self.closed and not is_chosen(c, self.fit.chosen)]
+        listed = [c for c in listed if c not in self.closed and not is_chosen(c, self.fit.chosen)]
+        return found + self.seen(listed, 0.7 * share * self.bound, share**2)
+
+    def seen(self, listed: Sequence[Candidate], bound: float, share: float) -> list[Candidate]:
+        """Those of some candidates without screening columns that the screening windows, too, make worth a trial."""
+        if not listed:
+            return []
+        columns = Columns(listed, self.small.sensitivities(listed, self.fit.effects))
+        tests = score_tests(self.small, columns, self.small_fit(), self.weights[self.keep])
+        return [c for k, c in enumerate(listed) if self.is_open(c, tests, k, bound, share)]
 
     def is_open(self, c: Candidate, tests: Scores, k: int, bound: float, share: float) -> bool:
         """Whether a candidate, number `k` of `tests`, is worth a trial and was not chosen or tried in vain."""

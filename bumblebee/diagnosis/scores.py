@@ -59,12 +59,19 @@ def score_tests(problem: Problem, columns: Columns, fit: Fit, weights: np.ndarra
     basis, inverse = project(problem, fit.columns, weights)
     left = fit.residual - np.tensordot(solve(basis, inverse, fit.residual, weights), basis, axes=1)
     parts = _Parts(columns.values, basis, inverse, weights)
-    steps, errors, z, gain = [], [], np.zeros(len(columns.candidates)), np.zeros(len(columns.candidates))
-    scores = parts.scores(left)
-    for c, rows in enumerate(columns.slices):
-        estimate, error, z[c], gain[c] = _test(scores[rows], parts.curvature(rows), parts.raw[rows])
-        steps.append(estimate)
-        errors.append(error)
+    scores, slices = parts.scores(left), columns.slices
+    count = len(columns.candidates)
+    steps, errors = [np.empty(0)] * count, [np.empty(0)] * count
+    z, gain = np.zeros(count), np.zeros(count)
+    sizes = np.array([s.stop - s.start for s in slices], dtype=int)
+    for size in np.unique(sizes):
+        which = np.flatnonzero(sizes == size)
+        rows = np.stack([np.arange(slices[c].start, slices[c].stop) for c in which])
+        curvature = np.stack([parts.curvature(slices[c]) for c in which])
+        tested = _tests(scores[rows], curvature, parts.raw[rows])
+        for c, estimate, error in zip(which, tested[0], tested[1], strict=True):
+            steps[c], errors[c] = estimate, error
+        z[which], gain[which] = tested[2:]
     return Scores(steps, errors, z, gain)
 
 
@@ -98,35 +105,49 @@ class _Parts:
         return own - self._shares[rows] @ self._cross[rows].T
 
 
-def _test(scores: np.ndarray, curvature: np.ndarray, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """Estimate, errors, z and gain of one candidate from its scores (F, W) and curvature (F, F)."""
-    count, windows = scores.shape
-    nothing = np.zeros(count), np.full(count, np.inf), 0.0, 0.0
-    diagonal = np.diag(curvature)
+def _tests(
+    scores: np.ndarray, curvature: np.ndarray, raw: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Estimates and errors (C, F), z and gain (C,) of candidates from scores (C, F, W) and curvatures (C, F, F)."""
+    count, windows = scores.shape[1:]
+    diagonal = np.einsum("cff->cf", curvature)
     seen = (diagonal > _SEEN * raw) & (diagonal > _LEAST_POWER)
-    if not seen.any():
-        return nothing
-    scores, curvature = scores[seen], curvature[np.ix_(seen, seen)]
+    # Unseen rows become directions of their own, without a score: they change nothing.
+    scores = scores * seen[..., None]
+    curvature = np.where(seen[:, :, None] & seen[:, None, :], curvature, 0.0)
     inverse = np.linalg.pinv(curvature, rcond=1e-6, hermitian=True)
-    total = scores.sum(axis=1)
-    spread = (scores - scores.mean(axis=1, keepdims=True)) @ (scores - scores.mean(axis=1, keepdims=True)).T
-    spread += np.diag(np.maximum(0.25 * np.diag(curvature) - np.diag(spread), 0.0))
-    wald = float(total @ np.linalg.pinv(spread, rcond=1e-9, hermitian=True) @ total)
-    estimate, errors = np.zeros(count), np.full(count, np.inf)
-    estimate[seen] = inverse @ total
-    errors[seen] = np.sqrt(np.maximum(np.diag(inverse @ spread @ inverse), 0.0))
-    return estimate, errors, as_z(wald, int(seen.sum()), windows), float(total @ inverse @ total)
+    total = scores.sum(axis=2)
+    away = scores - scores.mean(axis=2, keepdims=True)
+    spread = np.matmul(away, away.transpose(0, 2, 1))
+    at = np.arange(count)
+    spread[:, at, at] += np.maximum(0.25 * np.where(seen, diagonal, 0.0) - spread[:, at, at], 0.0)
+    wald = np.einsum("cf,cfg,cg->c", total, np.linalg.pinv(spread, rcond=1e-9, hermitian=True), total)
+    estimate = np.einsum("cfg,cg->cf", inverse, total)
+    variance = np.einsum("cff->cf", np.matmul(np.matmul(inverse, spread), inverse))
+    errors = np.where(seen, np.sqrt(np.maximum(variance, 0.0)), np.inf)
+    left = seen.sum(axis=1)
+    z = np.zeros(len(wald))
+    for n in range(1, count + 1):
+        z[left == n] = _as_z(wald[left == n], n, windows)
+    return estimate, errors, z, np.einsum("cf,cf->c", total, estimate)
 
 
 def as_z(wald: float, count: int, windows: int) -> float:
     """A Wald statistic of `count` parameters over `windows` clusters as a two-sided standard normal."""
+    return float(_as_z(np.array([wald]), count, windows)[0])
+
+
+def _as_z(wald: np.ndarray, count: int, windows: int) -> np.ndarray:
+    """The same of several statistics (C,)."""
     if count == 1:
-        return float(np.sqrt(wald))
+        return np.sqrt(wald)
     share = windows - count
-    log_p = fisher.logsf(wald * share / (count * max(windows - 1, 1)), count, share) if share > 0 else 0.0
-    if not np.isfinite(log_p) or log_p < -600:
-        log_p = float(chi2.logsf(min(wald, 1200.0), count))
-    return float(norm.isf(np.exp(max(log_p, -600.0)) / 2))
+    log_p = np.zeros(len(wald))
+    if share > 0:
+        log_p = fisher.logsf(wald * share / (count * max(windows - 1, 1)), count, share)
+    far = ~np.isfinite(log_p) | (log_p < -600)
+    log_p[far] = chi2.logsf(np.minimum(wald[far], 1200.0), count)
+    return norm.isf(np.exp(np.maximum(log_p, -600.0)) / 2)
 
 
 def null_maxima(problem: Problem, columns: Columns, fit: Fit, weights: np.ndarray, draws: np.ndarray) -> np.ndarray:

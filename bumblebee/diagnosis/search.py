@@ -78,7 +78,7 @@ def search(
 
 def _select(run: Run, config: SearchConfig) -> None:
     """Forward selection until nothing is worth a trial, or too many were in vain."""
-    vain = 0
+    vain, judged, limits = 0, None, []
     while len(run.fit.chosen) < config.most + run.given and vain < config.patience:
         tried, looked = [], []
         if not run.given:
@@ -86,7 +86,8 @@ def _select(run: Run, config: SearchConfig) -> None:
             tried = [t for t in tried if t.candidate not in run.closed]
         if not tried:
             tried, looked = run.trials()
-        limits = limit_trials(run.problem, run.fit, run.candidates, run.weights)
+        if judged is not run.fit:
+            judged, limits = run.fit, limit_trials(run.problem, run.fit, run.candidates, run.weights)
         tried += [t for t in limits if t.candidate not in run.closed]
         if not tried and not looked:
             break

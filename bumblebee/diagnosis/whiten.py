@@ -54,7 +54,9 @@ class Whitener:
         flat = np.nan_to_num(flat, nan=0.0)
         if centre:
             flat = flat - self.offset
-        return np.matmul(self.factor, flat[..., None])[..., 0]
+        # All residuals of a window at once: the factors are far larger than what they are multiplied with.
+        rows = np.moveaxis(flat.reshape(-1, *flat.shape[-2:]), 0, -1)
+        return np.moveaxis(np.matmul(self.factor, rows), -1, 0).reshape(flat.shape)
 
     def on(self, keep: np.ndarray, residual: np.ndarray) -> np.ndarray:
         """Whiten residuals (..., K, N, D) of the windows at the indices `keep` (K,), without copying their factors."""

@@ -144,19 +144,18 @@ def select(windows: Windows, keep: np.ndarray) -> Windows:
 
 def controls(windows: Windows, delay: np.ndarray, step: float, count: int) -> np.ndarray:
     """Commands (W, count, nu) for steps of `step` s: the mean over each step of the held, delayed command."""
-    edges = np.arange(count + 1) * step
+    time, command = windows.command_time, windows.command
+    area = np.zeros_like(command)
+    np.cumsum(np.diff(time, axis=1)[..., None] * command[:, :-1], axis=1, out=area[:, 1:])
     out = np.empty((len(windows), count, len(delay)))
-    groups = {value: np.flatnonzero(delay == value) for value in np.unique(delay)}
-    for w in range(len(windows)):
-        time, command = windows.command_time[w], windows.command[w]
-        area = np.concatenate(
-            (np.zeros((1, command.shape[1])), np.cumsum(np.diff(time)[:, None] * command[:-1], axis=0))
-        )
-        for value, columns in groups.items():
-            at = edges - value
-            k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 1)
-            integral = area[k][:, columns] + (at - time[k])[:, None] * command[k][:, columns]
-            out[w][:, columns] = np.diff(integral, axis=0) / step
+    for value in np.unique(delay):
+        columns = np.flatnonzero(delay == value)
+        at = np.arange(count + 1) * step - value
+        k = np.maximum((time[:, None, :] <= at[:, None]).sum(axis=-1) - 1, 0)  # (W, count + 1)
+        since = at - np.take_along_axis(time, k, axis=1)
+        rows = np.arange(len(windows))[:, None, None]
+        integral = area[rows, k[..., None], columns] + since[..., None] * command[rows, k[..., None], columns]
+        out[..., columns] = np.diff(integral, axis=1) / step
     return out
 
 
