@@ -14,14 +14,12 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 from torch import Tensor
 
-from bumblebee.robot.facts import joints
-from bumblebee.robot.model import gains
 from bumblebee.sim.cuda_graph import Captured
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
-from bumblebee.tracking.observations import action_middle, middle_targets
+from bumblebee.tracking.observations import action_middle, action_scale, middle_targets
 from bumblebee.tracking.randomisation import draw_push, push_phase, randomise_worlds, regular_push
 from bumblebee.tracking.rewards import Limits, Reward, Step
 from bumblebee.tracking.rows import Rows
@@ -37,17 +35,12 @@ ActionAdapter = Callable[[RobotState, Tensor, Tensor], Tensor]
 """(state, joint targets (B, J) [rad] of an action of zero, action (B, J)) -> what the motors execute, (B, J)."""
 
 
-def action_scale() -> Tensor:
-    """Scale of the action (J,) [rad]: a quarter of the angle at which the servo reaches its torque limit, bounded."""
-    scale = [0.25 * joint.effort_limit / gains(joint)[0] for joint in joints()]
-    return torch.tensor(scale, dtype=torch.float32).clamp(0.08, 0.35)
-
-
 class TrackingEnv(VecEnv):
     """Follow the clips of `library` with `engine`'s robots.
 
     What a step leaves for the next lies in tensors that stay where they are and are written in place, so that on a GPU
-    the work around the physics is recorded once and replayed without the host.
+    the work around the physics is recorded once and replayed without the host. On a CPU state, reference and what is
+    seen are new tensors each step, which saves copies.
 
     Args:
         library: the reference motions, on the engine's device.
@@ -68,8 +61,7 @@ class TrackingEnv(VecEnv):
         clip_share: Tensor | None = None,
     ) -> None:
         self.library, self.engine, self.action_adapter = library, engine, action_adapter
-        self.cfg = config
-        device = engine.device
+        self.cfg, device = config, engine.device
         self.num_envs, self.num_actions, self.device = engine.num_worlds, library.num_joints, str(device)
         self.dt = engine.control_dt
         self.max_episode_length = round(config.episode_seconds / self.dt)
@@ -85,8 +77,7 @@ class TrackingEnv(VecEnv):
         self.sampler: ClipSampler | StretchSampler = (
             StretchSampler(library.length, stretch, *drawing) if stretch else ClipSampler(library.length, *drawing)
         )
-        self.statistics = Statistics(device)
-        self._generator = torch.Generator(device).manual_seed(seed)
+        self.statistics, self._generator = Statistics(device), torch.Generator(device).manual_seed(seed)
         randomise_worlds(engine, config.randomisation, seed)
         self._threshold = torch.zeros((), device=device)
         self.progress = 0.0
@@ -135,8 +126,10 @@ class TrackingEnv(VecEnv):
 
     def get_observations(self) -> TensorDict:
         """Groups "policy" (B, D), "critic" (B, D + extras), perhaps "student"; the tensors are the caller's to keep."""
-        groups = {name: group.noisy.clone() for name, group in self.groups.items()}
-        return TensorDict(groups | {"critic": self._privileged.clone()}, batch_size=[self.num_envs])
+        shown = {name: group.noisy for name, group in self.groups.items()} | {"critic": self._privileged}
+        if self._recorded:  # the next look writes into these tensors
+            shown = {name: tensor.clone() for name, tensor in shown.items()}
+        return TensorDict(shown, batch_size=[self.num_envs])
 
     def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
         """One control period: observations, rewards (B,), dones (B,) and `extras["time_outs"]` (B,)."""
@@ -155,7 +148,7 @@ class TrackingEnv(VecEnv):
         """Everything that training needs to go on from here exactly."""
         return {
             "engine": self.engine.state_dict(),
-            **{name: tensor.clone() for name, tensor in self._kept().items()},
+            **{name: tensor.clone() for name, tensor in (self._kept() | self._shown()).items()},
             "progress": self.progress,
             "generator": self._generator.get_state(),
         }
@@ -166,18 +159,28 @@ class TrackingEnv(VecEnv):
         self.progress = saved["progress"]
         for name, tensor in self._kept().items():
             tensor.copy_(saved[name])
+        for name, own in self.groups.items():
+            own.show(saved[f"{name}_exact"], saved[f"{name}_noisy"])
+        self._show(saved["privileged"])
         self._keep(self._read(), self._coming())
         self._generator.set_state(saved["generator"].cpu())
 
     def _kept(self) -> dict[str, Tensor]:
         """What a step leaves for the next, beside state and reference, which follow from it."""
-        names = ("clip", "frame", "action", "action_before", "push_clock", "privileged")
+        names = ("clip", "frame", "action", "action_before", "push_clock")
         kept = {name: getattr(self, f"_{name}") for name in names}
         for group, own in self.groups.items():
             kept |= {f"{group}_{name}": tensor for name, tensor in own.kept().items()}
         if self.ground is not None:
             kept["origin"] = self.ground.origin
         return kept | {"episode_length": self.episode_length_buf, "failure": self.sampler.failure}
+
+    def _shown(self) -> dict[str, Tensor]:
+        """What was seen last."""
+        shown = {"privileged": self._privileged}
+        for name, own in self.groups.items():
+            shown |= {f"{name}_exact": own.exact, f"{name}_noisy": own.noisy}
+        return shown
 
     def _read(self) -> RobotState:
         """The robots now, each in its clip's frame."""
@@ -254,22 +257,29 @@ class TrackingEnv(VecEnv):
         fresh = Rows(self.episode_length_buf == 0, self.engine.by_mask)
         for group in self.groups.values():
             group.look(self._state, self._ref, self._action, fresh, self._generator)
-        self._extended(self.groups["policy"].exact, self._privileged)
+        self._show(self._extended(self.groups["policy"].exact))
+
+    def _show(self, privileged: Tensor) -> None:
+        """Let this (B, D + extras) be what the critic sees now."""
+        if self._recorded:
+            self._privileged.copy_(privileged)
+        else:
+            self._privileged = privileged
 
     def _keep(self, state: RobotState, ref: ReferenceFrame) -> None:
         """State and reference for the coming step; where work is recorded, in the tensors that it was recorded with."""
-        if not self._recorded:
+        if self._recorded:
+            _copy(state, self._state)
+            _copy(ref, self._ref)
+        else:
             self._state, self._ref = state, ref
-            return
-        _copy(state, self._state)
-        _copy(ref, self._ref)
 
     def _coming(self) -> ReferenceFrame:
         """The reference at the end of the coming control period."""
         return self.library.frames(self._clip, (self._frame + 1) * self.dt)
 
-    def _extended(self, exact: Tensor, into: Tensor | None = None) -> Tensor:
-        """What the critic sees (B, D + extras), from the exact observation (B, D); written `into` a tensor, if any."""
+    def _extended(self, exact: Tensor) -> Tensor:
+        """What the critic sees (B, D + extras), from the exact observation (B, D)."""
         left = (self.library.length[self._clip] - self._frame).float() * self.dt
         # What the sensors of a robot that was put anew say belongs to the time before.
         fresh = (self.episode_length_buf == 0)[:, None]
@@ -279,7 +289,7 @@ class TrackingEnv(VecEnv):
             left[:, None].clamp(max=2.0),
             self._threshold.expand(self.num_envs, 1),
         )
-        return torch.cat((exact, *extras), dim=-1, out=into)
+        return torch.cat((exact, *extras), dim=-1)
 
 
 def _copy(source: RobotState | ReferenceFrame, into: RobotState | ReferenceFrame) -> None:

@@ -19,7 +19,7 @@ Look = Callable[[RobotState, ReferenceFrame, Tensor], Tensor]
 
 
 class Group:
-    """What one network sees of B robots, in tensors that stay where they are.
+    """What one network sees of B robots; on a GPU in tensors that stay where they are, since looks are recorded there.
 
     Args:
         config: its terms and history.
@@ -52,6 +52,7 @@ class Group:
         self._levels = levels.to(device) if bool(levels.any()) else None
         kinds = 1 if self._levels is None else 2
         kept = kinds if config.history > 1 else 0
+        self._stays = device.type == "cuda"
         self._rings = [History(worlds, self._size, config.history, device) for _ in range(kept)]
         whole = torch.zeros(worlds, config.history * self._size + len(levels) - self._size, device=device)
         self.exact = whole
@@ -73,12 +74,20 @@ class Group:
                 ring.add(row[:, : self._size], fresh)
             pairs = zip(self._rings, rows, strict=True)
             rows = [torch.cat((ring.stacked(), row[:, self._size :]), dim=-1) for ring, row in pairs]
-        for into, values in zip((self.exact, self.noisy), rows, strict=False):
-            into.copy_(values)
+        self.show(rows[0], rows[-1])
+
+    def show(self, exact: Tensor, noisy: Tensor) -> None:
+        """Let these be what is seen now, (B, H * D + N) each; on a CPU they are taken as they are."""
+        if not self._stays:
+            self.exact, self.noisy = exact, noisy
+            return
+        self.exact.copy_(exact)
+        if self.noisy is not self.exact:
+            self.noisy.copy_(noisy)
 
     def kept(self) -> dict[str, Tensor]:
-        """All that the next look depends on, and what was seen last."""
-        kept = {"exact": self.exact, "noisy": self.noisy}
+        """All that the next look depends on."""
+        kept = {}
         for index, ring in enumerate(self._rings):
             kept |= {f"ring{index}": ring.ring, f"oldest{index}": ring.oldest}
         return kept

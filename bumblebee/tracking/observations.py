@@ -7,7 +7,8 @@ kinematics; nothing depends on the heading or the place in the world (paper, sec
 import torch
 from torch import Tensor
 
-from bumblebee.robot.facts import KEY_BODIES, stand_pose
+from bumblebee.robot.facts import KEY_BODIES, joints, stand_pose
+from bumblebee.robot.model import gains
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, matrix, multiply, rotate_inverse
 from bumblebee.tracking.library import ReferenceFrame
@@ -97,6 +98,12 @@ def middle_targets(ref: ReferenceFrame, middle: Tensor | None) -> Tensor:
 def action_middle(kind: str) -> Tensor | None:
     """The joint targets (J,) [rad] of an action of zero: the relaxed stand for "default", None for the reference."""
     return torch.tensor(stand_pose(), dtype=torch.float32) if kind == "default" else None
+
+
+def action_scale() -> Tensor:
+    """Scale of the action (J,) [rad]: a quarter of the angle at which the servo reaches its torque limit, bounded."""
+    scale = [0.25 * joint.effort_limit / gains(joint)[0] for joint in joints()]
+    return torch.tensor(scale, dtype=torch.float32).clamp(0.08, 0.35)
 
 
 def _six(quat: Tensor) -> Tensor:

@@ -133,6 +133,18 @@ def test_saved_and_loaded_it_goes_on_alike(model: mujoco.MjModel) -> None:
     assert torch.equal(rollout(env, 10), rollout(other, 10))
 
 
+def test_what_was_seen_in_training_can_be_put_back_outside_of_it(model: mujoco.MjModel) -> None:
+    """Steps in torch's inference mode, as in training, make tensors that nobody may write later; loading does not."""
+    env = make(model)
+    with torch.inference_mode():
+        saved, seen = env.state_dict(), env.get_observations()
+        first = rollout(env, 5)
+    kept = {name: seen[name].clone() for name in ("policy", "critic")}
+    env.load_state_dict(saved)
+    assert torch.equal(rollout(env, 5), first)
+    assert all(torch.equal(seen[name], values) for name, values in kept.items())
+
+
 def test_a_step_leaves_torchs_threads_as_they_were(model: mujoco.MjModel) -> None:
     """The step itself has one; whoever trains keeps theirs, also when the step fails."""
     before, seen = torch.get_num_threads(), []
