@@ -78,6 +78,11 @@ def _scaled(field_name: str, share: float) -> Callable[[Place], float]:
     return lambda p: share * p.of(getattr(p.robot, field_name))
 
 
+def _read(p: Place) -> float:
+    """What the encoder of play and shafts reads, as the contract has it: 0 the motor, 1 the joint."""
+    return float(p.draw["sign"] < 0)
+
+
 def _fixed(value: float) -> Callable[[Place], float]:
     return lambda p: value
 
@@ -179,11 +184,12 @@ CATALOGUE: tuple[Kind, ...] = (
     Kind("encoder_quantisation", "joint", _plain(lambda p, s: signals.EncoderQuantisation(p.name, s), "step"),
          _fixed(0.003), _fixed(0.05), group="sensor"),
     Kind("backlash", "joint",
-         lambda p, s: (rubbing.Backlash(p.name, s, p.draw["sign"] > 0), {"gap": s}),
+         lambda p, s: (rubbing.Backlash(p.name, s, p.draw["sign"] > 0), {"gap": s, "encoder": _read(p)}),
          _fixed(0.01), _fixed(0.12)),
     Kind("series_elasticity", "joint",
          lambda p, s: (rubbing.Elastic(p.name, 1 / s, p.draw["sign"] > 0),
-                       {"stiffness": 1 / s}),
+                       {"stiffness": 1 / s, "encoder": _read(p),
+                        "loss": 0.2 * np.sqrt(rubbing.ROTOR * p.of(p.robot.armature) * s)}),
          lambda p: 0.1 / p.of(p.robot.kp), lambda p: 1.0 / p.of(p.robot.kp),
          least=lambda p: 0.04 / p.of(p.robot.kp)),
     Kind("cogging", "joint", lambda p, s: (rubbing.Cogging(p.name, s, p.draw["number"]),
@@ -192,7 +198,8 @@ CATALOGUE: tuple[Kind, ...] = (
     Kind("joint_spring", "joint", 
          lambda p, s: (rubbing.Spring(p.name, s), {"stiffness": s, "preload": 0.0}), _KP(0.03), _KP(0.6)),
     Kind("hysteresis", "joint", 
-         lambda p, s: (rubbing.Hysteresis(p.name, s), {"amplitude": s, "width": rubbing.REACH}), _L(0.01), _L(0.15)),
+         lambda p, s: (rubbing.Hysteresis(p.name, s), {"amplitude": s, "width": rubbing.REACH, "dahl": 1.0}),
+         _L(0.01), _L(0.15)),
     Kind("link_mass", "body", _mass, _fixed(0.1), _fixed(1.5), group="mass"),
     Kind("link_com", "body",
          lambda p, s: (bodies.Com(p.name, p.draw["axis"], p.draw["sign"] * s),

@@ -20,9 +20,9 @@ SIMULATED = (
     "encoder_offset", "imu_offset", "ground_friction", "ground_compliance", "backlash", "series_elasticity",
     "torque_lag", "encoder_delay",
 )  # fmt: skip
-_STRUCTURAL = ("backlash", "series_elasticity")
-_SLOW = ("torque_lag", "encoder_delay")
+_SLOW = ("torque_lag", "encoder_delay", "series_elasticity")
 _FEW_JOINTS = 8
+_STIFF = 0.03  # of a servo's own compliance
 _HARMONICS = (*range(1, 25), 28, 30, 32, 36, 40, 42, 48, 50, 56, 60, 64, 72, 80, 84, 96, 100, 120, 128, 144)
 
 
@@ -51,6 +51,7 @@ class Candidate:
     def scales(self) -> np.ndarray:
         """Changes (P,) of the parameters that matter, all positive; 0 for those that are not fitted."""
         out = np.full(len(self.step), self.shape_scale) * (np.array(self.step) != 0)
+        out[[i for i, p in enumerate(CATALOGUE[self.effect].parameters) if p.choice]] = 0.0
         out[list(self.free)] = np.abs(np.array(self.step)[list(self.free)])
         return out
 
@@ -58,7 +59,7 @@ class Candidate:
         """The effect with its parameters at `values` (P,), brought within bounds."""
         values = self.clip(values)
         if self.effect in INVERSE:
-            values = 1.0 / values
+            values[0] = 1.0 / values[0]
         return single(self.effect, self.where, *values)
 
     def clip(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -67,7 +68,7 @@ class Candidate:
         low, high = (np.array([getattr(p, side) for p in kinds]) for side in ("lower", "upper"))
         if self.effect in INVERSE:
             # An infinitely stiff shaft cannot be simulated: a fiftieth of the first step is as good as absent.
-            low, high = np.maximum(1.0 / high, 0.02 * np.abs(self.step)), 1.0 / low
+            low[0], high[0] = max(1.0 / high[0], 0.02 * abs(self.step[0])), 1.0 / low[0]
         return np.clip(np.asarray(values, dtype=float), low, high)
 
     def moved(self, index: int, steps: float) -> np.ndarray:
@@ -81,7 +82,7 @@ class Candidate:
 
 def shortlisted(c: Candidate, joints: int) -> bool:
     """Whether a candidate costs too much to be simulated on every joint: only those worst explained are tried."""
-    return c.effect in _STRUCTURAL or (c.effect in _SLOW and bool(c.where) and joints > _FEW_JOINTS)
+    return c.effect == "backlash" or (c.effect in _SLOW and bool(c.where) and joints > _FEW_JOINTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +165,8 @@ def _on_joint(plant: Plant, s: Scales, j: int, name: str) -> Iterator[Candidate]
     joint = plant.model.joint(name).id
     for share in () if plant.model.jnt_stiffness[joint] else (0.03, 0.2):  # MJCF has one spring a joint
         width = share * max(s.travel[j], 0.02)
-        yield make("hysteresis", tenth, width, start=(0.0, 0.0), shape=0.3 * width)
+        for dahl in (0.0, 1.0):
+            yield make("hysteresis", tenth, width, dahl, start=(0.0, 0.0, 0.0), shape=0.3 * width)
     hinge = plant.model.jnt_type[plant.model.joint(name).id] == int(mujoco.mjtJoint.mjJNT_HINGE)
     for n in _HARMONICS if hinge else ():
         if n * s.travel[j] > np.pi:
@@ -177,9 +179,9 @@ def _on_joint(plant: Plant, s: Scales, j: int, name: str) -> Iterator[Candidate]
     yield make("command_delay", 0.005)
     yield make("dropped_commands", 0.2)
     if s.peak[j] > 0:
-        for share in (0.01, 0.05):
-            yield make("series_elasticity", share * max(s.travel[j], 0.02) / s.peak[j], start=(0.0,))
-        yield make("backlash", max(0.01 * s.travel[j], 0.002))
+        for encoder in (0.0, 1.0):  # on the motor, on the joint
+            yield make("series_elasticity", _twist(plant, s, j, encoder), encoder, 1e-3, start=(0.0,) * 3, shape=3e-4)
+            yield make("backlash", max(0.01 * s.travel[j], 0.002), encoder, start=(0.0, 0.0))
     if not plant.scalable[j] or plant.torque_input:
         if plant.torque_input and plant.scalable[j]:
             yield make("motor_strength", -0.1)
@@ -197,6 +199,13 @@ def _on_joint(plant: Plant, s: Scales, j: int, name: str) -> Iterator[Candidate]
     if np.isfinite(limit):
         for factor in (0.6, 1.5, 4.0):
             yield make("torque_speed_limit", 1.0 / (factor * s.fastest[j]), start=(0.0,))
+
+
+def _twist(plant: Plant, s: Scales, j: int, encoder: float) -> float:
+    """Compliance [rad/(N m)] that matters; a servo that reads the joint behind a soft shaft would swing it up."""
+    large, a = 0.02 * max(s.travel[j], 0.02) / s.peak[j], plant.actuator[j]
+    gain = abs(plant.model.actuator_gear[a, 0] ** 2 * plant.model.actuator_biasprm[a, 1])
+    return float(min(large, _STIFF / gain) if encoder and gain else large)
 
 
 def _on_whole(plant: Plant) -> list[Candidate]:

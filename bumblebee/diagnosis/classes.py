@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from bumblebee.diagnosis.candidates import INVERSE, Candidate
+from bumblebee.diagnosis.eligible import is_chosen
 from bumblebee.diagnosis.fit import Fit
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.scores import Columns, score_tests
@@ -123,8 +124,8 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
     out = []
     for i, kin in enumerate(ranked):
         same = [c for c, share in kin if share > _SAME]
-        near = [c for c, share in kin if _KIN < share <= _SAME][:most]
         rest = _less(fit, i)
+        near = [c for c, share in kin if _KIN < share <= _SAME and not is_chosen(c, rest.chosen)][:most]
         for rival in near:
             columns = Columns([rival], problem.sensitivities([rival], rest.effects))
             steps = _direction(problem, columns, rest, found.weights)

@@ -28,6 +28,7 @@ from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.variation import declared_values, vary
 from bumblebee.diagnosis.windows import choose_starts, cut
 from bumblebee.errors import BadInput
+from bumblebee.sim.effect_catalogue import is_native
 from bumblebee.sim.effects import CATALOGUE, Effect
 
 _LONG = 1.0  # [s]
@@ -200,7 +201,7 @@ def _effects(found: Search, last: Refined, holdout: Holdout, beyond: Discovery |
                 "test": f"Wald test in the joint fit, variance clustered by window, z = {steps[c].z:.1f}, bound "
                 f"{found.bound:.1f} for {found.count} candidates",
             },
-            "native": CATALOGUE[c.effect].native,
+            "native": is_native(c.at(last.fit.values[part])),
         }
         if others:
             kinds = dict.fromkeys([c.effect, *(o.effect for o in others)])
@@ -218,7 +219,7 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
         if p.default is not None and value == p.default:
             continue
         ends = [float(value - wide), float(value + wide)]
-        if c.effect in INVERSE:
+        if c.effect in INVERSE and not out:
             # The fit moves the inverse; an interval that reaches zero has no upper end.
             low, high = 1.0 / max(ends[1], 1e-12), None if ends[0] <= 0 else 1.0 / ends[0]
             out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": p.unit}

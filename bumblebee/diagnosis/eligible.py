@@ -6,6 +6,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.scores import Scores
+from bumblebee.sim.effect_native import SUFFIX
 
 _SPRINGS = {"joint_spring", "asymmetric_friction"}
 _MUCH = 0.15  # share of the cost
@@ -15,7 +16,7 @@ _PLAIN = 2.0  # times the chi-square of the bound
 def is_chosen(c: Candidate, chosen: Sequence[Candidate]) -> bool:
     """Whether it is chosen, or something on its place that one spring of MJCF cannot be as well."""
     there = {o.effect for o in chosen if o.where == c.where}
-    if c.effect in there:
+    if c.effect in there or (c.effect in SUFFIX and there & set(SUFFIX)):
         return True
     return bool((c.effect == "hysteresis" and there & _SPRINGS) or (c.effect in _SPRINGS and "hysteresis" in there))
 

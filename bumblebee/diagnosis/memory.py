@@ -13,7 +13,7 @@ import numpy as np
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.windows import Windows, command_inputs
 from bumblebee.measured.rollout import Rollout
-from bumblebee.sim.effect_forces import Memory, history_length
+from bumblebee.sim.effect_forces import Memory, bent, history_length
 from bumblebee.sim.effect_hooks import RuntimeHooks
 from bumblebee.sim.effect_states import State, states_of
 from bumblebee.sim.servo import Servos, servos_of
@@ -70,7 +70,34 @@ def remember(plant: Plant, windows: Windows, hooks: RuntimeHooks, step: float) -
         position=None if past is None else past[0] - hooks.encoder_offset,
         velocity=None if past is None else past[1],
         states=_states(plant, windows, hooks, order),
+        bent=_bent(windows, [(order[column], width) for column, _, width in hooks.hysteresis]),
     )
+
+
+def _bent(windows: Windows, columns: Sequence[tuple[int, float]]) -> np.ndarray | None:
+    """Dahl's z (W, H) of joints (columns in the log) and widths [rad]."""
+    if not columns:
+        return None
+    return np.stack([bent_before(windows, column, width) for column, width in columns], axis=1)
+
+
+def bent_before(windows: Windows, column: int, width: float) -> np.ndarray:
+    """Dahl's z (W,) of one joint (a column in the log) at the windows' starts, its path followed from the first tick.
+
+    Positions are means over a few ticks: what a sensor's noise would wind back is no motion.
+    """
+
+    def of(rollout: Rollout) -> np.ndarray:
+        wide = np.ones(2 * _SMOOTH + 1)
+        known = np.convolve(np.ones(len(rollout.time)), wide, mode="same")
+        place = np.convolve(rollout.joint_pos[:, column], wide, mode="same") / known
+        out, now = np.zeros(len(place)), np.zeros(1)
+        for k, path in enumerate(np.diff(place), 1):
+            now = bent(now, np.array([path]), width)
+            out[k] = now[0]
+        return out
+
+    return at_starts(windows, of)
 
 
 def _states(plant: Plant, windows: Windows, hooks: RuntimeHooks, order: Sequence[int]) -> np.ndarray | None:

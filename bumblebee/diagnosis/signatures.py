@@ -11,12 +11,13 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.memory import remember, yielded
+from bumblebee.diagnosis.memory import bent_before, remember, yielded
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.pulses import Path
 from bumblebee.diagnosis.simulate import inputs_of
 from bumblebee.diagnosis.variation import Variation
 from bumblebee.diagnosis.windows import Windows
+from bumblebee.sim.effect_forces import bent
 from bumblebee.sim.effect_hooks import runtime_hooks
 from bumblebee.sim.effect_native import sloped, spread_inertia
 from bumblebee.sim.effects import Effect
@@ -96,6 +97,12 @@ class Signatures:
 
     def _hysteresis(self, c: Candidate, j: int) -> np.ndarray:
         width, q = c.step[1], self.q[..., j]
+        if c.step[2]:
+            z, out = bent_before(self.windows, j, width), np.empty_like(q)
+            for k, path in enumerate(np.diff(q, axis=1, append=q[:, -1:]).T):
+                out[:, k] = z
+                z = bent(z, path, width)
+            return -c.step[0] * out
         centre = yielded(self.windows, j, width)
         out = np.empty_like(q)
         for k in range(q.shape[1]):

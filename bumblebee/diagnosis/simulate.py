@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from bumblebee.diagnosis.memory import at_starts, logged_torques, read_at, remember, yielded
+from bumblebee.diagnosis.hidden import restructured, set_plastic
+from bumblebee.diagnosis.memory import read_at, remember
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.signals import (
     Layout,
@@ -22,7 +23,6 @@ from bumblebee.diagnosis.signals import (
 from bumblebee.diagnosis.variation import Variation
 from bumblebee.diagnosis.windows import Windows, controls
 from bumblebee.sim.effect_forces import Memory, StepHooks
-from bumblebee.sim.effect_native import SUFFIX
 
 THREADS: int | None = None
 """Threads of every simulation; None: see `threads`."""
@@ -137,13 +137,13 @@ def _run(
     if lead.tilt is not None:
         qpos, qvel = _righted(plant, qpos, qvel, lead.tilt)
     if lead.plant is not None:
-        qpos, qvel = _restructured(plant, windows, lead, qpos, qvel)
+        qpos, qvel = restructured(plant, windows, lead, qpos, qvel)
     batch.bind("qpos")[:] = qpos.reshape(copies * size, -1)
     batch.bind("qvel")[:] = qvel.reshape(copies * size, -1)
     control = np.stack(inputs).reshape(copies * size, count, -1)
     if own.model.na:
         batch.bind("act")[:] = _activation(own.model, control[:, 0])
-    _set_plastic(batch, plant, windows, lead, copies)
+    set_plastic(batch, plant, windows, lead, copies)
     path_q, path_v = _roll(batch, plant, windows, lead, control, step, copies)
     failed = batch.warning.reshape(copies * size, -1).any(axis=1)
     at_q = at_ticks(windows, qpos, path_q, step, copies)
@@ -219,40 +219,6 @@ def _righted(plant: Plant, qpos: np.ndarray, qvel: np.ndarray, tilt: np.ndarray)
     qpos[..., at] = multiply(qpos[..., at], conjugate(from_rotation_vector(tilt)))
     qvel[..., dof] = rotate(qpos[..., at], speed_b)
     return qpos, qvel
-
-
-def _restructured(
-    plant: Plant, windows: Windows, lead: Variation, qpos: np.ndarray, qvel: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The starts in the layout of a model with play or shafts, whose own state follows from the servo's torque."""
-    own = lead.plant or plant
-    q = np.broadcast_to(own.model.qpos0, (*qpos.shape[:-1], own.model.nq)).copy()
-    v = np.zeros((*qvel.shape[:-1], own.model.nv))
-    q[..., own.qpos], v[..., own.dof] = qpos[..., plant.qpos], qvel[..., plant.dof]
-    if plant.floating:
-        q[..., own.base_qpos : own.base_qpos + 7] = qpos[..., plant.base_qpos : plant.base_qpos + 7]
-        v[..., own.base_dof : own.base_dof + 6] = qvel[..., plant.base_dof : plant.base_dof + 6]
-    for kind, joint, value in lead.hidden:
-        if kind in SUFFIX:
-            column, second = plant.joints.index(joint), own.model.joint(joint + SUFFIX[kind])
-            torque = at_starts(windows, lambda r: logged_torques(plant, r)[0])[:, column]
-            # The motor leads the link by half the gap, or by the shaft's twist, in the direction in which it pushes.
-            behind = 0.5 * value * np.sign(torque) if kind == "backlash" else torque / value
-            q[..., int(second.qposadr[0])] = -behind
-    return q, v
-
-
-def _set_plastic(batch: Batch, plant: Plant, windows: Windows, lead: Variation, copies: int) -> None:
-    """References of yielding springs, where the log before the start has left them."""
-    if lead.plant is None or not any(kind == "hysteresis" for kind, _, _ in lead.hidden):
-        return
-    plastic = batch.bind("plastic")
-    for kind, joint, width in lead.hidden:
-        if kind == "hysteresis":
-            column = plant.joints.index(joint)
-            address = int(lead.model.jnt_plasticadr[lead.model.joint(joint).id])
-            centre = yielded(windows, column, width) - lead.offset[column]
-            plastic[:, address] = np.tile(centre, copies)
 
 
 def with_step(model: mujoco.MjModel, step: float) -> mujoco.MjModel:

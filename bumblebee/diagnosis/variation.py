@@ -35,8 +35,8 @@ class Variation:
     """(nu,) share of commands that never arrive."""
     tilt: np.ndarray | None = None
     """(3,) [rad] rotation vector multiplied onto the reading of the base's orientation."""
-    hidden: tuple[tuple[str, str, float], ...] = field(default=())
-    """(kind, joint, value) of the structural effects, for the state that no sensor reads."""
+    hidden: tuple[tuple[str, str, tuple[float, ...]], ...] = field(default=())
+    """(kind, joint, parameters) of the structural effects, for the state that no sensor reads."""
 
     @property
     def plain(self) -> bool:
@@ -48,15 +48,15 @@ def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
     """The plant with `effects`; the same meaning as `sim.effect_spec.add_to_spec`, without compiling again."""
     if not effects:
         return Variation(plant.model, plant.delay, plant.offset)
-    structural = [e for e in effects if e.effect in STRUCTURAL]
+    structural = [e for e in effects if _is_structural(e)]
     own = _structure(plant, structural) if structural else plant
     model, delay, offset = copy.copy(own.model), plant.delay.copy(), plant.offset.copy()
     constants, hidden = False, []
     for effect in sorted(effects, key=lambda e: _ORDER.index(e.effect)):
         for place in effect.where or _everywhere(plant, effect.effect):
             constants |= _apply(own, model, delay, offset, effect, place)
-            if effect.effect in STRUCTURAL:
-                hidden.append((effect.effect, place, effect.values()[-1]))
+            if _is_structural(effect):
+                hidden.append((effect.effect, place, effect.values()))
     if constants:
         # set_const reads qpos0 through a scratch MjData; gains, friction and damping do not enter it.
         mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -71,6 +71,11 @@ def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
         tilt=hooks.imu if hooks.imu.any() else None,
         hidden=tuple(hidden),
     )
+
+
+def _is_structural(effect: Effect) -> bool:
+    """Whether the effect changes the layout of MuJoCo's state; hysteresis by Dahl's law is a hook."""
+    return effect.effect in STRUCTURAL and not (effect.effect == "hysteresis" and effect.values()[2])
 
 
 def _dropped(plant: Plant, hooks: RuntimeHooks) -> np.ndarray | None:
@@ -93,7 +98,8 @@ def _everywhere(plant: Plant, kind: str) -> tuple[str, ...]:
 
 def _structure(plant: Plant, effects: Sequence[Effect]) -> Plant:
     """The plant compiled with play, shafts and yielding springs; their sizes are set afterwards."""
-    key = tuple(sorted((e.effect, e.where) for e in effects))
+    # Where the encoder is decides on the structure.
+    key = tuple(sorted((e.effect, e.where, e.values()[1] if e.effect in native.SUFFIX else 0.0) for e in effects))
     if key not in plant.compiled:
         spec = plant.spec.copy()
         add_to_spec(spec, effects)
@@ -155,14 +161,18 @@ def _apply_to_joint(plant: Plant, model: mujoco.MjModel, kind: str, column: int,
     elif kind == "joint_spring":
         _set_spring(model, joint, *values)
     elif kind == "hysteresis":
-        model.jnt_stiffness[joint], model.jnt_springyield[joint] = value / values[1], values[1]
+        if not values[2]:
+            model.jnt_stiffness[joint], model.jnt_springyield[joint] = value / values[1], values[1]
     elif kind in native.SUFFIX:
         second = int(model.joint(plant.joints[column] + native.SUFFIX[kind]).id)
+        if values[1] and model.dof_armature[dof]:  # another than the declared one: the rotor has it
+            tendon = int(model.tendon(native.rotor_of(kind, plant.joints[column])).id)
+            model.tendon_armature[tendon], model.dof_armature[dof] = model.dof_armature[dof], 0.0
         if kind == "backlash":
             model.jnt_range[second] = (-0.5 * value, 0.5 * value)
         else:
             model.jnt_stiffness[second] = value
-            model.dof_damping[model.jnt_dofadr[second]] = native.FLEX_LOSS * value
+            model.dof_damping[model.jnt_dofadr[second]] = values[2] * value
 
 
 def _set_spring(model: mujoco.MjModel, joint: int, stiffness: float, preload: float) -> None:
@@ -237,7 +247,7 @@ def _declared_on_joint(plant: Plant, kind: str, column: int) -> tuple[float, ...
         "series_elasticity": np.inf,
     }
     if kind in simple:
-        return (float(simple[kind]),)
+        return (float(simple[kind]), *(0.0,) * (len(CATALOGUE[kind].parameters) - 1))
     if kind == "torque_limit":
         limited = a >= 0 and model.actuator_forcelimited[a]
         return (float(abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1]) if limited else np.inf,)

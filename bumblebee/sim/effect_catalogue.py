@@ -23,6 +23,8 @@ class Parameter:
     """Largest value that is sensible; infinite where only the data can tell."""
     default: float | None = None
     """Its value where an effect does not give it, and then not written either; None: it must be given."""
+    choice: bool = False
+    """Whether it is 0 or 1 and names a form of the effect, not a size: never fitted."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,9 @@ class Kind:
         return self.parameters[0].upper
 
 
-def _joint(*parameters: tuple[str, str, float, float], whole: bool = False, native: bool = True) -> Kind:
+def _joint(
+    *parameters: tuple[str, str, float, float, *tuple[float | bool, ...]], whole: bool = False, native: bool = True
+) -> Kind:
     return Kind("joint", tuple(Parameter(*p) for p in parameters), whole, native)
 
 
@@ -95,12 +99,19 @@ CATALOGUE: dict[str, Kind] = {
     "encoder_quantisation": _joint(("step", "rad", 0.0, 0.2), native=False),
     "joint_spring": _joint(("stiffness", "N m/rad", -_INF, _INF), ("preload", "N m", -_INF, _INF)),
     "asymmetric_friction": _joint(("difference", "N m", -_INF, _INF)),
-    "hysteresis": _joint(("amplitude", "N m", 0.0, _INF), ("width", "rad", 1e-5, 3.0)),
+    # dahl 0: a spring that yields at the width; 1: Dahl's law, which turns round smoothly and needs a hook.
+    "hysteresis": _joint(
+        ("amplitude", "N m", 0.0, _INF), ("width", "rad", 1e-5, 3.0), ("dahl", "", 0.0, 1.0, 0.0, True)
+    ),
     "cogging": _joint(
         ("sine", "N m", -_INF, _INF), ("cosine", "N m", -_INF, _INF), ("periods", "1/turn", 0.1, 500.0), native=False
     ),
-    "backlash": _joint(("gap", "rad", 0.0, 0.5)),
-    "series_elasticity": _joint(("stiffness", "N m/rad", 1e-2, _INF)),
+    # encoder 0: it reads the motor; 1: it reads the joint, behind the play or the shaft, which needs a hook.
+    "backlash": _joint(("gap", "rad", 0.0, 0.5), ("encoder", "", 0.0, 1.0, 0.0, True)),
+    # loss: damping of a shaft over its stiffness.
+    "series_elasticity": _joint(
+        ("stiffness", "N m/rad", 1e-2, _INF), ("encoder", "", 0.0, 1.0, 0.0, True), ("loss", "s", 0.0, 0.1, 1e-3)
+    ),
     # spread 0: what is added sits at the centre of mass; 1: the moments of inertia grow as the mass does.
     "link_mass": _body(("mass", "kg", 1e-3, _INF), ("spread", "", 0.0, 1.0, 0.0)),
     "link_com": _body(*((axis, "m", -2.0, 2.0) for axis in _AXES)),
@@ -139,6 +150,15 @@ class Effect:
             given[p.name] if p.default is None else given.get(p.name, p.default)
             for p in CATALOGUE[self.effect].parameters
         )
+
+
+# Forms of effects that MJCF carries in their plain form only: a parameter that is not zero.
+HOOKED = {"hysteresis": "dahl", "backlash": "encoder", "series_elasticity": "encoder"}
+
+
+def is_native(effect: Effect) -> bool:
+    """Whether plain MJCF carries an effect, in the form that it has."""
+    return CATALOGUE[effect.effect].native and not effect.parameters.get(HOOKED.get(effect.effect, ""), 0.0)
 
 
 def single(effect: str, where: str, *values: float) -> Effect:

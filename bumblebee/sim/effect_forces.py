@@ -13,6 +13,8 @@ written anew, so that MuJoCo's implicit treatment of both stays. The others are 
 | torque_lag | the servo's torque after dx/dt = (torque - x) / time, instead of the present one |
 | cogging | sine sin(periods q) + cosine cos(periods q) |
 | external_wrench | xfrc_applied |
+| hysteresis by Dahl's law | -amplitude z; dz/dt = v / width (1 - sgn(v) z) |
+| backlash, series_elasticity, encoder on the joint | the servo's torque also turns the rotor on its own hinge |
 | discovered | the terms' sum, as torque or, for `friction(...)`, as frictionloss |
 """
 
@@ -44,9 +46,17 @@ class Memory:
     """(n, L, J)."""
     states: np.ndarray | None = None
     """(n, C): those of discovered terms, see `effect_states.states_of`."""
+    bent: np.ndarray | None = None
+    """(n, H): z of Dahl's law on the H joints that have it."""
 
 
-_REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states")
+_REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states", "bent")
+
+
+def bent(z: np.ndarray, path: np.ndarray, width: float) -> np.ndarray:
+    """Dahl's z (n,) after a `path` (n,) [rad] one way: it goes to the path's sign over the `width` [rad]."""
+    way = np.sign(path)
+    return np.where(way != 0, way + (z - way) * np.exp(-np.abs(path) / width), z)
 
 
 def history_length(hooks: RuntimeHooks, step: float) -> int:
@@ -71,6 +81,7 @@ class StepHooks:
         self._past_v = np.zeros((count, self._back, joints))
         self._kept = states_of(hooks.terms)
         self._states = np.zeros((count, len(self._kept)))
+        self._bent = np.zeros((count, len(hooks.hysteresis)))
         self._fading = bool(hooks.thermal.any() or hooks.drift.any())
         self._rubbing = bool(hooks.stiction[:, 0].any() or hooks.load_friction.any())
         self._rubbing |= any(term.rubs for _, _, term in hooks.terms)
@@ -78,6 +89,7 @@ class StepHooks:
         self._running_out = bool(np.isfinite(hooks.speed_limit).any())
         self._late = bool(hooks.encoder_delay.any() or hooks.encoder_step.any() or hooks.torque_lag.any())
         self._pushing = self._late or bool(hooks.cogging) or any(not term.rubs for _, _, term in hooks.terms)
+        self._pushing |= bool(hooks.hysteresis)
         if self._fading:
             self._gain, self._bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
         if self._rubbing:
@@ -109,6 +121,7 @@ class StepHooks:
             self._states[ids, k] = s.first(target[:, s.column])
         if memory is not None and memory.states is not None:
             self._states[ids] = memory.states
+        self._bent[ids] = 0.0 if memory is None or memory.bent is None else memory.bent
         self._fresh[ids] = memory is None or memory.torque is None
         if memory is not None and memory.torque is not None:
             self._lagged[ids] = memory.torque
@@ -169,7 +182,13 @@ class StepHooks:
             for column, sine, cosine, periods in h.cogging:
                 angle = periods * q[:, column]
                 applied[:, column] += sine * np.sin(angle) + cosine * np.cos(angle)
+            for k, (column, amplitude, _) in enumerate(h.hysteresis):
+                applied[:, column] -= amplitude * self._bent[:, k]
             self._batch.bind("qfrc_applied")[:, servos.dof] = applied
+        for column, dof in h.rotors:
+            self._batch.bind("qfrc_applied")[:, dof] = torque[:, column]
+        for k, (column, _, width) in enumerate(h.hysteresis):
+            self._bent[:, k] = bent(self._bent[:, k], self._step * v[:, column], width)
         for k, s in enumerate(self._kept):
             self._states[:, k] = s.after(self._states[:, k], v[:, s.column], self._step)
         self._time += self._step

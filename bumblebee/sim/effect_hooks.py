@@ -12,7 +12,7 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.sim.effect_catalogue import CATALOGUE, Effect
-from bumblebee.sim.effect_native import is_hidden
+from bumblebee.sim.effect_native import SUFFIX, is_hidden
 from bumblebee.sim.effect_terms import Term, read_term
 
 
@@ -52,6 +52,10 @@ class RuntimeHooks:
     """(joint, sine, cosine [N m], periods a turn)."""
     terms: tuple[tuple[int, float, Term], ...] = ()
     """(joint, coefficient, term) of discovered effects."""
+    hysteresis: tuple[tuple[int, float, float], ...] = ()
+    """(joint, amplitude [N m], width [rad]) of Dahl's law."""
+    rotors: tuple[tuple[int, int], ...] = ()
+    """(joint, address in qvel) of rotors behind play or shafts whose joints the encoders read."""
     wrench: tuple[tuple[int, np.ndarray], ...] = ()
     """(body id, (6,) force [N] and torque [N m] in the world, at the body's centre of mass)."""
     imu: np.ndarray = field(default_factory=lambda: np.zeros(3))
@@ -73,7 +77,8 @@ class RuntimeHooks:
         """Whether something must be written before every physics step."""
         arrays = (self.encoder_step, self.encoder_delay, self.torque_lag, self.load_friction, self.thermal, self.drift)
         some = any(a.any() for a in arrays) or self.stiction[:, 0].any()
-        return bool(some or np.isfinite(self.speed_limit).any() or self.cogging or self.terms)
+        some = some or np.isfinite(self.speed_limit).any() or self.hysteresis or self.rotors
+        return bool(some or self.cogging or self.terms)
 
 
 _COLUMN = {
@@ -102,7 +107,7 @@ def runtime_hooks(effects: Sequence[Effect], model: mujoco.MjModel) -> RuntimeHo
     table["speed_limit"] = np.full(len(names), np.inf)
     stiction, imu = np.zeros((len(names), 2)), np.zeros(3)
     stiction[:, 1] = 1.0
-    cogging, wrench, terms, together = [], [], [], True
+    cogging, wrench, terms, dahl, rotors, together = [], [], [], [], [], True
     for effect in effects:
         kind = CATALOGUE[effect.effect]
         if kind.on == "body" and effect.effect in ("imu_offset", "external_wrench"):
@@ -114,6 +119,10 @@ def runtime_hooks(effects: Sequence[Effect], model: mujoco.MjModel) -> RuntimeHo
             continue
         if effect.effect == "discovered":
             terms += _terms(names, effect)
+        if effect.effect == "hysteresis" and effect.values()[-1]:
+            dahl += [(_column(names, effect.effect, place), *effect.values()[:2]) for place in effect.where]
+        if effect.effect in SUFFIX and effect.values()[1]:
+            rotors += [(_column(names, effect.effect, p), _rotor(model, effect.effect, p)) for p in effect.where]
         if effect.effect not in (*_COLUMN, "stribeck_friction", "cogging"):
             continue
         together = together and not (effect.effect == "dropped_commands" and effect.where)
@@ -130,6 +139,8 @@ def runtime_hooks(effects: Sequence[Effect], model: mujoco.MjModel) -> RuntimeHo
         stiction=stiction,
         cogging=tuple(cogging),
         terms=tuple(terms),
+        hysteresis=tuple(dahl),
+        rotors=tuple(rotors),
         wrench=tuple(wrench),
         imu=imu,
         dropped_together=together,
@@ -151,6 +162,14 @@ def _column(names: tuple[str, ...], kind: str, place: str) -> int:
     if place not in names:
         raise BadInput(f"{kind} on joint {place!r}", "a hinge or slide of the model", "no such joint")
     return names.index(place)
+
+
+def _rotor(model: mujoco.MjModel, kind: str, place: str) -> int:
+    """Address in qvel of the hinge between a joint and its rotor."""
+    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, place + SUFFIX[kind])
+    if joint < 0:
+        raise BadInput(f"{kind} on joint {place!r}", f"a model with the joint {place + SUFFIX[kind]!r}", "none in it")
+    return int(model.jnt_dofadr[joint])
 
 
 def _body(model: mujoco.MjModel, kind: str, place: str) -> int:

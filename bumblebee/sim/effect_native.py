@@ -10,7 +10,7 @@ _WEAK = 1e-4
 # Second, coaxial hinges: how hard the ends of the play are, and how fast a shaft's own swing dies.
 PLAY_SOLREF, PLAY_SOLIMP = (0.004, 1.0), (0.95, 0.99, 1e-3)
 HIDDEN_ARMATURE = 1e-5  # [kg m^2] keeps the mass matrix regular where the rotor has no armature
-FLEX_LOSS = 1e-3  # [s] damping of a shaft over its stiffness
+ROTOR_MASS, ROTOR_INERTIA = 1e-6, 1e-9  # [kg], [kg m^2] of a rotor's body, which must have some
 SUFFIX = {"backlash": "_play", "series_elasticity": "_flex"}
 
 
@@ -51,6 +51,11 @@ def sloped(gravity: Sequence[float], x: float, y: float) -> np.ndarray:
 def touch(a_type: int, a_affinity: int, b_type: int, b_affinity: int) -> bool:
     """Whether two geometries' masks let them touch."""
     return bool((a_type & b_affinity) | (b_type & a_affinity))
+
+
+def rotor_of(kind: str, joint: str) -> str:
+    """Name of the body and the tendon of a rotor behind play or a shaft, where the encoder is on the joint."""
+    return f"{joint}{SUFFIX[kind]}_rotor"
 
 
 def is_hidden(joint: str) -> bool:

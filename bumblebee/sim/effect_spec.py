@@ -10,6 +10,7 @@
 | encoder_offset | biasprm[0] = biasprm[1] * offset: the servo's part; the reading's part is a runtime hook |
 | joint_spring, hysteresis | joint stiffness with springref; with springyield |
 | backlash, series_elasticity | a second hinge on the same axis, with a range; with a stiffness. nq grows |
+| the same, encoder on the joint | a rotor of its own: a weightless body on such a hinge, whose inertia is a tendon's |
 | link_mass, link_com, link_inertia | the body's inertial; the moments with the mass where `spread` says so |
 | ground_friction, ground_compliance | friction, solref of the geometry and of what can touch it |
 | ground_slope | gravity |
@@ -33,6 +34,7 @@ from bumblebee.sim.effect_catalogue import (
     STICTION_SOLREF,
     Effect,
 )
+from bumblebee.sim.effect_hinges import add_backlash, add_elasticity, angle_of, joint_of
 
 # The order matters: the encoder's offset is multiplied with the gain that is in force.
 _ORDER = tuple(CATALOGUE)
@@ -57,22 +59,9 @@ def _everywhere(spec: mujoco.MjSpec, kind: str) -> tuple[str, ...]:
 _ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 
-def _joint(spec: mujoco.MjSpec, name: str) -> Any:
-    joint = spec.joint(name)
-    if joint is None:
-        raise BadInput(f"effect on joint {name!r}", "a joint of the model", "no joint of this name")
-    return joint
-
-
-def _angle(spec: mujoco.MjSpec, joint: Any) -> float:
-    """A radian in the unit that the spec counts this joint's angles in; 1 for slides."""
-    hinge = joint.type == mujoco.mjtJoint.mjJNT_HINGE
-    return math.degrees(1.0) if hinge and spec.compiler.degree else 1.0
-
-
 def _servos(spec: mujoco.MjSpec, joint: str) -> list[Any]:
     """Every actuator that drives `joint`."""
-    _joint(spec, joint)
+    joint_of(spec, joint)
     servos = [a for a in spec.actuators if a.trntype in _ON_JOINT and a.target == joint]
     if not servos:
         raise BadInput(f"effect on joint {joint!r}", "a joint with an actuator", "a passive joint")
@@ -81,12 +70,12 @@ def _servos(spec: mujoco.MjSpec, joint: str) -> list[Any]:
 
 def _frictionloss(spec: mujoco.MjSpec, name: str, value: float) -> None:
     _stiff_friction(spec, name)
-    _joint(spec, name).frictionloss = value
+    joint_of(spec, name).frictionloss = value
 
 
 def _stiff_friction(spec: mujoco.MjSpec, name: str, *values: float) -> None:
     """Dry friction that sticks, for friction that a hook writes at run time, too."""
-    joint = _joint(spec, name)
+    joint = joint_of(spec, name)
     joint.solref_friction = STICTION_SOLREF
     joint.solimp_friction = [STICTION_SOLIMP, STICTION_SOLIMP, *joint.solimp_friction[2:]]
     spec.option.iterations = max(spec.option.iterations, STICTION_ITERATIONS)
@@ -94,37 +83,39 @@ def _stiff_friction(spec: mujoco.MjSpec, name: str, *values: float) -> None:
 
 
 def _damping(spec: mujoco.MjSpec, name: str, value: float) -> None:
-    joint = _joint(spec, name)
+    joint = joint_of(spec, name)
     joint.damping = [value, *joint.damping[1:]]
 
 
 def _armature(spec: mujoco.MjSpec, name: str, value: float) -> None:
-    _joint(spec, name).armature = value
+    joint_of(spec, name).armature = value
 
 
 def _set_spring(spec: mujoco.MjSpec, joint: Any, stiffness: float, preload: float) -> None:
     stiffness, reference = native.spring_of(stiffness, preload)
     joint.stiffness = [stiffness, *joint.stiffness[1:]]
-    joint.springref = reference * _angle(spec, joint)
+    joint.springref = reference * angle_of(spec, joint)
 
 
 def _asymmetry(spec: mujoco.MjSpec, name: str, difference: float) -> None:
-    joint = _joint(spec, name)
+    joint = joint_of(spec, name)
     stiffness = float(joint.stiffness[0])
-    preload = stiffness * joint.springref / _angle(spec, joint)
+    preload = stiffness * joint.springref / angle_of(spec, joint)
     _set_spring(spec, joint, stiffness, preload - 0.5 * difference)
 
 
 def _spring(spec: mujoco.MjSpec, name: str, stiffness: float, preload: float) -> None:
-    _set_spring(spec, _joint(spec, name), stiffness, preload)
+    _set_spring(spec, joint_of(spec, name), stiffness, preload)
 
 
-def _hysteresis(spec: mujoco.MjSpec, name: str, amplitude: float, width: float) -> None:
-    joint = _joint(spec, name)
+def _hysteresis(spec: mujoco.MjSpec, name: str, amplitude: float, width: float, dahl: float) -> None:
+    joint = joint_of(spec, name)
+    if dahl:  # a hook
+        return
     if joint.stiffness[0]:
         raise BadInput(f"hysteresis on joint {name!r}", "a joint without a spring", "one with a stiffness")
     joint.stiffness = [amplitude / width, *joint.stiffness[1:]]
-    joint.springyield = width * _angle(spec, joint)
+    joint.springyield = width * angle_of(spec, joint)
 
 
 def _scale_gains(spec: mujoco.MjSpec, name: str, kp: float, kd: float) -> None:
@@ -153,41 +144,6 @@ def _offset(spec: mujoco.MjSpec, name: str, value: float) -> None:
         bias = servo.biasprm.copy()
         bias[0] = bias[1] * value * servo.gear[0]
         servo.biasprm = bias
-
-
-def _second_hinge(spec: mujoco.MjSpec, name: str, kind: str) -> Any:
-    """A joint on the same axis, the last of its body; keyframes get a zero for it."""
-    joint, body = _joint(spec, name), _joint(spec, name).parent
-    last = body.joints[-1].name
-    if last not in (name, *(name + suffix for suffix in native.SUFFIX.values())):
-        raise BadInput(f"{kind} on joint {name!r}", "the last joint of its body", f"joint {last!r} after it")
-    declared = spec.compile()
-    index = declared.joint(last).id
-    at_q, at_v = int(declared.jnt_qposadr[index]) + 1, int(declared.jnt_dofadr[index]) + 1
-    keys = [(np.insert(k.qpos, at_q, 0.0), np.insert(k.qvel, at_v, 0.0)) for k in _filled_keys(spec, declared)]
-    hinge = body.add_joint(name=name + native.SUFFIX[kind], type=joint.type, axis=joint.axis, pos=joint.pos)
-    hinge.armature = native.HIDDEN_ARMATURE
-    for key, (qpos, qvel) in zip(spec.keys, keys, strict=True):
-        key.qpos, key.qvel = qpos, qvel
-    return hinge
-
-
-def _filled_keys(spec: mujoco.MjSpec, declared: mujoco.MjModel) -> list[Any]:
-    return [declared.key(i) for i in range(len(spec.keys))]
-
-
-def _backlash(spec: mujoco.MjSpec, name: str, gap: float) -> None:
-    play = _second_hinge(spec, name, "backlash")
-    half = 0.5 * gap * _angle(spec, play)
-    play.range, play.limited = [-half, half], mujoco.mjtLimited.mjLIMITED_TRUE
-    play.solref_limit = native.PLAY_SOLREF
-    play.solimp_limit = [*native.PLAY_SOLIMP, *play.solimp_limit[3:]]
-
-
-def _elasticity(spec: mujoco.MjSpec, name: str, stiffness: float) -> None:
-    flex = _second_hinge(spec, name, "series_elasticity")
-    flex.stiffness = [stiffness, *flex.stiffness[1:]]
-    flex.damping = [native.FLEX_LOSS * stiffness, *flex.damping[1:]]
 
 
 def _body(spec: mujoco.MjSpec, name: str) -> Any:
@@ -263,8 +219,8 @@ _ADD = {
     "encoder_offset": _offset,
     "joint_spring": _spring,
     "hysteresis": _hysteresis,
-    "backlash": _backlash,
-    "series_elasticity": _elasticity,
+    "backlash": add_backlash,
+    "series_elasticity": add_elasticity,
     "link_mass": _mass,
     "link_com": _com,
     "link_inertia": _inertia,

@@ -186,16 +186,19 @@ def test_heat_takes_strength() -> None:
     check([single("thermal_fade", "j", 0.9)], reference(torque), share=0.1, target=lambda t: 4 * swing(t))
 
 
-def two_masses(between: Callable[[float, float], float], seconds: float = 0.4) -> np.ndarray:
-    """Rotor (INERTIA) under the servo, link (MASS ARM^2), `between(angle, speed)` pulls the rotor to the link."""
+def two_masses(between: Callable[[float, float], float], seconds: float = 0.4, encoder: int = 0) -> np.ndarray:
+    """Rotor (INERTIA) under the servo, link (MASS ARM^2), `between(angle, speed)` pulls the rotor to the link.
+
+    The encoder, which the servo hears, reads the rotor (0) or the link (1).
+    """
     q, v, out = np.zeros(2), np.zeros(2), []
     step = FINE / 5
     for k in range(round(seconds / step)):
         pull = between(q[1] - q[0], v[1] - v[0])
-        v += step * np.array([(servo(k * step, q[0], v[0]) + pull) / INERTIA, -pull / (MASS * ARM**2)])
+        v += step * np.array([(servo(k * step, q[encoder], v[encoder]) + pull) / INERTIA, -pull / (MASS * ARM**2)])
         q += step * v
         if (k + 1) % round(0.001 / step) == 0:
-            out.append((q[0], v[0]))
+            out.append((q[encoder], v[encoder]))
     return np.array(out)
 
 
@@ -203,6 +206,25 @@ def test_a_flexible_shaft_is_a_second_mass_on_a_spring() -> None:
     model = model_with(single("series_elasticity", "j", 60.0))
     assert model.nq == 2 and model.key("up").qpos.tolist() == [0.1, 0.0]
     check([single("series_elasticity", "j", 60.0)], two_masses(lambda d, w: 60.0 * d + 0.06 * w), share=0.1)
+
+
+def test_a_flexible_shaft_before_the_encoder_is_one_too() -> None:
+    effect = single("series_elasticity", "j", 60.0, 1.0)
+    model = model_with(effect)
+    assert model.nq == 2 and model.key("up").qpos.tolist() == [0.1, 0.0]
+    wanted = two_masses(lambda d, w: 60.0 * d + 0.06 * w, encoder=1)
+    assert np.abs(wanted - two_masses(lambda d, w: 60.0 * d + 0.06 * w)).max() > 0.01  # not the same motion
+    check([effect], wanted, share=0.1)
+
+
+def test_hysteresis_by_dahls_law_follows_its_equation() -> None:
+    z = np.zeros(1)
+
+    def torque(t: float, q: float, v: float) -> float:
+        z[0] += FINE * v / 0.05 * (1 - np.sign(v) * z[0])
+        return servo(t, q, v) - 0.4 * z[0]
+
+    check([single("hysteresis", "j", 0.4, 0.05, 1.0)], reference(torque), share=0.1)
 
 
 @pytest.mark.parametrize("degrees", [False, True])
@@ -303,5 +325,5 @@ def test_every_id_says_truly_whether_mjcf_carries_it() -> None:
         if name == "discovered":
             continue  # has terms in place of values: tests/sim/test_discovered.py
         model = model_with() if kind.on != "geom" else mujoco.MjModel.from_xml_string(BOX)
-        values = [max(p.lower, 0.03) for p in kind.parameters]
+        values = [max(p.lower, 0.03) for p in kind.parameters if p.default is None]
         assert runtime_hooks([single(name, places[kind.on], *values)], model).empty == kind.native, name

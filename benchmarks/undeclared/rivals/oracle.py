@@ -15,8 +15,6 @@ def run(robot: Declared, truth: Sequence[dict[str, Any]]) -> Answer | None:
     for entry in truth:
         name = entry["effect"]
         kind = CATALOGUE.get(name)
-        if name in ("backlash", "series_elasticity") and entry["draw"]["sign"] < 0:
-            return None  # the simulator's effect has the encoder on the motor
         if kind is None or KINDS[name].outside or not set(_names(kind)) <= set(entry["parameters"]):
             return None
         where = ("floor",) if name in ("ground_friction", "ground_compliance") else tuple(entry["where"])

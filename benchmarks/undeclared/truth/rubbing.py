@@ -8,6 +8,7 @@ import numpy as np
 from benchmarks.undeclared.truth.law import Law, World
 
 STRIBECK_SPEED = 0.15  # [rad/s]
+ROTOR = 0.9  # share of the declared armature that turns with the rotor
 REACH = 0.05  # travel after which hysteresis has turned round [rad]
 
 
@@ -155,7 +156,7 @@ class Backlash(Law):
     def model(self, model: mujoco.MjModel) -> None:
         """A tenth of the armature, declared or not, stays with the joint when the rotor lets go."""
         self._armature = float(model.dof_armature[model.joint(self.joint).dofadr[0]])
-        self._rotor = 0.9 * self._armature
+        self._rotor = ROTOR * self._armature
 
     def start(self, world: World, target: np.ndarray) -> None:
         """Touching on the forward side."""
@@ -218,7 +219,7 @@ class Elastic(Law):
     def model(self, model: mujoco.MjModel) -> None:
         """The armature, declared or not, moves to the rotor."""
         dof = model.joint(self.joint).dofadr[0]
-        self._rotor = 0.9 * float(model.dof_armature[dof])
+        self._rotor = ROTOR * float(model.dof_armature[dof])
         model.dof_armature[dof] *= 0.1
 
     def start(self, world: World, target: np.ndarray) -> None:
