@@ -62,14 +62,19 @@ def effects_at(chosen: Sequence[Candidate], values: np.ndarray) -> list[Effect]:
     return out
 
 
-def project(problem: Problem, columns: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Basis of nuisances and columns (B, W, M) and the inverse of its weighted normal matrix (B, B)."""
+def project(
+    problem: Problem, columns: np.ndarray, weights: np.ndarray, damping: float = 1e-9
+) -> tuple[np.ndarray, np.ndarray]:
+    """Basis of nuisances and columns (B, W, M) and the inverse of its weighted normal matrix (B, B).
+
+    `damping` is Marquardt's: by what share the columns' powers are raised.
+    """
     basis = np.concatenate((problem.nuisance, columns)) if len(columns) else problem.nuisance
     flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
     normal = flat @ flat.T
     count = len(problem.nuisance)
     normal[np.arange(count), np.arange(count)] += 1.0  # the nuisances' prior
-    normal[np.arange(count, len(normal)), np.arange(count, len(normal))] *= 1 + 1e-9
+    normal[np.arange(count, len(normal)), np.arange(count, len(normal))] *= 1 + damping
     return basis, np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
 
 
@@ -100,8 +105,12 @@ def gauss_newton(
     weights: np.ndarray,
     iterations: int = 4,
     coarse: bool = False,
+    damping: float = 1e-9,
 ) -> Fit:
-    """Refit all chosen effects jointly, from `values` (P,); `coarse` takes the sensitivities from coarse steps."""
+    """Refit all chosen effects jointly, from `values` (P,); `coarse` takes the sensitivities from coarse steps.
+
+    With `damping` (Marquardt's) what the data hardly tell stays where it is.
+    """
     values = _clip(chosen, np.asarray(values, dtype=float))
     residual = problem.residual([effects_at(chosen, values)])[0]
     cost, nuisance = cost_of(problem, residual, weights)
@@ -109,7 +118,7 @@ def gauss_newton(
     moving = np.flatnonzero(scales)
     columns = _columns(problem, chosen, values, residual, scales, coarse)
     for _ in range(iterations if len(chosen) else 0):
-        basis, inverse = project(problem, columns, weights)
+        basis, inverse = project(problem, columns, weights, damping)
         move = np.zeros(len(values))
         move[moving] = solve(basis, inverse, residual, weights)[len(problem.nuisance) :] * scales[moving]
         for share in (1.0, 0.4):

@@ -15,6 +15,7 @@ from bumblebee.diagnosis.gains import plain_gains
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.limits import pays_where_felt
+from bumblebee.diagnosis.many import certainty, fit_many, pays_together
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.scores import Columns, Scores, score_tests
 from bumblebee.diagnosis.screen import pulse_sizes, restless, screen, screening_windows
@@ -22,6 +23,7 @@ from bumblebee.diagnosis.trials import Trial, try_one
 from bumblebee.sim.effects import Effect
 
 _ANEW = 0.1  # share of the cost left, below which all candidates are screened anew
+_SOME = 2  # effects after which a model that is still far off is taken to lack many
 _CHANGED = 0.8  # share of the cost that a fit must leave less of, to be worth linearising around
 
 
@@ -39,16 +41,18 @@ class SearchConfig:
     """Candidates a round that are tried at their size in the simulator."""
     shortlist: int = 2
     """Joints a round on which play and flexible shafts are tried."""
-    most: int = 12
-    """Effects at most."""
+    most: int = 24
+    """Effects at most, beside those that the search began with."""
     patience: int = 4
-    """Rounds that may fail before the search ends."""
+    """Rounds that may fail, one after the other, before the search ends."""
     holdout_z: float = 2.0
     """Held-out gain must exceed this many of its standard errors."""
     least_gain: float = 0.01
     """Held-out gain must exceed this share of what all effects gain together: no law is exactly the catalogue's."""
     far: float = 30.0
     """Median chi-square above which gains far from the declared ones are tried first."""
+    many: float = 4.0
+    """Median chi-square above which, after two effects, the usual ones of all joints are fitted together."""
 
 
 class Run:
@@ -72,6 +76,7 @@ class Run:
         self.rejected: list[str] = []
         self.loss: Loss | None = None
         self.given = 0
+        self.tried_many = False
         self.candidates, _ = remake([])
         self.start_far()
         self.rescreen()
@@ -191,6 +196,35 @@ class Run:
         self.renew(fit)
         self.given = len(fit.chosen)
         return True
+
+    def start_many(self) -> bool:
+        """Begin anew with the usual effects of all joints, where some effects leave the data far from the model.
+
+        At once, where it is very far and half of the joints lack torque.
+        """
+        power = float(np.median((self.fit.clean(self.problem) ** 2).mean(axis=1)))
+        some = power > self.config.many and len(self.fit.chosen) >= _SOME
+        if self.tried_many or self.given or not (some or (power > self.config.far and self.half_lack())):
+            return False
+        self.tried_many = True
+        fit = fit_many(self.problem, self.candidates, self.say)
+        if fit is None or not pays_together(self.holdout, self.fit, fit):
+            return False
+        weights = window_weights(fit.clean(self.problem))
+        z = certainty(self.problem, fit, weights)
+        self.steps = [evidence(c, float(least), len(self.candidates)) for c, least in zip(fit.chosen, z, strict=True)]
+        self.say(f"begun anew with {len(fit.chosen)} effects together")
+        self.screened_cost = np.inf
+        self.closed.clear()
+        self.given = len(fit.chosen)
+        self.renew(fit)
+        return True
+
+    def half_lack(self) -> bool:
+        """Whether half of the joints, two at least, lack torque on the screening windows."""
+        joints = len(self.problem.plant.joints)
+        lack = restless(self.small, self.answers, self.small_fit().clean(self.small), joints, self.config.far)
+        return len(lack) >= max(_SOME, joints / 2)
 
     def find_loss(self) -> bool:
         """Look for commands that never arrived; if some did not, go on with those that did."""

@@ -77,10 +77,11 @@ def search(
 
 
 def _select(run: Run, config: SearchConfig) -> None:
-    """Forward selection until nothing is worth a trial, or too many were in vain."""
+    """Forward selection until nothing is worth a trial, or too many in a row were in vain."""
     vain, judged, limits = 0, None, []
     while len(run.fit.chosen) < config.most + run.given and vain < config.patience:
         tried, looked = [], []
+        run.start_many()
         if not run.given:
             tried = far_trials(run.problem, run.fit, run.candidates, run.weights, config.far)
             tried = [t for t in tried if t.candidate not in run.closed]
@@ -98,4 +99,4 @@ def _select(run: Run, config: SearchConfig) -> None:
         best = simplest(tried, run.fit.cost)
         if best.candidate.effect in LIMITS and run.find_loss():
             continue  # a lost command, too, spoils a few windows
-        vain += not run.accept(best.candidate, best.values)
+        vain = 0 if run.accept(best.candidate, best.values) else vain + 1
