@@ -1,7 +1,9 @@
 """Encoders that read in steps: seen in the readings themselves, not in the motion.
 
 Readings on a grid of step s add up in phase at the frequency 1 / s: |mean exp(2 pi i x / s)| is 1 without further noise
-and exp(-2 (pi sigma / s)^2) with noise of standard deviation sigma, and nearly 0 where there is no grid.
+and exp(-2 (pi sigma / s)^2) with noise of standard deviation sigma, and nearly 0 where there is no grid. A thousand
+readings show a tenth, so a grid is seen under noise of a third of its step. Places where the joint rests would feign
+one: readings of places that are crowded weigh less, and a stay within a step counts as one reading.
 """
 
 from collections.abc import Sequence
@@ -15,11 +17,12 @@ from bumblebee.diagnosis.problem import Problem
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect, single
 
-_SAMPLES = 1500
+_SAMPLES = 20_000
 _SMALLEST, _CELLS = 5e-4, 20  # a step is at least half a milliradian, and the joint crosses at least so many
-_IN_PHASE = 0.5
 _ON_GRID = 0.8  # of the resultant that the noise leaves of a grid
-_ABOVE = 4.0  # times the typical resultant of other frequencies
+_CHANCE = 1e-5  # of a joint without a grid
+_COARSEST = 0.7  # of the largest resultant: a grid's multiples in frequency fit as well as itself
+_PLACES = 40  # in which the crowd is counted
 _DENSE = 0.25  # of the width of a peak
 
 
@@ -44,7 +47,7 @@ def grids(rollouts: Sequence[Rollout], noise: Sequence[float] | np.ndarray | Non
     """
     joints = rollouts[0].joints
     every = np.concatenate([r.joint_pos for r in rollouts])
-    some = every[np.unique(np.linspace(0, len(every) - 1, _SAMPLES).round().astype(int))]
+    some = every[:: -(-len(every) // _SAMPLES)]
     most = np.full(len(joints), np.inf) if noise is None else np.asarray(noise, dtype=float)
     found = [_grid(name, some[:, j], float(most[j])) for j, name in enumerate(joints)]
     return [g for g in found if g is not None]
@@ -89,31 +92,49 @@ def _grid(joint: str, x: np.ndarray, noise: float) -> Grid | None:
     if span < _CELLS * _SMALLEST:
         return None
     x = x - x.mean()
+    weights = _uncrowded(x, span)
     # The mean phase at evenly spaced frequencies is the Fourier transform of a histogram, in cells far below a step.
     cell = _SMALLEST / 8
     count = int(2 ** np.ceil(np.log2(span / (_DENSE * cell))))
-    counts = np.bincount(np.round((x - x.min()) / cell).astype(int), minlength=count) / len(x)
+    counts = np.bincount(np.round((x - x.min()) / cell).astype(int), weights, minlength=count)
     every = np.arange(count // 2 + 1) / (count * cell)
     inside = (every >= _CELLS / span) & (every <= 1.0 / _SMALLEST)
     frequency, resultant = every[inside], np.abs(np.fft.rfft(counts, count))[inside]
     width = frequency[1] - frequency[0]
-    # The coarsest grid that fits: its multiples in frequency fit as well.
-    high = np.flatnonzero(resultant > max(_IN_PHASE, _ABOVE * float(np.median(resultant))))
+    fits = np.where(resultant > _ON_GRID * _left_of(frequency, noise), resultant, 0.0)
+    high = np.flatnonzero(fits > max(_COARSEST * fits.max(), 1e-9))
     if not len(high):
         return None
     first = high[frequency[high] <= frequency[high[0]] + 2 / span]
     best = frequency[first[np.argmax(resultant[first])]]
     near = np.linspace(best - width, best + width, 41)
-    fine = np.abs(_mean_phase(x, near))
+    fine = np.abs(np.exp(2j * np.pi * np.outer(near, x)) @ weights)
     value, top = float(near[np.argmax(fine)]), float(fine.max())
-    if top < _ON_GRID * np.exp(-2.0 * (np.pi * noise * value) ** 2):
+    p = len(frequency) * float(np.exp(-min(_readings(x, weights, 1.0 / value) * top**2, 600.0)))
+    if p > _CHANCE or top < _ON_GRID * _left_of(value, noise):
         return None
     # Phase noise of each reading, and how well a slope of phase over x is known from them.
     spread = np.sqrt(-2.0 * np.log(min(top, 1 - 1e-6)))
     error = spread / (2 * np.pi * np.sqrt(len(x)) * x.std())
-    p = min(1.0, len(frequency) * float(np.exp(-min(len(x) * top**2, 600.0))))
-    return Grid(joint, 1.0 / value, float(error / value**2), p)
+    return Grid(joint, 1.0 / value, float(error / value**2), min(1.0, p))
 
 
-def _mean_phase(x: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    return np.exp(2j * np.pi * np.outer(frequency, x)).mean(axis=1)
+def _left_of(frequency: np.ndarray | float, noise: float) -> np.ndarray | float:
+    """Resultant that noise leaves of a grid."""
+    return np.exp(-2.0 * (np.pi * np.minimum(noise, 1e3) * frequency) ** 2)
+
+
+def _uncrowded(x: np.ndarray, span: float) -> np.ndarray:
+    """Weights (N,) of readings, together 1: those of a place with more than the usual crowd share its weight."""
+    place = np.floor((x - x.min()) / (span / _PLACES)).astype(int)
+    crowd = np.bincount(place)
+    usual = float(np.median(crowd[crowd > 0]))
+    weights = np.minimum(1.0, usual / crowd[place])
+    return weights / weights.sum()
+
+
+def _readings(x: np.ndarray, weights: np.ndarray, step: float) -> float:
+    """How many readings count as independent: a stay within a step is one."""
+    stay = np.concatenate(([0], np.cumsum(np.abs(np.diff(np.round(x / step))) > 0)))
+    together = np.bincount(stay, weights)
+    return float(1.0 / (together**2).sum())

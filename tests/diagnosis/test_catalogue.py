@@ -38,7 +38,7 @@ def test_an_effect_is_named_up_to_its_class(
         assert found[0]["parameters"][parameter]["value"] == pytest.approx(truth, rel=tolerance)
 
 
-@pytest.mark.parametrize("noise", [0.0, 4e-4])
+@pytest.mark.parametrize("noise", [0.0, 4e-4, 8e-4])
 def test_an_encoders_steps_are_seen_in_its_readings(noise: float) -> None:
     """The grid is found with its step, with noise on top as well; a smooth reading has none."""
     rng = np.random.default_rng(0)
