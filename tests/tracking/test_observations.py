@@ -3,7 +3,15 @@
 import torch
 
 from bumblebee.sim.engine import RobotState
-from bumblebee.sim.rotations import angle_between, from_rotation_vector, matrix, multiply, rotate, rotate_inverse
+from bumblebee.sim.rotations import (
+    angle_between,
+    from_rotation_vector,
+    length3,
+    matrix,
+    multiply,
+    rotate,
+    rotate_inverse,
+)
 from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
 from bumblebee.tracking.noise import LEVELS, noise_levels
 from bumblebee.tracking.observations import joint_targets, layout, observe
@@ -106,6 +114,8 @@ def test_rotations_agree_with_each_other() -> None:
     assert torch.allclose(rotate_inverse(a, rotate(a, v)), v, atol=1e-5)
     small = from_rotation_vector(torch.tensor([[0.0, 0.3, 0.0]]))
     assert torch.allclose(angle_between(a[:1], multiply(a[:1], small)), torch.tensor([0.3]), atol=1e-4)
+    assert torch.allclose(angle_between(a, -a), torch.zeros(5), atol=1e-6)  # two names of one rotation
+    assert torch.allclose(length3(v), v.norm(dim=-1)) and length3(torch.zeros(2, 3, 3)).shape == (2, 3)
 
 
 def test_every_noise_level_names_a_part() -> None:
