@@ -1,18 +1,27 @@
 """Copies of motions: other arms, another tempo, what stays as it is, and how often they are drawn."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 
-from benchmarks.baselines.variety import ARMS, at_tempo, flies, shares, varied, with_arms
-from benchmarks.motion_pack import Packed
+from benchmarks.baselines import relatives
+from benchmarks.baselines.variety import ARMS, at_tempo, flies, mirrored, shares, varied, with_arms
+from benchmarks.motion_pack import Packed, write_pack
+from bumblebee.learning.policy import Policy, Shape, new_actor
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.motion.kinematics import forward_key_positions, make_clip
 from bumblebee.motion.quaternions import from_axis_angle
-from bumblebee.robot.facts import joint_names
+from bumblebee.robot.facts import KEY_BODIES, joint_names
+from bumblebee.tracking.mirror import other_side
+from bumblebee.tracking.observations import layout
 
 CLIPS = make_library(EmbeddedConfig(limit=3))
+ARRAYS = ("root_pos", "root_quat", "joint_pos", "key_pos")
 LEGS = [i for i in range(len(joint_names())) if i not in ARMS]
 
 
@@ -59,6 +68,41 @@ def test_at_another_tempo_it_goes_through_the_same_places_in_another_time(factor
     assert np.allclose(made.joint_pos[whole], clip.joint_pos[index], atol=1e-5)
     assert np.allclose(made.root_pos[whole], clip.root_pos[index], atol=1e-5)
     assert np.allclose(np.abs((made.root_quat[whole] * clip.root_quat[index]).sum(1)), 1.0, atol=1e-5)
+
+
+def test_a_mirrored_motion_has_the_other_sides_key_bodies_and_mirrored_twice_is_itself():
+    clip = CLIPS[0]
+    made = mirrored(clip)
+    order = [KEY_BODIES.index(other_side(name)) for name in KEY_BODIES]
+    assert np.allclose(made.key_pos, clip.key_pos[:, order] * [1, -1, 1], atol=2e-3)  # the robot is symmetric to 2 mm
+    assert not np.allclose(made.joint_pos, clip.joint_pos, atol=0.1)
+    again = mirrored(made)
+    assert np.allclose(again.joint_pos, clip.joint_pos) and np.allclose(again.root_quat, clip.root_quat, atol=1e-6)
+
+
+def test_relatives_of_a_motion_are_tried_and_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    shape = Shape(sum(size for _, size in layout(23, 2)), 4, 23, (8,), (0.1, 0.3))
+    actor = new_actor(shape)
+    for parameter in actor.mlp.parameters():
+        parameter.data.zero_()
+    (tmp_path / "p").mkdir()
+    Policy(actor, {}, shape).save(tmp_path / "p")
+    short = replace(CLIPS[0], **{name: getattr(CLIPS[0], name)[:20] for name in ARRAYS})
+    rows = [Packed("real", True, short), Packed("embedded", True, CLIPS[1])]
+    rows.append(Packed("real", True, replace(short, name="held", split="test")))
+    write_pack(tmp_path / "m.npz", rows)
+    options = ["relatives", str(tmp_path / "p"), "--motions", str(tmp_path / "m.npz"), "--out", str(tmp_path / "r.csv")]
+    monkeypatch.setattr("sys.argv", options)
+    relatives.main()
+    table = pd.read_csv(tmp_path / "r.csv")
+    assert set(table["kind"]) == set(relatives.RELATIVES) and set(table["name"]) == {short.name, "held"}
+    assert table["success"].all()  # 0.4 s of waving: an action of zero holds it
+    own = table.assign(success=table["kind"] != "mirrored")
+    text = relatives.table_of(own)
+    assert "| p | 1 of 1, 1.00 [" in text and "0 of 1, 0.00 [" in text
+    monkeypatch.setattr("sys.argv", ["relatives", str(tmp_path / "none"), *options[2:]])
+    with pytest.raises(SystemExit, match="2"):
+        relatives.main()
 
 
 def test_a_flight_keeps_its_tempo():
