@@ -268,7 +268,8 @@ def scales_of(plant: Plant, rollouts: Sequence[Rollout], model: mujoco.MjModel |
         for r in rollouts
     ]
     rms = np.sqrt(np.mean([(t**2).mean(axis=0) for t in torques], axis=0))
-    rms = np.where(plant.actuator < 0, np.maximum(rms, _bias(plant, rollouts)), rms)
+    if (plant.actuator < 0).any():
+        rms = np.where(plant.actuator < 0, np.maximum(rms, _bias(plant, rollouts)), rms)
     torque = np.maximum(rms, 0.05 * rms.max() + 1e-9)
     speeds = np.sqrt(np.mean([(r.joint_vel**2).mean(axis=0) for r in rollouts], axis=0))
     return Scales(

@@ -84,6 +84,7 @@ def diagnose(
     )
     # A small model costs little to simulate: more windows.
     more = float(np.clip(12 / session.plant.model.nv, 1.0, _MORE)) if config.grow else 1.0
+    say("what noise in the starts becomes, by simulation")
     problem = _problem(session, fitted, round(more * config.max_windows), config.horizon, rng)
     holdout = _holdout(session, config, more, rng)
     say(f"{len(problem.windows)} windows of {config.horizon:g} s")

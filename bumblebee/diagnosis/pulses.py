@@ -52,13 +52,23 @@ class Answers:
 
 
 def answers_of(
-    plant: Plant, layout: Layout, windows: Windows, variation: Variation, step: float, sizes: np.ndarray
+    plant: Plant,
+    layout: Layout,
+    windows: Windows,
+    variation: Variation,
+    step: float,
+    sizes: np.ndarray,
+    only: np.ndarray | None = None,
 ) -> Answers:
-    """Simulate pulses of `sizes` (nv,) [N m, N] on every degree of freedom of a plain variation."""
+    """Simulate pulses of `sizes` (nv,) [N m, N] on every degree of freedom of a plain variation.
+
+    With `only` on these alone, (some of nv,); the others' answers are left at zero.
+    """
+    pushed = np.arange(plant.model.nv) if only is None else only
     count = max(1, int(np.ceil(windows.span / step - 1e-6)))
     control = inputs_of(windows, variation, step, count, {})
     edges = np.unique(np.linspace(0, count, min(SEGMENTS, count) + 1).round().astype(int))
-    model, size, nv = with_step(variation.model, step), len(windows), plant.model.nv
+    model, size, many = with_step(variation.model, step), len(windows), len(pushed)
     qpos = windows.qpos.copy()
     qpos[:, plant.qpos] -= variation.offset
     plain = Batch(model, size, threads())
@@ -80,21 +90,21 @@ def answers_of(
         return simulated_readings(plant, layout, *parts, offset)
 
     base, base_quat = readings(path.qpos, path.qvel)
-    change = np.zeros((nv, len(edges) - 1, size, *base.shape[2:]))
-    batch = Batch(model, nv * size, threads())
+    change = np.zeros((plant.model.nv, len(edges) - 1, size, *base.shape[2:]))
+    batch = Batch(model, many * size, threads())
     for s, (first, last) in enumerate(itertools.pairwise(edges)):
         batch.reset(stage=0)
-        batch.bind("qpos")[:] = np.tile(path.qpos[:, first], (nv, 1))
-        batch.bind("qvel")[:] = np.tile(path.qvel[:, first], (nv, 1))
-        push = np.repeat(np.diag(sizes), size, axis=0)
-        q, v = (np.tile(x[:, : first + 1], (nv, 1, 1)) for x in (path.qpos, path.qvel))
+        batch.bind("qpos")[:] = np.tile(path.qpos[:, first], (many, 1))
+        batch.bind("qvel")[:] = np.tile(path.qvel[:, first], (many, 1))
+        push = np.repeat(np.diag(sizes)[pushed], size, axis=0)
+        q, v = (np.tile(x[:, : first + 1], (many, 1, 1)) for x in (path.qpos, path.qvel))
         for a, b, torque in ((first, last, push), (last, count, np.zeros_like(push))):
             if b > a:
                 batch.bind("qfrc_applied")[:] = torque
-                part = batch.rollout(b - a, np.tile(control[:, a:b], (nv, 1, 1)), record=("qpos", "qvel"))
+                part = batch.rollout(b - a, np.tile(control[:, a:b], (many, 1, 1)), record=("qpos", "qvel"))
                 q, v = np.concatenate((q, part["qpos"]), axis=1), np.concatenate((v, part["qvel"]), axis=1)
         moved, moved_quat = readings(q, v)
         same = None if base_quat is None else np.broadcast_to(base_quat, moved_quat.shape)
-        change[:, s] = difference(layout, moved, moved_quat, np.broadcast_to(base, moved.shape), same)
+        change[pushed, s] = difference(layout, moved, moved_quat, np.broadcast_to(base, moved.shape), same)
     change /= sizes[:, None, None, None, None]
     return Answers(path, np.nan_to_num(change))

@@ -136,6 +136,7 @@ class Run:
         looked = self.promising()
         if not looked:
             return [], []
+        self.say(f"{len(looked)} of {len(self.candidates)} candidates simulated on all windows")
         columns = Columns(looked, self.problem.sensitivities(looked, self.fit.effects))
         tests = score_tests(self.problem, columns, self.fit, self.weights)
         order = [k for k in np.argsort(-tests.gain) if self.is_open(looked[k], tests, k, self.bound, 1.0)]

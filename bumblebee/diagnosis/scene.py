@@ -66,6 +66,7 @@ def _scene(
         variation = Variation(variation.model, variation.delay, variation.offset)
     else:
         variation = vary(plant, [])
-    answers = answers_of(plant, layout, windows, variation, problem.coarse, pulse_sizes(problem, torque))
+    sizes = pulse_sizes(problem, torque)
+    answers = answers_of(plant, layout, windows, variation, problem.coarse, sizes, only=plant.dof)
     evidence = make_evidence(problem, joint_answers(problem, answers), residual, columns, weights)
     return Scene(problem, residual, columns, evidence, quantities(plant, windows, answers.path, variation.model))

@@ -51,7 +51,7 @@ def _judge_velocity(
     velocity then have little to do with each other, over any window, which is a warning and no wrong file.
     """
     limits, column = view.limits, view.label("joint_vel", joint)
-    fits = np.array([_correlation(speed[:, other], said[:, joint]) for other in range(speed.shape[1])])
+    fits = _correlations(speed, said[:, joint])
     fit, best = float(fits[joint]), int(np.argmax(fits))
     ratio = float(said[:, joint].std() / max(speed[:, joint].std(), 1e-9))
     row = int(np.argmax(np.abs(speed[:, joint] - said[:, joint])))
@@ -73,7 +73,15 @@ def _judge_velocity(
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.corrcoef(a, b)[0, 1]) if min(a.std(), b.std()) > 1e-9 else 0.0
+    return float(_correlations(a[:, None], b)[0])
+
+
+def _correlations(several: np.ndarray, one: np.ndarray) -> np.ndarray:
+    """Correlation (J,) of each column of `several` (T, J) with `one` (T,); 0 where either rests."""
+    spread, size = several.std(axis=0), one.std()
+    moving = np.minimum(spread, size) > 1e-9
+    product = (several - several.mean(axis=0)).T @ (one - one.mean()) / len(one)
+    return np.where(moving, product / np.where(moving, spread * size, 1.0), 0.0)
 
 
 def check_response(view: View) -> None:
