@@ -26,6 +26,7 @@ from bumblebee.diagnosis.search import Search
 from bumblebee.diagnosis.trials import try_one
 
 _OFFERS, _SHAPES = 5, 2  # effects whose sensitivities are simulated, and shapes of each
+_ANYWHERE = 2  # of these the most promising may be on other joints
 _TRIALS, _FITS = 4, 2  # of these tried at their size, and refitted jointly
 _ROUNDS = 2  # effects of the catalogue that together may take a form's place
 _HOPELESS = 0.5  # share of what a form gains, above which no second name is tried
@@ -41,11 +42,17 @@ class Offers:
     """The most promising first."""
 
     def on(self, plant: Plant, joint: str) -> list[Candidate]:
-        """Those that could act on a joint: on it, on what it carries, or on the whole robot; a few shapes of each."""
-        carried = {joint, "", *_carried(plant, joint)}
+        """Those that could act on a joint, a few shapes of each; and the most promising wherever they are.
+
+        What sits on another joint or on a body that the joint does not carry is left out.
+        """
+        elsewhere = (set(plant.joints) | set(plant.bodies)) - {joint, *_carried(plant, joint)}
+        best = list(dict.fromkeys((c.effect, c.where) for c in self.candidates))[:_ANYWHERE]
         kept: list[Candidate] = []
         for c in self.candidates:
-            if c.where in carried and sum((c.effect, c.where) == (o.effect, o.where) for o in kept) < _SHAPES:
+            if c.where in elsewhere and (c.effect, c.where) not in best:
+                continue
+            if sum((c.effect, c.where) == (o.effect, o.where) for o in kept) < _SHAPES:
                 kept.append(c)
         return kept
 

@@ -48,13 +48,14 @@ def test_without_offers_nothing_takes_a_forms_place() -> None:
     assert named_instead(problem, Holdout(judge), nothing, form, "pole", Offers()) is None
 
 
-def test_an_offer_acts_on_the_joint_on_what_it_carries_or_on_all() -> None:
+def test_an_offer_acts_on_the_joint_on_what_it_carries_or_on_all_or_is_among_the_best() -> None:
     _, problem, _ = prepared()
-    places = ("cart", "pole", "", "cart")
-    kinds = ("viscous_friction", "link_mass", "command_delay", "coulomb_friction")
+    places = ("pole", "cart", "cart", "pole", "")
+    kinds = ("armature", "armature", "viscous_friction", "link_mass", "command_delay")
     offers = Offers([Candidate(k, w, (0.0,), (0.1,)) for k, w in zip(kinds, places, strict=True)])
-    assert [c.effect for c in offers.on(problem.plant, "pole")] == ["link_mass", "command_delay"]
-    assert len(offers.on(problem.plant, "cart")) == 4
+    on_pole = [(c.effect, c.where) for c in offers.on(problem.plant, "pole")]
+    assert on_pole == [("armature", "pole"), ("armature", "cart"), ("link_mass", "pole"), ("command_delay", "")]
+    assert len(offers.on(problem.plant, "cart")) == 5
 
 
 @pytest.mark.parametrize(
