@@ -6,7 +6,7 @@ the rest.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from scipy.stats import t as student
 from bumblebee.diagnosis.fit import Fit, cost_of
 from bumblebee.diagnosis.nuisance import nuisance_columns
 from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.recall import Recall
 from bumblebee.diagnosis.simulate import residuals
 from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.windows import Windows
@@ -34,6 +35,7 @@ class Holdout:
     problem: Problem | None = None
     long: Windows | None = None
     """Windows of 1 s, their last tick compared."""
+    recall: Recall = field(default_factory=Recall, repr=False)
 
     def relinearised(self, effects: Sequence[Effect]) -> "Holdout":
         """The same around a model with `effects`."""
@@ -86,8 +88,12 @@ class Holdout:
             return False
         p = self.problem
         part = p.layout.slices["joint_pos"]
-        models = [vary(p.plant, fit.effects) for fit in (before, after)]
-        raw = residuals(p.plant, p.layout, self.long, models, p.fine)[:, :, -1, part]
+
+        def simulated(new: Sequence[Sequence[Effect]]) -> np.ndarray:
+            models = [vary(p.plant, effects) for effects in new]
+            return residuals(p.plant, p.layout, self.long, models, p.fine)[:, :, -1, part]
+
+        raw = self.recall.get((self.long,), [before.effects, after.effects], p.fine, simulated)
         diverged = ~np.isfinite(raw).all(axis=2)
         if diverged[1].sum() > diverged[0].sum():
             return True

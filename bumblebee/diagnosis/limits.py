@@ -28,8 +28,9 @@ from bumblebee.sim.servo import Servos, servos_of
 KINDS = ("torque_limit", "torque_speed_limit")
 _ODD, _FIRST = 1.6, 4  # power of a window that is off; windows that a limit reaches first
 _WORTH, _SHARE = 15.0, 2e-3  # fall of the cost; share of it that a size must gain to be looked at closer
-_REACHED = (*range(1, 9), 10, 12, 16, 24, 40, 75, 180)  # windows that the sizes tried reach
-_HOPELESS = 0.03  # share of the cost that two sizes one after the other may add before smaller ones are left out
+_REACHED = (1, 2, 4, 7, 12, 24, 50, 100, 200)  # windows that the sizes tried reach
+_HOPELESS = 1.5  # rise of log(1 + power / s), summed, by each of two sizes from which on no more are tried
+_ENOUGH = 12  # windows: where no size that reaches up to so many gains, no more are tried
 _CLOSER = 5  # halvings of the interval around the best of them
 _FELT, _NEARLY, _CLEAR = 0.1, 0.8, 0.5  # change of a window's log(1 + power); share of these that gain; their sum
 _SEVERAL, _MOSTLY = 4, 0.5  # windows that speak for themselves; share of the excess that fewer must lose
@@ -49,17 +50,24 @@ class _Demand:
         return -self.peak[:, j] if kind == "torque_limit" else self.slowest[:, j]
 
 
-def limit_trials(problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray) -> list[Trial]:
+def limit_trials(
+    problem: Problem,
+    fit: Fit,
+    candidates: Sequence[Candidate],
+    weights: np.ndarray,
+    hopeless: set[tuple[str, str]],
+) -> list[Trial]:
     """The limit that explains most of the windows that are far off; none where no limit does.
 
     Of the four windows that a limit reaches first one must be off, or it is not simulated. Where it acts in a few only
-    it must bring them down to noise, which one number does not do by chance.
+    it must bring them down to noise, which one number does not do by chance. One that only makes the windows worse that
+    it reaches first joins the `hopeless` (effect, place), which are not tried.
     """
     clean = fit.clean(problem)
     power = (clean**2).mean(axis=1)
     usual = max(float(np.median(power)), 1.0)
     taken = {(c.effect, c.where) for c in fit.chosen}
-    kinds = [c for c in candidates if c.effect in KINDS and (c.effect, c.where) not in taken]
+    kinds = [c for c in candidates if c.effect in KINDS and (c.effect, c.where) not in taken | hopeless]
     odd = power > _ODD
     if not odd.any() or not kinds:
         return []
@@ -72,6 +80,8 @@ def limit_trials(problem: Problem, fit: Fit, candidates: Sequence[Candidate], we
         if not odd[np.argsort(reach)[:_FIRST]].any():
             continue
         best = _profile(problem, fit, clean, usual, own[0], reach)
+        if best is not None and best[1] <= 0:
+            hopeless.add((kind, where))
         if best is not None and best[1] > _WORTH:
             nearest = min(own, key=lambda c: abs(c.start[0] - best[0]))
             change = _change(problem, fit, nearest, best[0], np.isfinite(reach))
@@ -110,7 +120,10 @@ def pays_where_felt(problem: Problem, holdout: Holdout, before: Fit, after: Fit)
 def _profile(
     problem: Problem, fit: Fit, clean: np.ndarray, usual: float, candidate: Candidate, reach: np.ndarray
 ) -> tuple[float, float] | None:
-    """Size and gain of the best of the sizes tried, `reach` (W,) being where each window begins to feel it."""
+    """Size and gain of the best of the sizes tried, `reach` (W,) being where each window begins to feel it.
+
+    None where no size is worth a closer look; no gain where all that were tried only do harm.
+    """
     order = np.argsort(reach)
     felt = reach[order][np.isfinite(reach[order])]
     counts = sorted({min(n, len(felt) - 1) for n in _REACHED if len(felt) >= 2} - {0})
@@ -118,13 +131,14 @@ def _profile(
         return None
     sizes = [float(0.5 * (felt[n - 1] + felt[n])) for n in counts]
     gains: list[float] = []
-    for size in sizes:
+    for count, size in zip(counts, sizes, strict=True):
         gains.append(_gain(problem, fit, clean, usual, candidate, size, reach))
-        if (
-            len(gains) > 1 and max(gains[-2:]) < -_HOPELESS * fit.cost
-        ):  # smaller limits spoil these windows further, and others
-            break
+        harmful = len(gains) > 1 and max(gains[-2:]) < -2.0 * usual * clean.shape[1] * _HOPELESS
+        if harmful or (count >= _ENOUGH and max(gains) < 0.5 * _SHARE * fit.cost):
+            break  # smaller limits spoil these windows further, and others
     best = int(np.argmax(gains))
+    if gains[best] <= 0 and harmful:
+        return _value(candidate, sizes[best]), 0.0
     if gains[best] <= _SHARE * fit.cost:
         return None
     low, high = sizes[max(best - 1, 0)], sizes[min(best + 1, len(gains) - 1)]

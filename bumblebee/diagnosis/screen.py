@@ -45,9 +45,9 @@ def screen(
             torques = signatures.of(c).astype(np.float32)
             felt = np.flatnonzero(np.abs(torques).any(axis=(0, 1, 2)))  # a joint's effect is felt by its own dof alone
             flat = torques[..., felt].transpose(1, 0, 3, 2).reshape(len(problem.windows), count, -1)
-            values[at : at + count] = np.matmul(flat, white[:, felt].reshape(len(flat), -1, white.shape[-1])).transpose(
-                1, 0, 2
-            )
+            # A view where one degree of freedom is all: a copy for each of a thousand candidates costs seconds.
+            own = white[:, felt[0]] if len(felt) == 1 else white[:, felt].reshape(len(flat), -1, white.shape[-1])
+            values[at : at + count] = np.matmul(flat, own).transpose(1, 0, 2)
         at += count
     if simulated:
         drawn = problem.sensitivities([c for c, _ in simulated], list(effects))

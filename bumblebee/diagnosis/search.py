@@ -15,8 +15,10 @@ from bumblebee.diagnosis.limits import limit_trials
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.run import Run, SearchConfig
 from bumblebee.diagnosis.scores import Columns, Scores
-from bumblebee.diagnosis.trials import far_trials, simplest
+from bumblebee.diagnosis.trials import Trial, far_trials, simplest
 from bumblebee.sim.effects import Effect
+
+_MOST_OF_IT = 0.3  # share of the cost that a trial takes away, beside which limits elsewhere can wait
 
 
 @dataclass(eq=False)
@@ -79,6 +81,7 @@ def search(
 def _select(run: Run, config: SearchConfig) -> None:
     """Forward selection until nothing is worth a trial, or too many in a row were in vain."""
     vain, judged, limits = 0, None, []
+    hopeless: set[tuple[str, str]] = set()
     while len(run.fit.chosen) < config.most + run.given and vain < config.patience:
         tried, looked = [], []
         run.start_many()
@@ -87,8 +90,9 @@ def _select(run: Run, config: SearchConfig) -> None:
             tried = [t for t in tried if t.candidate not in run.closed]
         if not tried:
             tried, looked = run.trials()
-        if judged is not run.fit:
-            judged, limits = run.fit, limit_trials(run.problem, run.fit, run.candidates, run.weights)
+        some = _where_limits_matter(tried, run)
+        if judged != (run.fit, some):
+            judged, limits = (run.fit, some), limit_trials(run.problem, run.fit, some, run.weights, hopeless)
         tried += [t for t in limits if t.candidate not in run.closed]
         if not tried and not looked:
             break
@@ -99,4 +103,19 @@ def _select(run: Run, config: SearchConfig) -> None:
         best = simplest(tried, run.fit.cost)
         if best.candidate.effect in LIMITS and run.find_loss():
             continue  # a lost command, too, spoils a few windows
-        vain = 0 if run.accept(best.candidate, best.values) else vain + 1
+        accepted, place = run.accept(best.candidate, best.values), best.candidate.where
+        vain = 0 if accepted else vain + 1
+        if accepted:
+            hopeless = {(kind, where) for kind, where in hopeless if place and where != place}
+
+
+def _where_limits_matter(tried: Sequence[Trial], run: Run) -> tuple[Candidate, ...]:
+    """The candidates among which limits are tried: all, or while one trial explains much the places of these trials.
+
+    What a limit does may pass for weakness or friction of its joint, and then the two are compared; a limit elsewhere
+    is judged when the large effects are known.
+    """
+    if min((t.cost for t in tried), default=np.inf) > (1 - _MOST_OF_IT) * run.fit.cost:
+        return tuple(run.candidates)
+    places = {t.candidate.where for t in tried}
+    return tuple(c for c in run.candidates if c.where in places)
