@@ -15,6 +15,7 @@ from bumblebee.diagnosis.discover import Discovery, discover
 from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_whiteners, horizon_windows
 from bumblebee.diagnosis.fit import Fit, interval
 from bumblebee.diagnosis.formula import Formula
+from bumblebee.diagnosis.guard import standing
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.instead import offers_of, with_named
 from bumblebee.diagnosis.latency import latency_notes
@@ -116,9 +117,13 @@ def diagnose(
         document["structure"] = structure_table(beyond)
         session.notes.extend(f"withdrawn for what explains more: {name}" for name in beyond.withdrawn)
     readings = grids(session.rollouts, session.sigma[: len(session.plant.joints)])
-    rounded, steps = entries(readings, holdout.problem or last.problem, last.fit)
+    judging = holdout.problem or last.problem
+    rounded, steps = entries(readings, judging, last.fit)
     lost, losses = loss_entries(found.loss)
-    effects, document["effects"] = [*effects, *steps, *losses], document["effects"] + rounded + lost
+    effects, steps, withdrawn = standing(judging, effects, steps)
+    session.notes.extend(withdrawn)
+    named = (document["effects"] if effects else []) + (rounded if steps else [])
+    effects, document["effects"] = [*effects, *steps, *losses], named + lost
     document["error"] = _errors(session, effects, config)
     document["unidentifiable"] = [
         {"where": [name], "why": "the joint moves no more than its sensor's noise"} for name in still

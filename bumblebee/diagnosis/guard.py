@@ -1,0 +1,52 @@
+"""The last question: is the corrected model worse than the declared one on windows that took no part in the fit?
+
+Each effect had to pay there when it was accepted, but not all of what stands in the end is judged so: steps of encoders
+are read off the logs, a last fit moves every value. A correction that makes things worse is withdrawn, with a note.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bumblebee.diagnosis.fit import cost_of
+from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.sim.effects import Effect
+
+_WORSE = 0.02  # growth of log(1 + chi-square) that is none
+
+
+def is_worse_than(problem: Problem, before: Sequence[Effect], after: Sequence[Effect]) -> bool:
+    """Whether the windows of `problem` are further off with `after`, beyond two standard errors and a trifle.
+
+    Each with numerical differences of its own taken out.
+    """
+    logs = []
+    for residual in problem.residual([before, after]):
+        nuisance = cost_of(problem, residual, window_weights(residual))[1]
+        left = residual - np.tensordot(nuisance, problem.nuisance, axes=1)
+        logs.append(np.log1p((left**2).mean(axis=1)))
+    growth = logs[1] - logs[0]
+    error = growth.std(ddof=1) / np.sqrt(len(growth)) if len(growth) > 1 else np.inf
+    return bool(growth.mean() > max(_WORSE, 2.0 * error))
+
+
+def standing(
+    problem: Problem, fitted: Sequence[Effect], read: Sequence[Effect]
+) -> tuple[list[Effect], list[Effect], list[str]]:
+    """What may stand of the effects that were fitted and of those that were read off the logs; and notes on the rest.
+
+    `problem` has windows that took no part in the fit, where there are any.
+    """
+    fitted, read, notes = list(fitted), list(read), []
+    if read and is_worse_than(problem, fitted, [*fitted, *read]):
+        notes.append(_note(read))
+        read = []
+    if fitted and is_worse_than(problem, read, [*fitted, *read]):
+        notes.append(_note(fitted))
+        fitted = []
+    return fitted, read, notes
+
+
+def _note(effects: Sequence[Effect]) -> str:
+    names = ", ".join(f"{e.effect} on {', '.join(e.where) or 'the whole robot'}" for e in effects)
+    return f"withdrawn, for windows that took no part in the fit were further off with it: {names}"

@@ -1,0 +1,60 @@
+"""Parameters that are wrong on all joints at once are found together and by name."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.candidates import all_candidates
+from bumblebee.diagnosis.diagnose import make_problem
+from bumblebee.diagnosis.fit import gauss_newton
+from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.many import certainty, fit_many, pays_together
+from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.session import Session, make_session
+from bumblebee.diagnosis.windows import choose_starts, cut
+from tests.diagnosis import arm
+
+TRUTH = {
+    **{("coulomb_friction", j): v for j, v in zip(arm.JOINTS, (1.2, 2.0, 0.8), strict=True)},
+    **{("viscous_friction", j): v for j, v in zip(arm.JOINTS, (0.8, 1.0, 0.5), strict=True)},
+    **{("armature", j): v for j, v in zip(arm.JOINTS, (0.05, 0.06, 0.03), strict=True)},
+}
+
+
+def _opened(effects: dict[tuple[str, str], float]) -> tuple[Session, Problem, Problem]:
+    rollouts = arm.simulate(effects, count=3, seconds=5.0)
+    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+
+    def of(ids: list[int], budget: int) -> Problem:
+        windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, ids, 0.2, budget))
+        rng = np.random.default_rng(0)
+        return make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
+
+    return session, of([0, 1], 40), of([2], 20)
+
+
+def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None:
+    session, problem, other = _opened(TRUTH)
+    fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), lambda text: None)
+    assert fit is not None
+    found = {(c.effect, c.where): float(fit.of(c)[0]) for c in fit.chosen}
+    for place, value in TRUTH.items():
+        assert found[place] == pytest.approx(value, rel=0.25), place
+    assert set(found) - set(TRUTH) <= {(kind, j) for kind in ("motor_strength", "encoder_offset") for j in arm.JOINTS}
+    assert certainty(problem, fit, window_weights(fit.clean(problem))).min() >= 4.0
+    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+    assert pays_together(Holdout(other), declared, fit)
+    assert not pays_together(Holdout(other), fit, declared)
+
+
+def test_without_candidates_there_is_no_fit() -> None:
+    _, problem, _ = _opened({})
+    assert fit_many(problem, [], lambda text: None) is None
+
+
+def test_what_is_found_on_a_robot_like_its_model_does_not_pay() -> None:
+    """Another integrator looks like a little inertia on every joint."""
+    session, problem, other = _opened({})
+    fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), lambda text: None)
+    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+    assert fit is None or not pays_together(Holdout(other), declared, fit)
