@@ -68,7 +68,8 @@ class MujocoCpu:
         self._keys = [model.body(name).id for name in KEY_BODIES]
         self._feet = [model.body(name).id for name in FEET]
         self._force = foot_sensor_columns(model)
-        self._qpos, self._qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
+        self._time, self._qpos, self._qvel = (self.batch.bind(name) for name in ("time", "qpos", "qvel"))
+        self._ctrl, self._act, self._warmstart = (self.batch.bind(name) for name in ("ctrl", "act", "qacc_warmstart"))
         self._xpos, self._xquat = self.batch.bind("xpos"), self.batch.bind("xquat")
         self._actuator_force, self._sensordata = self.batch.bind("actuator_force"), self.batch.bind("sensordata")
         self._history, self._held = history_template(model)
@@ -93,20 +94,19 @@ class MujocoCpu:
         if len(ids) == 0:
             return
         i, held = ids.numpy(), targets.numpy()
-        batch = self.batch
-        batch.time[i] = 0.0
-        batch.qpos[i] = qpos.numpy()
-        batch.qvel[i] = qvel.numpy()
-        batch.ctrl[i] = held
-        batch.qacc_warmstart[i] = 0.0
+        self._time[i] = 0.0
+        self._qpos[i] = qpos.numpy()
+        self._qvel[i] = qvel.numpy()
+        self._ctrl[i] = held
+        self._warmstart[i] = 0.0
         if self.model.na:
-            batch.act[i] = 0.0
+            self._act[i] = 0.0
         if len(self._history):
             filled = np.repeat(self._history[None], len(i), axis=0)
             for column, actuator in self._held:
                 filled[:, column] = held[:, actuator]
-            batch.history[i] = filled
-        batch.forward(ids=i, stage=_VEL)
+            self.batch.history[i] = filled
+        self.batch.forward(ids=i, stage=_VEL)
         self._unstable[ids] = False
 
     def settle(self) -> None:
@@ -117,7 +117,7 @@ class MujocoCpu:
 
     def step(self, targets: Tensor) -> None:
         """See `Engine.step`."""
-        self.batch.ctrl[:] = targets.numpy()
+        self._ctrl[:] = targets.numpy()
         self.batch.step(nstep=self.substeps, stage=_VEL)
         counted = self.batch.warning[:, _BAD, 1].sum(axis=1)  # [last index, number]
         finite = np.isfinite(self._qpos.sum(axis=1) + self._qvel.sum(axis=1))
@@ -164,7 +164,7 @@ class MujocoCpu:
 
     def push(self, velocity_w: Tensor) -> None:
         """See `Engine.push`."""
-        self.batch.qvel[:, :3] += velocity_w.numpy()
+        self._qvel[:, :3] += velocity_w.numpy()
 
     def unstable(self) -> Tensor:
         """See `Engine.unstable`."""

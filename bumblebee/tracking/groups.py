@@ -67,8 +67,8 @@ class Group:
         exact = self._look(state, ref, action)
         rows = [exact]
         if self._levels is not None:
-            draws = torch.rand(exact.shape, generator=generator, device=exact.device)
-            rows.append((exact - self._levels).addcmul_(draws, 2 * self._levels))
+            draws = torch.empty_like(exact).uniform_(-1, 1, generator=generator)
+            rows.append(torch.addcmul(exact, self._levels, draws))
         if self._rings:
             for ring, row in zip(self._rings, rows, strict=True):
                 ring.add(row[:, : self._size], fresh)
