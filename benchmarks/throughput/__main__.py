@@ -10,6 +10,7 @@ What counts are the ratios.
 """
 
 import argparse
+import math
 import sys
 from pathlib import Path
 
@@ -34,20 +35,24 @@ GOALS = {"mujoco": {"environment": 0.8}, "mujoco_warp": {"environment": 0.75}}
 def print_rows(
     config: EnvConfig, clips: list[Clip], ppo: PpoConfig, seconds: float, effects: list[Effect]
 ) -> tuple[float, float]:
-    """Three rows of the table; the environment's and the loop's rates."""
+    """The rows of one configuration; the environment's and the loop's rates."""
     before = used_memory("cpu" if config.engine == "mujoco" else "cuda:0")
     env = make_env(config, lambda device: MotionLibrary(clips, config.ahead, device=device), effects=effects)
-    alone, whole = physics_and_environment(env, seconds)
+    rates = physics_and_environment(env, seconds)
     loop = loop_rate(started(env, ppo), seconds)
     worlds, hz = config.num_worlds, config.physics_hz
-    for name, value in {"physics": alone, "environment": whole, "PPO loop": loop.frames}.items():
-        goal = GOALS[config.engine].get(name, "")
-        print(f"{worlds:6d}  {hz:4.0f} Hz   {name:11s} {value:14.0f}   {value / alone:8.2f}   {goal}")
+    alone = {"physics": rates.physics, "commands held": rates.held, "mujoco.rollout": rates.rollout}
+    alone = {name: value for name, value in alone.items() if not math.isnan(value)}
+    for name, value in (alone | {"environment": rates.environment, "PPO loop": loop.frames}).items():
+        goal, share = GOALS[config.engine].get(name, ""), value / rates.physics
+        print(f"{worlds:6d}  {hz:4.0f} Hz   {name:14s} {value:14.0f}   {share:8.2f}   {goal}")
+    shares = ", ".join(f"{rates.environment / value:.2f} of {name}" for name, value in alone.items())
+    print(f"{'':16s}  environment: {shares}")
     times = f"{1e3 * loop.iteration:.0f} ms, update {1e3 * loop.update:.0f} ms"
     print(f"{'':16s}  an iteration of {ppo.steps} steps {times}", flush=True)
     if env.device != "cpu":
         print(f"{'':16s}  memory {used_memory(env.device) - before:.1f} GiB", flush=True)
-    return whole, loop.frames
+    return rates.environment, loop.frames
 
 
 def parsed() -> argparse.Namespace:
@@ -89,7 +94,7 @@ def main() -> None:
         return
     clips = make_library(EmbeddedConfig(limit=7))
     effects = read_effects(options.effects) if options.effects else []
-    print("worlds  physics   row          control steps/s  of physics  goal")
+    print("worlds  physics   row             control steps/s  of physics  goal")
     for config in configs:
         environment, loop = print_rows(config, clips, ppo, options.seconds, effects)
         if options.against:

@@ -1,19 +1,21 @@
 """Rates and memory of one environment: its physics alone, the environment, the PPO loop.
 
-Physics alone is the engine's step on the states that the environment has just reached, again and again within the same
-run: half a second of the environment, half a second of physics from there, back. Actions are random around the
-reference, so that robots fall and are reset.
+Physics alone is what `alone` has, side by side within the same run: half a second of the environment, then half a
+second of each kind of physics from the states that it began with, with the commands that it gave; back to where the
+environment was. Actions are random around the reference, so that robots fall and are reset; physics alone resets
+nobody.
 """
 
 import gc
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import torch
 
+from benchmarks.throughput.alone import Rolled, command, listening, physics_step
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.ppo import Trainer
 from bumblebee.learning.ranks import Ranks
@@ -27,6 +29,19 @@ from bumblebee.tracking.model import task_model
 
 ROUND = 25  # control steps: short enough that robots without resets do not all lie on the floor
 ACTION = 0.3  # deviation of the random actions, of the action's scale
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Control steps a second."""
+
+    environment: float
+    physics: float
+    """The engine's step from the same states with the same commands."""
+    held: float
+    """The engine's step from the states at the environment's end, its last commands held."""
+    rollout: float
+    """`mujoco.rollout` from the same states with the same commands; nan on a GPU."""
 
 
 @dataclass(frozen=True)
@@ -59,21 +74,6 @@ def make_env(
     return TrackingEnv(library_on(engine.device), engine, config, alone.seed(0))
 
 
-def physics_step(env: TrackingEnv) -> Callable[[], None]:
-    """One control period of the engine alone: no kinematics afterwards, no copies."""
-    engine = env.engine
-    if env.cfg.engine == "mujoco":
-        return lambda: engine.batch.step(nstep=engine.substeps)
-    import mujoco_warp
-    import warp
-
-    with warp.ScopedDevice(str(engine.device)), warp.ScopedCapture() as capture:
-        for _ in range(engine.substeps):
-            mujoco_warp.step(engine._model, engine._data)
-    stream = warp.stream_from_torch(torch.cuda.current_stream(engine.device))
-    return lambda: warp.capture_launch(capture.graph, stream=stream)
-
-
 def timed(work: Callable[[], object], device: str, times: int = 1) -> float:
     """Seconds that `work` takes, `times` in a row."""
     wait(device)
@@ -91,22 +91,37 @@ def wait(device: str) -> None:
 
 
 @torch.inference_mode()
-def physics_and_environment(env: TrackingEnv, seconds: float) -> tuple[float, float]:
-    """Control steps a second of the physics alone and of the environment, on the same states."""
+def physics_and_environment(env: TrackingEnv, seconds: float) -> Rates:
+    """Control steps a second of the environment, and of the physics alone from the same states."""
     actions = random_actions(env)
     for action in actions * 2:
         env.step(action)
-    alone = physics_step(env)
-    spent, rounds = [0.0, 0.0], 0
-    while sum(spent) < 2 * seconds:
-        turn = iter(actions)
-        whole = timed(lambda turn=turn: env.step(next(turn)), env.device, ROUND)
-        kept = env.engine.state_dict()
-        only = timed(alone, env.device, ROUND)
-        env.engine.load_state_dict(kept)
-        spent, rounds = [spent[0] + only, spent[1] + whole], rounds + 1
+    alone, engine = physics_step(env), env.engine
+    rolled = Rolled(env, ROUND) if env.cfg.engine == "mujoco" else None
+    spent = dict.fromkeys(("environment", "physics", "held", "rollout"), 0.0)
+    rounds = 0
+
+    def driven(turn: Iterator[torch.Tensor]) -> None:
+        command(env, next(turn))
+        alone()
+
+    while spent["environment"] < seconds:
+        began, turn = engine.state_dict(), iter(actions)
+        with listening(engine) as commands:
+            spent["environment"] += timed(lambda turn=turn: env.step(next(turn)), env.device, ROUND)
+        ended = engine.state_dict()
+        spent["held"] += timed(alone, env.device, ROUND)
+        engine.load_state_dict(began)
+        if rolled is not None:
+            rolled.prepare(commands)
+        again = iter(commands)
+        spent["physics"] += timed(lambda turn=again: driven(turn), env.device, ROUND)
+        if rolled is not None:
+            spent["rollout"] += timed(rolled, env.device)
+        engine.load_state_dict(ended)
+        rounds += 1
     steps = rounds * ROUND * env.num_envs
-    return steps / spent[0], steps / spent[1]
+    return Rates(**{name: steps / seconds if seconds else float("nan") for name, seconds in spent.items()})
 
 
 @torch.inference_mode()

@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from benchmarks.throughput.alone import Rolled, command, listening, physics_step
 from benchmarks.throughput.growth import FRAMES, copies
 from benchmarks.throughput.measure import environment_rate, loop_rate, make_env, physics_and_environment, started
 from benchmarks.throughput.peer import write_motion
 from bumblebee.learning.config import PpoConfig
 from bumblebee.sim.effects import single
-from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.config import EnvConfig, Randomisation
 from bumblebee.tracking.library import MotionLibrary
 from tests.tracking.clips import waving
 
@@ -34,11 +35,33 @@ def test_the_rows_are_rates() -> None:
     ppo = PpoConfig(steps=2, epochs=1, mini_batches=1, hidden=(8,))
     for effects in ((), (single("torque_lag", "left_knee_joint", 0.01),)):
         env = make_env(config, lambda device: MotionLibrary(CLIPS, config.ahead, device=device), effects=effects)
-        physics, environment = physics_and_environment(env, 0.05)
+        rates = physics_and_environment(env, 0.05)
         loop = loop_rate(started(env, ppo), 0.05)
-        assert physics > environment > 0 and environment_rate(env, 0.05) > 0
+        assert min(rates.physics, rates.held, rates.rollout) > rates.environment > 0
+        assert environment_rate(env, 0.05) > 0
         assert 0 < loop.update < loop.iteration
         np.testing.assert_allclose(loop.frames * loop.iteration, 2 * 4, rtol=1e-6)
+
+
+def test_physics_alone_goes_where_the_environment_went() -> None:
+    """Where nobody is restarted: the engine by its own step, and `mujoco.rollout`, with the commands of the steps."""
+    quiet = Randomisation(friction=(1.0, 1.0), gains=0.0, mass=0.0, push=0.0)
+    config = EnvConfig(num_worlds=3, threads=1, physics_hz=100.0, randomisation=quiet, threshold_start=9.0)
+    env = make_env(config, lambda device: MotionLibrary(CLIPS, config.ahead, device=device))
+    began, rolled, alone = env.engine.state_dict(), Rolled(env, 4), physics_step(env)
+    with listening(env.engine) as commands:
+        for action in torch.linspace(0, 0.3, 4):
+            assert not env.step(torch.full((3, 23), float(action)))[2].any()
+    ended = env.engine.batch.qpos.copy()
+    env.engine.load_state_dict(began)
+    rolled.prepare(commands)
+    for targets in commands:
+        command(env, targets)
+        alone()
+    rolled()
+    np.testing.assert_allclose(env.engine.batch.qpos, ended, atol=1e-9)
+    np.testing.assert_allclose(rolled.last(), ended, atol=1e-9)
+    assert len(commands) == 4 and env.engine.step.__name__ == "step"
 
 
 def test_the_motion_for_mjlab_is_the_longest(tmp_path: Path) -> None:
