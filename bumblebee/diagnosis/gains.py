@@ -1,7 +1,9 @@
 """The effects on a servo's gains in their plainest form: one effect where one does, else kp and kd.
 
 `motor_strength` scales kp and kd together, so any two of the three can say what any other two say. A forward search
-takes that which explains most first, and so writes half the damping as kp twice and strength half.
+takes that which explains most first, and so writes half the damping as kp twice and strength half. A servo damps as the
+joint does, so viscous friction beside one of them may be the rest of another: a weaker drive whose damping is made up
+for is a lower kp.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,18 +34,21 @@ def plain_gains(
     for where in sorted({c.where for c in fit.chosen if c.effect in KINDS}):
         there = {c.effect: c for c in candidates if c.where == where and c.effect in KINDS}
         mine = [c for c in fit.chosen if c.where == where and c.effect in KINDS]
-        if len(mine) < 2 or len(there) < len(KINDS):
+        damper = [c for c in fit.chosen if (c.effect, c.where) == ("viscous_friction", where)] if len(mine) == 1 else []
+        if len(mine) + len(damper) < 2 or len(there) < len(KINDS):
             continue
         factor = {c.effect: float(fit.of(c)[0]) for c in mine}
         strength = factor.get("motor_strength", 1.0)
         both = {"kp": strength * factor.get("kp", 1.0), "kd": strength * factor.get("kd", 1.0)}
         alone = sorted(both.values(), key=lambda v: abs(np.log(max(v, 1e-6))))[-1]
         singles = [{"kp": both["kp"]}, {"kd": both["kd"]}, {"motor_strength": alone}]
-        rest = [c for c in fit.chosen if c not in mine]
+        rest = [c for c in fit.chosen if c not in (*mine, *damper)]
         tried = [_refit(problem, fit, rest, there, s, weights) for s in singles]
         best = min(tried, key=lambda f: f.cost)
         most = fit.cost + max(bound**2, _SHARE * (_refit(problem, fit, rest, there, {}, weights).cost - fit.cost))
         if best.cost > most:
+            if damper:
+                continue
             best = _refit(problem, fit, rest, there, both, weights)
             if set(factor) == set(both) or best.cost > most:
                 continue

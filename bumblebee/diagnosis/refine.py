@@ -9,6 +9,7 @@ from bumblebee.diagnosis.acceptance import pruned
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, interval
 from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.paying import still_paying
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 
 _SURE = 3.0  # standard errors
@@ -47,6 +48,8 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
         return gauss_newton(problem, chosen, values, weights, iterations=1)
 
     fit = pruned(problem, refit(fit.chosen, fit.values), weights, _SURE, refit)
+    if holdout is not None:
+        fit = still_paying(fit, refit, holdout)
     if holdout is not None and holdout.worse_later(found, fit):  # short windows alone led it astray
         fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
     return Refined(problem, fit, weights, interval(problem, fit, weights) if fit.chosen else np.empty(0))

@@ -113,7 +113,10 @@ def _in_two(scene: Scene, joint: int) -> bool:
 
 
 def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[Found, np.ndarray]]:
-    """The laws with their sizes, in the joint fit of all; each that the judging windows are better with."""
+    """The laws with their sizes, in the joint fit of all; each that the judging windows are better with.
+
+    Where there are none, or none that meet it, each half of the fitted windows must be better with what the other says.
+    """
     evidence, found = sought.evidence, sought.found
     sizes = solve(evidence.basis, evidence.inverse, scene.residual, evidence.weights)
     sizes = sizes[len(sizes) - sum(len(one.torque) for one in found) :]
@@ -121,6 +124,8 @@ def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[
     for one in found:
         size = sizes[at : at + len(one.torque)]
         at += len(one.torque)
+        if judged is None and not _repeats(scene, one):
+            continue
         if judged is not None:
             moved = judged.evidence.column(one.joint, one.law.torque(judged.data, one.joint))
             change = np.tensordot(size, moved, axes=1)

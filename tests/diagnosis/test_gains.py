@@ -37,6 +37,25 @@ def test_a_pair_becomes_one(truth: tuple[str, float], start: dict[str, float], w
     assert one.values[0] == pytest.approx(value, rel=0.01)
 
 
+@pytest.mark.parametrize(("damping", "wanted"), [(0.4, ["kp"]), (1.5, ["motor_strength", "viscous_friction"])])
+def test_a_weaker_drive_whose_damping_is_made_up_for_is_a_lower_kp(damping: float, wanted: list[str]) -> None:
+    """A strength of 0.9 takes 0.4 of a kd of 4 away."""
+    rollouts = arm.simulate({("motor_strength", "j2"): 0.9, ("viscous_friction", "j2"): damping}, count=1)
+    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, [0], 0.2, 14))
+    problem = make_problem(
+        session.plant, session.layout, windows, session.sigma, session.steps, [], np.random.default_rng(0)
+    )
+    candidates = all_candidates(session.plant, rollouts, [])
+    kinds = ("motor_strength", "viscous_friction")
+    chosen = [c for kind in kinds for c in candidates if (c.effect, c.where) == (kind, "j2")]
+    weights = window_weights(problem.residual([[]])[0])
+    pair = gauss_newton(problem, chosen, [0.9, chosen[1].nominal[0] + damping], weights)
+    plain = plain_gains(problem, pair, candidates, weights, bound=4.0)
+    assert [c.effect for c in plain.chosen] == wanted
+    assert plain.values[0] == pytest.approx(0.9, rel=0.02)
+
+
 def test_what_needs_both_keeps_both() -> None:
     rollouts = arm.simulate({("motor_strength", "j2"): 0.6, ("viscous_friction", "j2"): 2.0}, count=1)
     session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
