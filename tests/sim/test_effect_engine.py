@@ -75,9 +75,12 @@ def test_without_effects_it_is_the_plain_engine() -> None:
         single("backlash", KNEE, 0.1),
         single("series_elasticity", KNEE, 200.0),
         single("hysteresis", KNEE, 8.0, 0.05),
+        single("backlash", KNEE, 0.1, 1.0),
+        single("series_elasticity", KNEE, 200.0, 1.0),
+        single("hysteresis", KNEE, 8.0, 0.05, 1.0),
         single("asymmetric_friction", KNEE, 12.0),
     ],
-    ids=lambda e: e.effect,
+    ids=lambda e: "_".join((e.effect, *(k for k in ("encoder", "dahl") if k in e.parameters))),
 )
 def test_an_effect_changes_the_motion_and_keeps_the_tasks_joints(effect: Effect) -> None:
     """23 joints whatever the model has, finite, and other than without."""

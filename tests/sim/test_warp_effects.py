@@ -45,6 +45,11 @@ SHAFTS = (
     single("series_elasticity", "right_elbow_joint", 200.0),
     single("hysteresis", "waist_yaw_joint", 4.0, 0.05),
 )
+READ_BEHIND = (
+    single("backlash", "left_elbow_joint", 0.05, 1.0),
+    single("series_elasticity", "right_elbow_joint", 200.0, 1.0),
+    single("hysteresis", "waist_yaw_joint", 4.0, 0.05, 1.0),
+)
 
 
 @pytest.fixture(scope="module", params=["cpu", GPU])
@@ -75,9 +80,10 @@ def test_hooks_act_alike_on_both_engines(effects: tuple[Effect, ...], device: st
         torch.testing.assert_close(a.read_key_pos_w, b.read_key_pos_w.cpu(), atol=4e-3, rtol=0)
 
 
-def test_play_and_shafts_are_alike_on_both_engines(device: str) -> None:
-    """Joints that no encoder reads, and a spring that yields; the task sees 23 joints."""
-    plain, warp = both(SHAFTS, device)
+@pytest.mark.parametrize("effects", [SHAFTS, READ_BEHIND], ids=["encoder on the motor", "encoder on the joint"])
+def test_play_and_shafts_are_alike_on_both_engines(effects: tuple[Effect, ...], device: str) -> None:
+    """Joints that no encoder reads, and a spring that yields or Dahl's law; the task sees 23 joints."""
+    plain, warp = both(effects, device)
     assert warp.model.nq > 30
     qpos = torch.tensor(plain.model.key_qpos[0], dtype=torch.float32)[plain._q].repeat(WORLDS, 1)
     for engine in (plain, warp):
