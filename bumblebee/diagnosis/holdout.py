@@ -25,7 +25,7 @@ from bumblebee.sim.effects import Effect
 _FEW = 8  # windows that ranks can be trusted with
 _WORSE = 0.02  # a longer window's error may grow by this share
 _DOUBT = norm.cdf(2.0)  # that it has not grown
-_OF_REST = 0.025  # share of what is left that is never a trifle
+_OF_REST = 0.2  # share of what is left that is never a trifle
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +58,8 @@ class Holdout:
         The held-out residual of `before` is compared with the change that `after` predicts there, and with nothing
         else: in a robot of many joints an effect of one is a small share of the whole chi-square, and none of its
         noise. `after` must gain the share `least` of what it and all effects before it gain together: where one law
-        stands for a slightly different one, the rest is significant, too. A fortieth of what is left is enough: of a
-        robot far from its model, a hundredth of what a drive of half the strength explains is more than all friction.
+        stands for a slightly different one, the rest is significant, too. A fifth of what is left is enough: of a robot
+        far from its model, a hundredth of what a drive of half the strength explains is more than all friction.
         """
         if self.problem is None:
             return True

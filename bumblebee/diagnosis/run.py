@@ -76,7 +76,7 @@ class Run:
         self.rejected: list[str] = []
         self.loss: Loss | None = None
         self.given = 0
-        self.tried_many = False
+        self.tried_many, self.patience = False, config.patience
         self.candidates, _ = remake([])
         self.start_far()
         self.rescreen()
@@ -217,7 +217,7 @@ class Run:
         self.say(f"begun anew with {len(fit.chosen)} effects together")
         self.screened_cost = np.inf
         self.closed.clear()
-        self.given = len(fit.chosen)
+        self.given, self.patience = len(fit.chosen), min(self.patience, _SOME)
         self.renew(fit)
         return True
 

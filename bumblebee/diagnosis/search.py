@@ -82,7 +82,7 @@ def _select(run: Run, config: SearchConfig) -> None:
     """Forward selection until nothing is worth a trial, or too many in a row were in vain."""
     vain, judged, limits = 0, None, []
     hopeless: set[tuple[str, str]] = set()
-    while len(run.fit.chosen) < config.most + run.given and vain < config.patience:
+    while len(run.fit.chosen) < config.most + run.given and vain < run.patience:
         tried, looked = [], []
         run.start_many()
         if not run.given:
