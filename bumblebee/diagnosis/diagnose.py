@@ -6,31 +6,28 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.diagnosis.acceptance import wald
 from bumblebee.diagnosis.arrivals import loss_entries
-from bumblebee.diagnosis.beyond import NOT_TESTED, discovered_entry, structure_table, unexplained
-from bumblebee.diagnosis.candidates import INVERSE, Candidate, all_candidates, scales_of, still_joints
-from bumblebee.diagnosis.classes import EXPERIMENTS, alike, detectable, label, rivals
+from bumblebee.diagnosis.beyond import NOT_TESTED, structure_table, unexplained
+from bumblebee.diagnosis.candidates import Candidate, all_candidates, scales_of, still_joints
+from bumblebee.diagnosis.classes import detectable
 from bumblebee.diagnosis.discover import Discovery, discover
+from bumblebee.diagnosis.entries import effect_entries
 from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_whiteners, horizon_windows
-from bumblebee.diagnosis.fit import Fit, interval
-from bumblebee.diagnosis.formula import Formula
+from bumblebee.diagnosis.fit import interval
 from bumblebee.diagnosis.guard import standing
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.instead import offers_of, with_named
 from bumblebee.diagnosis.latency import latency_notes
 from bumblebee.diagnosis.nuisance import NAMES
-from bumblebee.diagnosis.plant import Plant
-from bumblebee.diagnosis.problem import Problem, make_problem, window_weights, without
+from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.quantised import entries, grids
 from bumblebee.diagnosis.refine import Refined, refine
 from bumblebee.diagnosis.search import Search, SearchConfig, search
 from bumblebee.diagnosis.session import Session
-from bumblebee.diagnosis.variation import declared_values, vary
+from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.windows import choose_starts, cut
 from bumblebee.errors import BadInput
-from bumblebee.sim.effect_catalogue import is_native
-from bumblebee.sim.effects import CATALOGUE, Effect
+from bumblebee.sim.effects import Effect
 
 _LONG = 1.0  # [s]
 _MORE = 2.5  # times as many windows for the smallest models
@@ -110,7 +107,7 @@ def diagnose(
         last, holdout = _with(beyond, last), beyond.holdout
         found = with_named(found, last.fit)
     say(f"{len(last.fit.chosen)} effects; error before and after")
-    document["effects"] = _effects(found, last, holdout, beyond)
+    document["effects"] = effect_entries(found, last, holdout, beyond)
     effects = last.fit.effects
     document["unexplained"] = NOT_TESTED if beyond is None else unexplained(beyond)
     if beyond is not None:
@@ -181,68 +178,6 @@ def _with(beyond: Discovery, last: Refined) -> Refined:
         return last
     weights = window_weights(beyond.fit.clean(beyond.problem))
     return Refined(beyond.problem, beyond.fit, weights, interval(beyond.problem, beyond.fit, weights))
-
-
-def _effects(found: Search, last: Refined, holdout: Holdout, beyond: Discovery | None) -> list[dict[str, Any]]:
-    """The contract's list, most explaining first."""
-    if not last.fit.chosen:
-        return []
-    shares = _explained(holdout.problem or last.problem, last.fit)
-    classes = dict(zip(found.fit.chosen, rivals(found, holdout, alike(found.columns, found)), strict=True))
-    steps = {s.candidate: s for s in found.steps}
-    entries = []
-    for i, (c, part) in enumerate(zip(last.fit.chosen, last.fit.slices, strict=True)):
-        if isinstance(c, Formula):
-            z, kind = wald(last.problem, last.fit, last.weights, i), beyond.kinds[c.where] if beyond else ""
-            values, half = last.fit.values[part], last.half[part]
-            entries.append(discovered_entry(c, values, half, float(shares[i]), z, kind))
-            continue
-        others = classes[c]
-        entry = label(c) | {
-            "parameters": _parameters(last.problem.plant, c, last.fit.values[part], last.half[part]),
-            "equivalent": [label(o) for o in others],
-            "explains": float(shares[i]),
-            "evidence": {
-                "p": float(steps[c].p),
-                "test": f"Wald test in the joint fit, variance clustered by window, z = {steps[c].z:.1f}, bound "
-                f"{found.bound:.1f} for {found.count} candidates",
-            },
-            "native": is_native(c.at(last.fit.values[part])),
-        }
-        if others:
-            kinds = dict.fromkeys([c.effect, *(o.effect for o in others)])
-            entry["separate_by"] = [EXPERIMENTS[k] for k in kinds if k in EXPERIMENTS][:3]
-        entries.append(entry)
-    return sorted(entries, key=lambda e: -e["explains"])
-
-
-def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray) -> dict[str, Any]:
-    """The contract's parameters of one effect, in its own units; `nominal` is null where the model knows no bound."""
-    out = {}
-    # A limit is tried from the largest torque in the data on, which is not where the model has it.
-    declared = declared_values(plant, c.effect, c.where) if c.effect == "torque_limit" else c.nominal
-    for p, value, nominal, wide in zip(CATALOGUE[c.effect].parameters, values, declared, half, strict=True):
-        if p.default is not None and value == p.default:
-            continue
-        ends = [float(value - wide), float(value + wide)]
-        if c.effect in INVERSE and not out:
-            # The fit moves the inverse; an interval that reaches zero has no upper end.
-            low, high = 1.0 / max(ends[1], 1e-12), None if ends[0] <= 0 else 1.0 / ends[0]
-            out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": p.unit}
-        else:
-            ends = [max(p.lower, ends[0]), min(p.upper, ends[1])]
-            known = float(nominal) + 0.0 if np.isfinite(nominal) else None  # no -0
-            out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": p.unit}
-    return out
-
-
-def _explained(problem: Problem, fit: Fit) -> np.ndarray:
-    """Share of the excess of chi-square over its best value that comes back when an effect alone is taken out."""
-    sets = [fit.effects] + [without(fit.effects, c) for c in fit.chosen] + [[]]
-    left = problem.residual(sets) - np.tensordot(fit.nuisance, problem.nuisance, axes=1)
-    power = (left**2).mean(axis=(1, 2))
-    excess = max(power[-1] - power[0], 1e-12)
-    return np.clip((power[1:-1] - power[0]) / excess, 0.0, 1.0)
 
 
 def _errors(session: Session, effects: Sequence[Effect], config: DiagnosisConfig) -> dict[str, Any]:
