@@ -1,9 +1,8 @@
 """Rates and memory of one environment: its physics alone, the environment, the PPO loop.
 
-Physics alone is what `alone` has, side by side within the same run: half a second of the environment, then half a
-second of each kind of physics from the states that it began with, with the commands that it gave; back to where the
-environment was. Actions are random around the reference, so that robots fall and are reset; physics alone resets
-nobody.
+Physics alone is what `alone` has, side by side within the same run: .1 s of the environment, then .1 s of each kind of
+physics from the states that it began with, with the commands that it gave; back to where the environment was. Actions
+are random around the reference, so that robots fall and are reset; physics alone resets nobody.
 """
 
 import gc
@@ -27,7 +26,8 @@ from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 
-ROUND = 25  # control steps: short enough that robots without resets do not all lie on the floor
+ROUND = 25  # control steps between two looks at the clock
+TURN = 5  # the same of environment and physics in turn: short, so that few robots without resets lie on the floor
 ACTION = 0.3  # deviation of the random actions, of the action's scale
 
 
@@ -97,30 +97,30 @@ def physics_and_environment(env: TrackingEnv, seconds: float) -> Rates:
     for action in actions * 2:
         env.step(action)
     alone, engine = physics_step(env), env.engine
-    rolled = Rolled(env, ROUND) if env.cfg.engine == "mujoco" else None
+    rolled = Rolled(env, TURN) if env.cfg.engine == "mujoco" else None
     spent = dict.fromkeys(("environment", "physics", "held", "rollout"), 0.0)
-    rounds = 0
+    turns = 0
 
     def driven(turn: Iterator[torch.Tensor]) -> None:
         command(env, next(turn))
         alone()
 
     while spent["environment"] < seconds:
-        began, turn = engine.state_dict(), iter(actions)
+        began, turn = engine.state_dict(), iter(actions[turns * TURN % ROUND :])
         with listening(engine) as commands:
-            spent["environment"] += timed(lambda turn=turn: env.step(next(turn)), env.device, ROUND)
+            spent["environment"] += timed(lambda turn=turn: env.step(next(turn)), env.device, TURN)
         ended = engine.state_dict()
-        spent["held"] += timed(alone, env.device, ROUND)
+        spent["held"] += timed(alone, env.device, TURN)
         engine.load_state_dict(began)
         if rolled is not None:
             rolled.prepare(commands)
         again = iter(commands)
-        spent["physics"] += timed(lambda turn=again: driven(turn), env.device, ROUND)
+        spent["physics"] += timed(lambda turn=again: driven(turn), env.device, TURN)
         if rolled is not None:
             spent["rollout"] += timed(rolled, env.device)
         engine.load_state_dict(ended)
-        rounds += 1
-    steps = rounds * ROUND * env.num_envs
+        turns += 1
+    steps = turns * TURN * env.num_envs
     return Rates(**{name: steps / seconds if seconds else float("nan") for name, seconds in spent.items()})
 
 
