@@ -143,19 +143,21 @@ class Evidence:
         ridge = _RIDGE * np.einsum("wss->w", power)[:, None, None] / power.shape[1] * np.eye(power.shape[1])
         return np.linalg.solve(power + ridge, score[..., None])[..., 0]
 
-    def free(self, joint: int, some: np.ndarray | None = None) -> tuple[float, int]:
+    def free(self, joint: int, some: np.ndarray | None = None, spared: int = 0) -> tuple[float, int]:
         """Chi-square of a torque of its own in every segment of every window, and its degrees of freedom.
 
         Directions that sensor noise hides (whitened answers below a hundredth of the strongest) are left out; `some`
-        (W,) bool are the windows that count, all by default.
+        (W,) bool are the windows that count, all by default, less the `spared` ones that say most.
         """
         values, vectors = np.linalg.eigh(self.power[joint])
         along = np.einsum("wst,ws->wt", vectors, self.score[joint])
         seen = values > 1e-4 * values.max()
         if some is not None:
             seen &= some[:, None]
-        weight = np.repeat(self.weights[:, None], values.shape[1], axis=1)
-        return float((along[seen] ** 2 / values[seen] / weight[seen]).sum()), int(seen.sum())
+        values = np.where(seen, values, 1.0)
+        power = np.where(seen, along**2 / values / self.weights[:, None], 0.0).sum(axis=1)
+        keep = np.argsort(power)[: len(power) - spared]
+        return float(power[keep].sum()), int(seen[keep].sum())
 
 
 def _falls(total: np.ndarray, curvature: np.ndarray, raw: np.ndarray) -> np.ndarray:

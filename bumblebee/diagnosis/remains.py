@@ -20,6 +20,7 @@ from bumblebee.diagnosis.seek import Found, Sought, closest, library, seek
 _LEAST = 0.01  # share of a joint's typical torque below which structure is not worth a word
 _CONFIRMED = 2.0  # standard errors by which windows that were not fitted must be better
 _POWER, _AGAIN, _ALONE = 4.0, 1.5, 6.0  # standard errors of a joint's power: fitted, judged, fitted without judges
+_LOUDEST = 2  # windows of a rollout that do not count there
 _FELT, _PAYS = 9.0, 25.0  # chi-square of a law on judging windows that do not meet it; its gain on half of the fitted
 _HINT = 3.0  # z from which a law says what a power that no law explains depends on
 _MOST = 8  # joints that laws are sought on, those that lack most
@@ -106,9 +107,12 @@ def remains(
 
 
 def _in_two(scene: Scene, joint: int) -> bool:
-    """Whether a joint's power is too large in each of two rollouts: what one rollout shows may be an accident."""
+    """Whether a joint's power is too large in each of two rollouts: what one rollout shows may be an accident.
+
+    So may what a rollout's loudest windows show: where a foot tips, one of them holds more than all others.
+    """
     rollouts = scene.problem.windows.rollout
-    values = [scene.evidence.free(joint, rollouts == i) for i in np.unique(rollouts)]
+    values = [scene.evidence.free(joint, rollouts == i, _LOUDEST) for i in np.unique(rollouts)]
     return sum((value - count) / np.sqrt(2.0 * max(count, 1)) > _POWER for value, count in values) > 1
 
 

@@ -41,6 +41,17 @@ def test_a_planted_torque_comes_back_with_its_size() -> None:
     assert verdict.z > 10
 
 
+def test_power_that_two_windows_hold_is_gone_with_them() -> None:
+    problem, scene = null()
+    torque = np.zeros((1, *scene.evidence.score.shape[1:]))
+    torque[0, [3, 7]] = 5.0
+    residual = scene.residual + scene.evidence.column(1, torque)[0]
+    evidence = scene.evidence.with_columns(problem, residual, scene.columns)
+    (loud, count), (rest, fewer) = evidence.free(1), evidence.free(1, spared=2)
+    assert (loud - count) / np.sqrt(2 * count) > 10 > 4 > (rest - fewer) / np.sqrt(2 * fewer)
+    assert fewer < count
+
+
 def test_a_gain_is_the_fall_of_the_cost_of_a_fit_with_the_column() -> None:
     problem, scene, evidence, torque = planted(0.2)
     residual = scene.residual + 0.2 * evidence.column(1, torque)[0]
