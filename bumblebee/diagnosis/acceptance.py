@@ -15,8 +15,9 @@ from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.scores import Columns, as_z, null_maxima
 from bumblebee.diagnosis.whiten import null_draws
 
-# Where the model restarts a late encoder's joint follows from noisy readings: that alone gains a little.
-_NOISY, _NOISY_GAIN = ("encoder_delay",), 0.02
+# Where the model restarts a late encoder's joint follows from the mean of two noisy readings: that alone gains a
+# little, on all joints at once more.
+_NOISY, _NOISY_GAIN, _NOISY_ALL = ("encoder_delay",), 0.02, 0.05
 
 
 @dataclass(eq=False)
@@ -70,7 +71,7 @@ def is_physical(problem: Problem, fit: Fit, new: Fit, candidate: Candidate, weig
     """
     if candidate.effect in _NOISY:
         before = cost_of(problem, fit.residual, weights)[0]
-        if before - new.cost < _NOISY_GAIN * before:
+        if before - new.cost < (_NOISY_GAIN if candidate.where else _NOISY_ALL) * before:
             return False
     return beyond_numerics(problem, fit, new, weights)
 

@@ -22,6 +22,7 @@ from bumblebee.diagnosis.nuisance import NAMES
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.quantised import entries, grids
 from bumblebee.diagnosis.refine import Refined, refine
+from bumblebee.diagnosis.roles import informative
 from bumblebee.diagnosis.search import Search, SearchConfig, search
 from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.variation import vary
@@ -75,6 +76,7 @@ def diagnose(
     rng = np.random.default_rng(config.seed)
     still = still_joints(session.plant, session.rollouts, session.sigma)
     candidates = all_candidates(session.plant, session.rollouts, still)
+    session = informative(session, config.horizon)
     fitted = [i for i in session.train if i not in session.accept]
     say(
         f"{len(fitted)} rollouts to fit, {len(session.accept)} to accept by, {len(session.holdout)} held out, "

@@ -34,6 +34,7 @@ _ENOUGH = 12  # windows: where no size that reaches up to so many gains, no more
 _CLOSER = 5  # halvings of the interval around the best of them
 _FELT, _NEARLY, _CLEAR = 0.1, 0.8, 0.5  # change of a window's log(1 + power); share of these that gain; their sum
 _SEVERAL, _MOSTLY = 4, 0.5  # windows that speak for themselves; share of the excess that fewer must lose
+_UNFELT = 0.1  # of what a fitted window feels, on the mean: a window that feels less cannot judge
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,22 +100,40 @@ def _plausible(clean: np.ndarray, change: np.ndarray) -> bool:
     return felt.sum() >= _SEVERAL or float((before - after)[felt].sum()) > _MOSTLY * excess
 
 
-def pays_where_felt(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bool:
+def pays_where_felt(problem: Problem, holdout: Holdout, before: Fit, after: Fit, least: int = 1) -> bool:
     """Whether `after` is better on nearly all windows that the two fits predict differently, held-out ones included.
 
     The rest of the windows, most of them, knows nothing of a limit: a mean gain over all of them would need many more
-    windows that feel it than a limit reaches.
+    windows that feel it than a limit reaches. `least` is how many windows must be better.
     """
-    sides = [(problem, before.clean(problem), after.clean(problem))]
-    if holdout.problem is not None:
-        raw = holdout.problem.residual([before.effects, after.effects])
-        parts = zip(raw, (before, after), strict=True)
-        sides.append((holdout.problem, *(r - np.tensordot(f.nuisance, holdout.problem.nuisance, 1) for r, f in parts)))
-    logs = [np.log1p((np.stack(x) ** 2).mean(axis=2)) for x in ([old, new] for _, old, new in sides)]
-    gains = np.concatenate([g[0] - g[1] for g in logs])
+    sides = [(before.clean(problem), after.clean(problem)), *_judged(holdout, before, after)]
+    gains = np.concatenate([np.log1p((old**2).mean(axis=1)) - np.log1p((new**2).mean(axis=1)) for old, new in sides])
     felt = gains[np.abs(gains) > _FELT]
     better = int((felt > 0).sum())
-    return better > 0 and better >= _NEARLY * len(felt) and float(felt.sum()) > _CLEAR
+    return better >= max(least, 1) and better >= _NEARLY * len(felt) and float(felt.sum()) > _CLEAR
+
+
+def pays_where_rare(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bool:
+    """The same for any effect that the held-out windows cannot judge: they feel next to nothing of it.
+
+    Fitted windows alone decide then, each for itself, and several must.
+    """
+    change = ((before.clean(problem) - after.clean(problem)) ** 2).sum(axis=1).mean()
+    seen = [((old - new) ** 2).sum(axis=1).mean() for old, new in _judged(holdout, before, after)]
+    if not seen or seen[0] > _UNFELT * change:
+        return False
+    return pays_where_felt(problem, holdout, before, after, _SEVERAL)
+
+
+def _judged(holdout: Holdout, before: Fit, after: Fit) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Held-out residuals (W, M) of the two fits less their nuisances; empty where nothing is held out."""
+    if holdout.problem is None:
+        return []
+    raw = holdout.problem.residual([before.effects, after.effects])
+    old, new = (
+        r - np.tensordot(f.nuisance, holdout.problem.nuisance, 1) for r, f in zip(raw, (before, after), strict=True)
+    )
+    return [(old, new)]
 
 
 def _profile(

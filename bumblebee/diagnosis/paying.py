@@ -11,16 +11,18 @@ from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, cost_of
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
-from bumblebee.diagnosis.problem import window_weights
+from bumblebee.diagnosis.limits import pays_where_rare
+from bumblebee.diagnosis.problem import Problem, window_weights
 
 _SMALL = 0.05  # share of what all effects gain, above which an effect need not be asked
 _Z, _LEAST = 2.0, 0.01  # as of acceptance
 
 
-def still_paying(fit: Fit, refit: Refit, holdout: Holdout) -> Fit:
+def still_paying(fit: Fit, refit: Refit, holdout: Holdout, problem: Problem | None = None) -> Fit:
     """The fit less effects that do not pay on the judging windows, the others refitted without them, the least first.
 
-    Limits are left alone: few windows feel them, of the judging ones perhaps none.
+    Limits are left alone: few windows feel them, of the judging ones perhaps none. Of other effects that these do not
+    feel the fitted windows of `problem`, if given, decide.
     """
     kept: set[Candidate] = set()
     while holdout.problem is not None and fit.chosen:
@@ -32,7 +34,8 @@ def still_paying(fit: Fit, refit: Refit, holdout: Holdout) -> Fit:
         keep = [i for i in range(len(fit.chosen)) if i != least]
         values = [fit.values[fit.slices[i]] for i in keep]
         less = refit([fit.chosen[i] for i in keep], np.concatenate(values) if values else np.empty(0))
-        if holdout.gains(less, fit, _Z, _LEAST):
+        rare = problem is not None and pays_where_rare(problem, holdout, less, fit)
+        if rare or holdout.gains(less, fit, _Z, _LEAST):
             kept.add(fit.chosen[least])
         else:
             fit = less

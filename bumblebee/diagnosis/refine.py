@@ -49,7 +49,7 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
 
     fit = pruned(problem, refit(fit.chosen, fit.values), weights, _SURE, refit)
     if holdout is not None:
-        fit = still_paying(fit, refit, holdout)
+        fit = still_paying(fit, refit, holdout, problem)
     if holdout is not None and holdout.worse_later(found, fit):  # short windows alone led it astray
         fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
     return Refined(problem, fit, weights, interval(problem, fit, weights) if fit.chosen else np.empty(0))

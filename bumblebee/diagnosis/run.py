@@ -14,7 +14,7 @@ from bumblebee.diagnosis.fit import Fit, cost_of, effects_at, gauss_newton, reso
 from bumblebee.diagnosis.gains import plain_gains
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
-from bumblebee.diagnosis.limits import pays_where_felt
+from bumblebee.diagnosis.limits import pays_where_felt, pays_where_rare
 from bumblebee.diagnosis.many import certainty, fit_many, pays_together
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.scores import Columns, Scores, score_tests
@@ -155,7 +155,9 @@ class Run:
         fit = gauss_newton(self.problem, chosen, start, weights, iterations=2, coarse=True)
         z = wald(self.problem, fit, weights, len(fit.chosen) - 1)
         pays = self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain) or (
-            candidate.effect in LIMITS and pays_where_felt(self.problem, self.holdout, self.fit, fit)
+            pays_where_felt(self.problem, self.holdout, self.fit, fit)
+            if candidate.effect in LIMITS
+            else pays_where_rare(self.problem, self.holdout, self.fit, fit)
         )
         if z < self.bound or not pays or not is_physical(self.problem, self.fit, fit, candidate, weights):
             self.closed.add(candidate)
