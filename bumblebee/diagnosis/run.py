@@ -154,19 +154,25 @@ class Run:
         weights = window_weights(residual - np.tensordot(self.fit.nuisance, self.problem.nuisance, axes=1))
         fit = gauss_newton(self.problem, chosen, start, weights, iterations=2, coarse=True)
         z = wald(self.problem, fit, weights, len(fit.chosen) - 1)
+        if z < self.bound:  # the windows that judge need not be simulated
+            return self.refuse(candidate)
         pays = self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain) or (
             pays_where_felt(self.problem, self.holdout, self.fit, fit)
             if candidate.effect in LIMITS
             else pays_where_rare(self.problem, self.holdout, self.fit, fit)
         )
-        if z < self.bound or not pays or not is_physical(self.problem, self.fit, fit, candidate, weights):
-            self.closed.add(candidate)
-            self.rejected.append(f"{candidate.effect} on {candidate.where or 'the whole robot'}")
-            return False
+        if not pays or not is_physical(self.problem, self.fit, fit, candidate, weights):
+            return self.refuse(candidate)
         self.steps.append(evidence(candidate, z, len(self.candidates)))
         self.say(f"found {candidate.effect} on {candidate.where or 'the whole robot'}: {fit.of(candidate).round(5)}")
         self.renew(fit)
         return True
+
+    def refuse(self, candidate: Candidate) -> bool:
+        """Leave a candidate out of all further trials; always False."""
+        self.closed.add(candidate)
+        self.rejected.append(f"{candidate.effect} on {candidate.where or 'the whole robot'}")
+        return False
 
     def renew(self, fit: Fit) -> None:
         """Nuisances around what was found, where it is more than a little; weights; candidates, where it is a lot."""
