@@ -16,15 +16,18 @@ from bumblebee.diagnosis.problem import Problem, window_weights
 
 _SMALL = 0.05  # share of what all effects gain, above which an effect need not be asked
 _Z, _LEAST = 2.0, 0.01  # as of acceptance
+_FEW = 4  # effects; of more, each may be a small share of the whole, and they were accepted together
 
 
 def still_paying(fit: Fit, refit: Refit, holdout: Holdout, problem: Problem | None = None) -> Fit:
     """The fit less effects that do not pay on the judging windows, the others refitted without them, the least first.
 
     Limits are left alone: few windows feel them, of the judging ones perhaps none. Of other effects that these do not
-    feel the fitted windows of `problem`, if given, decide.
+    feel the fitted windows of `problem`, if given, decide. More than four effects are left alone, too.
     """
     kept: set[Candidate] = set()
+    if len(fit.chosen) > _FEW:
+        return fit
     while holdout.problem is not None and fit.chosen:
         share = shares(holdout, fit)
         asked = [i for i, c in enumerate(fit.chosen) if share[i] < _SMALL and c.effect not in LIMITS and c not in kept]
