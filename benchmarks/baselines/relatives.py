@@ -2,6 +2,8 @@
 
     python -m benchmarks.baselines.relatives FOLDER... --motions motions.npz --out relatives.csv
 
+tries them on the robot as it is; with `--robots light` or `paper` each motion's robot is drawn from that randomisation.
+
 Held-out motions are few; every motion has relatives, which a training has not seen unless it was told to, and whose
 difficulty is much the same: its reflection, itself with the arms of another one, itself at 1.1 of its tempo (flights
 keep theirs). A policy that follows a motion and loses its reflection has learned the motion and not the task.
@@ -16,6 +18,7 @@ import numpy as np
 import pandas as pd
 import torch
 
+from benchmarks.baselines.methods import RANDOMISATIONS
 from benchmarks.baselines.trial import PHYSICS_HZ, rate
 from benchmarks.baselines.variety import at_tempo, flies, mirrored, with_arms
 from benchmarks.motion_pack import read_pack, whole_motions
@@ -24,7 +27,8 @@ from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.intervals import success_rate
 from bumblebee.learning.policy import load_policy
 from bumblebee.motion.clip import Clip
-from bumblebee.sim.sensors import load_model
+from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.model import task_model
 
 FASTER = 1.1
 
@@ -43,13 +47,18 @@ RELATIVES: dict[str, Callable[[Sequence[Clip]], list[Clip]]] = {
 """By name: the relatives of clips, one of each."""
 
 
-def try_relatives(folder: Path, motions: Path, kind: str) -> pd.DataFrame:
-    """Roll the policy in `folder` out on relatives of one kind of all whole real motions; a row each."""
+def try_relatives(folder: Path, motions: Path, kind: str, robots: str = "none") -> pd.DataFrame:
+    """Roll the policy in `folder` out on relatives of one kind of all whole real motions; a row each.
+
+    Each motion's robot is drawn from the randomisation of that name.
+    """
     torch.set_num_threads(1)
     rows = [row for row in whole_motions(read_pack(motions)) if row.group != "embedded"]
     policy = load_policy(folder)
     clips = RELATIVES[kind]([row.clip for row in rows])
-    table = follow(policy, Manner(policy.shape.seen), clips, load_model(physics_hz=PHYSICS_HZ))
+    drawn = RANDOMISATIONS[robots]
+    model = task_model(EnvConfig(physics_hz=PHYSICS_HZ, randomisation=drawn))
+    table = follow(policy, Manner(policy.shape.seen), clips, model, robots=drawn)
     return table.assign(policy=Path(folder).name, kind=kind)
 
 
@@ -81,10 +90,11 @@ def main() -> None:
     parser.add_argument("--motions", type=Path, required=True, help="file of benchmarks.motion_pack")
     parser.add_argument("--out", type=Path, required=True, help="CSV file, a row a rollout")
     parser.add_argument("--kinds", nargs="*", choices=RELATIVES, default=list(RELATIVES))
+    parser.add_argument("--robots", choices=RANDOMISATIONS, default="none", help="randomisation of the robots")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     options = parser.parse_args()
     try:
-        work = [(folder, options.motions, kind) for folder in options.folders for kind in options.kinds]
+        work = [(folder, options.motions, kind, options.robots) for folder in options.folders for kind in options.kinds]
         for folder in options.folders:
             load_policy(folder)
         if options.jobs == 1:

@@ -19,13 +19,17 @@ from bumblebee.learning.policy import Policy
 from bumblebee.motion.clip import Clip
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.engines import make_engine
-from bumblebee.tracking.config import ObservationConfig
+from bumblebee.tracking.config import ObservationConfig, Randomisation
 from bumblebee.tracking.env import action_scale, start_state
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import ReferenceFrame
 from bumblebee.tracking.observations import action_middle, joint_targets
+from bumblebee.tracking.randomisation import randomise_worlds
 from bumblebee.tracking.rows import Rows
 from bumblebee.tracking.terminations import fallen, success_threshold
+
+ROBOTS_SEED = 11
+"""Of robots that differ, the same for all policies."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +42,22 @@ class Manner:
 
 @torch.inference_mode()
 def follow(
-    policy: Policy, manner: Manner, clips: Sequence[Clip], model: mujoco.MjModel, threads: int = 1
+    policy: Policy,
+    manner: Manner,
+    clips: Sequence[Clip],
+    model: mujoco.MjModel,
+    threads: int = 1,
+    robots: Randomisation | None = None,
 ) -> pd.DataFrame:
     """Roll out each clip once.
+
+    Args:
+        policy: what acts.
+        manner: how it is run.
+        clips: N motions.
+        model: the robot, with room for the delays of `robots`.
+        threads: of the physics.
+        robots: how much each clip's robot differs from `model`, drawn with a fixed seed, without pushes; None: not.
 
     Returns:
         a row a clip: name, family, split, seconds; success and lost_at [s]; success_local, by distances after the
@@ -50,6 +67,8 @@ def follow(
     n = len(clips)
     library = MovingLibrary(clips, policy.shape.ahead)
     engine = make_engine("mujoco", model, n, min(threads, n))
+    if robots is not None:
+        randomise_worlds(engine, robots, ROBOTS_SEED)
     ids, dt = torch.arange(n), engine.control_dt
     scale = action_scale() if manner.scale is None else torch.full((library.num_joints,), manner.scale)
     middle = action_middle(policy.shape.action)

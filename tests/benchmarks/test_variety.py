@@ -97,6 +97,12 @@ def test_relatives_of_a_motion_are_tried_and_counted(tmp_path: Path, monkeypatch
     table = pd.read_csv(tmp_path / "r.csv")
     assert set(table["kind"]) == set(relatives.RELATIVES) and set(table["name"]) == {short.name, "held"}
     assert table["success"].all()  # 0.4 s of waving: an action of zero holds it
+    monkeypatch.setattr("sys.argv", [*options, "--kinds", "itself", "--robots", "paper"])
+    relatives.main()
+    other = pd.read_csv(tmp_path / "r.csv")
+    assert set(other["kind"]) == {"itself"} and len(other) == 2
+    plain = table[table["kind"] == "itself"]["mpkpe_mm"].to_numpy()
+    assert (np.abs(other["mpkpe_mm"].to_numpy() - plain) > 0.1).all()  # other robots stand otherwise
     own = table.assign(success=table["kind"] != "mirrored")
     text = relatives.table_of(own)
     assert "| p | 1 of 1, 1.00 [" in text and "0 of 1, 0.00 [" in text
