@@ -2,9 +2,10 @@
 
 A robot on which every joint rubs and comes late is found one effect at a time only by a long way round: each
 effect alone explains a twentieth, and what stands for the others' share has a strange name. Where the windows are far
-from the noise still after some effects, the usual ones of all joints are fitted together from the declared values on,
-those that are not sure are taken out again, and the rest has to pay on windows that took no part. The search goes on
-from there.
+from the noise still after some effects, and the last of these explained little, the usual ones of all joints are fitted
+together from the declared values on, beside those found; what is not sure is taken out again, and the rest has to pay
+on windows that took no part. The search goes on from there. It never begins so: a load at the end of an arm weakens
+all drives as far as these can tell.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,14 +32,19 @@ def usual_effects(candidates: Sequence[Candidate]) -> list[Candidate]:
     return [c for c in candidates if (c.effect in KINDS and c.where) or (c.effect in WHOLE and not c.where)]
 
 
-def fit_many(problem: Problem, candidates: Sequence[Candidate], say: Callable[[str], None]) -> Fit | None:
-    """A fit of the usual effects that are sure, from the declared model on; None where there are none."""
-    chosen = usual_effects(candidates)
-    if not chosen:
+def fit_many(problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None]) -> Fit | None:
+    """A fit of the usual effects, and of the others that were `found`, that are sure together; None where none is.
+
+    The usual ones start from the declared values.
+    """
+    usual = usual_effects(candidates)
+    others = [c for c in found.chosen if c not in usual]
+    if not usual:
         return None
     fit = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
     weights = window_weights(fit.clean(problem))
-    values = np.concatenate([c.nominal for c in chosen])
+    chosen = [*usual, *others]
+    values = np.concatenate([*(c.nominal for c in usual), *(found.of(c) for c in others)])
     for _ in range(_ROUNDS):
         fit = gauss_newton(problem, chosen, values, weights, iterations=3, coarse=True, damping=_DAMPING)
         values, weights = fit.values, window_weights(fit.clean(problem))
@@ -79,10 +85,12 @@ def pays_together(holdout: Holdout, before: Fit, after: Fit) -> bool:
 
 
 def certainty(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
-    """How many standard errors each effect of one parameter is from the declared value; 0 for a trifle."""
+    """How many standard errors each effect (C,) is from the declared value, by its surest parameter; 0 for a trifle."""
     errors = np.sqrt(np.diag(standard_covariance(problem, fit, weights)))
     away = np.abs(fit.values - np.concatenate([c.nominal for c in fit.chosen]))
-    return np.where(away < _TRIFLE * fit.scales, 0.0, away / np.maximum(errors, 1e-300))
+    counts = (fit.scales > 0) & (away >= _TRIFLE * fit.scales)
+    z = np.where(counts, away / np.maximum(errors, 1e-300), 0.0)
+    return np.array([z[part].max() for part in fit.slices])
 
 
 def _power(problem: Problem, fit: Fit) -> float:

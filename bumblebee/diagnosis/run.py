@@ -24,6 +24,7 @@ from bumblebee.sim.effects import Effect
 
 _ANEW = 0.1  # share of the cost left, below which all candidates are screened anew
 _SOME = 2  # effects after which a model that is still far off is taken to lack many
+_LITTLE = 0.5  # share of the median chi-square that the last of them took at most
 _CHANGED = 0.8  # share of the cost that a fit must leave less of, to be worth linearising around
 
 
@@ -52,7 +53,7 @@ class SearchConfig:
     far: float = 30.0
     """Median chi-square above which gains far from the declared ones are tried first."""
     many: float = 4.0
-    """Median chi-square above which, after two effects, the usual ones of all joints are fitted together."""
+    """Median chi-square above which, after two effects, the second little, the usual ones of all joints are fitted."""
 
 
 class Run:
@@ -77,6 +78,7 @@ class Run:
         self.loss: Loss | None = None
         self.given = 0
         self.tried_many, self.patience = False, config.patience
+        self.fall = 1.0
         self.candidates, _ = remake([])
         self.start_far()
         self.rescreen()
@@ -165,8 +167,14 @@ class Run:
             return self.refuse(candidate)
         self.steps.append(evidence(candidate, z, len(self.candidates)))
         self.say(f"found {candidate.effect} on {candidate.where or 'the whole robot'}: {fit.of(candidate).round(5)}")
+        before = self.power()
         self.renew(fit)
+        self.fall = 1.0 - self.power() / max(before, 1e-12)
         return True
+
+    def power(self) -> float:
+        """Median chi-square of the windows, by value."""
+        return float(np.median((self.fit.clean(self.problem) ** 2).mean(axis=1)))
 
     def refuse(self, candidate: Candidate) -> bool:
         """Leave a candidate out of all further trials; always False."""
@@ -209,14 +217,13 @@ class Run:
     def start_many(self) -> bool:
         """Begin anew with the usual effects of all joints, where some effects leave the data far from the model.
 
-        At once, where it is very far and half of the joints lack torque.
+        Only if the last of these explained little: else the next may explain the rest.
         """
-        power = float(np.median((self.fit.clean(self.problem) ** 2).mean(axis=1)))
-        some = power > self.config.many and len(self.fit.chosen) >= _SOME
-        if self.tried_many or self.given or not (some or (power > self.config.far and self.half_lack())):
+        enough = len(self.fit.chosen) >= _SOME and self.fall < _LITTLE
+        if self.tried_many or self.given or not enough or self.power() < self.config.many:
             return False
         self.tried_many = True
-        fit = fit_many(self.problem, self.candidates, self.say)
+        fit = fit_many(self.problem, self.candidates, self.fit, self.say)
         if fit is None or not pays_together(self.holdout, self.fit, fit):
             return False
         weights = window_weights(fit.clean(self.problem))
@@ -228,12 +235,6 @@ class Run:
         self.given, self.patience = len(fit.chosen), min(self.patience, _SOME)
         self.renew(fit)
         return True
-
-    def half_lack(self) -> bool:
-        """Whether half of the joints, two at least, lack torque on the screening windows."""
-        joints = len(self.problem.plant.joints)
-        lack = restless(self.small, self.answers, self.small_fit().clean(self.small), joints, self.config.far)
-        return len(lack) >= max(_SOME, joints / 2)
 
     def find_loss(self) -> bool:
         """Look for commands that never arrived; if some did not, go on with those that did."""

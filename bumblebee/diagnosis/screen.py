@@ -77,10 +77,8 @@ def pulse_sizes(problem: Problem, torque: np.ndarray) -> np.ndarray:
     return np.maximum(out, 1e-9)
 
 
-def restless(
-    problem: Problem, answers: np.ndarray, residual: np.ndarray, count: int, least: float = _RESTLESS
-) -> list[str]:
-    """Joints that lack most torque, worst first, of power `least`: where play and shafts are worth a simulation.
+def restless(problem: Problem, answers: np.ndarray, residual: np.ndarray, count: int) -> list[str]:
+    """Joints that lack most torque, worst first: where play and shafts are worth a simulation.
 
     `answers` (W, nv, S, M) to pulses explain the whitened residual (W, M), all degrees of freedom together; a joint's
     power is the mean square of its torques in their own standard errors, 1 for noise.
@@ -95,4 +93,4 @@ def restless(
     torque = np.matmul(inverse, np.matmul(rows, residual[:, :, None]))[..., 0]
     lacks = torque**2 / np.diagonal(inverse, axis1=1, axis2=2)
     power = lacks.reshape(len(answers), *answers.shape[1:3]).mean(axis=(0, 2))[problem.plant.dof]
-    return [problem.plant.joints[j] for j in np.argsort(-power)[:count] if power[j] > least]
+    return [problem.plant.joints[j] for j in np.argsort(-power)[:count] if power[j] > _RESTLESS]

@@ -35,26 +35,38 @@ def _opened(effects: dict[tuple[str, str], float]) -> tuple[Session, Problem, Pr
 
 def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None:
     session, problem, other = _opened(TRUTH)
-    fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), lambda text: None)
+    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+    fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
     assert fit is not None
     found = {(c.effect, c.where): float(fit.of(c)[0]) for c in fit.chosen}
     for place, value in TRUTH.items():
         assert found[place] == pytest.approx(value, rel=0.25), place
     assert set(found) - set(TRUTH) <= {(kind, j) for kind in ("motor_strength", "encoder_offset") for j in arm.JOINTS}
     assert certainty(problem, fit, window_weights(fit.clean(problem))).min() >= 4.0
-    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     assert pays_together(Holdout(other), declared, fit)
     assert not pays_together(Holdout(other), fit, declared)
 
 
 def test_without_candidates_there_is_no_fit() -> None:
     _, problem, _ = _opened({})
-    assert fit_many(problem, [], lambda text: None) is None
+    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+    assert fit_many(problem, [], declared, lambda text: None) is None
+
+
+def test_a_load_that_was_found_stays_and_the_drives_are_not_weak() -> None:
+    """A heavier last link weakens all drives as far as these alone can tell."""
+    session, problem, _ = _opened({("link_mass", "l3"): 0.9})
+    candidates = all_candidates(session.plant, session.rollouts, [])
+    mass = next(c for c in candidates if (c.effect, c.where) == ("link_mass", "l3"))
+    start = gauss_newton(problem, (mass,), mass.start, np.ones(len(problem.windows)))
+    fit = fit_many(problem, candidates, start, lambda text: None)
+    assert fit is not None and fit.of(mass)[0] == pytest.approx(0.9, rel=0.02)
+    assert not [c for c in fit.chosen if c.effect == "motor_strength"]
 
 
 def test_what_is_found_on_a_robot_like_its_model_does_not_pay() -> None:
     """Another integrator looks like a little inertia on every joint."""
     session, problem, other = _opened({})
-    fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), lambda text: None)
     declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+    fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
     assert fit is None or not pays_together(Holdout(other), declared, fit)
