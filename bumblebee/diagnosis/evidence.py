@@ -159,6 +159,11 @@ class Evidence:
         keep = np.argsort(power)[: len(power) - spared]
         return float(power[keep].sum()), int(seen[keep].sum())
 
+    def implied(self, joint: int) -> float:
+        """RMS [N m] of the torques that a joint's chi-square above noise stands for, if all segments lack alike."""
+        value, count = self.free(joint)
+        return float(np.sqrt(max(value - count, 0.0) / max(np.einsum("wss->", self.power[joint]), 1e-30)))
+
 
 def _falls(total: np.ndarray, curvature: np.ndarray, raw: np.ndarray) -> np.ndarray:
     """(G,) falls of the cost for scores (G, F) and matrices (G, F, F); `raw` (G, F) their diagonals without a basis."""

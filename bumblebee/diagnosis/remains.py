@@ -22,6 +22,7 @@ _CONFIRMED = 2.0  # standard errors by which windows that were not fitted must b
 _POWER, _AGAIN, _ALONE = 4.0, 1.5, 6.0  # standard errors of a joint's power: fitted, judged, fitted without judges
 _LOUDEST = 2  # windows of a rollout that do not count there
 _FELT, _PAYS = 9.0, 25.0  # chi-square of a law on judging windows that do not meet it; its gain on half of the fitted
+_SLIGHT = 0.03  # share of a joint's typical torque below which a power that no law explains is no structure in contact
 _HINT = 3.0  # z from which a law says what a power that no law explains depends on
 _MOST = 8  # joints that laws are sought on, those that lack most
 
@@ -88,6 +89,8 @@ def remains(
         rms = float(np.sqrt((np.sum(lacks, axis=0) ** 2).mean())) if own else 0.0
         loud = excess[j] > (_ALONE if again is None else _POWER)
         loud &= again is None or again[j] > _AGAIN or _in_two(scene, j)
+        # Where feet stand, other steps and integrators feign a hundredth or two of an ankle's torque.
+        loud &= not problem.plant.floating or scene.evidence.implied(j) > _SLIGHT * typical[j]
         real = bool(own) and rms > _LEAST * typical[j]
         p = [2 * norm.sf(one.verdict.z) * some.count for one, _ in own]
         p.append(float(norm.sf(excess[j])) * len(names))
