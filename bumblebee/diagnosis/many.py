@@ -24,7 +24,7 @@ _DAMPING = 1e-3
 _SURE = 4.0  # standard errors
 _TRIFLE = 0.02  # share of a change that matters
 _ROUNDS = 3
-_MUCH = 0.2  # fall of log(1 + chi-square)
+_MUCH = 0.1  # fall of log(1 + chi-square)
 
 
 def usual_effects(candidates: Sequence[Candidate]) -> list[Candidate]:

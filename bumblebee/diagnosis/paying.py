@@ -17,16 +17,18 @@ from bumblebee.diagnosis.problem import Problem, window_weights
 _SMALL = 0.05  # share of what all effects gain, above which an effect need not be asked
 _Z, _LEAST = 2.0, 0.01  # as of acceptance
 _FEW = 4  # effects; of more, each may be a small share of the whole, and they were accepted together
+_FAR = 4.0  # median chi-square
 
 
 def still_paying(fit: Fit, refit: Refit, holdout: Holdout, problem: Problem | None = None) -> Fit:
     """The fit less effects that do not pay on the judging windows, the others refitted without them, the least first.
 
     Limits are left alone: few windows feel them, of the judging ones perhaps none. Of other effects that these do not
-    feel the fitted windows of `problem`, if given, decide. More than four effects are left alone, too.
+    feel the fitted windows of `problem`, if given, decide. More than four effects are left alone, too, and any where
+    the model is still far from the data: what it lacks there spoils the comparison.
     """
     kept: set[Candidate] = set()
-    if len(fit.chosen) > _FEW:
+    if len(fit.chosen) > _FEW or (holdout.problem is not None and _off(holdout.problem, fit) > _FAR):
         return fit
     while holdout.problem is not None and fit.chosen:
         share = shares(holdout, fit)
@@ -43,6 +45,12 @@ def still_paying(fit: Fit, refit: Refit, holdout: Holdout, problem: Problem | No
         else:
             fit = less
     return fit
+
+
+def _off(problem: Problem, fit: Fit) -> float:
+    """Median chi-square of the windows of `problem` with the effects of `fit`."""
+    left = problem.residual([fit.effects])[0] - np.tensordot(fit.nuisance, problem.nuisance, axes=1)
+    return float(np.median((left**2).mean(axis=1)))
 
 
 def shares(holdout: Holdout, fit: Fit) -> np.ndarray:
