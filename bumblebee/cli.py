@@ -37,7 +37,7 @@ def diagnose(
     result = diagnose(session, DiagnosisConfig(max_windows=max_windows, seed=seed), _teller())
     write_diagnosis(result, out, overwrite)
     print(summary(result.document))
-    shown = examples(session, result.effects, count=1)
+    shown = examples(result.session, result.effects, count=1)
     print(plot(shown[0]) if shown else "")
     print(f"written: {out / 'diagnosis.json'}, model.xml, effects.yaml, report.html")
 

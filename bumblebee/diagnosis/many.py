@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.fit import Fit, gauss_newton, standard_covariance
+from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, standard_covariance
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, window_weights
 
@@ -72,15 +72,16 @@ def _least_sure(chosen: Sequence[Candidate], z: np.ndarray) -> set[int]:
     return out
 
 
-def pays_together(holdout: Holdout, before: Fit, after: Fit) -> bool:
+def pays_together(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bool:
     """Whether windows that took no part are better with `after` than with `before`, which lacks some of it, by far.
 
-    Not worse after 1 s either. Without such windows the fitted ones decide.
+    Not worse after 1 s either. Without such windows those of `problem`, the fitted ones, decide.
     """
     if holdout.problem is None:
-        return after.cost < before.cost
-    old, new = holdout.logs([before, after])
-    gain = old - new
+        weights = window_weights(after.clean(problem))
+        old, new = (cost_of(problem, fit.residual, weights)[0] for fit in (before, after))
+        return new < (1.0 - _MUCH) * old
+    gain = np.subtract(*holdout.logs([before, after]))
     return bool(gain.mean() > _MUCH + 2.0 * gain.std() / np.sqrt(len(gain))) and not holdout.worse_later(before, after)
 
 

@@ -99,6 +99,8 @@ def _grid(joint: str, x: np.ndarray, noise: float) -> Grid | None:
     counts = np.bincount(np.round((x - x.min()) / cell).astype(int), weights, minlength=count)
     every = np.arange(count // 2 + 1) / (count * cell)
     inside = (every >= _CELLS / span) & (every <= 1.0 / _SMALLEST)
+    if inside.sum() < 2:
+        return None
     frequency, resultant = every[inside], np.abs(np.fft.rfft(counts, count))[inside]
     width = frequency[1] - frequency[0]
     fits = np.where(resultant > _ON_GRID * _left_of(frequency, noise), resultant, 0.0)

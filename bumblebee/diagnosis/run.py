@@ -25,6 +25,7 @@ from bumblebee.sim.effects import Effect
 _ANEW = 0.1  # share of the cost left, below which all candidates are screened anew
 _SOME = 2  # effects after which a model that is still far off is taken to lack many
 _LITTLE = 0.5  # share of the median chi-square that the last of them took at most
+_PATIENCE = 2  # rounds that may fail once many were fitted together
 _CHANGED = 0.8  # share of the cost that a fit must leave less of, to be worth linearising around
 
 
@@ -73,6 +74,7 @@ class Run:
         self.fit = gauss_newton(problem, (), (), self.weights)
         self.keep = screening_windows(problem, config.screen_windows)
         self.closed: set[Candidate] = set()
+        self.hopeless: set[tuple[str, str]] = set()  # limits (effect, joint) that only spoilt more when they were tried
         self.steps: list[Step] = []
         self.rejected: list[str] = []
         self.loss: Loss | None = None
@@ -224,7 +226,7 @@ class Run:
             return False
         self.tried_many = True
         fit = fit_many(self.problem, self.candidates, self.fit, self.say)
-        if fit is None or not pays_together(self.holdout, self.fit, fit):
+        if fit is None or not pays_together(self.problem, self.holdout, self.fit, fit):
             return False
         weights = window_weights(fit.clean(self.problem))
         z = certainty(self.problem, fit, weights)
@@ -232,7 +234,8 @@ class Run:
         self.say(f"begun anew with {len(fit.chosen)} effects together")
         self.screened_cost = np.inf
         self.closed.clear()
-        self.given, self.patience = len(fit.chosen), min(self.patience, _SOME)
+        self.hopeless.clear()
+        self.given, self.patience = len(fit.chosen), min(self.patience, _PATIENCE)
         self.renew(fit)
         return True
 
@@ -244,6 +247,7 @@ class Run:
         self.loss, self.problem, self.holdout = found
         self.say(f"found lost commands on {self.loss.where or 'the whole robot'}: {self.loss.share:.4f}")
         self.closed.clear()
+        self.hopeless.clear()
         chosen, values = self.fit.chosen, self.fit.values
         self.fit = gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True)
         self.renew(self.fit)

@@ -81,7 +81,6 @@ def search(
 def _select(run: Run, config: SearchConfig) -> None:
     """Forward selection until nothing is worth a trial, or too many in a row were in vain."""
     vain, judged, limits = 0, None, []
-    hopeless: set[tuple[str, str]] = set()
     while len(run.fit.chosen) < config.most + run.given and vain < run.patience:
         tried, looked = [], []
         run.start_many()
@@ -92,7 +91,7 @@ def _select(run: Run, config: SearchConfig) -> None:
             tried, looked = run.trials()
         some = _where_limits_matter(tried, run)
         if judged != (run.fit, some):
-            judged, limits = (run.fit, some), limit_trials(run.problem, run.fit, some, run.weights, hopeless)
+            judged, limits = (run.fit, some), limit_trials(run.problem, run.fit, some, run.weights, run.hopeless)
         tried += [t for t in limits if t.candidate not in run.closed]
         if not tried and not looked:
             break
@@ -106,7 +105,7 @@ def _select(run: Run, config: SearchConfig) -> None:
         accepted, place = run.accept(best.candidate, best.values), best.candidate.where
         vain = 0 if accepted else vain + 1
         if accepted:
-            hopeless = {(kind, where) for kind, where in hopeless if place and where != place}
+            run.hopeless = {(kind, where) for kind, where in run.hopeless if place and where != place}
 
 
 def _where_limits_matter(tried: Sequence[Trial], run: Run) -> tuple[Candidate, ...]:

@@ -39,12 +39,11 @@ class Starts:
 
 
 def threads() -> int:
-    """Threads for simulations: `THREADS`, or the processors that this process may use, at most OMP_NUM_THREADS."""
+    """Threads for simulations: `THREADS`, or as many as the processors that this process may use."""
     if THREADS is not None:
         return THREADS
     allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    asked = os.environ.get("OMP_NUM_THREADS", "")
-    return max(1, min(allowed, int(asked) if asked.isdigit() else allowed, _MOST_THREADS))
+    return min(allowed, _MOST_THREADS)
 
 
 def step_for(windows_period: float, longest: float) -> float:

@@ -64,3 +64,10 @@ def test_a_motion_that_comes_back_to_the_same_places_is_no_grid() -> None:
     readings = [replace(rollout, time=time, joint_pos=places, joint_vel=rest, joint_target=rest)]
     assert len(grids(readings)) == 3
     assert grids(readings, noise=[1e-3] * 3) == []
+
+
+@pytest.mark.parametrize("travel", [0.0099, 0.01001, 0.01005, 0.0102])
+def test_a_joint_that_hardly_travels_has_no_grid(travel: float) -> None:
+    (rollout,) = arm.simulate({}, count=1, seconds=1.0)
+    turn = np.linspace(0.0, travel, len(rollout.time))
+    assert grids([replace(rollout, joint_pos=np.stack([turn] * 3, axis=1))]) == []

@@ -43,8 +43,9 @@ def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None
         assert found[place] == pytest.approx(value, rel=0.25), place
     assert set(found) - set(TRUTH) <= {(kind, j) for kind in ("motor_strength", "encoder_offset") for j in arm.JOINTS}
     assert certainty(problem, fit, window_weights(fit.clean(problem))).min() >= 4.0
-    assert pays_together(Holdout(other), declared, fit)
-    assert not pays_together(Holdout(other), fit, declared)
+    assert pays_together(problem, Holdout(other), declared, fit)
+    assert not pays_together(problem, Holdout(other), fit, declared)
+    assert pays_together(problem, Holdout(), declared, fit) and not pays_together(problem, Holdout(), fit, declared)
 
 
 def test_without_candidates_there_is_no_fit() -> None:
@@ -69,4 +70,4 @@ def test_what_is_found_on_a_robot_like_its_model_does_not_pay() -> None:
     session, problem, other = _opened({})
     declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
-    assert fit is None or not pays_together(Holdout(other), declared, fit)
+    assert fit is None or not pays_together(problem, Holdout(other), declared, fit)
