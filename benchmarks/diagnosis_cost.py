@@ -11,7 +11,6 @@ processors that this one may use.
 
 import argparse
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -84,13 +83,22 @@ def write_dataset(folder: Path, motions: int, repeats: int, kinds: Sequence[str]
 
 def measure(model: Path, folder: Path, out: Path) -> tuple[float, float, float]:
     """Wall time [s], processor time [s] and peak memory [MB] of one diagnosis; its report goes to standard output."""
-    began, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
-    command = [sys.executable, "-m", "bumblebee.cli", "diagnose", str(model), str(folder), "--out", str(out)]
-    subprocess.run(command, check=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return cost([sys.executable, "-m", "bumblebee.cli", "diagnose", str(model), str(folder), "--out", str(out)])
+
+
+def cost(command: Sequence[str]) -> tuple[float, float, float]:
+    """Wall time [s], processor time [s] and peak memory [MB] of one command and of the children that it waits for.
+
+    Linux counts no less memory than this process itself has had when it starts the command.
+    """
+    began = time.monotonic()
+    process = subprocess.Popen(command)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
     unit = 1e6 if sys.platform == "darwin" else 1e3
-    return time.monotonic() - began, spent, after.ru_maxrss / unit
+    return time.monotonic() - began, used.ru_utime + used.ru_stime, used.ru_maxrss / unit
 
 
 def main() -> None:

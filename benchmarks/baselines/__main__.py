@@ -20,7 +20,7 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.baselines.methods import METHODS, RANDOMISATIONS, Method, changed, method
+from benchmarks.baselines.methods import METHODS, RANDOMISATIONS, Method, changed, method, require_kept
 from benchmarks.baselines.trial import Tried, report
 from benchmarks.baselines.variety import shares, varied
 from benchmarks.motion_pack import Packed, read_pack, whole_motions
@@ -223,9 +223,12 @@ def run(options: argparse.Namespace) -> int:
     sizes = {"engine": options.engine, "num_worlds": options.worlds, "physics_hz": 200.0, "threads": options.threads}
     own = changed(replace(own, env=replace(own.env, **sizes)), options.set)
     rows = read_pack(options.motions)
-    options.out.mkdir(parents=True, exist_ok=True)
     settings = {"method": own.name, "minutes": options.minutes, "env": asdict(own.env), "ppo": asdict(own.ppo)}
     settings |= {"student": asdict(own.student) if own.student else None, "parent": str(options.parent or "")}
+    settings |= {name: getattr(options, name) for name in ("variety", "seed", "embedded", "std", "snapshots")}
+    if (options.out / RESUME).exists():
+        require_kept(settings, options.out / SETTINGS)
+    options.out.mkdir(parents=True, exist_ok=True)
     (options.out / SETTINGS).write_text(json.dumps(settings, indent=1) + "\n")
     torch.set_num_threads(options.threads)
     clock, learned = Clock(options.call_minutes), training_clips(rows)

@@ -75,3 +75,23 @@ def _put(settings: Any, path: list[str], value: Any, change: str) -> Any:
     elif isinstance(old, float):
         value = float(value)
     return replace(settings, **{path[0]: value})
+
+
+def require_kept(settings: dict[str, Any], path: Path) -> None:
+    """Refuse to go on with another method, seed or draw of motions than the run in this folder began with.
+
+    Args:
+        settings: of this call.
+        path: those that the run began with; what they do not say may be anything.
+
+    Raises:
+        BadInput: if one of them differs, or the file is none of a run's.
+    """
+    try:
+        began = dict(json.loads(path.read_text()))
+    except (OSError, ValueError, TypeError) as error:
+        raise BadInput(path, "the settings of the run that goes on", f"{type(error).__name__}: {error}") from None
+    for name in KEPT:
+        if name in began and began[name] != settings[name]:
+            expected, came = f"{began[name]}, with which the run began", str(settings[name])
+            raise BadInput(f"{path}: {name}", expected, came, "Another run needs another --out.")

@@ -20,7 +20,7 @@ import torch
 
 from benchmarks.baselines.methods import RANDOMISATIONS
 from benchmarks.baselines.trial import PHYSICS_HZ, rate
-from benchmarks.baselines.variety import at_tempo, flies, mirrored, with_arms
+from benchmarks.baselines.variety import another, at_tempo, flies, mirrored, with_arms
 from benchmarks.motion_pack import read_pack, whole_motions
 from bumblebee.baselines.trial import Manner, follow
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
@@ -35,7 +35,8 @@ FASTER = 1.1
 
 def _armed(clips: Sequence[Clip]) -> list[Clip]:
     generator = np.random.default_rng(5)
-    return [with_arms(clip, clips[generator.integers(len(clips))], generator.random()) for clip in clips]
+    count = len(clips)
+    return [with_arms(c, clips[another(i, count, generator)], generator.random()) for i, c in enumerate(clips)]
 
 
 RELATIVES: dict[str, Callable[[Sequence[Clip]], list[Clip]]] = {

@@ -35,17 +35,23 @@ def varied(rows: Sequence[Packed], copies: int, seed: int = 0) -> list[Packed]:
     """`copies` of each row: with drawn arms of another row, and at a drawn tempo where it has no flight.
 
     A flight lasts as long as gravity lets it, so its tempo stays. Arms that would reach more than 1 cm deeper than the
-    motion itself are not taken.
+    motion itself are not taken. Only where there is no other row does a motion keep its own.
     """
     generator = np.random.default_rng(seed)
     out = []
     for copy in range(1, copies + 1):
-        for row in rows:
-            clip = with_arms(row.clip, rows[generator.integers(len(rows))].clip, generator.random())
+        for own, row in enumerate(rows):
+            clip = with_arms(row.clip, rows[another(own, len(rows), generator)].clip, generator.random())
             factor = float(np.exp(generator.uniform(*np.log(TEMPO))))
             clip = clip if flies(clip) else at_tempo(clip, factor)
             out.append(replace(row, clip=replace(clip, name=f"{row.clip.name}{MARK}{copy}")))
     return out
+
+
+def another(own: int, count: int, generator: np.random.Generator) -> int:
+    """A drawn index below `count`; the one after `own` (or the first) where `own` itself is drawn."""
+    drawn = int(generator.integers(count))
+    return (own + 1) % count if drawn == own else drawn
 
 
 def shares(rows: Sequence[Packed], embedded: float = 1.0) -> Tensor:

@@ -144,11 +144,7 @@ def all_candidates(
 
 def _on_joint(plant: Plant, s: Scales, j: int, name: str) -> Iterator[Candidate]:
     def make(
-        kind: str,
-        *step: float,
-        free: tuple[int, ...] = (0,),
-        start: tuple[float, ...] | None = None,
-        shape: float = 0.0,
+        kind: str, *step: float, free: tuple[int, ...] = (0,), start: Sequence[float] | None = None, shape: float = 0.0
     ) -> Candidate:
         nominal = declared_values(plant, kind, name) if start is None else start
         return Candidate(kind, name, tuple(0.0 if np.isinf(x) else x for x in nominal), step, free, shape)
@@ -167,7 +163,7 @@ def _on_joint(plant: Plant, s: Scales, j: int, name: str) -> Iterator[Candidate]
         width = share * max(s.travel[j], 0.02)
         for dahl in (0.0, 1.0):
             yield make("hysteresis", tenth, width, dahl, start=(0.0, 0.0, 0.0), shape=0.3 * width)
-    hinge = plant.model.jnt_type[plant.model.joint(name).id] == int(mujoco.mjtJoint.mjJNT_HINGE)
+    hinge = plant.model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_HINGE)
     for n in _HARMONICS if hinge else ():
         if n * s.travel[j] > np.pi:
             sizes = (0.5 * tenth, 0.5 * tenth, float(n))

@@ -156,7 +156,7 @@ class Evidence:
             seen &= some[:, None]
         values = np.where(seen, values, 1.0)
         power = np.where(seen, along**2 / values / self.weights[:, None], 0.0).sum(axis=1)
-        keep = np.argsort(power)[: len(power) - spared]
+        keep = np.argsort(power)[: max(0, len(power) - spared)]
         return float(power[keep].sum()), int(seen[keep].sum())
 
     def implied(self, joint: int) -> float:

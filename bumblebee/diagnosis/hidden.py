@@ -26,7 +26,8 @@ def restructured(
     Returns:
         The same in the layout of `lead`, (..., W, nq'), (..., W, nv').
     """
-    own = lead.plant or plant
+    own = lead.plant
+    assert own is not None
     q = np.broadcast_to(own.model.qpos0, (*qpos.shape[:-1], own.model.nq)).copy()
     v = np.zeros((*qvel.shape[:-1], own.model.nv))
     q[..., own.qpos], v[..., own.dof] = qpos[..., plant.qpos], qvel[..., plant.dof]

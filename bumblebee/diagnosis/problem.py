@@ -11,7 +11,7 @@ from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.recall import Recall
 from bumblebee.diagnosis.restart import restarted, start_moves
 from bumblebee.diagnosis.signals import Layout
-from bumblebee.diagnosis.simulate import Starts, residuals
+from bumblebee.diagnosis.simulate import residuals
 from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.whiten import Whitener, fit_whitener
 from bumblebee.diagnosis.windows import Windows, select
@@ -63,11 +63,6 @@ class Problem:
         some, step = select(self.windows, keep), self.coarse if coarse else self.fine
         raw = residuals(self.plant, self.layout, some, [vary(self.plant, effects)], step)
         return self.finite(raw, keep)[0]
-
-    def from_starts(self, effects: Sequence[Effect], starts: Starts) -> np.ndarray:
-        """Raw residuals (K, W, N, D) of one model from K other starts, in coarse steps where they will do."""
-        step = self.coarse if rough(e.effect for e in effects) else self.fine
-        return residuals(self.plant, self.layout, self.windows, [vary(self.plant, effects)], step, starts)
 
     def finite(self, raw: np.ndarray, keep: np.ndarray | None = None) -> np.ndarray:
         """Whiten, on the windows `keep` if given; a window that diverged counts as a very bad one, not as none."""

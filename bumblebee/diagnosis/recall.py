@@ -38,6 +38,6 @@ class Recall:
         out = np.stack([self.kept[key] for key in keys])
         for key in keys:
             self.kept.move_to_end(key)
-        while len(self.kept) > max(1, _KEPT_BYTES / out[0].nbytes):
+        while len(self.kept) > max(1, _KEPT_BYTES / max(1, out[0].nbytes)):
             self.kept.popitem(last=False)
         return out

@@ -57,6 +57,7 @@ def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
             constants |= _apply(own, model, delay, offset, effect, place)
             if _is_structural(effect):
                 hidden.append((effect.effect, place, effect.values()))
+    _set_rotors(own, model, hidden, {place for e in effects if e.effect == "armature" for place in e.where})
     if constants:
         # set_const reads qpos0 through a scratch MjData; gains, friction and damping do not enter it.
         mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -71,6 +72,17 @@ def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
         tilt=hooks.imu if hooks.imu.any() else None,
         hidden=tuple(hidden),
     )
+
+
+def _set_rotors(
+    plant: Plant, model: mujoco.MjModel, hidden: Sequence[tuple[str, str, tuple[float, ...]]], joints: set[str]
+) -> None:
+    """Give the armatures fitted on `joints` to the rotors' tendons, where the encoder is on the joint."""
+    for kind, place, values in hidden:
+        if place in joints and kind in native.SUFFIX and values[1]:
+            dof, tendon = plant.dof[plant.joints.index(place)], model.tendon(native.rotor_of(kind, place)).id
+            model.tendon_armature[tendon] = max(model.dof_armature[dof], native.HIDDEN_ARMATURE)
+            model.dof_armature[dof] = 0.0
 
 
 def _is_structural(effect: Effect) -> bool:
@@ -165,9 +177,6 @@ def _apply_to_joint(plant: Plant, model: mujoco.MjModel, kind: str, column: int,
             model.jnt_stiffness[joint], model.jnt_springyield[joint] = value / values[1], values[1]
     elif kind in native.SUFFIX:
         second = int(model.joint(plant.joints[column] + native.SUFFIX[kind]).id)
-        if values[1] and model.dof_armature[dof]:  # another than the declared one: the rotor has it
-            tendon = int(model.tendon(native.rotor_of(kind, plant.joints[column])).id)
-            model.tendon_armature[tendon], model.dof_armature[dof] = model.dof_armature[dof], 0.0
         if kind == "backlash":
             model.jnt_range[second] = (-0.5 * value, 0.5 * value)
         else:
@@ -255,8 +264,3 @@ def _declared_on_joint(plant: Plant, kind: str, column: int) -> tuple[float, ...
         stiffness = float(model.jnt_stiffness[joint])
         return (stiffness, stiffness * float(model.qpos_spring[model.jnt_qposadr[joint]]))
     return (0.0,) * len(CATALOGUE[kind].parameters)
-
-
-def declared_value(plant: Plant, kind: str, place: str) -> float:
-    """The first parameter of an effect as the declared model has it."""
-    return declared_values(plant, kind, place)[0]

@@ -45,7 +45,7 @@ def _second_hinge(spec: mujoco.MjSpec, name: str, kind: str, encoder: float) -> 
     at_q, at_v = _room_after(declared, declared.joint(last).id, bool(encoder))
     keys = [(np.insert(k.qpos, at_q, 0.0), np.insert(k.qvel, at_v, 0.0)) for k in _filled_keys(spec, declared)]
     if encoder:
-        body = _rotor(spec, joint, native.rotor_of(kind, name))
+        body = _rotor(joint, native.rotor_of(kind, name))
     hinge = body.add_joint(name=name + native.SUFFIX[kind], type=joint.type, axis=joint.axis, pos=joint.pos)
     hinge.armature = native.HIDDEN_ARMATURE
     if encoder:
@@ -59,7 +59,7 @@ def _second_hinge(spec: mujoco.MjSpec, name: str, kind: str, encoder: float) -> 
     return hinge
 
 
-def _rotor(spec: mujoco.MjSpec, joint: Any, name: str) -> Any:
+def _rotor(joint: Any, name: str) -> Any:
     """A next to weightless body on the joint's body, centred on the joint: what turns in it is the tendon's inertia."""
     body = joint.parent.add_body(name=name, mass=native.ROTOR_MASS, ipos=joint.pos, explicitinertial=True)
     body.inertia = [native.ROTOR_INERTIA] * 3
