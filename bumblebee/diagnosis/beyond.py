@@ -1,5 +1,6 @@
 """The document's part on what lies beyond the catalogue: entries of discovered effects, and what is unexplained."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ from bumblebee.diagnosis.remains import JointRemains
 
 NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
 _NAMED = 3  # joints that get a sentence
+_TABLE = re.compile(r"(curve)\(([^,()]+),[^()]*\)")  # its points are for diagnosis.json
 
 
 def discovered_entry(
@@ -63,7 +65,8 @@ def _described(left: Sequence[JointRemains], forms: Mapping[str, Mapping[str, fl
             line = f"{j.joint}: a torque of {j.rms:.2g} N m RMS ({share:.0f} % of its drive's) depends on {on}"
         if j.joint in forms:
             terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in forms[j.joint].items())
-            line += f"; near {terms if len(terms) <= 100 else terms[:80] + ' ...'}, which was not confirmed"
+            terms = _TABLE.sub(r"\1(\2, ...)", terms)
+            line += f"; near {terms}, which was not confirmed"
         lines.append(line)
     if len(left) > _NAMED:
         lines.append(f"and {len(left) - _NAMED} joints more")

@@ -39,7 +39,7 @@ class JointRemains:
     laws: tuple[tuple[Law, np.ndarray], ...]
     """Laws with their sizes, each confirmed on the judging windows."""
     rms: float
-    """RMS torque of the laws [N m]."""
+    """RMS torque of the laws [N m]; without any, what the excess stands for."""
     typical: float
     """RMS torque of the joint's servo [N m]."""
     depends_on: tuple[str, ...]
@@ -86,11 +86,11 @@ def remains(
     for j, name in enumerate(names):
         own = [(one, size) for one, size in kept if one.joint == j]
         lacks = [np.einsum("fws,f->ws", one.torque, size) for one, size in own]
-        rms = float(np.sqrt((np.sum(lacks, axis=0) ** 2).mean())) if own else 0.0
+        rms = float(np.sqrt((np.sum(lacks, axis=0) ** 2).mean())) if own else scene.evidence.implied(j)
         loud = excess[j] > (_ALONE if again is None else _POWER)
         loud &= again is None or again[j] > _AGAIN or _in_two(scene, j)
         # Where feet stand, other steps and integrators feign a hundredth or two of an ankle's torque.
-        loud &= not problem.plant.floating or scene.evidence.implied(j) > _SLIGHT * typical[j]
+        loud &= not problem.plant.floating or rms > _SLIGHT * typical[j]
         real = bool(own) and rms > _LEAST * typical[j]
         p = [2 * norm.sf(one.verdict.z) * some.count for one, _ in own]
         p.append(float(norm.sf(excess[j])) * len(names))

@@ -174,7 +174,7 @@ def _left(left: dict[str, Any], structure: dict[str, Any]) -> str:
     text = (
         "<p>Structure remains that no effect above explains. It is described, not forced into a catalogue's name.</p>"
     )
-    head = ["joint", "predictable RMS [N m]", "of the drive's", "goes with", "p"]
+    head = ["joint", "RMS [N m]", "of the drive's", "goes with", "p"]
     said = f"<p>{escape(left['description'])}.</p>"
     return text + table(head, rows, (1, 2, 4)) + said + "".join(_curves(structure, left["where"][:3]))
 
