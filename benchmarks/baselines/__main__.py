@@ -226,7 +226,7 @@ def run(options: argparse.Namespace) -> int:
     settings = {"method": own.name, "minutes": options.minutes, "env": asdict(own.env), "ppo": asdict(own.ppo)}
     settings |= {"student": asdict(own.student) if own.student else None, "parent": str(options.parent or "")}
     settings |= {name: getattr(options, name) for name in ("variety", "seed", "embedded", "std", "snapshots")}
-    if (options.out / RESUME).exists():
+    if (options.out / RESUME).exists() and (options.out / SETTINGS).exists():
         require_kept(settings, options.out / SETTINGS)
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / SETTINGS).write_text(json.dumps(settings, indent=1) + "\n")

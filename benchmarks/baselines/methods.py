@@ -1,6 +1,8 @@
 """What `benchmarks.baselines` can train: each method with its own settings, and single settings changed by path."""
 
+import json
 from dataclasses import dataclass, fields, is_dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -20,6 +22,8 @@ OURS = PpoConfig(
 NO_RANDOMISATION = Randomisation(friction=(1.0, 1.0), gains=0.0, mass=0.0, push=0.0)
 RANDOMISATIONS = {"none": NO_RANDOMISATION, "light": Randomisation(), "paper": PAPER_RANDOMISATION}
 METHODS = ("ours", "paper", *BASELINES)
+KEPT = ("method", "variety", "seed", "embedded")
+"""Settings that a run which goes on may not change."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +93,8 @@ def require_kept(settings: dict[str, Any], path: Path) -> None:
     """
     try:
         began = dict(json.loads(path.read_text()))
-    except (OSError, ValueError, TypeError) as error:
-        raise BadInput(path, "the settings of the run that goes on", f"{type(error).__name__}: {error}") from None
+    except (ValueError, TypeError) as error:
+        raise BadInput(path, "the settings of a run", f"{type(error).__name__}: {error}") from None
     for name in KEPT:
         if name in began and began[name] != settings[name]:
             expected, came = f"{began[name]}, with which the run began", str(settings[name])

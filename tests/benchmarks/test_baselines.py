@@ -10,8 +10,8 @@ import pytest
 import torch
 
 from benchmarks.baselines import table as tables
-from benchmarks.baselines.__main__ import RESUME, parse, run, training_clips
-from benchmarks.baselines.methods import METHODS, changed, method
+from benchmarks.baselines.__main__ import RESUME, SETTINGS, parse, run, training_clips
+from benchmarks.baselines.methods import METHODS, changed, method, require_kept
 from benchmarks.baselines.trial import RESULTS, TABLE, TRIALS, summary, table_of
 from benchmarks.motion_pack import Packed, read_pack, whole_motions, write_pack
 from bumblebee.errors import BadInput
@@ -110,6 +110,13 @@ def test_a_call_that_is_over_goes_on_to_the_end(tmp_path: Path, capsys: pytest.C
     assert "the same command goes on" in capsys.readouterr().out
     first = torch.load(tmp_path / "out" / RESUME, weights_only=True)
     assert not (tmp_path / "out" / TABLE).exists()
+    began = (tmp_path / "out" / SETTINGS).read_text()
+    named = {name: json.loads(began)[name] for name in ("variety", "seed", "embedded", "std", "snapshots")}
+    assert named == {"variety": 1, "seed": 0, "embedded": 1.0, "std": 0.0, "snapshots": [1e-5, 9.0]}
+    for other in (["--variety", "2"], ["--seed", "1"], ["--embedded", "2"]):
+        with pytest.raises(BadInput, match=f"{SETTINGS}: {other[0][2:]}: expected .*, with which .*, came {other[1]}"):
+            run(parse([*command, *other]))
+        assert (tmp_path / "out" / SETTINGS).read_text() == began
     assert run(parse(command)) == 0
     assert "goes on after" in capsys.readouterr().out
     assert load_policy(tmp_path / "out" / "at-1e-05M").shape.hidden == (8,)  # kept once; the other is not reached
@@ -119,6 +126,16 @@ def test_a_call_that_is_over_goes_on_to_the_end(tmp_path: Path, capsys: pytest.C
     trials = pd.read_csv(tmp_path / "out" / TRIALS)
     assert set(trials["policy"]) == {"teacher", "omnih2o"} and set(trials["name"]) == {c.name for c in CLIPS[:2]}
     assert (tmp_path / "out" / RESULTS).exists() and (tmp_path / "out" / TABLE).exists()
+
+
+def test_settings_that_an_older_run_did_not_write_may_be_anything_and_damaged_ones_are_one_line(tmp_path: Path):
+    now = {"method": "ours", "variety": 2, "seed": 0, "embedded": 1.0}
+    path = tmp_path / SETTINGS
+    path.write_text(json.dumps({"method": "ours"}))
+    require_kept(now, path)
+    path.write_text("{")
+    with pytest.raises(BadInput, match="expected the settings of a run, came JSONDecodeError"):
+        require_kept(now, path)
 
 
 def results(folder: Path, success: list[bool], mpkpe: list[float], method: str = "x") -> Path:
