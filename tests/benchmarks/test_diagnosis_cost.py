@@ -1,5 +1,7 @@
 """The data of the cost benchmark: rollouts of the wanted length and number that name their motion, sealed or not."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -24,3 +26,18 @@ def test_repeats_of_a_motion_share_its_name_and_differ(tmp_path: Path, monkeypat
     rubbed = {r.rollout_id: r for r in sealed}["m00-0"]
     column = plain[0].joints.index(diagnosis_cost.SEALED["coulomb_friction"][0])
     assert np.abs(rubbed.joint_pos - by_motion["m00-0"].joint_pos)[:, column].max() > 1e-3
+
+
+def test_a_commands_memory_is_its_own_and_not_an_earlier_ones() -> None:
+    """In a process that has had little memory itself, for its children count that, too."""
+    commands = [[sys.executable, "-c", text] for text in ("x = b'1' * 1_000_000_000", "pass")]
+    text = f"from benchmarks.diagnosis_cost import cost; print(*[cost(c)[2] for c in {commands}])"
+    done = subprocess.run([sys.executable, "-c", text], check=True, capture_output=True, text=True)
+    large, small = map(float, done.stdout.split())
+    assert large > 950
+    assert small < 0.8 * large
+
+
+def test_a_command_that_fails_is_no_measurement() -> None:
+    with pytest.raises(subprocess.CalledProcessError, match="status 3"):
+        diagnosis_cost.cost([sys.executable, "-c", "raise SystemExit(3)"])
