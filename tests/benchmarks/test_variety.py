@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 import torch
 
-from benchmarks.baselines import relatives
-from benchmarks.baselines.variety import ARMS, at_tempo, flies, mirrored, shares, varied, with_arms
+from benchmarks.baselines import relatives, variety
+from benchmarks.baselines.variety import ARMS, another, at_tempo, flies, mirrored, shares, varied, with_arms
 from benchmarks.motion_pack import Packed, write_pack
 from bumblebee.learning.policy import Policy, Shape, new_actor
 from bumblebee.motion.clip import Clip
@@ -42,6 +42,26 @@ def test_arms_are_those_of_the_other_and_all_else_stays():
     assert np.array_equal(made.joint_pos[:, LEGS], clip.joint_pos[:, LEGS])
     assert np.array_equal(made.root_pos, clip.root_pos)
     assert np.allclose(made.key_pos, forward_key_positions(made.root_pos, made.root_quat, made.joint_pos), atol=1e-6)
+
+
+def test_another_is_never_the_motion_itself_and_else_what_is_drawn():
+    for own in range(5):
+        drawn = [int(k) for k in np.random.default_rng(own).integers(5, size=200)]
+        generator = np.random.default_rng(own)
+        found = [another(own, 5, generator) for _ in drawn]
+        assert found == [(own + 1) % 5 if k == own else k for k in drawn] and own in drawn
+    assert another(0, 1, generator) == 0
+
+
+def test_arms_are_never_the_motions_own(monkeypatch: pytest.MonkeyPatch):
+    pairs = []
+    for module in (variety, relatives):
+        monkeypatch.setattr(module, "with_arms", lambda clip, other, _: pairs.append((clip, other)) or clip)
+    clips = [replace(CLIPS[0], name=str(k)) for k in range(3)]
+    varied([Packed("real", True, clip) for clip in clips], 3)
+    for count in (2, 3):
+        relatives.RELATIVES["other arms"](clips[:count])
+    assert len(pairs) == 9 + 2 + 3 and all(clip.name != other.name for clip, other in pairs)
 
 
 def test_arms_that_reach_through_the_floor_are_not_taken():
