@@ -50,6 +50,7 @@ def test_power_that_two_windows_hold_is_gone_with_them() -> None:
     (loud, count), (rest, fewer) = evidence.free(1), evidence.free(1, spared=2)
     assert (loud - count) / np.sqrt(2 * count) > 10 > 4 > (rest - fewer) / np.sqrt(2 * fewer)
     assert fewer < count
+    assert evidence.free(1, spared=len(problem.windows) + 1) == (0.0, 0)
 
 
 def test_a_gain_is_the_fall_of_the_cost_of_a_fit_with_the_column() -> None:

@@ -54,6 +54,10 @@ def test_the_oldest_are_forgotten_first(monkeypatch: pytest.MonkeyPatch) -> None
     assert (repr(0.001), *map(repr, MODELS[0])) not in memory.kept
 
 
+def test_residuals_without_a_value_are_kept() -> None:
+    assert Recall().get((object(),), MODELS, 0.001, lambda new: np.zeros((len(new), 0, 3))).shape == (3, 0, 3)
+
+
 def test_residuals_are_those_of_a_problem_that_remembers_nothing(problem: Problem) -> None:
     some = np.array([0, 2, 3])
     together = problem.residual(MODELS)
