@@ -176,8 +176,8 @@ def loop_rate(trainer: Trainer, seconds: float) -> Loop:
 
 
 def used_memory(device: str) -> float:
-    """Memory of the whole GPU that is in use [GiB], after what nobody holds was given back; nan on a CPU."""
-    if device == "cpu":
+    """Memory of the whole GPU that is in use [GiB], after what nobody holds was given back; nan without one."""
+    if device == "cpu" or not torch.cuda.is_available():
         return float("nan")
     gc.collect()
     torch.cuda.empty_cache()

@@ -14,7 +14,7 @@ th{color:#6b7385;font-weight:500}td.n,th.n{text-align:right;font-variant-numeric
 margin:.8rem 0}
 .bar{display:inline-block;height:.6rem;background:#1b8a6b;border-radius:2px;vertical-align:middle;margin-right:.4rem}
 svg{max-width:100%;height:auto;font-size:11px}.row{display:flex;flex-wrap:wrap;gap:.6rem}.row figure{flex:1 1 18rem}
-figure{margin:.4rem 0}.row figure{max-width:26rem}figcaption{color:#6b7385;font-size:.86rem}
+figure{margin:.4rem 0}.row figure{max-width:20rem}figcaption{color:#6b7385;font-size:.86rem}
 code{font-size:.86rem;white-space:normal;overflow-wrap:anywhere}
 details{margin:.6rem 0}summary{cursor:pointer;color:#6b7385}.good{color:#1b8a6b}.bad{color:#c8553d}
 .values{min-width:13rem;display:inline-block}"""
