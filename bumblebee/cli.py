@@ -26,7 +26,8 @@ def diagnose(
     seed: Annotated[int, typer.Option(help="Of the perturbed starts.")] = 0,
 ) -> None:
     """Find which effect the model lacks, add it, and report the error before and after."""
-    from bumblebee.diagnosis.diagnose import DiagnosisConfig, diagnose
+    from bumblebee.diagnosis.config import DiagnosisConfig
+    from bumblebee.diagnosis.diagnose import diagnose
     from bumblebee.diagnosis.example import examples
     from bumblebee.diagnosis.output import refuse_existing, write_diagnosis
     from bumblebee.diagnosis.session import open_session

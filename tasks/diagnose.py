@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from bumblebee.diagnosis.diagnose import DiagnosisConfig, diagnose
+from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import fill
 from bumblebee.diagnosis.session import open_session
 from bumblebee.diagnosis.terminal import summary

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.diagnose import DiagnosisConfig
+from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.measured.rollout import Rollout
 
 SMALL = DiagnosisConfig(max_windows=50, max_holdout_windows=25, report_windows=10)

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates import all_candidates
-from bumblebee.diagnosis.diagnose import make_problem
 from bumblebee.diagnosis.far import far_servos
-from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.problem import Problem, make_problem
 from bumblebee.diagnosis.session import Session, make_session
 from bumblebee.diagnosis.windows import choose_starts, cut
 from tests.diagnosis import arm

@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.diagnose import make_problem
+from bumblebee.diagnosis import diagnose as diagnosis
 from bumblebee.diagnosis.guard import is_worse_than, standing
-from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.problem import Problem, make_problem
 from bumblebee.diagnosis.session import make_session
 from bumblebee.diagnosis.windows import choose_starts, cut
 from bumblebee.sim.effects import single
@@ -47,3 +47,15 @@ def test_what_was_read_off_the_logs_falls_alone(rubbing: Problem) -> None:
 
 def test_the_same_model_is_not_worse(rubbing: Problem) -> None:
     assert not is_worse_than(rubbing, [TRUE], [TRUE])
+
+
+def test_structure_is_that_of_the_model_that_stands(monkeypatch) -> None:
+    """A withdrawn fit is no longer what `structure` and `settings` describe: the joint that lacks friction is named."""
+    monkeypatch.setattr(diagnosis, "standing", lambda problem, fitted, read: ([], [], ["withdrawn: all"]))
+    rollouts = arm.simulate({("coulomb_friction", "j2"): 1.0}, count=3, seed=3)
+    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    document = diagnosis.diagnose(session, arm.SMALL).document
+    assert document["effects"] == []
+    assert "withdrawn: all" in document["notes"]
+    assert document["structure"]["j2"]["significant"]
+    assert "j2" in document["unexplained"]["where"]

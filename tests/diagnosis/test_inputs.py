@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.diagnose import DiagnosisConfig, diagnose
+from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.drives import drive_law
 from bumblebee.diagnosis.latency import latency_notes
 from bumblebee.diagnosis.replay import replay

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates import all_candidates
-from bumblebee.diagnosis.diagnose import make_problem
 from bumblebee.diagnosis.fit import gauss_newton
-from bumblebee.diagnosis.problem import window_weights
+from bumblebee.diagnosis.problem import make_problem, window_weights
 from bumblebee.diagnosis.refine import refine
 from bumblebee.diagnosis.session import make_session
 from bumblebee.diagnosis.windows import choose_starts, cut

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates import all_candidates
-from bumblebee.diagnosis.diagnose import make_problem
 from bumblebee.diagnosis.fit import gauss_newton
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.many import certainty, fit_many, pays_together
-from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.session import Session, make_session
 from bumblebee.diagnosis.windows import choose_starts, cut
 from tests.diagnosis import arm

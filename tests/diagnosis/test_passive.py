@@ -4,7 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.diagnose import DiagnosisConfig, diagnose
+from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.session import make_session
 from bumblebee.measured.rollout import Rollout
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates import SIMULATED, Candidate, all_candidates, scales_of
-from bumblebee.diagnosis.diagnose import make_problem
 from bumblebee.diagnosis.fit import gauss_newton
-from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.problem import Problem, make_problem
 from bumblebee.diagnosis.scores import Columns, null_maxima, score_tests
 from bumblebee.diagnosis.screen import pulse_sizes, screen
 from bumblebee.diagnosis.session import make_session
