@@ -14,7 +14,7 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.throughput.alone import Rolled, command, listening, physics_step
+from benchmarks.throughput.alone import Rolled, command, listening, physics_step, without_overflow
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.ppo import Trainer
 from bumblebee.learning.ranks import Ranks
@@ -110,14 +110,15 @@ def physics_and_environment(env: TrackingEnv, seconds: float) -> Rates:
         with listening(engine) as commands:
             spent["environment"] += timed(lambda turn=turn: env.step(next(turn)), env.device, TURN)
         ended = engine.state_dict()
-        spent["held"] += timed(alone, env.device, TURN)
-        engine.load_state_dict(began)
-        if rolled is not None:
-            rolled.prepare(commands)
-        again = iter(commands)
-        spent["physics"] += timed(lambda turn=again: driven(turn), env.device, TURN)
-        if rolled is not None:
-            spent["rollout"] += timed(rolled, env.device)
+        with without_overflow(env):
+            spent["held"] += timed(alone, env.device, TURN)
+            engine.load_state_dict(began)
+            if rolled is not None:
+                rolled.prepare(commands)
+            again = iter(commands)
+            spent["physics"] += timed(lambda turn=again: driven(turn), env.device, TURN)
+            if rolled is not None:
+                spent["rollout"] += timed(rolled, env.device)
         engine.load_state_dict(ended)
         turns += 1
     steps = turns * TURN * env.num_envs

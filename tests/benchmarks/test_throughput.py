@@ -1,21 +1,30 @@
 """The throughput benchmark: copies of motions are what they are copies of, and its rows are rates."""
 
+import math
 from pathlib import Path
 
 import numpy as np
+import pytest
 import torch
 
-from benchmarks.throughput.alone import Rolled, command, listening, physics_step
+from benchmarks.throughput.alone import Rolled, command, listening, physics_step, without_overflow
 from benchmarks.throughput.growth import FRAMES, copies
 from benchmarks.throughput.measure import environment_rate, loop_rate, make_env, physics_and_environment, started
 from benchmarks.throughput.peer import write_motion
+from bumblebee.errors import BadInput
 from bumblebee.learning.config import PpoConfig
+from bumblebee.learning.ranks import Ranks
 from bumblebee.sim.effects import single
+from bumblebee.sim.warp_limits import Buffers
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from bumblebee.tracking.library import MotionLibrary
 from tests.tracking.clips import waving
 
 CLIPS = [waving("a", 60), waving("b", 90)]
+QUIET = Randomisation(friction=(1.0, 1.0), gains=0.0, mass=0.0, push=0.0)
+GPU = pytest.param(
+    "cuda", marks=[pytest.mark.gpu, pytest.mark.skipif(not torch.cuda.is_available(), reason="no NVIDIA GPU")]
+)
 
 
 def test_copies_are_found_where_their_motions_are() -> None:
@@ -45,8 +54,7 @@ def test_the_rows_are_rates() -> None:
 
 def test_physics_alone_goes_where_the_environment_went() -> None:
     """Where nobody is restarted: the engine by its own step, and `mujoco.rollout`, with the commands of the steps."""
-    quiet = Randomisation(friction=(1.0, 1.0), gains=0.0, mass=0.0, push=0.0)
-    config = EnvConfig(num_worlds=3, threads=1, physics_hz=100.0, randomisation=quiet, threshold_start=9.0)
+    config = EnvConfig(num_worlds=3, threads=1, physics_hz=100.0, randomisation=QUIET, threshold_start=9.0)
     env = make_env(config, lambda device: MotionLibrary(CLIPS, config.ahead, device=device))
     began, rolled, alone = env.engine.state_dict(), Rolled(env, 4), physics_step(env)
     with listening(env.engine) as commands:
@@ -62,6 +70,49 @@ def test_physics_alone_goes_where_the_environment_went() -> None:
     np.testing.assert_allclose(env.engine.batch.qpos, ended, atol=1e-9)
     np.testing.assert_allclose(rolled.last(), ended, atol=1e-9)
     assert len(commands) == 4 and env.engine.step.__name__ == "step"
+
+
+@pytest.mark.parametrize("device", ["cpu", GPU])
+def test_warp_alone_goes_where_the_environment_went(device: str) -> None:
+    """By its own step with the commands of the steps; and all rows of a GPU's table are rates."""
+    pytest.importorskip("mujoco_warp", reason="the extra `gpu` is not installed")
+    config = EnvConfig("mujoco_warp", num_worlds=3, physics_hz=100.0, randomisation=QUIET, threshold_start=9.0)
+    env = make_env(config, lambda where: MotionLibrary(CLIPS, config.ahead, device=where), Ranks(device=device))
+    with torch.inference_mode():
+        for action in torch.zeros(4, 3, 23, device=device):  # on a GPU the first steps are recorded
+            env.step(action)
+        began, alone = env.engine.state_dict(), physics_step(env)
+        with listening(env.engine) as commands:
+            for action in torch.linspace(0, 0.3, 4):
+                assert not env.step(torch.full((3, 23), float(action), device=device))[2].any()
+        ended = env.engine.state_dict()
+        env.engine.load_state_dict(began)
+        for targets in commands:
+            command(env, targets)
+            alone()
+        torch.testing.assert_close(env.engine.state_dict()["qpos"], ended["qpos"], atol=1e-5, rtol=0)
+        assert (ended["qpos"] - began["qpos"]).abs().max() > 1e-3
+    rates = physics_and_environment(env, 0.05)
+    assert min(rates.physics, rates.held, rates.environment) > 0 and math.isnan(rates.rollout)
+    assert loop_rate(started(env, PpoConfig(steps=2, epochs=1, mini_batches=1, hidden=(8,))), 0.05).frames > 0
+
+
+def test_physics_alone_is_not_blamed_for_contacts_that_it_drops() -> None:
+    """The environment's own are still told; robots that nobody restarts may need more room."""
+    pytest.importorskip("mujoco_warp", reason="the extra `gpu` is not installed")
+    config = EnvConfig("mujoco_warp", num_worlds=3, physics_hz=100.0, buffers=Buffers(constraints=8))
+    env = make_env(config, lambda where: MotionLibrary(CLIPS, config.ahead, device=where), Ranks(device="cpu"))
+    with without_overflow(env):
+        for _ in range(3):
+            env.engine.step(torch.zeros(3, 23))
+        with pytest.raises(BadInput, match="constraints"):
+            env.engine.check()
+    env.engine.check()
+    env.engine.step(torch.zeros(3, 23))
+    with without_overflow(env):
+        pass
+    with pytest.raises(BadInput, match="constraints"):
+        env.engine.check()
 
 
 def test_the_motion_for_mjlab_is_the_longest(tmp_path: Path) -> None:
