@@ -1,6 +1,7 @@
 """Let true robots follow a plan, and write down what their sensors say."""
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,14 @@ class Flight:
     """(T, R, J) [N m]."""
     alive: np.ndarray
     """(R,) ticks before the fall."""
+    arrived: np.ndarray
+    """(T, R, J) what became of the targets when they were issued."""
+    own_qpos: np.ndarray
+    """(T, R, nq') the true model's own states."""
+    own_qvel: np.ndarray
+    """(T, R, nv')."""
+    laws: tuple[tuple[Law, ...], ...]
+    """The laws with what they remember at every tick."""
 
 
 def fly(robot: Declared, laws: Sequence[Law], plan: Plan, rng: np.random.Generator) -> Flight:
@@ -39,6 +48,7 @@ def fly(robot: Declared, laws: Sequence[Law], plan: Plan, rng: np.random.Generat
     target = plan.target(0, qpos, qvel)
     robots.reset(qpos, qvel, target)
     rows: list[tuple[np.ndarray, ...]] = []
+    moments: list[tuple[Law, ...]] = []
     alive = np.full(len(qpos), plan.ticks)
     for tick in range(plan.ticks):
         qpos, qvel = robots.state()
@@ -49,10 +59,13 @@ def fly(robot: Declared, laws: Sequence[Law], plan: Plan, rng: np.random.Generat
         if bad.all():
             break
         target = plan.target(tick, qpos, qvel)
-        rows.append((qpos, qvel, target, robots.torque.copy()))
-        robots.step(target)
-    parts = [np.stack(part) for part in zip(*rows, strict=True)]
-    return Flight(*parts, alive)
+        moments.append(tuple(deepcopy(robots.laws)))
+        own, torque = robots.own_state(), robots.torque.copy()
+        arrived = robots.arrived(target)
+        rows.append((qpos, qvel, target, torque, arrived, *own))
+        robots.hold(arrived)
+    qpos, qvel, target, torque, *more = (np.stack(part) for part in zip(*rows, strict=True))
+    return Flight(qpos, qvel, target, torque, alive, *more, tuple(moments))
 
 
 def rollouts(robot: Declared, flight: Flight, noise: float, rng: np.random.Generator, prefix: str) -> list[Rollout]:

@@ -106,5 +106,5 @@ class Drift(Law):
         """Weaker the later."""
         j = world.column(self.joint)
         torque = torque.copy()
-        torque[:, j] *= max(0.2, 1 - self.rate * world.time)
+        torque[:, j] *= np.maximum(0.2, 1 - self.rate * world.time)
         return torque

@@ -17,8 +17,8 @@ class World:
     """[s]."""
     rng: np.random.Generator
     """Of what is random in the truth itself, such as which commands are lost."""
-    time: float = 0.0
-    """[s] since the start."""
+    time: float | np.ndarray = 0.0
+    """[s] since the start, or (R,) of each robot."""
     q: np.ndarray | None = None
     """(R, J) true joint positions [rad]."""
     v: np.ndarray | None = None
@@ -31,6 +31,28 @@ class World:
     def column(self, joint: str) -> int:
         """Index of a joint."""
         return self.joints.index(joint)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What sensors say of W robots at one tick; J joints. What is read is exact, what is inferred has their noise."""
+
+    joints: tuple[str, ...]
+    q: np.ndarray
+    """(W, J) readings [rad]."""
+    v: np.ndarray
+    """(W, J) [rad/s]."""
+    torque: np.ndarray
+    """(W, J) of the drives, by the servos' law from noisy readings [N m]."""
+    growth: np.ndarray
+    """(W, J) its change a second."""
+    acceleration: np.ndarray
+    """(W, J) from noisy speeds around the tick [rad/s^2]."""
+
+    def through(self, joint: str, rotor: float) -> np.ndarray:
+        """Torque (W,) [N m] that a rotor of inertia `rotor` [kg m^2] passes on."""
+        j = self.joints.index(joint)
+        return self.torque[:, j] - rotor * self.acceleration[:, j]
 
 
 class Law:
@@ -50,6 +72,9 @@ class Law:
 
     def start(self, world: World, target: np.ndarray) -> None:
         """Begin at rest under `target` (R, J), which has long been held."""
+
+    def settle(self, model: mujoco.MjModel, seen: Seen, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Guess what no reading determines, here and in the states (W, nq), (W, nv) of `model`, in place."""
 
     def tick(self, world: World, target: np.ndarray) -> np.ndarray:
         """What becomes of a command (R, J) when it is issued, once a control period."""

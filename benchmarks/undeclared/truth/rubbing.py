@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from benchmarks.undeclared.truth.law import Law, World
+from benchmarks.undeclared.truth.law import Law, Seen, World
 
 STRIBECK_SPEED = 0.15  # [rad/s]
 ROTOR = 0.9  # share of the declared armature that turns with the rotor
@@ -140,6 +140,12 @@ class Hysteresis(Law):
         push[:, j] -= self.level * self._z
 
 
+def _place(model: mujoco.MjModel, joint: str, qpos: np.ndarray, qvel: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
+    """Put a joint of all robots at q, v (W,)."""
+    where = model.joint(joint)
+    qpos[:, where.qposadr[0]], qvel[:, where.dofadr[0]] = q, v
+
+
 @dataclass
 class Backlash(Law):
     """A rotor that turns freely within `gap` [rad] of the joint; where they touch they move as one.
@@ -163,6 +169,15 @@ class Backlash(Law):
         j = world.column(self.joint)
         self._side, self._play = np.ones(world.count), np.full(world.count, self.gap / 2)
         self._speed, self._last = world.v[:, j].copy(), world.v[:, j].copy()
+
+    def settle(self, model: mujoco.MjModel, seen: Seen, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Touching on the side to which the torque less what turns the rotor points."""
+        j = seen.joints.index(self.joint)
+        self._side = np.where(seen.through(self.joint, self._rotor) < 0, -1.0, 1.0)
+        self._play = 0.5 * self.gap * self._side
+        self._speed, self._last = seen.v[:, j].copy(), seen.v[:, j].copy()
+        if self.on_motor:
+            _place(model, self.joint, qpos, qvel, seen.q[:, j] - self._play, seen.v[:, j])
 
     def transmit(self, world: World, torque: np.ndarray) -> np.ndarray:
         """Nothing, the torque, or the torque and the rotor's blow."""
@@ -227,6 +242,17 @@ class Elastic(Law):
         j = world.column(self.joint)
         self._angle, self._speed = world.q[:, j].copy(), world.v[:, j].copy()
         self._damping = 0.2 * np.sqrt(self.stiffness * self._rotor)
+
+    def settle(self, model: mujoco.MjModel, seen: Seen, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Twisted as the torque less what turns the rotor would twist it at rest, and as fast as the torque grows."""
+        j = seen.joints.index(self.joint)
+        q, v = seen.q[:, j], seen.v[:, j]
+        twist, growth = seen.through(self.joint, self._rotor) / self.stiffness, seen.growth[:, j] / self.stiffness
+        if self.on_motor:
+            self._angle, self._speed = q.copy(), v.copy()
+            _place(model, self.joint, qpos, qvel, q - twist, v - growth)
+        else:
+            self._angle, self._speed = q + twist, v + growth
 
     def transmit(self, world: World, torque: np.ndarray) -> np.ndarray:
         """The drive turns the rotor, the joint gets what the spring gives."""

@@ -12,21 +12,21 @@ class Line:
 
     def __init__(self, delay: float, dt: float, first: np.ndarray) -> None:
         self._whole, self._share = int(delay / dt), delay / dt - int(delay / dt)
-        self._past = [first.copy() for _ in range(self._whole + 2)]
+        self.past = [first.copy() for _ in range(self._whole + 2)]
 
     def push(self, value: np.ndarray) -> np.ndarray:
         """Put the newest value in; what comes out is the mean over this millisecond of the late signal."""
-        self._past = [value.copy(), *self._past[:-1]]
+        self.past = [value.copy(), *self.past[:-1]]
         return self.peek()
 
     def ahead(self, value: np.ndarray) -> np.ndarray:
         """What would come out if `value` were put in now."""
-        past = [value, *self._past]
+        past = [value, *self.past]
         return (1 - self._share) * past[self._whole] + self._share * past[self._whole + 1]
 
     def peek(self) -> np.ndarray:
         """What came out last."""
-        return (1 - self._share) * self._past[self._whole] + self._share * self._past[self._whole + 1]
+        return (1 - self._share) * self.past[self._whole] + self._share * self.past[self._whole + 1]
 
 
 @dataclass

@@ -61,6 +61,19 @@ class TrueRobots:
         for law in self.laws:
             law.start(self.world, target)
 
+    def resume(self, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray, time: np.ndarray) -> None:
+        """Go on from states (R, nq'), (R, nv') of this very model after `time` (R,); the laws remember already."""
+        self._batch.reset()
+        self._qpos[:], self._qvel[:] = qpos, qvel
+        self._batch.bind("qacc_warmstart")[:] = 0.0
+        self._push[:] = self._wrench[:] = 0.0
+        self.world.time, self.world.torque = time, torque.copy()
+        self._see()
+
+    def own_state(self) -> tuple[np.ndarray, np.ndarray]:
+        """The model's own state, (R, nq'), (R, nv')."""
+        return self._qpos.copy(), self._qvel.copy()
+
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """What perfect sensors with this robot's faults would say, as (R, nq), (R, nv) of the declared model."""
         q, v = self._qpos[:, self._q].copy(), self._qvel[:, self._v].copy()
@@ -80,11 +93,19 @@ class TrueRobots:
 
     def step(self, target: np.ndarray, robots: np.ndarray | None = None) -> None:
         """Hold `target` (R, J) [rad] for one control period; only `robots` move, all by default."""
-        robots = self.everyone if robots is None else robots
+        self.hold(self.arrived(target), robots)
+
+    def arrived(self, target: np.ndarray) -> np.ndarray:
+        """What becomes of `target` (R, J) [rad] when it is issued."""
         for law in self.laws:
             target = law.tick(self.world, target)
+        return target
+
+    def hold(self, arrived: np.ndarray, robots: np.ndarray | None = None) -> None:
+        """Hold what has arrived for one control period."""
+        robots = self.everyone if robots is None else robots
         for _ in range(CYCLES):
-            self._cycle(target, robots)
+            self._cycle(arrived, robots)
 
     def _has(self, method: str) -> bool:
         return any(getattr(type(law), method) is not getattr(Law, method) for law in self.laws)
@@ -128,7 +149,7 @@ class TrueRobots:
             for law in self.laws:
                 law.push(world, self._wrench)
         self._batch.step(ids=robots)
-        world.time += STEP
+        world.time = world.time + STEP
 
 
 def _true_model(robot: Declared, laws: Sequence[Law]) -> mujoco.MjModel:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from benchmarks.undeclared.truth.law import Law, World
+from benchmarks.undeclared.truth.law import Law, Seen, World
 
 PERIOD = 0.02  # [s] between commands
 
@@ -145,6 +145,18 @@ class LooseMount(Law):
             # Stiffness and damping are polynomials in this version of MuJoCo: the first coefficient is the linear one.
             joint.stiffness = np.array([self.stiffness, 0, 0]) if np.ndim(joint.stiffness) else self.stiffness
             joint.damping = np.array([damping, 0, 0]) if np.ndim(joint.damping) else damping
+
+    def settle(self, model: mujoco.MjModel, seen: Seen, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Leaning as far as the arm's weight and motion bend it, at rest."""
+        mount = [model.joint(name).dofadr[0] for name in ("mount_x", "mount_y")]
+        dofs = [model.joint(name).dofadr[0] for name in seen.joints]
+        data = mujoco.MjData(model)
+        qpos[:, mount], qvel[:, mount] = 0.0, 0.0
+        for row in range(len(qpos)):
+            data.qpos, data.qvel, data.qacc = qpos[row], qvel[row], 0.0
+            data.qacc[dofs] = seen.acceleration[row]
+            mujoco.mj_inverse(model, data)
+            qpos[row, mount] = -data.qfrc_inverse[mount] / self.stiffness
 
 
 @dataclass
