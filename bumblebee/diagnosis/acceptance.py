@@ -43,7 +43,7 @@ def least_z(problem: Problem, columns: Columns, fit: Fit, count: int, level: flo
 
 def is_worse(problem: Problem, fit: Fit, less: Fit, z: float) -> bool:
     """Whether an effect less costs more than one of `z` standard errors is worth, at the residual's power."""
-    power = max(float(np.median((fit.clean(problem) ** 2).mean(axis=1))), 1.0)
+    power = max(fit.power(problem), 1.0)
     return less.cost - fit.cost > 2.0 * z**2 * power
 
 

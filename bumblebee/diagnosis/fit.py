@@ -52,6 +52,15 @@ class Fit:
         """Residual without nuisances (W, M)."""
         return self.residual - np.tensordot(self.nuisance, problem.nuisance, axes=1)
 
+    def power(self, problem: Problem) -> float:
+        """Median chi-square by value of the windows, 1 for noise alone."""
+        return typical_power(self.clean(problem))
+
+
+def typical_power(residual: np.ndarray) -> float:
+    """Median over windows of the mean square of a whitened residual (W, M)."""
+    return float(np.median((residual**2).mean(axis=1)))
+
 
 def effects_at(chosen: Sequence[Candidate], values: np.ndarray) -> list[Effect]:
     """The chosen effects with their parameters at `values` (P,)."""
@@ -192,7 +201,7 @@ def expected_covariance(problem: Problem, fit: Fit, weights: np.ndarray) -> np.n
     """Covariance (P, P) that whitened noise of the residual's own power gives."""
     basis, inverse = project(problem, fit.columns, weights)
     flat = (basis * weights[:, None]).reshape(len(basis), -1)
-    power = max(float(np.median((fit.clean(problem) ** 2).mean(axis=1))), 1.0)
+    power = max(fit.power(problem), 1.0)
     return _scaled(problem, fit, power * inverse @ (flat @ flat.T) @ inverse)
 
 

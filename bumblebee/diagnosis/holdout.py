@@ -41,16 +41,19 @@ class Holdout:
         """The same around a model with `effects`."""
         return self if self.problem is None else replace(self, problem=self.problem.relinearised(effects))
 
-    def logs(self, fits: Sequence[Fit]) -> np.ndarray:
-        """log(1 + chi-square) of every fit on every window, (F, W)."""
+    def left(self, fits: Sequence[Fit]) -> np.ndarray:
+        """Held-out residuals (F, W, M) of fits, each less its own nuisances."""
         problem = self.problem
         if problem is None:
             raise ValueError("nothing is held out")
         raw = problem.residual([f.effects for f in fits])
-        left = np.stack(
+        return np.stack(
             [r - np.tensordot(f.nuisance, problem.nuisance, axes=1) for r, f in zip(raw, fits, strict=True)]
         )
-        return np.log1p((left**2).mean(axis=2))
+
+    def logs(self, fits: Sequence[Fit]) -> np.ndarray:
+        """log(1 + chi-square) of every fit on every window, (F, W)."""
+        return np.log1p((self.left(fits) ** 2).mean(axis=2))
 
     def gains(self, before: Fit, after: Fit, z: float, least: float) -> bool:
         """Whether what `after` changes is there in the held-out windows, too, and not a trifle; and no worse after 1 s.
@@ -64,12 +67,10 @@ class Holdout:
         if self.problem is None:
             return True
         problem = self.problem
-        raw = problem.residual([[], before.effects, after.effects])
-        old, new = (
-            r - np.tensordot(f.nuisance, problem.nuisance, 1) for r, f in zip(raw[1:], (before, after), strict=True)
-        )
+        old, new = self.left([before, after])
         weights = window_weights(new)
-        bare = raw[0] - np.tensordot(cost_of(problem, raw[0], weights)[1], problem.nuisance, axes=1)
+        bare = problem.residual([[]])[0]
+        bare = bare - np.tensordot(cost_of(problem, bare, weights)[1], problem.nuisance, axes=1)
         powers = [float((weights[:, None] * r**2).sum()) for r in (bare, old, new)]
         worth = min(least * (powers[0] - powers[2]), _OF_REST * powers[1])
         if powers[1] - powers[2] < worth:

@@ -129,10 +129,7 @@ def _judged(holdout: Holdout, before: Fit, after: Fit) -> list[tuple[np.ndarray,
     """Held-out residuals (W, M) of the two fits less their nuisances; empty where nothing is held out."""
     if holdout.problem is None:
         return []
-    raw = holdout.problem.residual([before.effects, after.effects])
-    old, new = (
-        r - np.tensordot(f.nuisance, holdout.problem.nuisance, 1) for r, f in zip(raw, (before, after), strict=True)
-    )
+    old, new = holdout.left([before, after])
     return [(old, new)]
 
 

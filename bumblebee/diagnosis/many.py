@@ -18,7 +18,9 @@ from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, window_weights
 
 # PACE's set (Bjelonic et al. 2025: armature, damping, friction, offset, delay) and the drive's strength.
-KINDS = ("coulomb_friction", "viscous_friction", "armature", "motor_strength", "encoder_offset")
+KINDS = (
+    "coulomb_friction", "viscous_friction", "load_dependent_friction", "armature", "motor_strength", "encoder_offset",
+)  # fmt: skip
 WHOLE = ("command_delay",)
 _DAMPING = 1e-3
 _SURE = 4.0  # standard errors
@@ -48,7 +50,7 @@ def fit_many(problem: Problem, candidates: Sequence[Candidate], found: Fit, say:
     for _ in range(_ROUNDS):
         fit = gauss_newton(problem, chosen, values, weights, iterations=3, coarse=True, damping=_DAMPING)
         values, weights = fit.values, window_weights(fit.clean(problem))
-    say(f"{len(chosen)} usual effects together: chi-square {_power(problem, fit):.3g}")
+    say(f"{len(chosen)} usual effects together: chi-square {fit.power(problem):.3g}")
     while len(fit.chosen):
         z = certainty(problem, fit, weights)
         least = _least_sure(fit.chosen, z)
@@ -92,7 +94,3 @@ def certainty(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
     counts = (fit.scales > 0) & (away >= _TRIFLE * fit.scales)
     z = np.where(counts, away / np.maximum(errors, 1e-300), 0.0)
     return np.array([z[part].max() for part in fit.slices])
-
-
-def _power(problem: Problem, fit: Fit) -> float:
-    return float(np.median((fit.clean(problem) ** 2).mean(axis=1)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from bumblebee.diagnosis.acceptance import Refit
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.fit import Fit, cost_of
+from bumblebee.diagnosis.fit import Fit, cost_of, typical_power
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.limits import pays_where_rare
@@ -28,7 +28,7 @@ def still_paying(fit: Fit, refit: Refit, holdout: Holdout, problem: Problem | No
     the model is still far from the data: what it lacks there spoils the comparison.
     """
     kept: set[Candidate] = set()
-    if len(fit.chosen) > _FEW or (holdout.problem is not None and _off(holdout.problem, fit) > _FAR):
+    if len(fit.chosen) > _FEW or (holdout.problem is not None and typical_power(holdout.left([fit])[0]) > _FAR):
         return fit
     while holdout.problem is not None and fit.chosen:
         share = shares(holdout, fit)
@@ -45,12 +45,6 @@ def still_paying(fit: Fit, refit: Refit, holdout: Holdout, problem: Problem | No
         else:
             fit = less
     return fit
-
-
-def _off(problem: Problem, fit: Fit) -> float:
-    """Median chi-square of the windows of `problem` with the effects of `fit`."""
-    left = problem.residual([fit.effects])[0] - np.tensordot(fit.nuisance, problem.nuisance, axes=1)
-    return float(np.median((left**2).mean(axis=1)))
 
 
 def shares(holdout: Holdout, fit: Fit) -> np.ndarray:

@@ -10,7 +10,7 @@ from bumblebee.diagnosis.arrivals import Loss, find_loss
 from bumblebee.diagnosis.candidates import Candidate, shortlisted
 from bumblebee.diagnosis.eligible import is_chosen, is_like, is_promising
 from bumblebee.diagnosis.far import far_servos
-from bumblebee.diagnosis.fit import Fit, cost_of, effects_at, gauss_newton, resolved
+from bumblebee.diagnosis.fit import Fit, cost_of, effects_at, gauss_newton, resolved, typical_power
 from bumblebee.diagnosis.gains import plain_gains
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
@@ -176,7 +176,7 @@ class Run:
 
     def power(self) -> float:
         """Median chi-square of the windows, by value."""
-        return float(np.median((self.fit.clean(self.problem) ** 2).mean(axis=1)))
+        return self.fit.power(self.problem)
 
     def refuse(self, candidate: Candidate) -> bool:
         """Leave a candidate out of all further trials; always False."""
@@ -197,7 +197,7 @@ class Run:
 
     def start_far(self) -> bool:
         """Begin with servos far from the declared ones, where the data are that far from the model."""
-        if float(np.median((self.fit.residual**2).mean(axis=1))) < self.config.far:
+        if typical_power(self.fit.residual) < self.config.far:
             return False
         found = far_servos(self.problem, self.candidates)
         if not found:
