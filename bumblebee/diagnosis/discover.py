@@ -8,6 +8,7 @@ what effects of the catalogue can do in its place (`diagnosis/instead.py`); else
 described, never forced into a name.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,13 +18,14 @@ from bumblebee.diagnosis.acceptance import wald
 from bumblebee.diagnosis.fit import Fit, resolved
 from bumblebee.diagnosis.formula import formula, in_terms, related, stiffer_than_the_drive
 from bumblebee.diagnosis.holdout import Holdout
-from bumblebee.diagnosis.instead import Offers, named_instead
+from bumblebee.diagnosis.instead import Offers, is_better, named_instead
 from bumblebee.diagnosis.laws import beside, joined
 from bumblebee.diagnosis.problem import Problem, window_weights
-from bumblebee.diagnosis.refits import PARAMETER, less, refitted, score, without_needless, without_one
+from bumblebee.diagnosis.refits import PARAMETER, SURE, less, refitted, score, without_needless, without_one
 from bumblebee.diagnosis.remains import Remains, remains
 from bumblebee.diagnosis.scene import fitted_scene
 from bumblebee.diagnosis.seek import Found, library, seek
+from bumblebee.diagnosis.several import single_laws
 
 _JOINTS = 3  # joints at most that get a form
 _MANY = 8  # effects in a fit beyond which one joint does, and inner numbers stay as found: every trial refits them all
@@ -31,6 +33,7 @@ _Z, _LEAST = 2.0, 0.01  # of the judging windows' gain, and its least share
 _OF_ALL = 0.05  # share of what all effects gain together that a form must, what it replaces being gone
 _MOST = 0.5  # share of a joint's excess that may remain where its form was found
 _LAWS, _WORTH, _SHARE = 3, 12.0, 0.03  # laws in a form; what a further one must bring, and as a share of the first's
+_TRIALS = 2  # laws tried at most in the place of names on one joint
 _PART = 0.2  # an effect of the catalogue is a part of a law that is at least this share of it
 
 
@@ -72,10 +75,16 @@ def discover(
 ) -> Discovery:
     """Test, name and refit what `fit` leaves; arguments as of `remains`, and the catalogue's `offers` beside `fit`."""
     left = remains(problem, holdout.problem, fit, typical, still)
-    tried: list[str] = []
     unconfirmed: dict[str, dict[str, float]] = {}
     kinds: dict[str, str] = {}
     before = fit
+    for joint in dict.fromkeys(c.where for c in fit.chosen if c.where in problem.plant.joints):
+        form = _instead_of_names(problem, holdout, fit, left, joint, offers or Offers())
+        if form is not None:
+            problem, holdout, fit, left = _around(problem, holdout, form.fit, typical, still)
+            kinds[joint] = form.kind
+            say(f"in the place of names on {joint}: {_sum(form)}")
+    tried = list(kinds)
     for _ in range(_JOINTS if len(fit.chosen) <= _MANY else 1):
         worst = left.worst(tried)
         if worst is None:
@@ -92,17 +101,16 @@ def discover(
             unconfirmed[worst.joint] = form.terms
             continue
         best = named or form.fit
-        moved = problem.relinearised(best.effects)
-        new = resolved(moved, best, window_weights(best.clean(moved)))
-        judged = holdout.relinearised(new.effects)
-        rest = remains(moved, judged.problem, new, typical, still)
+        moved, judged, new, rest = _around(problem, holdout, best, typical, still)
         column = problem.plant.joints.index(worst.joint)
-        if named is None and rest.joints[column].excess > max(_MOST * worst.excess, 2.0):
+        if named is None and (
+            rest.joints[column].excess > max(_MOST * worst.excess, 2.0) or _surety(moved, new, fit) < SURE
+        ):
             unconfirmed[worst.joint] = form.terms
             continue
         if named is None:
             kinds[worst.joint] = form.kind
-            say(f"discovered on {worst.joint}: {' + '.join(f'{v:.3g} {t}' for t, v in form.terms.items())[:100]}")
+            say(f"discovered on {worst.joint}: {_sum(form)}")
         else:
             tried.remove(worst.joint)  # a name may leave something that has none
             names = [f"{c.effect} on {c.where or 'the whole robot'}" for c in named.chosen if c not in fit.chosen]
@@ -115,13 +123,53 @@ def discover(
 
 def _is_worth_it(problem: Problem, holdout: Holdout, fit: Fit, form: _Form, bound: float) -> bool:
     """Whether a form pays on the judging windows, is no trifle, and as sure in the joint fit as its law had to be."""
-    weights = window_weights(form.fit.clean(problem))
-    own = next(c for c in form.fit.chosen if c not in fit.chosen)
-    if wald(problem, form.fit, weights, form.fit.chosen.index(own)) < bound:
+    if _surety(problem, form.fit, fit) < bound:
         return False
     if not holdout.gains(fit, form.fit, _Z, _LEAST):
         return False
+    own = next(c for c in form.fit.chosen if c not in fit.chosen)
     return holdout.gains(less(problem, form.fit, [own]), form.fit, _Z, _OF_ALL)
+
+
+def _surety(problem: Problem, fit: Fit, before: Fit) -> float:
+    """Wald's z of the form that `fit` has and `before` has not."""
+    own = next(i for i, c in enumerate(fit.chosen) if c not in before.chosen)
+    return wald(problem, fit, window_weights(fit.clean(problem)), own)
+
+
+def _around(
+    problem: Problem, holdout: Holdout, fit: Fit, typical: np.ndarray, still: Sequence[str]
+) -> tuple[Problem, Holdout, Fit, Remains]:
+    """Problem, judges and fit with their nuisances around a new fit, and what that leaves."""
+    moved = problem.relinearised(fit.effects)
+    new = resolved(moved, fit, window_weights(fit.clean(moved)))
+    judged = holdout.relinearised(new.effects)
+    return moved, judged, new, remains(moved, judged.problem, new, typical, still)
+
+
+def _sum(form: _Form) -> str:
+    """The form in a line."""
+    return " + ".join(f"{v:.3g} {t}" for t, v in form.terms.items())[:100]
+
+
+def _instead_of_names(
+    problem: Problem, holdout: Holdout, fit: Fit, left: Remains, joint: str, offers: Offers
+) -> _Form | None:
+    """One law that explains a joint better than the catalogue's effects on it, with no more numbers; or None.
+
+    Nor may other effects of the catalogue do what it does.
+    """
+    laws = single_laws(problem, fit, left.scene, left.library, joint)
+    for gone, one in itertools.islice(laws, _TRIALS):
+        bare = less(problem, fit, gone)
+        form = _form(problem, bare, joint, [one])
+        if form is None or not is_better(problem, holdout, fit, form.fit):
+            continue
+        if _surety(problem, form.fit, fit) < left.sought.bound:
+            continue
+        if named_instead(problem, holdout, bare, form.fit, joint, offers) is None:
+            return form
+    return None
 
 
 def _best_form(problem: Problem, fit: Fit, left: Remains, joint: str, typical: np.ndarray) -> _Form | None:

@@ -30,7 +30,7 @@ _ANYWHERE = 2  # of these the most promising may be on other joints
 _TRIALS, _FITS = 4, 2  # of these tried at their size, and refitted jointly
 _ROUNDS = 2  # effects of the catalogue that together may take a form's place
 _HOPELESS = 0.5  # share of what a form gains, above which no second name is tried
-_DOUBT = norm.cdf(2.0)
+_SURER = 3.0  # standard errors, where windows count to which the fits have bent
 _SHARE = 0.1  # of what a form gains; less is what laws differ by whose torques correlate by 0.95
 
 
@@ -99,6 +99,9 @@ def named_instead(problem: Problem, holdout: Holdout, fit: Fit, form: Fit, joint
         short = lead(problem, holdout, form, named)
         if short <= (_SHARE if parameters(named) <= parameters(form) else 0.0):
             return named
+        # A table has a height for everything: names that explain the fit better for their numbers go before it.
+        if score(problem, named) >= score(problem, form):
+            return named
         if short > _HOPELESS:
             return None
     return None
@@ -146,10 +149,32 @@ def lead(problem: Problem, holdout: Holdout, form: Fit, named: Fit) -> float:
     common = less(problem, form, [c for c in form.chosen if c not in named.chosen])
     left = _logs(problem, holdout, [common, named, form])
     gain, whole = left[1] - left[2], left[0] - left[2]
-    error = student.ppf(_DOUBT, len(gain) - 1) * gain.std(ddof=1) / np.sqrt(len(gain))
-    if parameters(named) > parameters(form):
-        error = 0.0
+    error = 0.0 if parameters(named) > parameters(form) else _doubt(gain)
     return float(gain.mean() / max(whole.mean(), gain.mean())) if gain.mean() > error else 0.0
+
+
+def is_better(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bool:
+    """Whether `after`, with no more numbers than `before`, is better window by window beyond doubt, and later no worse.
+
+    By two standard errors on the windows that judge. With fewer numbers, which fitted windows flatter less, three on
+    those and the fitted ones together do as well, if the ones that judge are no worse.
+    """
+    fewer = parameters(before) - parameters(after)
+    if fewer < 0 or score(problem, after) <= score(problem, before):
+        return False
+    left = _logs(problem, holdout, [before, after])
+    gain = left[0] - left[1]
+    sure = gain.mean() > _doubt(gain)
+    if fewer and not sure and gain.mean() > 0 and holdout.problem is not None:
+        left = _logs(problem, Holdout(), [before, after])
+        gain = np.concatenate((gain, left[0] - left[1]))
+        sure = gain.mean() > _doubt(gain, _SURER)
+    return bool(sure) and not holdout.worse_later(before, after)
+
+
+def _doubt(gain: np.ndarray, count: float = 2.0) -> float:
+    """So many standard errors of the mean of (W,) differences between windows, wider where these are few."""
+    return float(student.ppf(norm.cdf(count), len(gain) - 1) * gain.std(ddof=1) / np.sqrt(len(gain)))
 
 
 def _logs(problem: Problem, holdout: Holdout, fits: Sequence[Fit]) -> np.ndarray:

@@ -24,7 +24,14 @@ def score(problem: Problem, fit: Fit) -> float:
 
 def parameters(fit: Fit) -> int:
     """How many numbers were found in the data."""
-    return sum(numbers(c) if isinstance(c, Formula) else len(c.free) + bool(c.shape_scale) for c in fit.chosen)
+    return sum(numbers_of(c) for c in fit.chosen)
+
+
+def numbers_of(candidate: Candidate) -> int:
+    """How many of one effect's."""
+    if isinstance(candidate, Formula):
+        return numbers(candidate)
+    return len(candidate.free) + bool(candidate.shape_scale)
 
 
 def numbers(form: Formula) -> int:

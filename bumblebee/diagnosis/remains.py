@@ -15,7 +15,7 @@ from bumblebee.diagnosis.fit import Fit, solve
 from bumblebee.diagnosis.laws import Law
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.scene import Scene, fitted_scene, judged_scene
-from bumblebee.diagnosis.seek import Found, Sought, closest, library, seek
+from bumblebee.diagnosis.seek import Found, Library, Sought, closest, library, seek
 
 _LEAST = 0.01  # share of a joint's typical torque below which structure is not worth a word
 _CONFIRMED = 2.0  # standard errors by which windows that were not fitted must be better
@@ -55,6 +55,8 @@ class Remains:
     scene: Scene
     judged: Scene | None
     sought: Sought
+    library: Library
+    """The laws that were tried on the fitted windows."""
 
     def worst(self, beside: Sequence[str] = ()) -> JointRemains | None:
         """The joint with most that is significant, those in `beside` left out."""
@@ -106,7 +108,7 @@ def remains(
                 float(typical[j]), tuple(on), bool(real or (loud and name not in still)),
             )
         )  # fmt: skip
-    return Remains(found, scene, judged, sought)
+    return Remains(found, scene, judged, sought, some)
 
 
 def _in_two(scene: Scene, joint: int) -> bool:

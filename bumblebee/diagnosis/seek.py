@@ -122,7 +122,7 @@ def _seen(evidence: Evidence, some: Library, found: Sequence[Found], bound: floa
                 best.append((float(worth[k]), j, laws[k]))
     best.sort(key=lambda b: -b[0])
     seen = [
-        (_closer if k < _REFINED else _at)(evidence, some.data, j, law) for k, (_, j, law) in enumerate(best[:_LOOK])
+        (closer if k < _REFINED else _at)(evidence, some.data, j, law) for k, (_, j, law) in enumerate(best[:_LOOK])
     ]
     return [f for f in seen if f.verdict.z >= bound and f.verdict.gain >= least]
 
@@ -157,7 +157,7 @@ def _worth(found: Found) -> float:
     return found.verdict.gain - _PRICE * len(found.law.texts)
 
 
-def _closer(evidence: Evidence, data: Quantities, joint: int, law: Law) -> Found:
+def closer(evidence: Evidence, data: Quantities, joint: int, law: Law) -> Found:
     """The law at its best inner number; a whole number where that is as good."""
     best = _at(evidence, data, joint, law)
     if law.family is None:
