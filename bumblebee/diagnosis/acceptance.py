@@ -16,8 +16,8 @@ from bumblebee.diagnosis.scores import Columns, as_z, null_maxima
 from bumblebee.diagnosis.whiten import null_draws
 
 # Where the model restarts a late encoder's joint follows from the mean of two noisy readings: that alone gains a
-# little, on all joints at once more.
-_NOISY, _NOISY_GAIN, _NOISY_ALL = ("encoder_delay",), 0.02, 0.05
+# little of the chi-square of the joint's own signals, on all joints at once more.
+_NOISY, _NOISY_GAIN, _NOISY_ALL = ("encoder_delay",), 0.1, 0.05
 
 
 @dataclass(eq=False)
@@ -71,7 +71,8 @@ def is_physical(problem: Problem, fit: Fit, new: Fit, candidate: Candidate, weig
     """
     if candidate.effect in _NOISY:
         before = cost_of(problem, fit.residual, weights)[0]
-        if before - new.cost < (_NOISY_GAIN if candidate.where else _NOISY_ALL) * before:
+        own = 2 / problem.layout.size  # position and speed
+        if before - new.cost < (_NOISY_GAIN * own if candidate.where else _NOISY_ALL) * before:
             return False
     return beyond_numerics(problem, fit, new, weights)
 

@@ -18,9 +18,9 @@ INVERSE = ("torque_speed_limit", "series_elasticity")
 # What no torque on the robot's joints can stand for: always simulated, never screened.
 SIMULATED = (
     "encoder_offset", "imu_offset", "ground_friction", "ground_compliance", "backlash", "series_elasticity",
-    "torque_lag", "encoder_delay",
 )  # fmt: skip
-_SLOW = ("torque_lag", "encoder_delay", "series_elasticity")
+# To first order a torque and a start that moved, which for the light joints of a stiff servo is a poor likeness.
+_SLOW = ("torque_lag", "encoder_delay")
 _FEW_JOINTS = 8
 _STIFF = 0.03  # of a servo's own compliance
 _HARMONICS = (*range(1, 25), 28, 30, 32, 36, 40, 42, 48, 50, 56, 60, 64, 72, 80, 84, 96, 100, 120, 128, 144)
@@ -80,9 +80,14 @@ class Candidate:
         return values
 
 
+def is_simulated(c: Candidate, joints: int) -> bool:
+    """Whether a candidate's column is simulated: where it is no torque, or where one can afford it to be exact."""
+    return c.effect in SIMULATED or (c.effect in _SLOW and (not c.where or joints <= _FEW_JOINTS))
+
+
 def shortlisted(c: Candidate, joints: int) -> bool:
     """Whether a candidate costs too much to be simulated on every joint: only those worst explained are tried."""
-    return c.effect == "backlash" or (c.effect in _SLOW and bool(c.where) and joints > _FEW_JOINTS)
+    return c.effect == "backlash" or (c.effect == "series_elasticity" and joints > _FEW_JOINTS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import SIMULATED, Candidate, shortlisted
+from bumblebee.diagnosis.candidates import Candidate, is_simulated, shortlisted
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.pulses import Answers, answers_of
 from bumblebee.diagnosis.scores import Columns
@@ -39,7 +39,7 @@ def screen(
     values = np.empty((sum(rows), *problem.nuisance.shape[1:]), dtype=np.float32)
     simulated, at = [], 0
     for c, count in zip(kept, rows, strict=True):
-        if c.effect in SIMULATED:
+        if is_simulated(c, len(problem.plant.joints)):
             simulated.append((c, at))
         else:
             torques = signatures.of(c).astype(np.float32)
@@ -48,6 +48,8 @@ def screen(
             # A view where one degree of freedom is all: a copy for each of a thousand candidates costs seconds.
             own = white[:, felt[0]] if len(felt) == 1 else white[:, felt].reshape(len(flat), -1, white.shape[-1])
             values[at : at + count] = np.matmul(flat, own).transpose(1, 0, 2)
+            if c.effect == "encoder_delay":
+                values[at] += signatures.late.readings(problem, c.start[0], problem.plant.joints.index(c.where))
         at += count
     if simulated:
         drawn = problem.sensitivities([c for c, _ in simulated], list(effects))

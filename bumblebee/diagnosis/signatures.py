@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.late import LATE, Late
 from bumblebee.diagnosis.memory import bent_before, remember, yielded
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.pulses import Path
@@ -44,6 +45,7 @@ class Signatures:
         self.clock = clock[..., None]
         self.heat = memory.heat[:, None, order]
         self._inverse: dict[tuple[str, int], np.ndarray] = {}
+        self.late = Late(plant, windows, path, self.servos)
 
     def of(self, candidate: Candidate) -> np.ndarray:
         """Torques (F, W, S, nv) for one step of each of the F free parameters."""
@@ -93,7 +95,9 @@ class Signatures:
         if c.effect == "torque_speed_limit":
             left = servos.limit[j] * np.clip(1.0 - np.abs(v) * c.step[0], 0.0, 1.0)
             return [np.where(torque * v > 0, np.clip(torque, -left, left) - torque, 0.0)]
-        return [self._late(c, j)]
+        if c.effect in LATE:
+            return [self.late.torque(c.effect, c.start[0], self.torque)[..., j]]
+        return [self._commanded(c, j)]
 
     def _hysteresis(self, c: Candidate, j: int) -> np.ndarray:
         width, q = c.step[1], self.q[..., j]
@@ -110,7 +114,7 @@ class Signatures:
             out[:, k] = (q[:, k] - centre) / width
         return -c.step[0] * out
 
-    def _late(self, c: Candidate, j: int) -> np.ndarray:
+    def _commanded(self, c: Candidate, j: int) -> np.ndarray:
         """Delayed and lost commands of one joint, alone or with the others."""
         effect = c.at(np.array(c.nominal) + np.array(c.step))
         if c.effect in ("command_delay", "dropped_commands"):

@@ -41,12 +41,15 @@ class Whitener:
     """(W,) windows whose simulations stayed finite."""
     moved: np.ndarray
     """(K, W, M) whitened change of the residual from K perturbed starts, less its mean: what noise alone looks like."""
+    slopes: np.ndarray
+    """(W, C, M) whitened change of the residual for a standard deviation of each coordinate of the start."""
 
     def part(self, keep: np.ndarray) -> "Whitener":
         """The whitener of the windows at the indices or mask `keep`."""
         return Whitener(
-            self.factor[keep], self.offset[keep], self.curvature[keep], self.valid[keep], self.moved[:, keep]
-        )
+            self.factor[keep], self.offset[keep], self.curvature[keep], self.valid[keep], self.moved[:, keep],
+            self.slopes[keep],
+        )  # fmt: skip
 
     def __call__(self, residual: np.ndarray, centre: bool = True) -> np.ndarray:
         """Whiten residuals (..., W, N, D) -> (..., W, M); differences of residuals are whitened with centre=False."""
@@ -156,10 +159,11 @@ def fit_whitener(
     away = found.moved - mean
     factor = factors_of(away, sigma)
     white = np.matmul(factor, away.transpose(1, 2, 0)).transpose(2, 0, 1).astype(np.float32)
-    offset = np.zeros_like(mean)
+    offset, slopes = np.zeros_like(mean), found.slopes
     if move is not None:
-        offset = np.einsum("wc,wcm->wm", move / start_noise(plant, layout, sigma), found.slopes)
-    return Whitener(factor, offset, np.matmul(factor, mean[..., None])[..., 0], found.valid, white)
+        offset = np.einsum("wc,wcm->wm", move / start_noise(plant, layout, sigma), slopes)
+    slopes = np.matmul(slopes, factor.transpose(0, 2, 1)).astype(np.float32)
+    return Whitener(factor, offset, np.matmul(factor, mean[..., None])[..., 0], found.valid, white, slopes)
 
 
 def null_draws(whitener: Whitener, sigma: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -8,6 +8,7 @@ import pytest
 
 from bumblebee.diagnosis.candidates import SIMULATED, Candidate, all_candidates, scales_of
 from bumblebee.diagnosis.fit import gauss_newton
+from bumblebee.diagnosis.late import LATE
 from bumblebee.diagnosis.problem import Problem, make_problem
 from bumblebee.diagnosis.scores import Columns, null_maxima, score_tests
 from bumblebee.diagnosis.screen import pulse_sizes, screen
@@ -71,3 +72,19 @@ def test_a_score_test_estimates_the_step(made: tuple) -> None:
     assert tests.steps[k][0] == pytest.approx(0.7, abs=0.02)
     beside = replace(fit, residual=residual, columns=columns.values[columns.slices[k]])
     assert abs(score_tests(problem, columns, beside, weights).gain[k]) < 1.0
+
+
+def test_late_drives_and_encoders_have_columns_like_those_of_simulations(
+    made: tuple, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a simulation too, as robots of many joints have them: to first order a torque and a start that moved."""
+    problem, candidates, columns = made
+    late = [c for c in candidates if c.effect in LATE and c.where]
+    monkeypatch.setattr("bumblebee.diagnosis.screen.is_simulated", lambda c, joints: False)
+    torque = scales_of(problem.plant, problem.windows.source).torque
+    first_order = screen(problem, late, [], pulse_sizes(problem, torque))[0].values
+    for c, ours in zip(late, first_order, strict=True):
+        simulated = columns.values[columns.slices[columns.candidates.index(c)]][0]
+        cosine = (ours * simulated).sum() / np.linalg.norm(ours) / np.linalg.norm(simulated)
+        light = c.where == "j3"  # its servo stops it within the lag: pulses of 40 ms follow that least well
+        assert cosine > (0.5 if light else 0.8), (c.effect, c.where, cosine)
