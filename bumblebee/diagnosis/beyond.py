@@ -15,6 +15,7 @@ from bumblebee.diagnosis.remains import JointRemains
 
 NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
 _NAMED = 3  # joints that get a sentence
+_NOWHERE = "no joint's torque stands out, but the windows' chi-square is {:.2f} of what sensor noise gives"
 _TABLE = re.compile(r"(curve)\(([^,()]+),[^()]*\)")  # its points are for diagnosis.json
 
 
@@ -44,13 +45,17 @@ def discovered_entry(
 
 def unexplained(found: Discovery) -> dict[str, Any]:
     """The contract's `unexplained`: what is left with all effects in force."""
-    left = sorted((j for j in found.left.joints if j.significant), key=lambda j: -j.excess)
+    left, whole = sorted((j for j in found.left.joints if j.significant), key=lambda j: -j.excess), found.left.whole
+    p = min((j.p for j in found.left.joints), default=1.0)
+    said = _described(left, found.unconfirmed)
+    if whole.significant and not left:
+        said = _NOWHERE.format(whole.power)
     return {
-        "significant": bool(left),
-        "p": min((j.p for j in found.left.joints), default=1.0),
+        "significant": bool(left) or whole.significant,
+        "p": min(p, float(norm.sf(whole.z))) if whole.significant else p,
         "where": [j.joint for j in left],
         "depends_on": list(dict.fromkeys(on for j in left for on in j.depends_on)),
-        "description": _described(left, found.unconfirmed),
+        "description": said,
     }
 
 

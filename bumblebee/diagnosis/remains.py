@@ -3,6 +3,7 @@
 Two tests, both on the fitted windows and again on those that took no part in the fit. Laws: whether one of several
 thousand, each with its few coefficients, explains what is left (`diagnosis/seek.py`). Power: whether the torques that a
 joint lacks, free in every fifth of every window, are larger than sensor noise makes them; it sees what no law names.
+A third says whether the windows as a whole are further off than noise makes them: no joint need lack a torque for that.
 """
 
 from collections.abc import Sequence
@@ -21,6 +22,8 @@ _LEAST = 0.01  # share of a joint's typical torque below which structure is not 
 _CONFIRMED = 2.0  # standard errors by which windows that were not fitted must be better
 _POWER, _AGAIN, _ALONE = 4.0, 1.5, 6.0  # standard errors of a joint's power: fitted, judged, fitted without judges
 _LOUDEST = 2  # windows of a rollout that do not count there
+_LONE = 20.0  # standard errors of a joint's power in one rollout alone, its loudest windows not counted
+_WHOLE, _WHOLE_ALONE = (2.0, 4.0), 6.0  # standard errors of all windows: each of fitted and judged, both; fitted alone
 _FELT, _PAYS = 9.0, 25.0  # chi-square of a law on judging windows that do not meet it; its gain on half of the fitted
 _SLIGHT = 0.03  # share of a joint's typical torque below which a power that no law explains is no structure in contact
 _HINT = 3.0  # z from which a law says what a power that no law explains depends on
@@ -47,6 +50,17 @@ class JointRemains:
     significant: bool
 
 
+@dataclass(frozen=True)
+class Whole:
+    """Of all joints and sensors together."""
+
+    power: float
+    """Mean square of what is left on the fitted windows, 1 for noise, each rollout's loudest windows not counted."""
+    z: float
+    """Standard errors by which that, with the judging windows where there are any, is more than noise."""
+    significant: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Remains:
     """Of all joints."""
@@ -57,6 +71,7 @@ class Remains:
     sought: Sought
     library: Library
     """The laws that were tried on the fitted windows."""
+    whole: Whole
 
     def worst(self, beside: Sequence[str] = ()) -> JointRemains | None:
         """The joint with most that is significant, those in `beside` left out."""
@@ -108,17 +123,33 @@ def remains(
                 float(typical[j]), tuple(on), bool(real or (loud and name not in still)),
             )
         )  # fmt: skip
-    return Remains(found, scene, judged, sought, some)
+    return Remains(found, scene, judged, sought, some, in_whole(scene, judged))
+
+
+def in_whole(scene: Scene, judged: Scene | None) -> Whole:
+    """Whether the windows are further off than noise makes them; never in contact, where whitening is not that sure."""
+    power, error = scene.power(_LOUDEST)
+    z, least = [(power - 1) / error], _WHOLE_ALONE
+    if judged is not None:
+        again, error = judged.power(_LOUDEST)
+        z.append((again - 1) / error)
+        least = _WHOLE[1]
+    both = float(np.sum(z) / np.sqrt(len(z)))
+    return Whole(power, both, min(z) > _WHOLE[0] and both > least and not scene.problem.plant.floating)
 
 
 def _in_two(scene: Scene, joint: int) -> bool:
     """Whether a joint's power is too large in each of two rollouts: what one rollout shows may be an accident.
 
-    So may what a rollout's loudest windows show: where a foot tips, one of them holds more than all others.
+    So may what a rollout's loudest windows show: where a foot tips, one of them holds more than all others. A base that
+    cannot fall has no such accidents: there one rollout does that shows very much in many windows.
     """
     rollouts = scene.problem.windows.rollout
     values = [scene.evidence.free(joint, rollouts == i, _LOUDEST) for i in np.unique(rollouts)]
-    return sum((value - count) / np.sqrt(2.0 * max(count, 1)) > _POWER for value, count in values) > 1
+    excess = [(value - count) / np.sqrt(2.0 * max(count, 1)) for value, count in values]
+    if not scene.problem.plant.floating and max(excess) > _LONE:
+        return True
+    return sum(e > _POWER for e in excess) > 1
 
 
 def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[Found, np.ndarray]]:

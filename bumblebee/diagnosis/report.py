@@ -176,7 +176,8 @@ def _left(left: dict[str, Any], structure: dict[str, Any]) -> str:
     )
     head = ["joint", "RMS [N m]", "of the drive's", "goes with", "p"]
     said = f"<p>{escape(left['description'])}.</p>"
-    return text + table(head, rows, (1, 2, 4)) + said + "".join(_curves(structure, left["where"][:3]))
+    listed = table(head, rows, (1, 2, 4)) if rows else ""
+    return text + listed + said + "".join(_curves(structure, left["where"][:3]))
 
 
 def _curves(structure: dict[str, Any], joints: Sequence[str]) -> list[str]:

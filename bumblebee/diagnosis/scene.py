@@ -34,10 +34,14 @@ class Scene:
             found.append((value - count) / np.sqrt(2.0 * max(count, 1)))
         return np.array(found)
 
-    def power(self) -> tuple[float, float]:
-        """Mean square of what is left, 1 for noise, and its standard error for noise."""
-        left = self.evidence.left
-        return float((left**2).mean()), float(np.sqrt(2.0 / left.size))
+    def power(self, spared: int = 0) -> tuple[float, float]:
+        """Mean square of what is left, 1 for noise, and its standard error; without each rollout's loudest windows."""
+        powers, rollouts = (self.evidence.left**2).mean(axis=1), self.problem.windows.rollout
+        each = [np.sort(powers[rollouts == i]) for i in np.unique(rollouts)]
+        kept = np.concatenate([some[: len(some) - spared] for some in each if len(some) > spared] or [np.ones(1)])
+        values = self.evidence.left.shape[1]
+        error = kept.std(ddof=1) if len(kept) > 1 else np.inf
+        return float(kept.mean()), float(max(error, np.sqrt(2.0 / values)) / np.sqrt(len(kept)))
 
 
 def fitted_scene(problem: Problem, fit: Fit, torque: np.ndarray) -> Scene:

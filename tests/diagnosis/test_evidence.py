@@ -1,5 +1,7 @@
 """Evidence on missing torques: sizes and gains as a fit would find them, laws whose text and torque are the same."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from bumblebee.diagnosis.evidence import Evidence
 from bumblebee.diagnosis.fit import cost_of, gauss_newton
 from bumblebee.diagnosis.laws import Law, all_laws, beside, joined
 from bumblebee.diagnosis.problem import Problem
-from bumblebee.diagnosis.remains import better
+from bumblebee.diagnosis.remains import better, in_whole
 from bumblebee.diagnosis.scene import Scene, fitted_scene
 from bumblebee.diagnosis.seek import library, seek
 from bumblebee.sim.effect_terms import read_term
@@ -51,6 +53,17 @@ def test_power_that_two_windows_hold_is_gone_with_them() -> None:
     assert (loud - count) / np.sqrt(2 * count) > 10 > 4 > (rest - fewer) / np.sqrt(2 * fewer)
     assert fewer < count
     assert evidence.free(1, spared=len(problem.windows) + 1) == (0.0, 0)
+
+
+def test_windows_further_off_than_noise_are_seen_whatever_the_reason() -> None:
+    """A residual that no torque makes: noise of one and a half times the size in all that the windows compare."""
+    problem, scene = null()
+    more = np.random.default_rng(3).standard_normal(scene.residual.shape)
+    loud = replace(scene, evidence=scene.evidence.with_columns(problem, scene.residual + more, scene.columns))
+    assert in_whole(loud, None).significant and in_whole(loud, loud).significant
+    assert not in_whole(scene, None).significant
+    assert not in_whole(loud, scene).significant and not in_whole(scene, loud).significant
+    assert loud.power()[0] == pytest.approx(scene.power()[0] + 1.0, rel=0.1)
 
 
 def test_a_gain_is_the_fall_of_the_cost_of_a_fit_with_the_column() -> None:
