@@ -17,7 +17,6 @@ from bumblebee.sim.engine import RobotState
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.rotations import from_rotation_vector, multiply, rotate_inverse
 
-_VEL = int(mujoco.mjtStage.mjSTAGE_VEL)
 _ROOT_Q, _ROOT_V = 7, 6
 
 
@@ -126,8 +125,7 @@ class EffectsCpu(MujocoCpu):
         if self._running is not None:
             read[:, self._q[_ROOT_Q:]] = self._running.read()
         if self._offset is not None:
-            self._believed.qpos[:] = read
-            self._believed.forward(stage=int(mujoco.mjtStage.mjSTAGE_POS))
+            self._believed.find(read)
         return read
 
     def torque(self) -> Tensor:

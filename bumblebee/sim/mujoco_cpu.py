@@ -1,10 +1,5 @@
-"""The CPU engine: MuJoCo's `batch.Batch`, many worlds on a few threads, seen through `sim.engine.Engine`.
+"""The CPU engine: MuJoCo's `batch.Batch`, many worlds on a few threads, seen through `sim.engine.Engine`."""
 
-One `MjData` a world (`persistent`), so that the position and velocity stages computed after a step, which make key
-bodies current, are not computed again by the next one.
-"""
-
-import copy
 from collections.abc import Mapping
 from typing import Protocol
 
@@ -17,11 +12,12 @@ from torch import Tensor
 from bumblebee.errors import BadInput
 from bumblebee.robot.facts import FEET, KEY_BODIES
 from bumblebee.sim.engine import RobotState
+from bumblebee.sim.places import Places
 from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.sim.sensors import sensor_name
 from bumblebee.sim.world_fields import MASSES
 
-_POS, _VEL = int(mujoco.mjtStage.mjSTAGE_POS), int(mujoco.mjtStage.mjSTAGE_VEL)
+_NOTHING = int(mujoco.mjtStage.mjSTAGE_NONE)
 # MuJoCo resets a world by itself when its state blows up, and counts it in these warnings.
 _BAD = [int(w) for w in (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL)]
 _BAD.append(int(mujoco.mjtWarning.mjWARN_BADQACC))
@@ -59,23 +55,23 @@ class MujocoCpu:
         self.model, self.num_worlds, self.control_dt = model, num_worlds, 1.0 / control_hz
         self.device = torch.device("cpu")
         self.substeps = substeps_of(model, control_hz)
-        self.batch = Batch(model, num_worlds, threads, persistent=True)
+        self.batch = Batch(model, num_worlds, threads)
+        self._places = Places(model, num_worlds, threads)
         self._offset: np.ndarray | None = None
         if hooks is not None and np.any(hooks.encoder_offset):
             self._offset = np.asarray(hooks.encoder_offset, dtype=np.float64)
-            self._believed = Batch(_kinematics_only(model), num_worlds, threads, persistent=True)
-            self._believed_xpos = self._believed.bind("xpos")
+            self._believed = Places(model, num_worlds, threads)
         self._keys = [model.body(name).id for name in KEY_BODIES]
         self._feet = [model.body(name).id for name in FEET]
         self._force = foot_sensor_columns(model)
         self._time, self._qpos, self._qvel = (self.batch.bind(name) for name in ("time", "qpos", "qvel"))
         self._ctrl, self._act, self._warmstart = (self.batch.bind(name) for name in ("ctrl", "act", "qacc_warmstart"))
-        self._xpos, self._xquat = self.batch.bind("xpos"), self.batch.bind("xquat")
         self._actuator_force, self._sensordata = self.batch.bind("actuator_force"), self.batch.bind("sensordata")
         self._history, self._held = history_template(model)
         self._warnings = np.zeros(num_worlds, dtype=np.int64)
         self._unstable = torch.zeros(num_worlds, dtype=torch.bool)
-        self.batch.reset(keyframe=0 if model.nkey else -1, stage=_VEL)
+        self.batch.reset(keyframe=0 if model.nkey else -1, stage=_NOTHING)
+        self._places.find(self._qpos)
 
     def set_fields(self, fields: Mapping[str, np.ndarray]) -> None:
         """See `Engine.set_fields`."""
@@ -83,6 +79,7 @@ class MujocoCpu:
             self.batch.expand(name)[:] = values
         if MASSES & set(fields):
             self.batch.set_const()
+        self._places.set_fields(fields)
 
     def reset(self, rows: Tensor, qpos: Tensor, qvel: Tensor, targets: Tensor) -> None:
         """See `Engine.reset`; makes the bodies' places current at once, of the chosen worlds only."""
@@ -106,7 +103,7 @@ class MujocoCpu:
             for column, actuator in self._held:
                 filled[:, column] = held[:, actuator]
             self.batch.history[i] = filled
-        self.batch.forward(ids=i, stage=_VEL)
+        self._places.find(self._qpos[i], i)
         self._unstable[ids] = False
 
     def settle(self) -> None:
@@ -118,7 +115,8 @@ class MujocoCpu:
     def step(self, targets: Tensor) -> None:
         """See `Engine.step`."""
         self._ctrl[:] = targets.numpy()
-        self.batch.step(nstep=self.substeps, stage=_VEL)
+        self.batch.step(nstep=self.substeps)
+        self._places.find(self._qpos)
         counted = self.batch.warning[:, _BAD, 1].sum(axis=1)  # [last index, number]
         finite = np.isfinite(self._qpos.sum(axis=1) + self._qvel.sum(axis=1))
         self._unstable = torch.from_numpy((counted > self._warnings) | ~finite)
@@ -137,16 +135,15 @@ class MujocoCpu:
             root_ang_vel_b=_float(qvel[:, 3:6]),
             joint_pos=_float((qpos if read is None else read)[:, 7:]),
             joint_vel=_float(qvel[:, 6:]),
-            key_pos_w=_some(self._xpos, self._keys),
-            read_key_pos_w=None if read is None else _some(self._believed_xpos, self._keys),
+            key_pos_w=_some(self._places.xpos, self._keys),
+            read_key_pos_w=None if read is None else _some(self._believed.xpos, self._keys),
         )
 
     def _read_qpos(self) -> np.ndarray:
         """Positions as the encoders read them, (B, 7 + J); also puts the bodies of `_believed` there."""
         read = np.array(self.batch.qpos)
         read[:, 7:] += self._offset
-        self._believed.qpos[:] = read
-        self._believed.forward(stage=_POS)
+        self._believed.find(read)
         return read
 
     def torque(self) -> Tensor:
@@ -160,7 +157,7 @@ class MujocoCpu:
 
     def foot_quat_w(self) -> Tensor:
         """See `Engine.foot_quat_w`."""
-        return _some(self._xquat, self._feet)
+        return _some(self._places.xquat, self._feet)
 
     def push(self, velocity_w: Tensor) -> None:
         """See `Engine.push`."""
@@ -177,7 +174,7 @@ class MujocoCpu:
     def load_state_dict(self, saved: dict[str, np.ndarray]) -> None:
         """Go on from what `state_dict` gave."""
         self.batch.state[:] = saved["state"]
-        self.batch.forward(stage=_VEL)
+        self._places.find(self._qpos)
 
 
 def substeps_of(model: mujoco.MjModel, control_hz: float) -> int:
@@ -200,14 +197,6 @@ def _float(values: np.ndarray) -> Tensor:
 def _some(values: np.ndarray, columns: list[int]) -> Tensor:
     """Some of the columns (B, n, ...) of values (B, N, ...)."""
     return _float(values.take(columns, axis=1))
-
-
-def _kinematics_only(model: mujoco.MjModel) -> mujoco.MjModel:
-    """The model for kinematics alone: nothing touches anything, nothing is felt."""
-    ghost = copy.copy(model)
-    off = mujoco.mjtDisableBit
-    ghost.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_SENSOR)
-    return ghost
 
 
 def foot_sensor_columns(model: mujoco.MjModel) -> list[int]:

@@ -142,3 +142,16 @@ def test_physics_must_fit_into_the_control_period_and_feet_must_feel() -> None:
         MujocoCpu(load_model(physics_hz=180), 1)
     with pytest.raises(BadInput, match="contact sensors"):
         MujocoCpu(build_model(), 1)
+
+
+def test_bodies_follow_fields_that_move_them(model: mujoco.MjModel) -> None:
+    """A world whose shank is 5 cm longer has its foot 5 cm further down at the same angles."""
+    engine = MujocoCpu(model, 2, threads=1)
+    foot = model.body("left_ankle_pitch_link").id
+    longer = np.repeat(model.body_pos[None], 2, axis=0)
+    longer[1, foot] *= 1 + 0.05 / np.linalg.norm(model.body_pos[foot])
+    engine.set_fields({"body_pos": longer})
+    qpos, qvel = standing(engine, 2)
+    engine.reset(torch.arange(2), qpos, qvel, STAND.repeat(2, 1))
+    ankle = engine.state().key_pos_w[:, [n.startswith("left_ankle") for n in KEY_BODIES].index(True)]
+    assert float((ankle[1] - ankle[0]).norm()) == pytest.approx(0.05, abs=1e-5)

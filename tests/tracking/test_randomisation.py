@@ -80,9 +80,9 @@ def test_a_shifted_centre_of_mass_is_felt(model: mujoco.MjModel) -> None:
     engine.set_fields({"body_ipos": moved})
     engine.batch.qpos[:] = model.qpos0
     engine.batch.qvel[:] = 0.0
-    engine.batch.forward()
     pitch = model.joint("waist_pitch_joint").dofadr[0]
     torque = engine.batch.bind("qfrc_bias")[:, pitch]
+    engine.batch.forward()
     assert abs(torque[1] - torque[0]) == pytest.approx(model.body_mass[torso] * 9.81 * 0.1, rel=1e-3)
     weights = engine.batch.expand("body_invweight0")
     assert not np.array_equal(weights[0], weights[1])

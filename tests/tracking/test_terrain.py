@@ -82,7 +82,9 @@ def test_robots_stand_on_it_and_are_seen_as_on_flat_ground(model: mujoco.MjModel
     soles = [
         g for g in range(model.ngeom) if model.geom(g).name.endswith("collision") and "_foot" in model.geom(g).name
     ]
-    lowest = env.engine.batch.bind("geom_xpos")[:, soles]
+    lowest = env.engine.batch.bind("geom_xpos")
+    env.engine.batch.forward(stage=int(mujoco.mjtStage.mjSTAGE_POS))
+    lowest = lowest[:, soles]
     for world in range(6):
         for x, y, z in lowest[world]:
             assert z - 0.01 > _height(x, y) - 1e-3
