@@ -79,8 +79,8 @@ def diagnose(
 def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator, say: Callable[[str], None]) -> _Found:
     """The effects of the catalogue, then what lies beyond it."""
     found = search(material.problem, material.holdout, material.remade, config.search, say)
-    last = refine(found.problem, found.fit, rng, material.holdout)
-    holdout = material.holdout
+    holdout = material.holdout.finely()
+    last = refine(found.problem, found.fit, rng, holdout)
     if last.fit.chosen:
         holdout = holdout.relinearised(last.fit.effects)
     if not config.beyond:
@@ -100,7 +100,7 @@ def _steps_of_encoders(session: Session, found: _Found) -> tuple[list[dict[str, 
 
 def _nothing(material: Material, found: _Found) -> _Found:
     """The declared model in the place of a fit that may not stand, and what it leaves."""
-    problem, holdout = found.search.problem.relinearised([]), material.holdout
+    problem, holdout = found.search.problem.finely().relinearised([]), material.holdout.finely()
     weights = window_weights(problem.residual([[]])[0])
     last = Refined(problem, gauss_newton(problem, (), (), weights), weights, np.empty(0))
     beyond = None

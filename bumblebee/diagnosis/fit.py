@@ -7,7 +7,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.problem import Problem, rough
+from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.slopes import clipped, columns_at, effects_at, taken_over
 from bumblebee.sim.effects import Effect
 
 _ENOUGH_ROLLOUTS = 6  # fewer say little about how much rollouts differ
@@ -62,15 +63,6 @@ def typical_power(residual: np.ndarray) -> float:
     return float(np.median((residual**2).mean(axis=1)))
 
 
-def effects_at(chosen: Sequence[Candidate], values: np.ndarray) -> list[Effect]:
-    """The chosen effects with their parameters at `values` (P,)."""
-    out, at = [], 0
-    for c in chosen:
-        out.append(c.at(values[at : at + len(c.nominal)]))
-        at += len(c.nominal)
-    return out
-
-
 def project(
     problem: Problem, columns: np.ndarray, weights: np.ndarray, damping: float = 1e-9
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -115,23 +107,26 @@ def gauss_newton(
     iterations: int = 4,
     coarse: bool = False,
     damping: float = 1e-9,
+    known: Fit | None = None,
 ) -> Fit:
     """Refit all chosen effects jointly, from `values` (P,); `coarse` takes the sensitivities from coarse steps.
 
-    With `damping` (Marquardt's) what the data hardly tell stays where it is.
+    With `damping` (Marquardt's) what the data hardly tell stays where it is. Sensitivities of a fit that is `known` of
+    the same windows are taken over where nothing near has changed, and simulated again where something near has moved.
     """
-    values = _clip(chosen, np.asarray(values, dtype=float))
+    values = clipped(chosen, np.asarray(values, dtype=float))
     residual = problem.residual([effects_at(chosen, values)])[0]
     cost, nuisance = cost_of(problem, residual, weights)
     scales = np.concatenate([c.scales for c in chosen]) if len(chosen) else np.empty(0)
     moving = np.flatnonzero(scales)
-    columns = _columns(problem, chosen, values, residual, scales, coarse)
+    columns, at = taken_over(problem, chosen, values, moving, known)
+    columns = columns_at(problem, chosen, values, residual, scales, coarse, columns, at)
     for _ in range(iterations if len(chosen) else 0):
         basis, inverse = project(problem, columns, weights, damping)
         move = np.zeros(len(values))
         move[moving] = solve(basis, inverse, residual, weights)[len(problem.nuisance) :] * scales[moving]
         for share in (1.0, 0.4):
-            trial = _clip(chosen, values + share * move)
+            trial = clipped(chosen, values + share * move)
             tried = problem.residual([effects_at(chosen, trial)])[0]
             new = cost_of(problem, tried, weights)
             if new[0] < cost - 1e-3:
@@ -142,44 +137,10 @@ def gauss_newton(
         gained = cost - new[0]
         values, residual, (cost, nuisance) = trial, tried, new
         if not small:
-            columns = _columns(problem, chosen, values, residual, scales, coarse)
+            columns = columns_at(problem, chosen, values, residual, scales, coarse, columns, at)
         if small or gained < 0.05:
             break
     return Fit(tuple(chosen), values, nuisance, residual, columns, cost)
-
-
-def _clip(chosen: Sequence[Candidate], values: np.ndarray) -> np.ndarray:
-    out, at = values.copy(), 0
-    for c in chosen:
-        part = slice(at, at + len(c.nominal))
-        out[part], at = c.clip(values[part]), part.stop
-    return out
-
-
-def _columns(
-    problem: Problem,
-    chosen: Sequence[Candidate],
-    values: np.ndarray,
-    residual: np.ndarray,
-    scales: np.ndarray,
-    coarse: bool,
-) -> np.ndarray:
-    """Sensitivities (P', W, M) per scale at `values`, by differences of a fifth of it, away from the bound."""
-    moving = np.flatnonzero(scales)
-    if not len(moving):
-        return np.empty((0, *residual.shape))
-    sets, sizes = [], []
-    for i in moving:
-        moved = values.copy()
-        moved[i] += 0.2 * scales[i]
-        if _clip(chosen, moved)[i] != moved[i]:
-            moved[i] = values[i] - 0.2 * scales[i]
-        sizes.append((moved[i] - values[i]) / scales[i])
-        sets.append(effects_at(chosen, moved))
-    if coarse and rough(c.effect for c in chosen):
-        several = problem.residual([effects_at(chosen, values), *sets], coarse=True)
-        return problem.tamed(several[0] - several[1:]) / np.array(sizes)[:, None, None]
-    return (residual - problem.residual(sets)) / np.array(sizes)[:, None, None]
 
 
 def covariance(problem: Problem, fit: Fit, weights: np.ndarray, clusters: np.ndarray) -> np.ndarray:

@@ -39,7 +39,18 @@ class Holdout:
 
     def relinearised(self, effects: Sequence[Effect]) -> "Holdout":
         """The same around a model with `effects`."""
-        return self if self.problem is None else replace(self, problem=self.problem.relinearised(effects))
+        return self if self.problem is None else self._with(self.problem.relinearised(effects))
+
+    def finely(self) -> "Holdout":
+        """The same in the steps of the last fit."""
+        return self if self.problem is None else self._with(self.problem.finely())
+
+    def _with(self, problem: Problem) -> "Holdout":
+        """The same on another problem; what is known of the declared model after 1 s stays known."""
+        other = replace(self, problem=problem)
+        if "late" in self.__dict__:
+            other.__dict__["late"] = self.late
+        return other
 
     def left(self, fits: Sequence[Fit]) -> np.ndarray:
         """Held-out residuals (F, W, M) of fits, each less its own nuisances."""

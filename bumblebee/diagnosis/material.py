@@ -78,4 +78,6 @@ def _problem(session: Session, ids: Sequence[int], budget: int, horizon: float, 
         names = ", ".join(session.ids(ids)[:3])
         raise BadInput(f"rollouts {names}", f"stretches of {horizon:g} s", "shorter ones", "Record longer runs.")
     windows = cut(session.plant, session.layout, session.rollouts, starts)
-    return make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
+    finest, coarse = session.steps
+    steps = (session.search_step, coarse)
+    return make_problem(session.plant, session.layout, windows, session.sigma, steps, [], rng, finest)

@@ -101,17 +101,27 @@ def bent_before(windows: Windows, column: int, width: float) -> np.ndarray:
     Positions are means over a few ticks: what a sensor's noise would wind back is no motion.
     """
 
-    def of(rollout: Rollout) -> np.ndarray:
+    def place(rollout: Rollout) -> np.ndarray:
         wide = np.ones(2 * _SMOOTH + 1)
         known = np.convolve(np.ones(len(rollout.time)), wide, mode="same")
-        place = np.convolve(rollout.joint_pos[:, column], wide, mode="same") / known
-        out, now = np.zeros(len(place)), np.zeros(1)
-        for k, path in enumerate(np.diff(place), 1):
-            now = bent(now, np.array([path]), width)
-            out[k] = now[0]
-        return out
+        return np.convolve(rollout.joint_pos[:, column], wide, mode="same") / known
 
-    return at_starts(windows, of)
+    rows, paths = _together(windows, place)
+    out = np.zeros(paths.shape)
+    for k in range(1, paths.shape[1]):
+        out[:, k] = bent(out[:, k - 1], paths[:, k] - paths[:, k - 1], width)
+    return out[rows, windows.start]
+
+
+def _together(windows: Windows, of: Callable[[Rollout], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """What the windows' rollouts `of` (T,) give, (R, T) up to the last start, a shorter one kept at its last value.
+
+    And which of the rows (W,) each window is of.
+    """
+    some, rows = np.unique(windows.rollout, return_inverse=True)
+    last = int(windows.start.max()) + 1
+    values = [of(windows.source[i])[:last] for i in some]
+    return rows, np.stack([np.concatenate((v, np.full(last - len(v), v[-1]))) for v in values])
 
 
 def _states(plant: Plant, windows: Windows, hooks: RuntimeHooks, order: Sequence[int]) -> np.ndarray | None:
@@ -203,14 +213,8 @@ def read_at(windows: Windows, shift: float, delay: np.ndarray, order: Sequence[i
 
 def yielded(windows: Windows, column: int, width: float) -> np.ndarray:
     """Reference (W,) [rad] of an elasto-plastic spring of `width` on a joint, its path followed from the first tick."""
-
-    def centre(rollout: Rollout) -> np.ndarray:
-        q = rollout.joint_pos[:, column]
-        out = np.empty_like(q)
-        at = q[0]
-        for k, value in enumerate(q):
-            at = min(max(at, value - width), value + width)
-            out[k] = at
-        return out
-
-    return at_starts(windows, centre)
+    rows, paths = _together(windows, lambda rollout: rollout.joint_pos[:, column])
+    out = paths.copy()
+    for k in range(1, paths.shape[1]):
+        out[:, k] = np.clip(out[:, k - 1], paths[:, k] - width, paths[:, k] + width)
+    return out[rows, windows.start]

@@ -35,16 +35,17 @@ def nuisance_columns(plant: Plant, layout: Layout, windows: Windows, variation: 
     every = residuals(plant, layout, _read_thrice(windows, 2 * step), [variation], step)[0]
     base, early, first = np.split(every, [ticks.shape[1], 2 * ticks.shape[1]], axis=1)
     double = residuals(plant, layout, windows, [variation], 2 * step)[0]
-    late = residuals(plant, layout, windows, [_late_loop(plant, variation, part) for part in ("kp", "kd")], step)
+    # Of what is a small change of the model both sides are simulated in the longer steps.
+    late = residuals(plant, layout, windows, [_late_loop(plant, variation, part) for part in ("kp", "kd")], 2 * step)
     start = _faster(plant, layout, windows, windows.measured[:, 0] - first[:, 0], 2 * step)
-    clock = base - residuals(plant, layout, windows, [variation], step, start)[0]
+    clock = double - residuals(plant, layout, windows, [variation], 2 * step, start)[0]
     clock[..., layout.slices["joint_vel"]] += (base - early)[..., layout.slices["joint_vel"]]
-    columns = [(base - double) * (_UNIT / step), base - late[0], base - late[1], clock]
+    columns = [(base - double) * (_UNIT / step), double - late[0], double - late[1], clock]
     if plant.floating and "base_pos" not in layout.slices:
         higher = windows.qpos.copy()
         higher[:, plant.base_qpos + 2] += _HEIGHT
         starts = Starts(higher[None], windows.qvel[None])
-        columns.append(base - residuals(plant, layout, windows, [variation], step, starts)[0])
+        columns.append(double - residuals(plant, layout, windows, [variation], 2 * step, starts)[0])
     return np.stack(columns)
 
 

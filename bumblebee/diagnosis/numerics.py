@@ -42,7 +42,7 @@ def feigned(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> f
         differs = np.where(good[:, None], problem.whitener(raw) - before.residual, 0.0)
         weight = weights[:, None] * change
         shares.append(abs(float((weight * left(differs)).sum() / max((weight * change).sum(), 1e-12))))
-    return max(shares)
+    return max(shares) * problem.finest / problem.fine  # of first order in the step
 
 
 def beyond_numerics(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> bool:

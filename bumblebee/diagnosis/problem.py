@@ -39,6 +39,8 @@ class Problem:
     """(D,) noise."""
     fine: float
     """Step [s] for residuals."""
+    finest: float
+    """The same of the last fit, at most `fine`."""
     coarse: float
     """Step [s] for sensitivities of many candidates."""
     whitener: Whitener = field(repr=False)
@@ -119,6 +121,10 @@ class Problem:
         fresh[:, bad] = self.nuisance[:, bad]
         return replace(self, nuisance=fresh)
 
+    def finely(self) -> "Problem":
+        """The same windows, simulated in the steps of the last fit."""
+        return self if self.fine == self.finest else replace(self, fine=self.finest, recall=Recall())
+
     def part(self, keep: np.ndarray) -> "Problem":
         """The problem on the windows `keep`."""
         windows, read = select(self.windows, keep), select(self.read, keep)
@@ -145,9 +151,11 @@ def make_problem(
     steps: tuple[float, float],
     effects: Sequence[Effect],
     rng: np.random.Generator,
+    finest: float | None = None,
 ) -> Problem:
     """Whiten `windows` around the declared model with `effects`; windows that diverge are dropped.
 
+    `steps` [s] are for residuals and for sensitivities, `finest` for residuals of the last fit, if these are shorter.
     The windows start as measured; the problem's start where the readings after that say they did.
     """
     fine, coarse = steps
@@ -166,7 +174,8 @@ def make_problem(
         )
     windows, raw, whitener = select(windows, keep), raw[:, keep], whitener.part(keep)
     columns = _columns(whitener, raw)
-    return Problem(plant, layout, windows, sigma, fine, coarse, whitener, columns, select(read, keep))
+    finest = fine if finest is None else finest
+    return Problem(plant, layout, windows, sigma, fine, finest, coarse, whitener, columns, select(read, keep))
 
 
 def _columns(whitener: Whitener, raw: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from bumblebee.sim.effects import Effect
 
-_KEPT_BYTES = 32e6
+_KEPT_BYTES = 64e6
 Key = tuple[str, ...]
 
 

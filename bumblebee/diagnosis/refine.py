@@ -33,23 +33,31 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
     A model that was nearly right before is whitened well enough: there only the nuisances are computed anew.
     """
     if not fit.chosen:
+        if problem.fine != problem.finest:
+            problem = problem.finely().relinearised([])
+            fit = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
         return Refined(problem, fit, window_weights(fit.clean(problem)), np.empty(0))
     if fit.cost < _CHANGED * cost_of(problem, problem.residual([[]])[0], window_weights(fit.clean(problem)))[0]:
         plant, layout, windows = problem.plant, problem.layout, problem.read
-        problem = make_problem(plant, layout, windows, problem.sigma, (problem.fine, problem.coarse), fit.effects, rng)
+        steps = (problem.finest, problem.coarse)
+        problem = make_problem(plant, layout, windows, problem.sigma, steps, fit.effects, rng)
     else:
-        problem = problem.relinearised(fit.effects)
+        problem = problem.finely().relinearised(fit.effects)
     residual = problem.residual([fit.effects])[0]
     _, nuisance = cost_of(problem, residual, window_weights(residual))
     weights = window_weights(residual - np.tensordot(nuisance, problem.nuisance, axes=1))
     found, fit = fit, gauss_newton(problem, fit.chosen, fit.values, weights, iterations=3, coarse=True)
 
-    def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
-        return gauss_newton(problem, chosen, values, weights, iterations=1)
+    whole = gauss_newton(problem, fit.chosen, fit.values, weights, iterations=1)
 
-    fit = pruned(problem, refit(fit.chosen, fit.values), weights, _SURE, refit)
+    def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
+        return gauss_newton(problem, chosen, values, weights, iterations=1, coarse=True, known=whole)
+
+    fit = pruned(problem, whole, weights, _SURE, refit)
     if holdout is not None:
         fit = still_paying(fit, refit, holdout, problem)
+    if fit.chosen != whole.chosen:
+        fit = gauss_newton(problem, fit.chosen, fit.values, weights, iterations=1)
     if holdout is not None and holdout.worse_later(found, fit):  # short windows alone led it astray
         fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
     return Refined(problem, fit, weights, interval(problem, fit, weights) if fit.chosen else np.empty(0))

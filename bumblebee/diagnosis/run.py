@@ -156,7 +156,7 @@ class Run:
         # Windows that only this effect explains weighed little so far: weigh them as it leaves them.
         residual = self.problem.residual([effects_at(chosen, start)])[0]
         weights = window_weights(residual - np.tensordot(self.fit.nuisance, self.problem.nuisance, axes=1))
-        fit = gauss_newton(self.problem, chosen, start, weights, iterations=2, coarse=True)
+        fit = gauss_newton(self.problem, chosen, start, weights, iterations=2, coarse=True, known=self.fit)
         z = wald(self.problem, fit, weights, len(fit.chosen) - 1)
         if z < self.bound:  # the windows that judge need not be simulated
             return self.refuse(candidate)
