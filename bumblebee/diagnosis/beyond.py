@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 from bumblebee.diagnosis.curves import measured_curve
 from bumblebee.diagnosis.discover import Discovery
-from bumblebee.diagnosis.formula import Formula
+from bumblebee.diagnosis.formula import Formula, quantities_of
 from bumblebee.diagnosis.laws import Law
 from bumblebee.diagnosis.remains import JointRemains
 
@@ -54,16 +54,21 @@ def unexplained(found: Discovery) -> dict[str, Any]:
         "significant": bool(left) or whole.significant,
         "p": min(p, float(norm.sf(whole.z))) if whole.significant else p,
         "where": [j.joint for j in left],
-        "depends_on": list(dict.fromkeys(on for j in left for on in j.depends_on)),
+        "depends_on": list(dict.fromkeys(on for j in left for on in _depends_on(j, found.unconfirmed))),
         "description": said,
     }
+
+
+def _depends_on(left: JointRemains, forms: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
+    """Quantities of a form that was not kept (it was sought without the joint's names, too), and of what is left."""
+    return tuple(dict.fromkeys((*quantities_of(tuple(forms.get(left.joint, ()))), *left.depends_on)))
 
 
 def _described(left: Sequence[JointRemains], forms: Mapping[str, Mapping[str, float]]) -> str:
     """One sentence a joint: how much is left, on what it depends, and a form that was not kept."""
     lines = []
     for j in left[:_NAMED]:
-        on = ", ".join(j.depends_on) or "no single quantity"
+        on = ", ".join(_depends_on(j, forms)) or "no single quantity"
         line = f"{j.joint}: torques that depend on {on}"
         if j.laws:
             share = 100 * j.rms / max(j.typical, 1e-12)

@@ -77,6 +77,19 @@ _FAMILY = {
 }
 
 
+_NAMES = {"u": "target", "tau": "torque", "t": "time", "q": "position", "v": "velocity"}
+
+
+def quantities_of(texts: Sequence[str]) -> tuple[str, ...]:
+    """Quantities that terms depend on: of `laws.QUANTITIES`, and "another joint (NAME)"."""
+    found: list[str] = []
+    for term in map(read_term, texts):
+        found += [f"another joint ({other})" for other in term.others]
+        found += [said for name, said in _NAMES.items() if name in term.names]
+        found += ["history"] if term.states else []
+    return tuple(dict.fromkeys(found))
+
+
 def related(texts: Sequence[str], effect: str) -> bool:
     """Whether a catalogue's effect is of the family of the laws `texts`: of friction, position or velocity."""
     kinds = set()

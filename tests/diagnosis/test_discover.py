@@ -8,7 +8,7 @@ from bumblebee.diagnosis.beyond import discovered_entry, structure_table, unexpl
 from bumblebee.diagnosis.candidates import Candidate, scales_of
 from bumblebee.diagnosis.discover import Discovery, discover
 from bumblebee.diagnosis.fit import gauss_newton
-from bumblebee.diagnosis.formula import formula, related, stiffer_than_the_drive
+from bumblebee.diagnosis.formula import formula, quantities_of, related, stiffer_than_the_drive
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.session import Session, make_session
@@ -87,6 +87,21 @@ def test_an_entry_has_a_coefficient_and_an_interval_for_each_term() -> None:
 )
 def test_a_constant_part_belongs_to_a_law_of_its_family(texts: list[str], effect: str, same: bool) -> None:
     assert related(texts, effect) is same
+
+
+@pytest.mark.parametrize(
+    ("texts", "on"),
+    [
+        (["sin(15*q)", "cos(15*q)"], ("position",)),
+        (["tau*sin(1.5*t)"], ("torque", "time")),
+        (["bound(u - q, 0.1)"], ("target", "position")),
+        (["slewed(2.5, 0.02) - u"], ("target", "history")),
+        (["friction(rested(0.3, 0.02))"], ("history",)),
+        (["v['left-hip']*abs(v['left-hip'])", "v*abs(v)"], ("another joint (left-hip)", "velocity")),
+    ],
+)
+def test_a_form_says_what_it_depends_on(texts: list[str], on: tuple[str, ...]) -> None:
+    assert quantities_of(texts) == on
 
 
 def test_a_target_changed_on_its_way_cannot_push_harder_than_the_servo() -> None:
