@@ -11,6 +11,7 @@ from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, interval
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.paying import still_paying
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
+from bumblebee.errors import BadInput
 
 _SURE = 3.0  # standard errors
 _CHANGED = 0.85  # share of the cost that is left, below which the declared model was not nearly right
@@ -27,6 +28,21 @@ class Refined:
     """(P,) of 95 % intervals; 0 for parameters that were not fitted."""
 
 
+def _around(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
+    """The problem whitened around `fit` where it changed much and its model stays finite from noisy starts.
+
+    Else only its nuisances are computed anew.
+    """
+    if fit.cost < _CHANGED * cost_of(problem, problem.residual([[]])[0], window_weights(fit.clean(problem)))[0]:
+        plant, layout, windows = problem.plant, problem.layout, problem.read
+        steps = (problem.finest, problem.coarse)
+        try:
+            return make_problem(plant, layout, windows, problem.sigma, steps, fit.effects, rng)
+        except BadInput:  # stiff and coarsely stepped, it diverges in more than half of the windows
+            pass
+    return problem.finely().relinearised(fit.effects)
+
+
 def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdout | None = None) -> Refined:
     """Whiten and linearise around `fit`, and fit again; a fit of nothing is as it should be already.
 
@@ -37,12 +53,7 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
             problem = problem.finely().relinearised([])
             fit = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
         return Refined(problem, fit, window_weights(fit.clean(problem)), np.empty(0))
-    if fit.cost < _CHANGED * cost_of(problem, problem.residual([[]])[0], window_weights(fit.clean(problem)))[0]:
-        plant, layout, windows = problem.plant, problem.layout, problem.read
-        steps = (problem.finest, problem.coarse)
-        problem = make_problem(plant, layout, windows, problem.sigma, steps, fit.effects, rng)
-    else:
-        problem = problem.finely().relinearised(fit.effects)
+    problem = _around(problem, fit, rng)
     residual = problem.residual([fit.effects])[0]
     _, nuisance = cost_of(problem, residual, window_weights(residual))
     weights = window_weights(residual - np.tensordot(nuisance, problem.nuisance, axes=1))

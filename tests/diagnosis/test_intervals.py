@@ -4,15 +4,29 @@ import mujoco
 import numpy as np
 import pytest
 
+from bumblebee.diagnosis import refine as refining
 from bumblebee.diagnosis.candidates import all_candidates
-from bumblebee.diagnosis.fit import gauss_newton
-from bumblebee.diagnosis.problem import make_problem, window_weights
+from bumblebee.diagnosis.fit import Fit, gauss_newton
+from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.refine import refine
 from bumblebee.diagnosis.session import make_session
 from bumblebee.diagnosis.windows import choose_starts, cut
+from bumblebee.errors import BadInput
 from tests.diagnosis import arm
 
 SEEDS = 5
+
+
+def _fitted(kind: str, place: str, value: float, seed: int) -> tuple[Problem, Fit, np.random.Generator]:
+    """The true effect alone, fitted to 40 windows of three rollouts."""
+    rollouts = arm.simulate({(kind, place): value}, count=3, seconds=4.0, seed=seed)
+    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    starts = choose_starts(session.rollouts, [0, 1, 2], 0.2, 40)
+    windows = cut(session.plant, session.layout, session.rollouts, starts)
+    rng = np.random.default_rng(0)
+    problem = make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
+    chosen = [c for c in all_candidates(session.plant, session.rollouts, []) if (c.effect, c.where) == (kind, place)]
+    return problem, gauss_newton(problem, chosen, chosen[0].start, window_weights(problem.residual([[]])[0])), rng
 
 
 @pytest.mark.parametrize(("kind", "place", "value"), [("command_delay", "j2", 0.013), ("viscous_friction", "j1", 0.3)])
@@ -20,18 +34,22 @@ def test_errors_are_as_large_as_their_intervals_say(kind: str, place: str, value
     """Of z = error / (half-width / 1.96) none is beyond 3.5, their mean is near 0 and their spread near 1."""
     z = []
     for seed in range(SEEDS):
-        rollouts = arm.simulate({(kind, place): value}, count=3, seconds=4.0, seed=100 + seed)
-        session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
-        starts = choose_starts(session.rollouts, [0, 1, 2], 0.2, 40)
-        windows = cut(session.plant, session.layout, session.rollouts, starts)
-        rng = np.random.default_rng(0)
-        problem = make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
-        chosen = [
-            c for c in all_candidates(session.plant, session.rollouts, []) if (c.effect, c.where) == (kind, place)
-        ]
-        fit = gauss_newton(problem, chosen, chosen[0].start, window_weights(problem.residual([[]])[0]))
+        problem, fit, rng = _fitted(kind, place, value, 100 + seed)
         last = refine(problem, fit, rng)
         z.append(1.96 * (last.fit.values[0] - value) / last.half[0])
     assert np.abs(z).max() < 3.5
     assert abs(np.mean(z)) < 1.5
     assert np.std(z) < 2.0
+
+
+def test_a_fit_whose_noisy_starts_diverge_keeps_its_whitening(monkeypatch) -> None:
+    """What stays finite in the windows may diverge from starts moved by noise: the fit goes on as it was whitened."""
+    problem, fit, rng = _fitted("coulomb_friction", "j2", 1.0, 100)
+
+    def diverging(*args: object) -> Problem:
+        raise BadInput("declared model, 40 of 40 windows", "simulations that stay finite", "simulations that diverge")
+
+    monkeypatch.setattr(refining, "make_problem", diverging)
+    last = refine(problem, fit, rng)
+    assert last.problem.whitener is problem.whitener
+    assert last.fit.values[0] == pytest.approx(1.0, rel=0.05)
