@@ -18,9 +18,7 @@ from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, window_weights
 
 # PACE's set (Bjelonic et al. 2025: armature, damping, friction, offset, delay) and the drive's strength.
-KINDS = (
-    "coulomb_friction", "viscous_friction", "load_dependent_friction", "armature", "motor_strength", "encoder_offset",
-)  # fmt: skip
+KINDS = ("coulomb_friction", "viscous_friction", "armature", "motor_strength", "encoder_offset")
 WHOLE = ("command_delay",)
 _DAMPING = 1e-3
 _SURE = 4.0  # standard errors
