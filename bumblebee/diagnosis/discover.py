@@ -18,6 +18,7 @@ from bumblebee.diagnosis.acceptance import wald
 from bumblebee.diagnosis.fit import Fit, resolved
 from bumblebee.diagnosis.formula import formula, in_terms, related, stiffer_than_the_drive
 from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.idle import without_idle
 from bumblebee.diagnosis.instead import Offers, is_better, named_instead
 from bumblebee.diagnosis.laws import beside, joined
 from bumblebee.diagnosis.problem import Problem, window_weights
@@ -74,6 +75,7 @@ def discover(
     offers: Offers | None = None,
 ) -> Discovery:
     """Test, name and refit what `fit` leaves; arguments as of `remains`, and the catalogue's `offers` beside `fit`."""
+    fit = without_idle(problem, holdout, fit)
     left = remains(problem, holdout.problem, fit, typical, still)
     unconfirmed: dict[str, dict[str, float]] = {}
     kinds: dict[str, str] = {}

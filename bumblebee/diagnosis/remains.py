@@ -105,9 +105,13 @@ def remains(
         lacks = [np.einsum("fws,f->ws", one.torque, size) for one, size in own]
         rms = float(np.sqrt((np.sum(lacks, axis=0) ** 2).mean())) if own else scene.evidence.implied(j)
         loud = excess[j] > (_ALONE if again is None else _POWER)
-        loud &= again is None or again[j] > _AGAIN or _in_two(scene, j)
-        # Where feet stand, other steps and integrators feign a hundredth or two of an ankle's torque.
-        loud &= not problem.plant.floating or rms > _SLIGHT * typical[j]
+        # Where feet stand or drives saturate, other steps and integrators feign a hundredth or two of a joint's torque.
+        more = rms > _SLIGHT * typical[j]
+        if again is None:
+            loud &= not problem.plant.floating or scene.quiet_excess(j, _LOUDEST) > _ALONE
+        else:
+            loud &= again[j] > _AGAIN or _in_two(scene, j, more)
+        loud &= not problem.plant.floating or more
         real = bool(own) and rms > _LEAST * typical[j]
         p = [2 * norm.sf(one.verdict.z) * some.count for one, _ in own]
         p.append(float(norm.sf(excess[j])) * len(names))
@@ -138,16 +142,15 @@ def in_whole(scene: Scene, judged: Scene | None) -> Whole:
     return Whole(power, both, min(z) > _WHOLE[0] and both > least and not scene.problem.plant.floating)
 
 
-def _in_two(scene: Scene, joint: int) -> bool:
+def _in_two(scene: Scene, joint: int, much: bool) -> bool:
     """Whether a joint's power is too large in each of two rollouts: what one rollout shows may be an accident.
 
     So may what a rollout's loudest windows show: where a foot tips, one of them holds more than all others. A base that
-    cannot fall has no such accidents: there one rollout does that shows very much in many windows.
+    cannot fall has no such accidents: there one rollout does that shows very much in many windows, if it is `much`.
     """
     rollouts = scene.problem.windows.rollout
-    values = [scene.evidence.free(joint, rollouts == i, _LOUDEST) for i in np.unique(rollouts)]
-    excess = [(value - count) / np.sqrt(2.0 * max(count, 1)) for value, count in values]
-    if not scene.problem.plant.floating and max(excess) > _LONE:
+    excess = [scene.quiet_excess(joint, _LOUDEST, rollouts == i) for i in np.unique(rollouts)]
+    if much and not scene.problem.plant.floating and max(excess) > _LONE:
         return True
     return sum(e > _POWER for e in excess) > 1
 

@@ -28,11 +28,12 @@ class Scene:
 
     def excess(self) -> np.ndarray:
         """(J,) by how many standard errors a joint's torques are larger than noise makes them."""
-        found = []
-        for j in range(self.evidence.joints):
-            value, count = self.evidence.free(j)
-            found.append((value - count) / np.sqrt(2.0 * max(count, 1)))
-        return np.array(found)
+        return np.array([self.quiet_excess(j) for j in range(self.evidence.joints)])
+
+    def quiet_excess(self, joint: int, spared: int = 0, some: np.ndarray | None = None) -> float:
+        """The same of one joint on some windows (W,) bool, all by default, less the `spared` ones that say most."""
+        value, count = self.evidence.free(joint, some, spared)
+        return float((value - count) / np.sqrt(2.0 * max(count, 1)))
 
     def power(self, spared: int = 0) -> tuple[float, float]:
         """Mean square of what is left, 1 for noise, and its standard error; without each rollout's loudest windows."""

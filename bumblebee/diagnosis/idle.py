@@ -1,0 +1,35 @@
+"""Effects that take nothing off the error of the windows that judge: none of them is reported.
+
+They were accepted beside others and for the windows that were fitted; in the result the judging windows are no nearer
+with them. Limits are left alone, for of the judging windows perhaps none feels them.
+"""
+
+import numpy as np
+
+from bumblebee.diagnosis.fit import Fit
+from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.limits import KINDS as LIMITS
+from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.refits import refitted, without_one
+
+
+def without_idle(problem: Problem, holdout: Holdout, fit: Fit) -> Fit:
+    """The fit less such effects, the worst first, the others refitted without it."""
+    while holdout.problem is not None and fit.chosen:
+        growth = _growth(holdout.problem, fit)
+        growth[[c.effect in LIMITS for c in fit.chosen]] = np.inf
+        worst = int(np.argmin(growth))
+        if growth[worst] > 0:
+            break
+        chosen, values = without_one(fit.chosen, fit.values, fit.chosen[worst])
+        fit = refitted(problem, chosen, values)
+    return fit
+
+
+def _growth(judge: Problem, fit: Fit) -> np.ndarray:
+    """(F,) by how much the mean square of the judging windows grows without each effect, the others as they are."""
+    effects = fit.effects
+    sets = [effects, *([e for k, e in enumerate(effects) if k != i] for i in range(len(effects)))]
+    left = judge.residual(sets) - np.tensordot(fit.nuisance, judge.nuisance, axes=1)
+    power = (left**2).mean(axis=(1, 2))
+    return power[1:] - power[0]
