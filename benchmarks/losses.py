@@ -25,11 +25,11 @@ from bumblebee.motion.clip import Clip
 from bumblebee.robot.facts import KEY_BODIES
 from bumblebee.sim.engines import make_engine
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.env import action_scale, start_state
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.observations import action_middle, joint_targets
+from bumblebee.tracking.observations import action_middle, action_scale, joint_targets
 from bumblebee.tracking.rows import Rows
+from bumblebee.tracking.starts import start_state
 from bumblebee.tracking.terminations import fallen, success_threshold
 
 BACK = (0.5, 1.0, 2.0)  # s before the loss that the robot starts again

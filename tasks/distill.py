@@ -23,9 +23,10 @@ from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.engines import make_engine
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.env import TrackingEnv, action_scale
+from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
+from bumblebee.tracking.observations import action_scale
 from tasks.sections import loop
 from tasks.stage import load, log_run, output_folder, run_stage
 

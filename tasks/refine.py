@@ -12,7 +12,7 @@ from bumblebee.learning.trial import World
 from bumblebee.sim.effects import read_effects, runtime_hooks
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.env import action_scale
+from bumblebee.tracking.observations import action_scale
 from tasks.experts import ExpertsConfig
 from tasks.sections import loop
 from tasks.stage import load, run_stage

@@ -17,15 +17,15 @@ from bumblebee.baselines.exbody2_terms import over_robot
 from bumblebee.baselines.library import MovingLibrary
 from bumblebee.learning.policy import Policy
 from bumblebee.motion.clip import Clip
-from bumblebee.sim.engine import RobotState
+from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.sim.engines import make_engine
 from bumblebee.tracking.config import ObservationConfig, Randomisation
-from bumblebee.tracking.env import action_scale, start_state
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import ReferenceFrame
-from bumblebee.tracking.observations import action_middle, joint_targets
+from bumblebee.tracking.observations import action_middle, action_scale, joint_targets
 from bumblebee.tracking.randomisation import randomise_worlds
 from bumblebee.tracking.rows import Rows
+from bumblebee.tracking.starts import start_state
 from bumblebee.tracking.terminations import fallen, success_threshold
 
 ROBOTS_SEED = 11
@@ -66,18 +66,13 @@ def follow(
     """
     n = len(clips)
     library = MovingLibrary(clips, policy.shape.ahead)
-    engine = make_engine("mujoco", model, n, min(threads, n))
-    if robots is not None:
-        randomise_worlds(engine, robots, ROBOTS_SEED)
+    engine = _started(library, model, threads, robots)
     ids, dt = torch.arange(n), engine.control_dt
     scale = action_scale() if manner.scale is None else torch.full((library.num_joints,), manner.scale)
     middle = action_middle(policy.shape.action)
     group = Group(manner.seen, (n, library.num_joints, len(library.ahead)), 0.0, engine.device)
     generator = torch.Generator().manual_seed(0)
     limit = torch.tensor([success_threshold(clip.family) for clip in clips])
-    first = library.frames(ids, torch.zeros(n))
-    engine.reset(ids, *start_state(first, 0.0, generator), first.hold_pos)
-    engine.settle()
     action = torch.zeros(n, library.num_joints)
     alive, alive_local = torch.ones(n, dtype=torch.bool), torch.ones(n, dtype=torch.bool)
     sums = torch.zeros(4, n)  # frames before the loss, and the three errors over them
@@ -98,6 +93,23 @@ def follow(
         sums += counted * torch.nan_to_num(errors)
         if not bool(((alive | alive_local) & running).any()):
             break
+    return _table(clips, alive, alive_local, sums, dt)
+
+
+def _started(library: MovingLibrary, model: mujoco.MjModel, threads: int, robots: Randomisation | None) -> Engine:
+    """A robot at the start of each clip."""
+    n = len(library)
+    engine = make_engine("mujoco", model, n, min(threads, n))
+    if robots is not None:
+        randomise_worlds(engine, robots, ROBOTS_SEED)
+    first = library.frames(torch.arange(n), torch.zeros(n))
+    engine.reset(torch.arange(n), *start_state(first, 0.0, torch.Generator()), first.hold_pos)
+    engine.settle()
+    return engine
+
+
+def _table(clips: Sequence[Clip], alive: Tensor, alive_local: Tensor, sums: Tensor, dt: float) -> pd.DataFrame:
+    """The rows of `follow`: which were never lost (N,) bool, and `sums` (4, N) of frames and errors before the loss."""
     frames = sums[0].clamp(min=1)
     about = [(clip.name, clip.family, clip.split, clip.duration) for clip in clips]
     table = pd.DataFrame(about, columns=["name", "family", "split", "seconds"])

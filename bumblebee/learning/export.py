@@ -14,7 +14,7 @@ from bumblebee.learning.policy import Policy
 from bumblebee.robot.facts import joint_names, joints, stand_pose
 from bumblebee.robot.model import gains
 from bumblebee.tracking.config import ObservationConfig
-from bumblebee.tracking.env import action_scale
+from bumblebee.tracking.observations import action_scale
 from bumblebee.tracking.terms import parts
 
 ONNX, CONTRACT = "policy.onnx", "contract.json"

@@ -12,11 +12,12 @@ from bumblebee.motion.clip import Clip
 from bumblebee.sim.effect_hooks import RuntimeHooks
 from bumblebee.sim.engines import make_engine
 from bumblebee.tracking.config import ObservationConfig
-from bumblebee.tracking.env import ActionAdapter, action_scale, start_state
+from bumblebee.tracking.env import ActionAdapter
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.observations import action_middle, middle_targets
+from bumblebee.tracking.observations import action_middle, action_scale, middle_targets
 from bumblebee.tracking.rows import Rows
+from bumblebee.tracking.starts import start_state
 from bumblebee.tracking.terminations import fallen, key_distance, success_threshold
 
 _WORLDS = 128  # at once

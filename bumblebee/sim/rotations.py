@@ -1,5 +1,6 @@
 """Quaternions in torch, batched, wxyz."""
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -20,12 +21,40 @@ def conjugate(q: Tensor) -> Tensor:
 
 def matrix(q: Tensor) -> Tensor:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4); columns are the rotated axes."""
-    w, x, y, z = q.movedim(-1, 0).contiguous().unbind(0)  # columns of their own: twice as fast on a CPU
-    x2, y2, z2 = x + x, y + y, z + z
-    wx, wy, wz = w * x2, w * y2, w * z2
-    xx, xy, xz, yy, yz, zz = x * x2, x * y2, x * z2, y * y2, y * z2, z * z2
-    rows = (1 - (yy + zz), xy - wz, xz + wy, xy + wz, 1 - (xx + zz), yz - wx, xz - wy, yz + wx, 1 - (xx + yy))
-    return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
+    return torch.stack(_entries(q), dim=-1).unflatten(-1, (3, 3))
+
+
+def two_columns(q: Tensor) -> Tensor:
+    """The rotated x and y axes (..., 2, 3) of unit quaternions (..., 4)."""
+    one, two, _, four, five, _, seven, eight, _ = _entries(q)
+    return torch.stack((one, four, seven, two, five, eight), dim=-1).unflatten(-1, (2, 3))
+
+
+def _entries(q: Tensor) -> tuple[Tensor, ...]:
+    """The nine entries (...,) of the matrices of quaternions (..., 4), row by row."""
+    parts = q.movedim(-1, 0).contiguous()  # columns of their own, three at a time: faster on a CPU
+    w, v = parts[:1], parts[1:]
+    twice = v + v
+    xx, yy, zz = (v * twice).unbind(0)
+    about = (w * twice).flip(0)  # wz, wy, wx
+    mixed = torch.cat((v[:1] * twice[1:], v[1:2] * twice[2:]))  # xy, xz, yz
+    one, five, nine = (1 - torch.stack((yy + zz, xx + zz, xx + yy))).unbind(0)
+    four, three, eight = (mixed + about).unbind(0)
+    two, seven, six = (mixed - about).unbind(0)
+    return one, two, three, four, five, six, seven, eight, nine
+
+
+def turned(vectors: Tensor, matrices: Tensor) -> Tensor:
+    """Vectors (B, N, 3), each turned by its row's matrix (B, 3, 3)."""
+    if vectors.device.type == "cpu" and not torch.compiler.is_compiling():
+        # A third of the time that torch takes for so small products.
+        return torch.from_numpy(np.matmul(vectors.numpy(), matrices.mT.contiguous().numpy()))
+    return turned_in_full(vectors, matrices)
+
+
+def turned_in_full(vectors: Tensor, matrices: Tensor) -> Tensor:
+    """The same by sums of products: a GPU's own product may round its factors to ten bits (TF32)."""
+    return (vectors[:, :, None] * matrices[:, None]).sum(-1)
 
 
 def rotate(q: Tensor, v: Tensor) -> Tensor:

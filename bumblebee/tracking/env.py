@@ -7,6 +7,7 @@ policy has a student, "student".
 
 from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from typing import Any
 
 import torch
@@ -29,7 +30,7 @@ from bumblebee.tracking.statistics import Statistics
 from bumblebee.tracking.stretches import StretchSampler
 from bumblebee.tracking.terminations import lying, threshold_at
 from bumblebee.tracking.terrain import Ground
-from bumblebee.tracking.threads import one_thread
+from bumblebee.tracking.threads import Aside, one_thread
 
 ActionAdapter = Callable[[RobotState, Tensor, Tensor], Tensor]
 """(state, joint targets (B, J) [rad] of an action of zero, action (B, J)) -> what the motors execute, (B, J)."""
@@ -68,9 +69,8 @@ class TrackingEnv(VecEnv):
         self.scale, middle = action_scale().to(device), action_middle(config.action)
         self._middle = None if middle is None else middle.to(device)
         self.reward = Reward(config.reward, self.dt, device)
-        self._earned: Callable[[Step], Tensor] = self.reward
-        if config.compile:
-            self._earned = torch.compile(self.reward.__call__, dynamic=False)
+        own, compiled = self.reward, config.compile
+        self._earned: Callable[[Step], Tensor] = torch.compile(own.__call__, dynamic=False) if compiled else own
         self.limits = Limits.of_robot(config.reward.soft_limit, device)
         drawing = (config.sampler_floor, config.sampler_memory, config.start_share, clip_share)
         stretch = round(config.sampler_stretch / self.dt)
@@ -99,6 +99,7 @@ class TrackingEnv(VecEnv):
         self._state, self._ref = self._read(), self._coming()
         self._privileged = self._extended(self.groups["policy"].exact)
         self._recorded = device.type == "cuda"
+        self._aside = Aside(1 if self._recorded else config.threads)
         self._judge_recorded = Captured(self._judge, device, [self._generator])
         self._look_recorded = Captured(self._look, device, [self._generator])
         self._look()
@@ -141,8 +142,8 @@ class TrackingEnv(VecEnv):
             self._judge_recorded()
             self.engine.settle()
             self._look_recorded()
-        extras = {"time_outs": self._time_outs.float()}
-        return self.get_observations(), self._rewards.clone(), self._dones.clone(), extras
+        outcome = self._rewards.clone(), self._dones.clone(), {"time_outs": self._time_outs.float()}
+        return self.get_observations(), *outcome
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that training needs to go on from here exactly."""
@@ -167,8 +168,7 @@ class TrackingEnv(VecEnv):
 
     def _kept(self) -> dict[str, Tensor]:
         """What a step leaves for the next, beside state and reference, which follow from it."""
-        names = ("clip", "frame", "action", "action_before", "push_clock")
-        kept = {name: getattr(self, f"_{name}") for name in names}
+        kept = {name: getattr(self, f"_{name}") for name in ("clip", "frame", "action", "action_before", "push_clock")}
         for group, own in self.groups.items():
             kept |= {f"{group}_{name}": tensor for name, tensor in own.kept().items()}
         if self.ground is not None:
@@ -214,10 +214,10 @@ class TrackingEnv(VecEnv):
         self._action_before.copy_(self._action)
         self._action.copy_(self._command)
         self.statistics.add(outcome, self._rewards, self._dones, lost, unstable, self.episode_length_buf)
-        over = Rows(self._dones, self.engine.by_mask)
         if isinstance(self.sampler, StretchSampler):
             self.sampler.follow(self._clip, self._frame, lost, self._dones)
         else:
+            over = Rows(self._dones, self.engine.by_mask)
             self.sampler.update(over.of(self._clip), over.of(lost), over.of(self._dones))
         self._restart(self._dones)
         self._push()
@@ -252,11 +252,12 @@ class TrackingEnv(VecEnv):
             rows.put(tensor, 0)
 
     def _look(self) -> None:
-        """The state, the reference of the coming step, and the observations of both."""
+        """The state, the reference of the coming step, and the observations of both; noise is drawn meanwhile."""
+        draws = [self._aside(partial(group.draws, self._generator)) for group in self.groups.values()]
         self._keep(self._read(), self._coming())
         fresh = Rows(self.episode_length_buf == 0, self.engine.by_mask)
-        for group in self.groups.values():
-            group.look(self._state, self._ref, self._action, fresh, self._generator)
+        for group, begun in zip(self.groups.values(), draws, strict=True):
+            group.look(self._state, self._ref, self._action, fresh, self._generator, begun)
         self._show(self._extended(self.groups["policy"].exact))
 
     def _show(self, privileged: Tensor) -> None:
@@ -281,8 +282,7 @@ class TrackingEnv(VecEnv):
     def _extended(self, exact: Tensor) -> Tensor:
         """What the critic sees (B, D + extras), from the exact observation (B, D)."""
         left = (self.library.length[self._clip] - self._frame).float() * self.dt
-        # What the sensors of a robot that was put anew say belongs to the time before.
-        fresh = (self.episode_length_buf == 0)[:, None]
+        fresh = (self.episode_length_buf == 0)[:, None]  # its sensors still tell of the episode before
         extras = (
             (self.engine.foot_force_w().flatten(1) / 300.0).masked_fill(fresh, 0.0),
             (self.engine.torque() / self.limits.torque).masked_fill(fresh, 0.0),

@@ -52,7 +52,7 @@ class Group:
         self._levels = levels.to(device) if bool(levels.any()) else None
         kinds = 1 if self._levels is None else 2
         kept = kinds if config.history > 1 else 0
-        self._stays = device.type == "cuda"
+        self._worlds, self._stays = worlds, device.type == "cuda"
         self._rings = [History(worlds, self._size, config.history, device) for _ in range(kept)]
         whole = torch.zeros(worlds, config.history * self._size + len(levels) - self._size, device=device)
         self.exact = whole
@@ -60,15 +60,31 @@ class Group:
         self.noisy = whole if self._levels is None else whole.clone()
         """(B, H * D + N) as sensors would have it."""
 
+    def draws(self, generator: torch.Generator) -> Tensor | None:
+        """Numbers (B, D + N) from -1 to 1 for the next look's noise; None for a group that is exact."""
+        if self._levels is None:
+            return None
+        drawn = torch.empty(self._worlds, len(self._levels), device=self._levels.device)
+        return drawn.uniform_(-1, 1, generator=generator)
+
     def look(
-        self, state: RobotState, ref: ReferenceFrame, action: Tensor, fresh: Rows, generator: torch.Generator
+        self,
+        state: RobotState,
+        ref: ReferenceFrame,
+        action: Tensor,
+        fresh: Rows,
+        generator: torch.Generator,
+        begun: Callable[[], Tensor | None] | None = None,
     ) -> None:
-        """Take in a control step of all worlds; those `fresh` have begun an episode with it."""
+        """Take in a control step of all worlds; those `fresh` have begun an episode with it.
+
+        `begun` gives what `draws` did if it was called before.
+        """
         exact = self._look(state, ref, action)
+        drawn = self.draws(generator) if begun is None else begun()
         rows = [exact]
-        if self._levels is not None:
-            draws = torch.empty_like(exact).uniform_(-1, 1, generator=generator)
-            rows.append(torch.addcmul(exact, self._levels, draws))
+        if self._levels is not None and drawn is not None:
+            rows.append(torch.addcmul(exact, self._levels, drawn))
         if self._rings:
             for ring, row in zip(self._rings, rows, strict=True):
                 ring.add(row[:, : self._size], fresh)

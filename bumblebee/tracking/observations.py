@@ -10,7 +10,7 @@ from torch import Tensor
 from bumblebee.robot.facts import KEY_BODIES, joints, stand_pose
 from bumblebee.robot.model import gains
 from bumblebee.sim.engine import RobotState
-from bumblebee.sim.rotations import conjugate, matrix, multiply, rotate_inverse
+from bumblebee.sim.rotations import conjugate, matrix, turned, two_columns
 from bumblebee.tracking.library import ReferenceFrame
 
 _PELVIS = KEY_BODIES.index("pelvis")
@@ -50,16 +50,17 @@ def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tens
         last_action: (B, J) the policy's previous output, zeros at the start.
     """
     quat = state.root_quat_w
-    inverse = conjugate(quat)
-    to_base = matrix(inverse)  # (B, 3, 3)
+    to_base = matrix(conjugate(quat))  # (B, 3, 3)
     root = state.root_pos_w[:, None]
     keys = state.key_pos_w if state.read_key_pos_w is None else state.read_key_pos_w
     count = len(KEY_BODIES)
-    # One product for all vectors and one for all rotations: small operations cost a CPU more than their arithmetic.
-    vectors_w = torch.cat((keys - root, ref.key_pos_w - keys, ref.ahead_root_pos_w - root), dim=1)
-    vectors_b = vectors_w @ to_base.mT
-    wanted = torch.cat((ref.root_quat_w[:, None], ref.ahead_root_quat_w), dim=1)
-    turns = _six(multiply(inverse[:, None], wanted))
+    # One product for all vectors and columns of rotations: small operations cost a CPU more than their arithmetic.
+    columns = two_columns(torch.cat((ref.root_quat_w[:, None], ref.ahead_root_quat_w), dim=1)).flatten(1, 2)
+    speed = ref.root_lin_vel_w[:, None]
+    shifts = (keys - root, ref.key_pos_w - keys, ref.ahead_root_pos_w - root)
+    vectors_b = turned(torch.cat((*shifts, speed, columns), dim=1), to_base)
+    first = 2 * count + ref.ahead + 1  # of the columns
+    turns = torch.stack((vectors_b[:, first::2], vectors_b[:, first + 1 :: 2]), dim=-1).flatten(2)  # (B, 1 + A, 6)
     parts = [
         -to_base[:, :, 2],
         state.root_lin_vel_b,
@@ -71,7 +72,7 @@ def observe(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> Tens
         vectors_b[:, :_PELVIS].flatten(1),
         vectors_b[:, _PELVIS + 1 : 2 * count].flatten(1),
         turns[:, 0],
-        rotate_inverse(quat, ref.root_lin_vel_w),
+        vectors_b[:, first - 1],
         ref.root_ang_vel_b,
         ref.root_pos_w[:, 2:],
         ref.hold_pos,
@@ -104,8 +105,3 @@ def action_scale() -> Tensor:
     """Scale of the action (J,) [rad]: a quarter of the angle at which the servo reaches its torque limit, bounded."""
     scale = [0.25 * joint.effort_limit / gains(joint)[0] for joint in joints()]
     return torch.tensor(scale, dtype=torch.float32).clamp(0.08, 0.35)
-
-
-def _six(quat: Tensor) -> Tensor:
-    """First two columns of the rotation matrix, (B, 6): continuous, unlike the quaternion."""
-    return matrix(quat)[..., :2].flatten(-2)

@@ -21,17 +21,12 @@ class Statistics:
 
     def add(self, step: Step, rewards: Tensor, dones: Tensor, lost: Tensor, unstable: Tensor, length: Tensor) -> None:
         """Count one control step of all worlds; those that blew up have no errors that mean anything."""
-        errors = (body_position(step), step.joint_error, step.velocity_error)
-        counted = (
-            rewards.mean(),
-            *(error.masked_fill(unstable, 0.0).mean() for error in errors),
-            torch.ones_like(rewards[0]),
-            dones.sum(),
-            lost.sum(),
-            unstable.sum(),
-            (length * dones).sum(),
-        )
-        self._sums += torch.stack([value.double() for value in counted])
+        means = torch.stack((rewards, body_position(step), step.joint_error, step.velocity_error))
+        counts = torch.stack((dones, lost, unstable)).sum(1)
+        self._sums[: len(_MEANS)] += means.masked_fill(unstable, 0.0).mean(1)
+        self._sums[len(_MEANS)] += 1
+        self._sums[len(_MEANS) + 1 : -1] += counts
+        self._sums[-1] += (length * dones).sum()
 
     @property
     def sums(self) -> Tensor:

@@ -14,7 +14,7 @@ from torch import Tensor
 from bumblebee.errors import BadInput
 from bumblebee.robot.facts import KEY_BODIES
 from bumblebee.sim.engine import RobotState
-from bumblebee.sim.rotations import conjugate, matrix, multiply
+from bumblebee.sim.rotations import conjugate, matrix, multiply, turned
 from bumblebee.tracking.library import ReferenceFrame
 from bumblebee.tracking.noise import LEVELS
 from bumblebee.tracking.observations import layout, observe
@@ -263,7 +263,7 @@ def see(terms: Sequence[str], state: RobotState, ref: ReferenceFrame, action: Te
 
 def _turned(seen: Seen, vectors_w: Tensor) -> Tensor:
     """Vectors (B, N, 3) of the world in the base frame, (B, 3 N)."""
-    return (vectors_w @ seen.to_base.mT).flatten(1)
+    return turned(vectors_w, seen.to_base).flatten(1)
 
 
 def _six(quat: Tensor) -> Tensor:

@@ -9,10 +9,10 @@ import torch
 
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.config import EnvConfig, Randomisation
-from bumblebee.tracking.env import TrackingEnv, action_scale
+from bumblebee.tracking.config import EnvConfig, ObservationConfig, Randomisation
+from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.observations import layout
+from bumblebee.tracking.observations import action_scale, layout
 from bumblebee.tracking.randomisation import randomise_worlds
 from tests.tracking.clips import waving
 
@@ -180,3 +180,17 @@ def test_the_scale_of_the_action_is_bounded() -> None:
     scale = action_scale()
     assert scale.shape == (23,)
     assert torch.allclose(scale, torch.tensor(0.35))
+
+
+def test_noise_drawn_on_a_thread_of_its_own_is_the_same(model: mujoco.MjModel) -> None:
+    """Two threads draw the numbers that one draws, in the same order, for a policy and for its student."""
+    student = ObservationConfig(terms=("student",), history=2)
+    config = replace(CONFIG, student=student, observation_noise=1.0, episode_seconds=0.1)
+    one, two = (make(model, replace(config, threads=threads)) for threads in (1, 2))
+    generator = torch.Generator().manual_seed(5)
+    for _ in range(12):
+        action = torch.randn(6, 23, generator=generator)
+        alone, aside = one.step(action)[0], two.step(action)[0]
+        for group in ("policy", "critic", "student"):
+            assert torch.equal(alone[group], aside[group])
+        assert not torch.equal(aside["policy"], aside["critic"][:, : aside["policy"].shape[1]])

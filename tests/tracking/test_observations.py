@@ -11,6 +11,9 @@ from bumblebee.sim.rotations import (
     multiply,
     rotate,
     rotate_inverse,
+    turned,
+    turned_in_full,
+    two_columns,
 )
 from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
 from bumblebee.tracking.noise import LEVELS, noise_levels
@@ -123,3 +126,14 @@ def test_every_noise_level_names_a_part() -> None:
     names = {name for name, _ in layout(23, 2)} | set(TERMS)
     assert set(LEVELS) <= names
     assert part(noise_levels(layout(23, 2))[None], "ref_joint_vel").max() == 0
+
+
+def test_two_columns_and_turned_vectors_are_those_of_the_matrix() -> None:
+    """The first two columns as rows, and each vector by its own row's matrix, whichever way the product is done."""
+    generator = torch.Generator().manual_seed(3)
+    q = torch.nn.functional.normalize(torch.randn(5, 4, generator=generator), dim=-1)
+    vectors = torch.randn(5, 7, 3, generator=generator)
+    torch.testing.assert_close(two_columns(q), matrix(q)[..., :2].mT)
+    expected = torch.stack([rotate(q, vectors[:, i]) for i in range(7)], dim=1)
+    torch.testing.assert_close(turned(vectors, matrix(q)), expected, atol=1e-5, rtol=0)
+    torch.testing.assert_close(turned_in_full(vectors, matrix(q)), expected, atol=1e-5, rtol=0)
