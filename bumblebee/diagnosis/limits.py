@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.changes import Changes
 from bumblebee.diagnosis.fit import Fit
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.plant import Plant
@@ -57,12 +58,13 @@ def limit_trials(
     candidates: Sequence[Candidate],
     weights: np.ndarray,
     hopeless: set[tuple[str, str]],
+    changes: Changes | None = None,
 ) -> list[Trial]:
     """The limit that explains most of the windows that are far off; none where no limit does.
 
     Of the four windows that a limit reaches first one must be off, or it is not simulated. Where it acts in a few only
     it must bring them down to noise, which one number does not do by chance. One that only makes the windows worse that
-    it reaches first joins the `hopeless` (effect, place), which are not tried.
+    it reaches first joins the `hopeless` (effect, place), which are not tried. `changes` are what was simulated before.
     """
     clean = fit.clean(problem)
     power = (clean**2).mean(axis=1)
@@ -74,13 +76,17 @@ def limit_trials(
         return []
     demand = _demand(problem, fit.effects)
     beside = Beside(problem, fit, weights)
+    changes = (changes or Changes()).on(problem)
     found = []
     for kind, where in dict.fromkeys((c.effect, c.where) for c in kinds):
         own = [c for c in kinds if (c.effect, c.where) == (kind, where)]
         reach = demand.reach(kind, problem.plant.joints.index(where))
         if not odd[np.argsort(reach)[:_FIRST]].any():
             continue
-        best = _profile(problem, fit, clean, usual, own[0], reach)
+        changes.taken = False
+        best = _profile(problem, fit, clean, usual, own[0], reach, changes)
+        if best is not None and changes.taken:
+            best = _profile(problem, fit, clean, usual, own[0], reach, changes, fresh=True)
         if best is not None and best[1] <= 0:
             hopeless.add((kind, where))
         if best is not None and best[1] > _WORTH:
@@ -134,12 +140,24 @@ def _judged(holdout: Holdout, before: Fit, after: Fit) -> list[tuple[np.ndarray,
 
 
 def _profile(
-    problem: Problem, fit: Fit, clean: np.ndarray, usual: float, candidate: Candidate, reach: np.ndarray
+    problem: Problem,
+    fit: Fit,
+    clean: np.ndarray,
+    usual: float,
+    candidate: Candidate,
+    reach: np.ndarray,
+    changes: Changes,
+    fresh: bool = False,
 ) -> tuple[float, float] | None:
     """Size and gain of the best of the sizes tried, `reach` (W,) being where each window begins to feel it.
 
-    None where no size is worth a closer look; no gain where all that were tried only do harm.
+    None where no size is worth a closer look; no gain where all that were tried only do harm. What `changes` know of an
+    earlier fit is taken for this one's, unless all is to be `fresh`: half of what is worth a look is enough for it.
     """
+
+    def gain(size: float) -> float:
+        return _gain(problem, fit, clean, usual, candidate, size, reach, changes, fresh)
+
     order = np.argsort(reach)
     felt = reach[order][np.isfinite(reach[order])]
     counts = sorted({min(n, len(felt) - 1) for n in _REACHED if len(felt) >= 2} - {0})
@@ -148,17 +166,19 @@ def _profile(
     sizes = [float(0.5 * (felt[n - 1] + felt[n])) for n in counts]
     gains: list[float] = []
     for count, size in zip(counts, sizes, strict=True):
-        gains.append(_gain(problem, fit, clean, usual, candidate, size, reach))
+        gains.append(gain(size))
         harmful = len(gains) > 1 and max(gains[-2:]) < -2.0 * usual * clean.shape[1] * _HOPELESS
         if harmful or (count >= _ENOUGH and max(gains) < 0.5 * _SHARE * fit.cost):
             break  # smaller limits spoil these windows further, and others
     best = int(np.argmax(gains))
     if gains[best] <= 0 and harmful:
         return _value(candidate, sizes[best]), 0.0
-    if gains[best] <= _SHARE * fit.cost:
+    if gains[best] <= (0.5 if changes.taken and not fresh else 1.0) * _SHARE * fit.cost:
         return None
+    if changes.taken and not fresh:
+        return _value(candidate, sizes[best]), gains[best]
     low, high = sizes[max(best - 1, 0)], sizes[min(best + 1, len(gains) - 1)]
-    at = _closer(lambda x: _gain(problem, fit, clean, usual, candidate, x, reach), low, sizes[best], high, gains[best])
+    at = _closer(gain, low, sizes[best], high, gains[best])
     return (_value(candidate, at[0]), at[1])
 
 
@@ -183,11 +203,24 @@ def _value(candidate: Candidate, size: float) -> float:
 
 
 def _gain(
-    problem: Problem, fit: Fit, clean: np.ndarray, usual: float, candidate: Candidate, size: float, reach: np.ndarray
+    problem: Problem,
+    fit: Fit,
+    clean: np.ndarray,
+    usual: float,
+    candidate: Candidate,
+    size: float,
+    reach: np.ndarray,
+    changes: Changes,
+    fresh: bool,
 ) -> float:
     """Fall of the robust cost; only windows that may feel the limit are simulated."""
     felt = reach <= size + 0.05 * abs(size)
-    left = clean[felt] - _change(problem, fit, candidate, _value(candidate, size), felt)[felt]
+
+    def simulate() -> np.ndarray:
+        return _change(problem, fit, candidate, _value(candidate, size), felt)[felt]
+
+    key = (candidate.effect, size, felt.tobytes())
+    left = clean[felt] - changes.get(fit.effects, candidate.where, key, fresh, simulate)
     before, after = (np.log1p((x**2).mean(axis=1) / usual) for x in (clean[felt], left))
     return float(2.0 * usual * clean.shape[1] * (before - after).sum())
 

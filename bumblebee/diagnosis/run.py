@@ -8,6 +8,7 @@ import numpy as np
 from bumblebee.diagnosis.acceptance import Step, evidence, is_physical, least_z, pruned, wald
 from bumblebee.diagnosis.arrivals import Loss, find_loss
 from bumblebee.diagnosis.candidates import Candidate, shortlisted
+from bumblebee.diagnosis.changes import Changes
 from bumblebee.diagnosis.eligible import is_chosen, is_like, is_promising
 from bumblebee.diagnosis.far import far_servos
 from bumblebee.diagnosis.fit import Fit, cost_of, effects_at, gauss_newton, resolved, typical_power
@@ -75,6 +76,7 @@ class Run:
         self.keep = screening_windows(problem, config.screen_windows)
         self.closed: set[Candidate] = set()
         self.hopeless: set[tuple[str, str]] = set()  # limits (effect, joint) that only spoilt more when they were tried
+        self.changes = Changes()
         self.steps: list[Step] = []
         self.rejected: list[str] = []
         self.loss: Loss | None = None

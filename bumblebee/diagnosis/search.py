@@ -91,7 +91,8 @@ def _select(run: Run, config: SearchConfig) -> None:
             tried, looked = run.trials()
         some = _where_limits_matter(tried, run)
         if judged != (run.fit, some):
-            judged, limits = (run.fit, some), limit_trials(run.problem, run.fit, some, run.weights, run.hopeless)
+            judged = (run.fit, some)
+            limits = limit_trials(run.problem, run.fit, some, run.weights, run.hopeless, run.changes)
         tried += [t for t in limits if t.candidate not in run.closed]
         if not tried and not looked:
             break
