@@ -1,8 +1,7 @@
-"""What limits do to the prediction, simulated around an earlier fit: to first order the same around the next one.
+"""Changes of the prediction that were simulated around an earlier fit: to first order the same around the next one.
 
-A search tries every limit in every round, and nearly all of them change nothing that matters. What a limit of one joint
-does hardly depends on an effect that was found on another, so a limit that does not pay by what was simulated before is
-not simulated again; one that may pay is.
+A search tries the same limits and the same candidates in every round. What one of them does hardly depends on an effect
+that was found in another place, so it is simulated again only where something near it has changed by a hundredth.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,11 +17,11 @@ Key = tuple[object, ...]
 
 @dataclass(eq=False)
 class Changes:
-    """Changes of the prediction by limit, size, windows and the effects of its joint, on one set of windows."""
+    """Changes of the prediction by what makes them and the effects near it, on one set of windows."""
 
     of: tuple[object, ...] = ()
     """Windows and whitening that they are of: when these are others, nothing is known."""
-    kept: dict[Key, tuple[tuple[str, ...], np.ndarray]] = field(default_factory=dict)
+    kept: dict[Key, tuple[Key, np.ndarray]] = field(default_factory=dict)
     taken: bool = False
     """Whether a change was taken from an earlier fit since this was last set to False."""
 
@@ -34,15 +33,23 @@ class Changes:
         return self
 
     def get(
-        self, effects: Sequence[Effect], place: str, key: Key, fresh: bool, simulate: Callable[[], np.ndarray]
+        self, effects: Sequence[Effect], place: str, key: Key, simulate: Callable[[], np.ndarray], fresh: bool = False
     ) -> np.ndarray:
-        """The change `key` of a limit on the joint `place` beside `effects`; simulated if not known, or `fresh`."""
-        near = tuple(repr(e) for e in effects if not e.where or place in e.where)
-        at, far = (place, near, *key), tuple(map(repr, effects))
+        """The change `key` of something at `place` ("": everywhere) beside `effects`.
+
+        It is simulated if it is not known, or is to be `fresh`. Near are effects of that place and of the whole robot.
+        """
+        near = tuple(_rounded(e) for e in effects if not place or not e.where or place in e.where)
+        at, every = (place, near, *key), tuple(map(repr, effects))
         known = self.kept.get(at)
-        if known is not None and (not fresh or known[0] == far):
-            self.taken |= known[0] != far
+        if known is not None and (not fresh or known[0] == every):
+            self.taken |= known[0] != every
             return known[1]
         change = simulate().astype(np.float32)
-        self.kept[at] = (far, change)
+        self.kept[at] = (every, change)
         return change
+
+
+def _rounded(effect: Effect) -> Key:
+    """What an effect is, its parameters to two digits."""
+    return (effect.effect, effect.where, *(f"{name} {value:.1e}" for name, value in effect.parameters.items()))

@@ -120,7 +120,7 @@ def gauss_newton(
     scales = np.concatenate([c.scales for c in chosen]) if len(chosen) else np.empty(0)
     moving = np.flatnonzero(scales)
     columns, at = taken_over(problem, chosen, values, moving, known)
-    columns = columns_at(problem, chosen, values, residual, scales, coarse, columns, at)
+    columns = columns_at(problem, chosen, values, scales, coarse, columns, at)
     for _ in range(iterations if len(chosen) else 0):
         basis, inverse = project(problem, columns, weights, damping)
         move = np.zeros(len(values))
@@ -137,7 +137,7 @@ def gauss_newton(
         gained = cost - new[0]
         values, residual, (cost, nuisance) = trial, tried, new
         if not small:
-            columns = columns_at(problem, chosen, values, residual, scales, coarse, columns, at)
+            columns = columns_at(problem, chosen, values, scales, coarse, columns, at)
         if small or gained < 0.05:
             break
     return Fit(tuple(chosen), values, nuisance, residual, columns, cost)

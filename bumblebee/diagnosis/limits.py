@@ -220,7 +220,7 @@ def _gain(
         return _change(problem, fit, candidate, _value(candidate, size), felt)[felt]
 
     key = (candidate.effect, size, felt.tobytes())
-    left = clean[felt] - changes.get(fit.effects, candidate.where, key, fresh, simulate)
+    left = clean[felt] - changes.get(fit.effects, candidate.where, key, simulate, fresh)
     before, after = (np.log1p((x**2).mean(axis=1) / usual) for x in (clean[felt], left))
     return float(2.0 * usual * clean.shape[1] * (before - after).sum())
 

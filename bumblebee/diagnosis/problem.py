@@ -41,6 +41,8 @@ class Problem:
     """Step [s] for residuals."""
     finest: float
     """The same of the last fit, at most `fine`."""
+    between: float
+    """Step [s] for sensitivities that coarse ones do not do for."""
     coarse: float
     """Step [s] for sensitivities of many candidates."""
     whitener: Whitener = field(repr=False)
@@ -59,6 +61,14 @@ class Problem:
             return self.finite(residuals(self.plant, self.layout, self.windows, variations, step))
 
         return self.recall.get((self.windows, self.whitener), effects, step, simulated)
+
+    def differences(self, effects: Sequence[Effect], moved: Sequence[Sequence[Effect]], coarse: bool) -> np.ndarray:
+        """How the prediction changes from a model to several others, (V, W, M), both sides simulated in one step."""
+        if coarse:
+            several = self.residual([effects, *moved], coarse=True)
+            return self.tamed(several[0] - several[1:])
+        several = replace(self, fine=self.between).residual([effects, *moved])
+        return several[0] - several[1:]
 
     def on(self, keep: np.ndarray, effects: Sequence[Effect], coarse: bool = False) -> np.ndarray:
         """Whitened residuals (K, M) of one model on the windows at the indices `keep` (K,) alone."""
@@ -123,7 +133,7 @@ class Problem:
 
     def finely(self) -> "Problem":
         """The same windows, simulated in the steps of the last fit."""
-        return self if self.fine == self.finest else replace(self, fine=self.finest, recall=Recall())
+        return replace(self, fine=self.finest)
 
     def part(self, keep: np.ndarray) -> "Problem":
         """The problem on the windows `keep`."""
@@ -175,7 +185,7 @@ def make_problem(
     windows, raw, whitener = select(windows, keep), raw[:, keep], whitener.part(keep)
     columns = _columns(whitener, raw)
     finest = fine if finest is None else finest
-    return Problem(plant, layout, windows, sigma, fine, finest, coarse, whitener, columns, select(read, keep))
+    return Problem(plant, layout, windows, sigma, fine, finest, fine, coarse, whitener, columns, select(read, keep))
 
 
 def _columns(whitener: Whitener, raw: np.ndarray) -> np.ndarray:

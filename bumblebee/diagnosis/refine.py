@@ -1,7 +1,7 @@
 """The last fit: everything whitened and linearised around what was found."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,7 +37,8 @@ def _around(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
         plant, layout, windows = problem.plant, problem.layout, problem.read
         steps = (problem.finest, problem.coarse)
         try:
-            return make_problem(plant, layout, windows, problem.sigma, steps, fit.effects, rng)
+            made = make_problem(plant, layout, windows, problem.sigma, steps, fit.effects, rng)
+            return replace(made, between=problem.between)
         except BadInput:  # stiff and coarsely stepped, it diverges in more than half of the windows
             pass
     return problem.finely().relinearised(fit.effects)

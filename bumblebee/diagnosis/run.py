@@ -76,7 +76,7 @@ class Run:
         self.keep = screening_windows(problem, config.screen_windows)
         self.closed: set[Candidate] = set()
         self.hopeless: set[tuple[str, str]] = set()  # limits (effect, joint) that only spoilt more when they were tried
-        self.changes = Changes()
+        self.changes, self.slopes = Changes(), Changes()
         self.steps: list[Step] = []
         self.rejected: list[str] = []
         self.loss: Loss | None = None
@@ -143,14 +143,22 @@ class Run:
         if not looked:
             return [], []
         self.say(f"{len(looked)} of {len(self.candidates)} candidates simulated on all windows")
-        columns = Columns(looked, self.problem.sensitivities(looked, self.fit.effects))
-        tests = score_tests(self.problem, columns, self.fit, self.weights)
+        tests = score_tests(self.problem, self.sensitivities(looked), self.fit, self.weights)
         order = [k for k in np.argsort(-tests.gain) if self.is_open(looked[k], tests, k, self.bound, 1.0)]
         tried = [
             try_one(self.problem, self.fit, looked[k], tests.steps[k], self.weights)
             for k in order[: self.config.trials]
         ]
         return [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2], looked
+
+    def sensitivities(self, looked: Sequence[Candidate]) -> Columns:
+        """Columns of some candidates on all windows; of those near which nothing has changed, as they were."""
+        effects, known = self.fit.effects, self.slopes.on(self.problem)
+
+        def simulated(c: Candidate) -> np.ndarray:
+            return known.get(effects, c.where, (c,), lambda: self.problem.sensitivities([c], effects))
+
+        return Columns(looked, np.concatenate([simulated(c) for c in looked]))
 
     def accept(self, candidate: Candidate, values: np.ndarray) -> bool:
         """Refit with the candidate; keep it if the joint fit and the held-out windows agree."""

@@ -37,7 +37,6 @@ def columns_at(
     problem: Problem,
     chosen: Sequence[Candidate],
     values: np.ndarray,
-    residual: np.ndarray,
     scales: np.ndarray,
     coarse: bool,
     known: np.ndarray,
@@ -50,7 +49,7 @@ def columns_at(
     """
     moving = np.flatnonzero(scales)
     if not len(moving):
-        return np.empty((0, *residual.shape))
+        return np.empty((0, *problem.nuisance.shape[1:]))
     near = _near(problem, chosen)
     moved = np.abs(values - at) <= _FAR * np.where(scales > 0, scales, np.inf)
     stale = np.flatnonzero([not moved[k, near[i]].all() for k, i in enumerate(moving)])
@@ -64,11 +63,8 @@ def columns_at(
             there[i] = values[i] - 0.2 * scales[i]
         sizes.append((there[i] - values[i]) / scales[i])
         sets.append(effects_at(chosen, there))
-    if coarse and rough(c.effect for c in chosen):
-        several = problem.residual([effects_at(chosen, values), *sets], coarse=True)
-        change = problem.tamed(several[0] - several[1:])
-    else:
-        change = residual - problem.residual(sets)
+    coarse = coarse and rough(c.effect for c in chosen)
+    change = problem.differences(effects_at(chosen, values), sets, coarse)
     columns, at[stale] = known.copy(), values
     columns[stale] = change / np.array(sizes)[:, None, None]
     return columns
