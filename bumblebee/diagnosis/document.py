@@ -5,6 +5,7 @@ from typing import Any
 
 from bumblebee.diagnosis.beyond import NOT_TESTED, structure_table, unexplained
 from bumblebee.diagnosis.classes import detectable
+from bumblebee.diagnosis.common_factor import factor_notes
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.discover import Discovery
 from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_whiteners, horizon_windows
@@ -32,6 +33,7 @@ def document(
 ) -> dict[str, Any]:
     """Which rollouts took which part, `entries` of the effects, the error with them, what is left and what to know."""
     session = material.session
+    driven = _driven(session)
     return (
         {"schema": 1, "train": session.ids(session.train)}
         | {"holdout": session.ids(session.holdout), "accept": session.ids(session.accept)}
@@ -42,7 +44,7 @@ def document(
             "unidentifiable": [{"where": [name], "why": _STILL} for name in material.still],
             "smallest_detectable": detectable(found),
             "set_aside": session.set_aside,
-            "notes": [*session.notes, *notes, *latency_notes(entries, _driven(session))],
+            "notes": [*session.notes, *notes, *latency_notes(entries, driven), *factor_notes(entries, driven)],
             "settings": _settings(material, config, found.bound, last),
         }
     )
