@@ -43,17 +43,23 @@ def logged_torques(plant: Plant, rollout: Rollout) -> tuple[np.ndarray, np.ndarr
 
 @lru_cache(maxsize=256)
 def mean_squares(plant: Plant, rollout: Rollout) -> np.ndarray:
-    """Mean square (T - 1, J) of the servo torques [N^2 m^2] between ticks, by Simpson's rule.
+    """Mean square (T - 1, J) of the servo torques [N^2 m^2] between ticks, by Gauss's rule of four points.
 
     A command that arrives makes a torque that is gone before the next tick: the mean of the squares at both ends is a
-    tenth too much. In the middle the joint is where a parabola of speed puts it that has the readings' speeds and path.
+    tenth too much. Between ticks the joint is on the cubic that has the readings' positions and speeds.
     """
-    servos, (before, after) = plant_servos(plant), logged_torques(plant, rollout)
-    place, speed, dt = rollout.joint_pos - plant.offset, rollout.joint_vel, np.diff(rollout.time)[:, None]
-    middle = 0.5 * (place[1:] + place[:-1]) + dt / 8 * (speed[:-1] - speed[1:])
-    halfway = 1.5 * np.diff(place, axis=0) / dt - 0.25 * (speed[1:] + speed[:-1])
-    between = servos.torque(middle, halfway, servos.controls(command_inputs(plant, rollout))[:-1])
-    return (after[:-1] ** 2 + 4 * between**2 + before[1:] ** 2) / 6
+    servos, dt = plant_servos(plant), np.diff(rollout.time)[:, None]
+    place, speed = rollout.joint_pos - plant.offset, rollout.joint_vel
+    gone, command = np.diff(place, axis=0), servos.controls(command_inputs(plant, rollout))[:-1]
+    ends = speed[:-1] - gone / dt, gone / dt - speed[1:]
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    total = np.zeros_like(gone)
+    for s, weight in zip(0.5 * (1 + nodes), 0.5 * weights, strict=True):
+        bow = s * (1 - s) * ((1 - s) * ends[0] + s * ends[1])
+        slope = (1 - s) * (1 - 3 * s) * ends[0] + s * (2 - 3 * s) * ends[1]
+        at = place[:-1] + s * gone + dt * bow
+        total += weight * servos.torque(at, gone / dt + slope, command) ** 2
+    return total
 
 
 def at_starts(windows: Windows, of: Callable[[Rollout], np.ndarray]) -> np.ndarray:
@@ -197,17 +203,21 @@ def _past(
 def read_at(windows: Windows, shift: float, delay: np.ndarray, order: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (W, J) that the joints `order` had `shift` s after the starts, by their late readings.
 
-    What an encoder reads `delay` (J,) s later is where the joint is now; between ticks a reading is linear in time.
+    What an encoder reads `delay` (J,) s later is where the joint is now. Between ticks a position is on the cubic that
+    has the readings' positions and speeds, a speed on a line: the cubic's would have three times the noise.
     """
     place, speed = np.empty((len(windows), len(order))), np.empty((len(windows), len(order)))
     for w, (i, k) in enumerate(zip(windows.rollout, windows.start, strict=True)):
         rollout = windows.source[i]
         at = np.clip(rollout.time[k] + shift + delay, rollout.time[0], rollout.time[-1])
         high = np.clip(np.searchsorted(rollout.time, at), 1, len(rollout.time) - 1)
-        share = (at - rollout.time[high - 1]) / (rollout.time[high] - rollout.time[high - 1])
-        for out, values in ((place, rollout.joint_pos), (speed, rollout.joint_vel)):
-            low = values[high - 1, order]
-            out[w] = low + share * (values[high, order] - low)
+        dt = rollout.time[high] - rollout.time[high - 1]
+        share = (at - rollout.time[high - 1]) / dt
+        first, gone = rollout.joint_pos[high - 1, order], np.subtract(*rollout.joint_pos[[high, high - 1], order])
+        speeds = rollout.joint_vel[[high - 1, high], order]
+        bow = (1 - share) * (dt * speeds[0] - gone) + share * (gone - dt * speeds[1])
+        place[w] = first + share * gone + share * (1 - share) * bow
+        speed[w] = speeds[0] + share * (speeds[1] - speeds[0])
     return place, speed
 
 
