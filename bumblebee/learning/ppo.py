@@ -23,6 +23,7 @@ from bumblebee.learning.curve import CurveWriter
 from bumblebee.learning.policy import Policy, load_policy, model_config, new_actor, shape_of
 from bumblebee.learning.ranks import Ranks
 from bumblebee.progress import progress
+from bumblebee.sim.warp_limits import within_memory
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.mirror import augmentation
 
@@ -108,7 +109,8 @@ class Trainer:
             if config.symmetry:
                 mirror = {"use_data_augmentation": True, "data_augmentation_func": augmentation(env)}
                 settings["algorithm"]["symmetry_cfg"] = mirror
-            built = BoundedPpo.construct_algorithm(env.get_observations(), env, settings, env.device)
+            with within_memory(env.num_envs):
+                built = BoundedPpo.construct_algorithm(env.get_observations(), env, settings, env.device)
         assert isinstance(built, BoundedPpo)
         self.algorithm = built
         self.iteration, self._seconds = 0, 0.0
@@ -135,7 +137,8 @@ class Trainer:
         with self._told(what) as tell:
             while self.iteration < config.iterations and not self.ranks.decide(enough):
                 began = time.monotonic()
-                scalars = self._iterate()
+                with within_memory(self.env.num_envs):
+                    scalars = self._iterate()
                 self._seconds += time.monotonic() - began
                 self.iteration += 1
                 tell({"frames": self.frames, "seconds": self._seconds, **scalars}, per_iteration)

@@ -1,5 +1,7 @@
 """What stops MuJoCo Warp: missing packages, device or memory, and buffers that are too small; a clear line for each."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -75,6 +77,20 @@ def fitting(model: mujoco.MjModel, num_worlds: int, buffers: Buffers, device: st
             wanted = f"worlds that fit into {free / 2**30:.1f} GiB"
             raise BadInput("num_worlds", wanted, came, f"At most {int(free / each)} fit.")
     return make(num_worlds)
+
+
+@contextmanager
+def within_memory(num_worlds: int) -> Iterator[None]:
+    """Work whose tensors must fit into the GPU's memory beside the worlds.
+
+    Raises:
+        BadInput: if they do not.
+    """
+    try:
+        yield
+    except torch.OutOfMemoryError as error:
+        wanted, do = "worlds, networks and batches within the GPU's memory", "Use fewer worlds or shorter batches."
+        raise BadInput("num_worlds", wanted, f"{num_worlds} worlds: {str(error).splitlines()[0]}", do) from None
 
 
 def bytes_of(data: Any) -> int:

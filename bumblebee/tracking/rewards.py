@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
+from bumblebee.errors import BadInput
 from bumblebee.robot.facts import joints
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import angle_between, length3, rotate
@@ -234,8 +235,7 @@ class Reward:
         self.sharpness = (PAPER_SHARPNESS if paper else DEMO_SHARPNESS) | config.sharpness
         unknown = (set(self.weights) - set(PENALTIES) - set(ERRORS)) | (set(self.sharpness) - set(ERRORS))
         if unknown:
-            known = ", ".join([*PENALTIES, *ERRORS])
-            raise ValueError(f"unknown reward terms {sorted(unknown)}; the terms are {known}")
+            raise BadInput("reward.weights, reward.sharpness", ", ".join([*PENALTIES, *ERRORS]), min(unknown))
         self.dt = dt
         self._penalties = [name for name, weight in self.weights.items() if weight and name in PENALTIES]
         self._errors = [name for name, weight in self.weights.items() if weight and name in ERRORS]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from bumblebee.errors import BadInput
 from bumblebee.robot.facts import joints
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import from_rotation_vector
@@ -126,6 +127,8 @@ def test_the_papers_weights() -> None:
 
 
 def test_an_unknown_term_is_refused() -> None:
-    """A misspelt weight is an error, not a silent nothing."""
-    with pytest.raises(ValueError, match="action_rat"):
+    """A misspelt weight, or a sharpness of a term that has none, is one line, not a silent nothing."""
+    with pytest.raises(BadInput, match=r"action_rate.*came action_rat$"):
         Reward(RewardConfig(weights={"action_rat": -1.0}), 0.02)
+    with pytest.raises(BadInput, match=r"came torque$"):
+        Reward(RewardConfig(sharpness={"torque": 1.0}), 0.02)
