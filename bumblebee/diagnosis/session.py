@@ -131,12 +131,9 @@ def make_session(
     search_step = steps[0] if small else max(steps[0], step_for(period, min(_SEARCH, declared)))
     sigma = estimate_noise(long, layout)
     if not plant.floating:
-        long, sigma, fast, age = smooth_rollouts(long, layout, sigma)
+        long, sigma, fast = smooth_rollouts(long, layout, sigma)
         if fast:
             notes.append(f"{fast} fast rollouts: joint readings smoothed over +-{1000 * HALF_SPAN:g} ms")
-        if age.any():
-            late = ", ".join(f"{n} {1000 * a:.1f}" for n, a in zip(plant.joints, age, strict=True) if a)
-            notes.append(f"velocities older than the positions beside them, taken for their own time, ms: {late}")
     aside = [{"rollout": name, "reason": str(error)} for name, error in failed]
     return Session(spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside)
 

@@ -13,7 +13,7 @@ from bumblebee.diagnosis.latency import latency_notes
 from bumblebee.diagnosis.replay import replay
 from bumblebee.diagnosis.reported import reported_torque
 from bumblebee.diagnosis.session import Session, make_session
-from bumblebee.diagnosis.smooth import smooth_rollouts, velocity_age
+from bumblebee.diagnosis.smooth import smooth_rollouts
 from bumblebee.diagnosis.windows import choose_starts, cut
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
@@ -100,36 +100,13 @@ def test_smoothing_leaves_the_noise_that_it_says() -> None:
                     speed + 0.07 * rng.standard_normal(speed.shape), joint_target=place)  # fmt: skip
     slow = replace(noisy, **{k: getattr(noisy, k)[::10] for k in ("time", "joint_pos", "joint_vel", "joint_target")})
     layout = session(cart.record(count=1)).layout.__class__({"joint_pos": slice(0, 1), "joint_vel": slice(1, 2)}, 2)
-    (out,), sigma, count, _ = smooth_rollouts([noisy], layout, np.array([1e-3, 0.07]))
+    (out,), sigma, count = smooth_rollouts([noisy], layout, np.array([1e-3, 0.07]))
     inner = slice(10, -10)
     assert count == 1 and sigma[1] < 0.035
     assert (out.joint_pos - place)[inner].std() == pytest.approx(sigma[0], rel=0.2)
     assert (out.joint_vel - speed)[inner].std() == pytest.approx(sigma[1], rel=0.2)
-    (same,), sigma, count, _ = smooth_rollouts([slow], layout, np.array([1e-3, 0.07]))
+    (same,), sigma, count = smooth_rollouts([slow], layout, np.array([1e-3, 0.07]))
     assert count == 0 and same is slow and sigma.tolist() == [1e-3, 0.07]
-
-
-def test_a_velocity_that_comes_late_is_taken_for_its_own_time() -> None:
-    rng = np.random.default_rng(1)
-    time = np.arange(3000) * 0.002
-
-    def run(name: str, rate: float, age: float) -> Rollout:
-        place, speed = np.sin(rate * time)[:, None], rate * np.cos(rate * (time - age))[:, None]
-        noise = rng.standard_normal((2, *place.shape))
-        columns = place + 2e-4 * noise[0], speed + 0.05 * noise[1]
-        return Rollout(name, ("j",), 500.0, time, *columns, joint_target=place)
-
-    late = [run("a", 9.0, 0.004), run("b", 7.0, 0.004), run("c", 11.0, 0.004)]
-    assert velocity_age(late)[0] == pytest.approx(0.004, abs=2e-4)
-    assert velocity_age([run(name, 9.0, 0.0) for name in "abc"])[0] == pytest.approx(0.0, abs=2e-4)
-    assert velocity_age(late[:1]).tolist() == [0.0] and velocity_age([]).size == 0
-    layout = session(cart.record(count=1)).layout.__class__({"joint_pos": slice(0, 1), "joint_vel": slice(1, 2)}, 2)
-    (out, *_), sigma, _, age = smooth_rollouts(late, layout, np.array([2e-4, 0.05]))
-    assert age[0] == pytest.approx(0.004, abs=2e-4)
-    inner = slice(10, -10)
-    true = 9.0 * np.cos(9.0 * time)[:, None]
-    assert (out.joint_vel - true)[inner].std() == pytest.approx(sigma[1], rel=0.3)
-    assert (late[0].joint_vel - true)[inner].std() > 5 * sigma[1]
 
 
 @pytest.mark.parametrize(("friction", "where"), [((3.0, 0.0), "cart"), ((0.0, 0.15), "pole")], ids=["slide", "hinge"])
