@@ -10,6 +10,7 @@ from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.variation import declared_values, touching
 from bumblebee.diagnosis.windows import command_inputs
 from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effect_native import physical_inertia
 from bumblebee.sim.effects import CATALOGUE, Effect, single
 from bumblebee.sim.servo import servos_of
 
@@ -69,7 +70,8 @@ class Candidate:
         if self.effect in INVERSE:
             # An infinitely stiff shaft cannot be simulated: a fiftieth of the first step is as good as absent.
             low[0], high[0] = max(1.0 / high[0], 0.02 * abs(self.step[0])), 1.0 / low[0]
-        return np.clip(np.asarray(values, dtype=float), low, high)
+        inside = np.clip(np.asarray(values, dtype=float), low, high)
+        return physical_inertia(inside) if self.effect == "link_inertia" else inside
 
     def moved(self, index: int, steps: float) -> np.ndarray:
         """First-trial parameters with only the free one number `index` away from nominal, by so many steps."""
