@@ -23,6 +23,7 @@ from bumblebee.diagnosis.refine import Refined, refine
 from bumblebee.diagnosis.remains import remains
 from bumblebee.diagnosis.search import Search, search
 from bumblebee.diagnosis.session import Session
+from bumblebee.diagnosis.unseen import unseen_notes
 from bumblebee.sim.effects import Effect
 
 
@@ -72,6 +73,7 @@ def diagnose(
     entries = [*entries, *(rounded if steps else []), *lost]
     if found.beyond is not None:
         notes = [*(f"withdrawn for what explains more: {name}" for name in found.beyond.withdrawn), *notes]
+    notes = [*notes, *unseen_notes(material.session, effects, config.horizon)]
     told = document(material, config, found.search, found.last, found.beyond, effects, entries, notes)
     return Diagnosis(told, effects, material.session, found.search, found.last.problem)
 

@@ -17,6 +17,7 @@ from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.simulate import residuals
 from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.windows import choose_starts, cut
+from bumblebee.sim.effects import Effect
 
 _BUDGET = 300  # windows
 _FAR, _SEVERAL = 4.0, 2  # times as far off as the worst fitted window; windows that are
@@ -28,7 +29,8 @@ def informative(session: Session, horizon: float) -> Session:
     if len(session.rollouts) < 2:
         return session
     names = motion_names(session.rollouts)
-    worst = {i: errors for i, errors in _errors(session, horizon).items() if _alone(names, i)}
+    errors = window_errors(session, [], horizon, session.steps[1])
+    worst = {i: some for i, some in errors.items() if _alone(names, i)}
     for _ in range(_MOST):
         fitted = [i for i in session.train if i not in session.accept and i in worst]
         aside = [i for i in worst if i not in fitted]
@@ -65,8 +67,8 @@ def _exchanged(session: Session, one: int, other: int) -> Session:
     )
 
 
-def _errors(session: Session, horizon: float) -> dict[int, np.ndarray]:
-    """Of each rollout its windows' squared errors under the declared model, largest first, 1 for a usual one.
+def window_errors(session: Session, effects: Sequence[Effect], horizon: float, step: float) -> dict[int, np.ndarray]:
+    """Of each rollout its windows' squared errors with `effects`, in steps of `step` [s]; largest first, 1 is usual.
 
     Every signal is compared with its usual error at the same time after the start; a window that diverged is left out.
     """
@@ -75,7 +77,7 @@ def _errors(session: Session, horizon: float) -> dict[int, np.ndarray]:
     if not starts:
         return {}
     windows = cut(session.plant, session.layout, session.rollouts, starts)
-    raw = residuals(session.plant, session.layout, windows, [vary(session.plant, [])], session.steps[1])[0]
+    raw = residuals(session.plant, session.layout, windows, [vary(session.plant, effects)], step)[0]
     raw = raw[:, 1:] if raw.shape[1] > 1 else raw
     usual = np.nanmedian(np.abs(raw), axis=0) + session.sigma
     error = np.nanmean((raw / usual) ** 2, axis=(1, 2))

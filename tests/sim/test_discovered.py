@@ -7,7 +7,7 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect, read_effects, runtime_hooks
-from tests.sim.test_effect_equations import both, close, model_with, path, reference, servo, sign, swing
+from tests.sim.hinge import both, close, model_with, path, reference, servo, sign, swing
 
 
 @pytest.mark.parametrize(

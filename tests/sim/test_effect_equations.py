@@ -1,104 +1,29 @@
-"""Every other effect of the catalogue, in MJCF or as a hook, against the same equation integrated in NumPy.
-
-One hinge about y with inertia INERTIA + MASS ARM^2, a position servo, steps of 1 ms; NumPy takes steps of 0.1 ms.
-"""
-
-from collections.abc import Callable
+"""Every other effect of the catalogue that adds no joint against its equation integrated in NumPy."""
 
 import mujoco
 import numpy as np
 import pytest
-from mujoco.batch import Batch
 
 from bumblebee.errors import BadInput
-from bumblebee.sim.effect_forces import StepHooks
 from bumblebee.sim.effects import CATALOGUE, Effect, add_to_spec, runtime_hooks, single
-
-INERTIA, KP, KD, MASS, ARM, LIMIT = 0.05, 20.0, 1.0, 0.8, 0.3, 15.0
-TOTAL = INERTIA + MASS * ARM**2
-FINE = 1e-4
-
-
-def model_with(
-    *effects: Effect, gravity: float = 0.0, kp: float = KP, kd: float = KD, degrees: bool = False
-) -> mujoco.MjModel:
-    """The hinge with the effects, through XML and back."""
-    unit = "degree" if degrees else "radian"
-    text = f"""<mujoco><compiler angle="{unit}"/><option timestep="0.001" gravity="0 0 {-gravity}"/>
-    <worldbody><body name="link"><joint name="j" axis="0 1 0" armature="{INERTIA}"/>
-    <inertial pos="{ARM} 0 0" mass="{MASS}" diaginertia="1e-6 1e-6 1e-6"/></body></worldbody><actuator>
-    <position name="j" joint="j" kp="{kp}" kv="{kd}" forcerange="-{LIMIT} {LIMIT}"/></actuator>
-    <keyframe><key name="up" qpos="0.1"/></keyframe></mujoco>"""
-    spec = mujoco.MjSpec.from_string(text)
-    add_to_spec(spec, effects)
-    spec.compile()
-    return mujoco.MjModel.from_xml_string(spec.to_xml())
-
-
-def path(
-    effects: list[Effect], target: Callable[[float], float], seconds: float = 0.4, speed: float = 0.0, **options: float
-) -> np.ndarray:
-    """Positions of the encoder's joint (T, 2) with velocities, one a millisecond, with hooks running."""
-    model = model_with(*effects, **options)
-    batch = Batch(model, 1, 1)
-    batch.qvel[0, 0] = speed
-    hooks = StepHooks(runtime_hooks(effects, model), model, batch)
-    hooks.reset(np.array([0]))
-    out = []
-    for k in range(round(seconds * 1000)):
-        batch.ctrl[0, 0] = target(k * 0.001)
-        hooks.apply()
-        batch.step()
-        out.append((batch.qpos[0, 0], batch.qvel[0, 0]))
-    return np.array(out)
-
-
-def reference(
-    torque: Callable[[float, float, float], float], seconds: float = 0.4, speed: float = 0.0, inertia: float = TOTAL
-) -> np.ndarray:
-    """The same by semi-implicit Euler in fine steps; `torque(t, q, v)` is all that acts."""
-    q, v, out = 0.0, speed, []
-    every = round(0.001 / FINE)
-    for k in range(round(seconds / FINE)):
-        v += FINE * torque(k * FINE, q, v) / inertia
-        q += FINE * v
-        if (k + 1) % every == 0:
-            out.append((q, v))
-    return np.array(out)
-
-
-def close(mine: np.ndarray, plain: np.ndarray, other: np.ndarray, without: np.ndarray, share: float = 0.06) -> None:
-    """The effect changes something, and both simulations by the same, to a share of the change."""
-    change = other - without
-    size = np.abs(change).max(axis=0)
-    assert (size > [2e-3, 2e-2]).all()
-    assert (np.abs(mine - plain - change).max(axis=0) < share * size).all()
-
-
-def check(effects: list[Effect], other: np.ndarray, share: float = 0.06, target: Callable | None = None) -> None:
-    """A path with hooks against a reference, both less their own without the effect."""
-    target = target or swing
-    plain, without = both(target)
-    close(path(effects, target), plain, other, without, share)
-
-
-def swing(t: float) -> float:
-    return 0.5 * np.sin(2 * np.pi * 3 * t)
-
-
-def servo(t: float, q: float, v: float) -> float:
-    return float(np.clip(KP * (swing(t) - q) - KD * v, -LIMIT, LIMIT))
-
-
-def both(target: Callable[[float], float] = swing) -> tuple[np.ndarray, np.ndarray]:
-    """The servo without an effect, in MuJoCo and in NumPy."""
-    torque = lambda t, q, v: float(np.clip(KP * (target(t) - q) - KD * v, -LIMIT, LIMIT))  # noqa: E731
-    return path([], target), reference(torque)
-
-
-def sign(v: float) -> float:
-    return float(np.tanh(v / 1e-3))
-
+from tests.sim.hinge import (
+    ARM,
+    FINE,
+    INERTIA,
+    KD,
+    KP,
+    LIMIT,
+    MASS,
+    TOTAL,
+    check,
+    close,
+    model_with,
+    path,
+    reference,
+    servo,
+    sign,
+    swing,
+)
 
 TORQUES = {
     "stribeck_friction": ((0.8, 1.0), lambda t, q, v: servo(t, q, v) - 0.8 * np.exp(-(v**2)) * sign(v)),
@@ -164,16 +89,6 @@ def test_a_rounded_reading_reaches_the_servo() -> None:
     check([single("encoder_quantisation", "j", 0.1)], reference(torque), share=0.35)
 
 
-def test_hysteresis_is_a_spring_that_yields() -> None:
-    centre = [0.0]
-
-    def torque(t: float, q: float, v: float) -> float:
-        centre[0] = min(max(centre[0], q - 0.05), q + 0.05)
-        return servo(t, q, v) - 1.2 * (q - centre[0]) / 0.05
-
-    check([single("hysteresis", "j", 1.2, 0.05)], reference(torque))
-
-
 def test_heat_takes_strength() -> None:
     heat = [0.0]
 
@@ -184,63 +99,6 @@ def test_heat_takes_strength() -> None:
         return force
 
     check([single("thermal_fade", "j", 0.9)], reference(torque), share=0.1, target=lambda t: 4 * swing(t))
-
-
-def two_masses(between: Callable[[float, float], float], seconds: float = 0.4, encoder: int = 0) -> np.ndarray:
-    """Rotor (INERTIA) under the servo, link (MASS ARM^2), `between(angle, speed)` pulls the rotor to the link.
-
-    The encoder, which the servo hears, reads the rotor (0) or the link (1).
-    """
-    q, v, out = np.zeros(2), np.zeros(2), []
-    step = FINE / 5
-    for k in range(round(seconds / step)):
-        pull = between(q[1] - q[0], v[1] - v[0])
-        v += step * np.array([(servo(k * step, q[encoder], v[encoder]) + pull) / INERTIA, -pull / (MASS * ARM**2)])
-        q += step * v
-        if (k + 1) % round(0.001 / step) == 0:
-            out.append((q[encoder], v[encoder]))
-    return np.array(out)
-
-
-def test_a_flexible_shaft_is_a_second_mass_on_a_spring() -> None:
-    model = model_with(single("series_elasticity", "j", 60.0))
-    assert model.nq == 2 and model.key("up").qpos.tolist() == [0.1, 0.0]
-    check([single("series_elasticity", "j", 60.0)], two_masses(lambda d, w: 60.0 * d + 0.06 * w), share=0.1)
-
-
-def test_a_flexible_shaft_before_the_encoder_is_one_too() -> None:
-    effect = single("series_elasticity", "j", 60.0, 1.0)
-    model = model_with(effect)
-    assert model.nq == 2 and model.key("up").qpos.tolist() == [0.1, 0.0]
-    wanted = two_masses(lambda d, w: 60.0 * d + 0.06 * w, encoder=1)
-    assert np.abs(wanted - two_masses(lambda d, w: 60.0 * d + 0.06 * w)).max() > 0.01  # not the same motion
-    check([effect], wanted, share=0.1)
-
-
-def test_hysteresis_by_dahls_law_follows_its_equation() -> None:
-    z = np.zeros(1)
-
-    def torque(t: float, q: float, v: float) -> float:
-        z[0] += FINE * v / 0.05 * (1 - np.sign(v) * z[0])
-        return servo(t, q, v) - 0.4 * z[0]
-
-    check([single("hysteresis", "j", 0.4, 0.05, 1.0)], reference(torque), share=0.1)
-
-
-@pytest.mark.parametrize("degrees", [False, True])
-def test_play_leaves_the_link_free_between_its_ends(degrees: bool) -> None:
-    """A hard spring outside the gap stands for the ends in the reference."""
-
-    def between(d: float, w: float) -> float:
-        over = d - np.clip(d, -0.05, 0.05)
-        return 2e4 * over + (20.0 * w if over else 0.0)
-
-    model = model_with(single("backlash", "j", 0.1), degrees=degrees)
-    np.testing.assert_allclose(model.joint("j_play").range, [-0.05, 0.05], atol=1e-9)
-    mine = path([single("backlash", "j", 0.1)], swing, degrees=degrees)
-    plain, without = both()
-    change = (two_masses(between) - without)[:150, 0]  # impacts are as sharp as their solver: positions only
-    assert np.abs((mine - plain)[:150, 0] - change).max() < 0.1 * np.abs(change).max()
 
 
 @pytest.mark.parametrize(
