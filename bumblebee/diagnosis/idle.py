@@ -1,28 +1,37 @@
 """Effects that take nothing off the error of the windows that judge: none of them is reported.
 
 They were accepted beside others and for the windows that were fitted; in the result the judging windows are no nearer
-with them. Limits are left alone, for of the judging windows perhaps none feels them.
+with them. Limits are left alone, for of the judging windows perhaps none feels them. So is a robot that is still far
+from its model: there a few windows make up the mean square (two joints' damping on the SO-101 arm, needless by it, made
+13.8 mrad after 1 s of 8.6).
 """
 
 import numpy as np
 
-from bumblebee.diagnosis.fit import Fit
+from bumblebee.diagnosis.fit import Fit, typical_power
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.refits import refitted, without_one
 
+_NEAR = 4.0  # median chi-square of the judging windows up to which their mean square tells
+
 
 def without_idle(problem: Problem, holdout: Holdout, fit: Fit) -> Fit:
-    """The fit less such effects, the worst first, the others refitted without it."""
-    while holdout.problem is not None and fit.chosen:
+    """The fit less such effects, the worst first, the others refitted without it; no worse after 1 s."""
+    if holdout.problem is None or typical_power(holdout.left([fit])[0]) > _NEAR:
+        return fit
+    while fit.chosen:
         growth = _growth(holdout.problem, fit)
         growth[[c.effect in LIMITS for c in fit.chosen]] = np.inf
         worst = int(np.argmin(growth))
         if growth[worst] > 0:
             break
         chosen, values = without_one(fit.chosen, fit.values, fit.chosen[worst])
-        fit = refitted(problem, chosen, values)
+        less = refitted(problem, chosen, values)
+        if holdout.worse_later(fit, less):
+            break
+        fit = less
     return fit
 
 
