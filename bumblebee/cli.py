@@ -16,6 +16,15 @@ Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (
 Data = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder that holds rollouts/*.parquet.")]
 
 
+@app.callback()
+def quiet() -> None:
+    """Close the loop with measured data."""
+    import mujoco
+
+    # Some of what is tried diverges and is judged so: MuJoCo says no line of it, and writes no MUJOCO_LOG.TXT.
+    mujoco.set_mju_user_warning(lambda text: None)
+
+
 @app.command()
 def diagnose(
     model: Model,

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import mujoco
+
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import fill
@@ -29,6 +31,7 @@ def main(round: int) -> None:
     """Diagnose data/measured/r<N> against its declared model into data/diagnosis/r<N>."""
     config = load("diagnose", DiagnoseConfig)
     measured = Path(f"data/measured/r{round}")
+    mujoco.set_mju_user_warning(lambda text: None)  # what is tried and diverges is judged so, not logged
     session = open_session(measured / "model.xml", measured)
     result = diagnose(session, DiagnosisConfig(**vars(config)), say=lambda text: print(text, flush=True))
     with output_folder(f"data/diagnosis/r{round}") as folder:

@@ -1,6 +1,8 @@
 """The command line: status 0 when done, status 2 and one line on standard error for unusable input."""
 
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -120,3 +122,19 @@ def test_a_model_that_blows_up_is_unusable(data: Path, capsys: pytest.CaptureFix
     assert run("diagnose", data / "bad.xml", data / "set", "--out", data / "out") == 2
     assert "diverge" in capsys.readouterr().err
     assert not (data / "out").exists()
+
+
+DIVERGE = """x = '<mujoco><worldbody><body><joint/><geom size=".1"/></body></worldbody></mujoco>'
+m = mujoco.MjModel.from_xml_string(x)
+d = mujoco.MjData(m)
+d.qvel[:] = 1e12
+mujoco.mj_step(m, d)"""
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_a_simulation_that_diverges_leaves_no_log_where_the_user_is(tmp_path: Path, quiet: bool) -> None:
+    """Some of what a diagnosis tries diverges; MuJoCo alone would write MUJOCO_LOG.TXT into the working folder."""
+    first = "import mujoco\n" + ("from bumblebee.cli import quiet\nquiet()\n" if quiet else "")
+    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
+    subprocess.run([sys.executable, "-c", first + DIVERGE], cwd=tmp_path, check=True, env=environment)
+    assert (tmp_path / "MUJOCO_LOG.TXT").exists() != quiet
