@@ -29,7 +29,7 @@ from bumblebee.diagnosis.seek import Found, library, seek
 from bumblebee.diagnosis.several import single_laws
 
 _JOINTS = 3  # joints at most that get a form
-_MANY = 8  # effects in a fit beyond which one joint does, and inner numbers stay as found: every trial refits them all
+_MANY = 8  # effects in a fit beyond which one joint does, names stay, inner numbers too: every trial refits them all
 _Z, _LEAST = 2.0, 0.01  # of the judging windows' gain, and its least share
 _OF_ALL = 0.05  # share of what all effects gain together that a form must, what it replaces being gone
 _MOST = 0.5  # share of a joint's excess that may remain where its form was found
@@ -80,7 +80,8 @@ def discover(
     unconfirmed: dict[str, dict[str, float]] = {}
     kinds: dict[str, str] = {}
     before = fit
-    for joint in dict.fromkeys(c.where for c in fit.chosen if c.where in problem.plant.joints):
+    few = len(fit.chosen) <= _MANY
+    for joint in dict.fromkeys(c.where for c in fit.chosen if few and c.where in problem.plant.joints):
         form = _instead_of_names(problem, holdout, fit, left, joint, offers or Offers())
         if form is not None:
             problem, holdout, fit, left = _around(problem, holdout, form.fit, typical, still)
