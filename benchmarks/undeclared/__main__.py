@@ -55,12 +55,14 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def run(cases: list[Case], options: argparse.Namespace, suite: Suite) -> None:
-    """Cases that are not in the file yet, in the suite's order, until the time is over."""
+    """Cases that are not in the file yet: in the suite's order until the time is over, or all, the longest first."""
     ends = time.monotonic() + options.seconds
     done = {row["case"] for row in read_lines(options.out)} if options.out.exists() else set()
     if options.skip:
         done |= {row["case"] for path in options.skip for row in read_lines(path)}
     left = [case for case in cases if case.number not in done][: options.limit]
+    if not np.isfinite(options.seconds):
+        left.sort(key=_Durations().of, reverse=True)
     stamp = {"version": VERSION, "seed": suite.seed, "suite": suite.digest(), "commit": commit()}
     options.out.parent.mkdir(parents=True, exist_ok=True)
     with options.out.open("a") as out, ProcessPoolExecutor(options.workers, initializer=_quiet) as pool:
@@ -106,7 +108,11 @@ class _Durations:
 
     def first(self, cases: list[Case], room: float) -> Case | None:
         """The first case that should end within `room` seconds."""
-        return next((c for c in cases if 1.3 * np.mean(self._seconds[c.robot]) * self._work(c) < room), None)
+        return next((c for c in cases if 1.3 * self.of(c) < room), None)
+
+    def of(self, case: Case) -> float:
+        """Seconds that one may take."""
+        return float(np.mean(self._seconds[case.robot]) * self._work(case))
 
     def _work(self, case: Case) -> float:
         return (case.rollouts + 3) / 7 * (2.0 if case.rivals else 1.0)
@@ -201,7 +207,7 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
                         help="robots, groups, kinds or case numbers; given several times, all must hold")  # fmt: skip
     parser.add_argument("--limit", type=int, default=None, help="cases at most")
     parser.add_argument(
-        "--seconds", type=float, default=1e9, help="begin no case after this long, drop what is unfinished"
+        "--seconds", type=float, default=np.inf, help="begin no case after this long, drop what is unfinished"
     )
     parser.add_argument("--policy", type=Path, help="folder of an exported policy, for the G1 that tracks motions")
     parser.add_argument("--list", action="store_true", help="print the cases and end")

@@ -7,12 +7,11 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.scales import Scales, scales_of
 from bumblebee.diagnosis.variation import declared_values, touching
-from bumblebee.diagnosis.windows import command_inputs
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effect_native import physical_inertia
 from bumblebee.sim.effects import CATALOGUE, Effect, single
-from bumblebee.sim.servo import servos_of
 
 # Of these the fit moves the inverse: where the effect is absent the parameter is infinite.
 INVERSE = ("torque_speed_limit", "series_elasticity")
@@ -90,26 +89,6 @@ def is_simulated(c: Candidate, joints: int) -> bool:
 def shortlisted(c: Candidate, joints: int) -> bool:
     """Whether a candidate costs too much to be simulated on every joint: only those worst explained are tried."""
     return c.effect == "backlash" or (c.effect == "series_elasticity" and joints > _FEW_JOINTS)
-
-
-@dataclass(frozen=True, eq=False)
-class Scales:
-    """Typical sizes of the data, from which first steps follow; J joints."""
-
-    torque: np.ndarray
-    """(J,) RMS servo torque [N m], of a joint without a drive that of gravity and speeds."""
-    peak: np.ndarray
-    """(J,) largest servo torque [N m]."""
-    speed: np.ndarray
-    """(J,) RMS speed [rad/s]."""
-    fastest: np.ndarray
-    """(J,) largest speed [rad/s]."""
-    travel: np.ndarray
-    """(J,) range of positions [rad]."""
-    inertia: np.ndarray
-    """(J,) diagonal of the joint-space inertia [kg m^2]."""
-    duration: float
-    """Longest rollout [s]."""
 
 
 def still_joints(plant: Plant, rollouts: Sequence[Rollout], sigma: np.ndarray) -> list[str]:
@@ -261,46 +240,3 @@ def _grounds(plant: Plant) -> list[str]:
     model = plant.model
     fixed = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == 0]
     return [model.geom(g).name for g in fixed if model.geom(g).name and touching(model, g)]
-
-
-def scales_of(plant: Plant, rollouts: Sequence[Rollout], model: mujoco.MjModel | None = None) -> Scales:
-    """Typical sizes by `model`, or by the declared one; floored for joints that rest."""
-    servos = servos_of(model or plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
-    torques = [
-        servos.torque(r.joint_pos - plant.offset, r.joint_vel, servos.controls(command_inputs(plant, r)))
-        for r in rollouts
-    ]
-    rms = np.sqrt(np.mean([(t**2).mean(axis=0) for t in torques], axis=0))
-    if (plant.actuator < 0).any():
-        rms = np.where(plant.actuator < 0, np.maximum(rms, _bias(plant, rollouts)), rms)
-    torque = np.maximum(rms, 0.05 * rms.max() + 1e-9)
-    speeds = np.sqrt(np.mean([(r.joint_vel**2).mean(axis=0) for r in rollouts], axis=0))
-    return Scales(
-        torque=torque,
-        peak=np.max([np.quantile(np.abs(t), 0.995, axis=0) for t in torques], axis=0),
-        speed=np.maximum(speeds, 0.1 * speeds.max() + 1e-6),
-        fastest=np.max([np.quantile(np.abs(r.joint_vel), 0.995, axis=0) for r in rollouts], axis=0) + 1e-3,
-        travel=np.max([np.ptp(r.joint_pos, axis=0) for r in rollouts], axis=0),
-        inertia=_inertia(plant),
-        duration=float(max(r.time[-1] - r.time[0] for r in rollouts)),
-    )
-
-
-def _bias(plant: Plant, rollouts: Sequence[Rollout], rows: int = 50) -> np.ndarray:
-    """RMS torque (J,) [N m] of gravity and of speeds along the rollouts: what a joint without a drive moves under."""
-    data, found = mujoco.MjData(plant.model), []
-    for r in rollouts:
-        for k in np.linspace(0, r.frames - 1, rows).astype(int):
-            data.qpos[plant.qpos], data.qvel[plant.dof] = r.joint_pos[k], r.joint_vel[k]
-            mujoco.mj_forward(plant.model, data)
-            found.append(data.qfrc_bias[plant.dof])
-    return np.sqrt(np.mean(np.square(found), axis=0))
-
-
-def _inertia(plant: Plant) -> np.ndarray:
-    """Diagonal of the joint-space inertia at the reference pose (J,)."""
-    data = mujoco.MjData(plant.model)
-    mujoco.mj_forward(plant.model, data)
-    full = np.zeros((plant.model.nv, plant.model.nv))
-    mujoco.mj_fullM(plant.model, data, full)
-    return np.diag(full)[plant.dof]

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import Candidate, all_candidates, scales_of, still_joints
+from bumblebee.diagnosis.candidates import Candidate, all_candidates, still_joints
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, make_problem
 from bumblebee.diagnosis.roles import informative
+from bumblebee.diagnosis.scales import scales_of
 from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.windows import choose_starts, cut

@@ -79,8 +79,11 @@ def window_errors(session: Session, effects: Sequence[Effect], horizon: float, s
     windows = cut(session.plant, session.layout, session.rollouts, starts)
     raw = residuals(session.plant, session.layout, windows, [vary(session.plant, effects)], step)[0]
     raw = raw[:, 1:] if raw.shape[1] > 1 else raw
-    usual = np.nanmedian(np.abs(raw), axis=0) + session.sigma
-    error = np.nanmean((raw / usual) ** 2, axis=(1, 2))
-    good = np.isfinite(error)
-    parts = {i: np.sort(error[good & (windows.rollout == i)])[::-1] for i in ids}
+    good = np.isfinite(raw).all(axis=(1, 2))
+    if not good.any():
+        return {}
+    raw, rollout = raw[good], windows.rollout[good]
+    usual = np.median(np.abs(raw), axis=0) + session.sigma
+    error = np.mean((raw / usual) ** 2, axis=(1, 2))
+    parts = {i: np.sort(error[rollout == i])[::-1] for i in ids}
     return {i: part for i, part in parts.items() if len(part)}

@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.beyond import discovered_entry, structure_table, unexplained
-from bumblebee.diagnosis.candidates import Candidate, scales_of
+from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.discover import Discovery, discover
 from bumblebee.diagnosis.fit import gauss_newton
 from bumblebee.diagnosis.formula import formula, quantities_of, related, stiffer_than_the_drive
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
+from bumblebee.diagnosis.scales import scales_of
 from bumblebee.diagnosis.session import Session, make_session
 from bumblebee.diagnosis.windows import choose_starts, cut
 from tests.diagnosis import arm, cart

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.candidates import scales_of
 from bumblebee.diagnosis.evidence import Evidence
 from bumblebee.diagnosis.fit import cost_of, gauss_newton
 from bumblebee.diagnosis.laws import Law, all_laws, beside, joined
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.remains import better, in_whole
+from bumblebee.diagnosis.scales import scales_of
 from bumblebee.diagnosis.scene import Scene, fitted_scene
 from bumblebee.diagnosis.seek import library, seek
 from bumblebee.sim.effect_terms import read_term

@@ -6,10 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.candidates import SIMULATED, Candidate, all_candidates, scales_of
+from bumblebee.diagnosis.candidates import SIMULATED, Candidate, all_candidates
 from bumblebee.diagnosis.fit import gauss_newton
 from bumblebee.diagnosis.late import LATE
 from bumblebee.diagnosis.problem import Problem, make_problem
+from bumblebee.diagnosis.scales import scales_of
 from bumblebee.diagnosis.scores import Columns, null_maxima, score_tests
 from bumblebee.diagnosis.screen import pulse_sizes, screen
 from bumblebee.diagnosis.session import make_session
