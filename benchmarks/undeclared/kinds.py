@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.undeclared.ringing import softest
 from benchmarks.undeclared.robots import Declared
 from benchmarks.undeclared.truth import bodies, drives, rubbing, signals, strange
 from benchmarks.undeclared.truth.law import Law
@@ -58,7 +59,7 @@ class Kind:
     most: Callable[[Place], float]
     """The largest size that is still this robot."""
     least: Callable[[Place], float] = lambda p: 0.0
-    """The smallest size that a simulation of 1 ms can hold."""
+    """The smallest size that the true robots' simulation can hold."""
     robots: str = "both"
     """both, arm or g1."""
     group: str = "joint"
@@ -81,6 +82,12 @@ def _scaled(field_name: str, share: float) -> Callable[[Place], float]:
 def _read(p: Place) -> float:
     """What the encoder of play and shafts reads, as the contract has it: 0 the motor, 1 the joint."""
     return float(p.draw["sign"] < 0)
+
+
+def _softest(p: Place) -> float:
+    """The largest compliance of a shaft: as soft as the servo, and with the encoder on the joint no self-made swing."""
+    soft = 1.0 / p.of(p.robot.kp)
+    return min(soft, softest(p.robot, p.name)) if _read(p) else soft
 
 
 def _fixed(value: float) -> Callable[[Place], float]:
@@ -189,9 +196,10 @@ CATALOGUE: tuple[Kind, ...] = (
     Kind("series_elasticity", "joint",
          lambda p, s: (rubbing.Elastic(p.name, 1 / s, p.draw["sign"] > 0),
                        {"stiffness": 1 / s, "encoder": _read(p),
-                        "loss": 0.2 * np.sqrt(rubbing.ROTOR * p.of(p.robot.armature) * s)}),
-         lambda p: 0.1 / p.of(p.robot.kp), lambda p: 1.0 / p.of(p.robot.kp),
-         least=lambda p: 0.04 / p.of(p.robot.kp)),
+                        "loss": rubbing.LOSS * np.sqrt(rubbing.ROTOR * p.of(p.robot.armature) * s),
+                        "share": 1 - rubbing.ROTOR}),
+         lambda p: 0.1 / p.of(p.robot.kp), _softest,
+         least=lambda p: 0.02 / p.of(p.robot.kp)),
     Kind("cogging", "joint", lambda p, s: (rubbing.Cogging(p.name, s, p.draw["number"]),
                        {"sine": s, "cosine": 0.0, "periods": float(p.draw["number"])}),
          _L(0.01), _L(0.15)),

@@ -51,7 +51,8 @@ class Candidate:
     def scales(self) -> np.ndarray:
         """Changes (P,) of the parameters that matter, all positive; 0 for those that are not fitted."""
         out = np.full(len(self.step), self.shape_scale) * (np.array(self.step) != 0)
-        out[[i for i, p in enumerate(CATALOGUE[self.effect].parameters) if p.choice]] = 0.0
+        for i, p in enumerate(CATALOGUE[self.effect].parameters):
+            out[i] = 0.0 if p.choice else p.matters * (out[i] > 0) or out[i]
         out[list(self.free)] = np.abs(np.array(self.step)[list(self.free)])
         return out
 
@@ -162,7 +163,8 @@ def _on_joint(plant: Plant, s: Scales, j: int, name: str) -> Iterator[Candidate]
     yield make("dropped_commands", 0.2)
     if s.peak[j] > 0:
         for encoder in (0.0, 1.0):  # on the motor, on the joint
-            yield make("series_elasticity", _twist(plant, s, j, encoder), encoder, 1e-3, start=(0.0,) * 3, shape=3e-4)
+            steps = (_twist(plant, s, j, encoder), encoder, 1e-3, 0.1)
+            yield make("series_elasticity", *steps, start=(0.0,) * 4, shape=3e-4)
             yield make("backlash", max(0.01 * s.travel[j], 0.002), encoder, start=(0.0, 0.0))
     if not plant.scalable[j] or plant.torque_input:
         if plant.torque_input and plant.scalable[j]:

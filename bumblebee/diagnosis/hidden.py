@@ -1,4 +1,12 @@
-"""States that no sensor reads when a window starts: play, shafts, springs that yield."""
+"""States that no sensor reads when a window starts: play, shafts, springs that yield.
+
+Shafts are led in: the simulation begins 0.1 s before the window, at rest under the torque there, and what its hidden
+hinges have come to is where the window starts. A shaft of a light joint swings for longer than a control period, and a
+torque that has just jumped says nothing of its twist. Play is not: on which side it touches follows from the torque.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from mujoco.batch import Batch
@@ -6,15 +14,44 @@ from mujoco.batch import Batch
 from bumblebee.diagnosis.memory import at_starts, logged_torques, yielded
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.variation import Variation
-from bumblebee.diagnosis.windows import Windows
+from bumblebee.diagnosis.windows import LEAD, Windows, start_state
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effect_native import SUFFIX
 
+Known = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""States (W, nq'), (W, nv') of a model with play or shafts, and for which windows (W,) they are to be believed."""
+
+
+def step_share(hidden: Sequence[tuple[str, str, tuple[float, ...]]]) -> float:
+    """What of the step a model with these structural effects needs.
+
+    Behind a shaft the servo's own delay of half a step acts as stiffness: 10 % of it at 1 ms on a joint of an arm.
+    """
+    return 0.5 if any(kind == "series_elasticity" and values[1] for kind, _, values in hidden) else 1.0
+
+
+def earlier(plant: Plant, windows: Windows) -> tuple[Windows, float, np.ndarray]:
+    """The windows begun `LEAD` before their starts; how much that is [s]; where (W,) the log has it without a gap."""
+    first, ahead = np.empty(len(windows), dtype=int), np.empty(len(windows))
+    qpos, qvel = windows.qpos.copy(), windows.qvel.copy()
+    for w, (i, k) in enumerate(zip(windows.rollout, windows.start, strict=True)):
+        rollout = windows.source[i]
+        first[w] = int(np.searchsorted(rollout.time, rollout.time[k] - LEAD - 1e-6))
+        ahead[w] = rollout.time[k] - rollout.time[first[w]]
+        height = windows.qpos[w, plant.base_qpos + 2] if plant.floating and rollout.base_pos is None else None
+        qpos[w], qvel[w] = start_state(plant, rollout, int(first[w]), height)
+    span = float(np.median(ahead))
+    time = windows.command_time + ahead[:, None]
+    early = replace(windows, start=first, qpos=qpos, qvel=qvel, command_time=time)
+    return early, span, np.abs(ahead - span) < 0.1 * LEAD
+
 
 def restructured(
-    plant: Plant, windows: Windows, lead: Variation, qpos: np.ndarray, qvel: np.ndarray
+    plant: Plant, windows: Windows, lead: Variation, qpos: np.ndarray, qvel: np.ndarray, known: Known | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The starts in the layout of a model with play or shafts, whose own state follows from the torque through them.
+    """The starts in the layout of a model with play or shafts.
+
+    Their own state is the known one; where there is none, it follows from the torque through them.
 
     Args:
         plant: the declared model.
@@ -22,6 +59,7 @@ def restructured(
         lead: a variation with a plant of its own.
         qpos: (..., W, nq) starts of the declared model.
         qvel: (..., W, nv).
+        known: what a simulation that began earlier has come to.
 
     Returns:
         The same in the layout of `lead`, (..., W, nq'), (..., W, nv').
@@ -40,7 +78,11 @@ def restructured(
             torque = transmitted(plant, windows, column)
             # The motor leads the link by half the gap, or by the shaft's twist, in the direction in which it pushes.
             ahead = 0.5 * values[0] * np.sign(torque) if kind == "backlash" else torque / values[0]
-            q[..., int(second.qposadr[0])] = ahead if values[1] else -ahead
+            at, dof = int(second.qposadr[0]), int(second.dofadr[0])
+            q[..., at] = ahead if values[1] else -ahead
+            if known is not None:
+                q[..., at] = np.where(known[2], known[0][:, at], q[..., at])
+                v[..., dof] = np.where(known[2], known[1][:, dof], 0.0)
     return q, v
 
 

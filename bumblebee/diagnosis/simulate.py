@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from bumblebee.diagnosis.hidden import restructured, set_plastic
+from bumblebee.diagnosis.hidden import Known, earlier, restructured, set_plastic, step_share
 from bumblebee.diagnosis.memory import read_at, remember
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.signals import (
@@ -64,17 +64,18 @@ def residuals(
     With `starts` of K start states, `variations` has one entry and the first axis is K.
     """
     copies = len(variations) if starts is None else len(starts.qpos)
-    count = int(np.ceil(windows.span / step - 1e-6))
     width = plant.model.nq + plant.model.nv + plant.model.nu
-    chunk = max(1, int(_CHUNK_BYTES / (8.0 * count * width * len(windows))))
+    chunk = max(1, int(_CHUNK_BYTES / (8.0 * np.ceil(windows.span / step - 1e-6) * width * len(windows))))
     out = np.empty((copies, *windows.measured.shape))
     cache: dict[bytes, np.ndarray] = {}
     first = 0
     while first < copies:
         part = _together(variations, first, chunk) if starts is None else range(first, min(first + chunk, copies))
         chosen = [variations[0] if starts is not None else variations[v] for v in part]
-        inputs = [inputs_of(windows, variation, step, count, cache) for variation in chosen]
-        out[part.start : part.stop] = _run(plant, layout, windows, chosen, inputs, step, count, starts, part)
+        short = step * step_share(chosen[0].hidden)
+        count = int(np.ceil(windows.span / short - 1e-6))
+        inputs = [inputs_of(windows, variation, short, count, cache) for variation in chosen]
+        out[part.start : part.stop] = _run(plant, layout, windows, chosen, inputs, short, count, starts, part)
         first = part.stop
     return out
 
@@ -92,7 +93,7 @@ def inputs_of(
 ) -> np.ndarray:
     """Controls (W, count, nu) of a variation: late, and on the mean as held as dropped commands leave them."""
     share = variation.dropped
-    key = variation.delay.tobytes() + (b"" if share is None else share.tobytes())
+    key = variation.delay.tobytes() + (b"" if share is None else share.tobytes()) + bytes(str(count), "ascii")
     if key not in cache:
         sent = windows
         if share is not None:
@@ -136,7 +137,7 @@ def _run(
     if lead.tilt is not None:
         qpos, qvel = _righted(plant, qpos, qvel, lead.tilt)
     if lead.plant is not None:
-        qpos, qvel = restructured(plant, windows, lead, qpos, qvel)
+        qpos, qvel = restructured(plant, windows, lead, qpos, qvel, _led_in(plant, windows, lead, step))
     batch.bind("qpos")[:] = qpos.reshape(copies * size, -1)
     batch.bind("qvel")[:] = qvel.reshape(copies * size, -1)
     control = np.stack(inputs).reshape(copies * size, count, -1)
@@ -160,6 +161,21 @@ def _run(
     result = difference(layout, measured, target, simulated, quat)
     result[failed.reshape(copies, size)] = np.nan
     return result
+
+
+def _led_in(plant: Plant, windows: Windows, lead: Variation, step: float) -> Known | None:
+    """What a model with shafts has come to at the windows' starts."""
+    if not any(kind == "series_elasticity" for kind, _, _ in lead.hidden):
+        return None
+    early, span, whole = earlier(plant, windows)
+    early.qpos[:, plant.qpos] -= lead.offset
+    qpos, qvel = restructured(plant, early, lead, early.qpos, early.qvel)
+    batch = Batch(lead.model, len(early), threads())
+    batch.bind("qpos")[:], batch.bind("qvel")[:] = qpos, qvel
+    set_plastic(batch, plant, early, lead, 1)
+    control = inputs_of(early, lead, step, max(1, round(span / step)), {})
+    path_q, path_v = _roll(batch, plant, early, lead, control, step, 1)
+    return path_q[:, -1], path_v[:, -1], whole & ~batch.warning.reshape(len(early), -1).any(axis=1)
 
 
 def _late(plant: Plant, lead: Variation) -> np.ndarray:

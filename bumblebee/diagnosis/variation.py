@@ -57,7 +57,7 @@ def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
             constants |= _apply(own, model, delay, offset, effect, place)
             if _is_structural(effect):
                 hidden.append((effect.effect, place, effect.values()))
-    _set_rotors(own, model, hidden, {place for e in effects if e.effect == "armature" for place in e.where})
+    _set_rotors(plant, own, model, hidden, {place for e in effects if e.effect == "armature" for place in e.where})
     if constants:
         # set_const reads qpos0 through a scratch MjData; gains, friction and damping do not enter it.
         mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -75,14 +75,23 @@ def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
 
 
 def _set_rotors(
-    plant: Plant, model: mujoco.MjModel, hidden: Sequence[tuple[str, str, tuple[float, ...]]], joints: set[str]
+    plant: Plant, own: Plant, model: mujoco.MjModel, hidden: Sequence[tuple[str, str, tuple[float, ...]]], new: set[str]
 ) -> None:
-    """Give the armatures fitted on `joints` to the rotors' tendons, where the encoder is on the joint."""
+    """Divide the declared armature, or that fitted on the joints `new`, between rotor and link behind play and shafts.
+
+    The encoder's side has it on its own hinge, the other side as the inertia of a tendon along both.
+    """
     for kind, place, values in hidden:
-        if place in joints and kind in native.SUFFIX and values[1]:
-            dof, tendon = plant.dof[plant.joints.index(place)], model.tendon(native.rotor_of(kind, place)).id
-            model.tendon_armature[tendon] = max(model.dof_armature[dof], native.HIDDEN_ARMATURE)
-            model.dof_armature[dof] = 0.0
+        share = values[3] if kind == "series_elasticity" else 0.0
+        if kind not in native.SUFFIX or not (values[1] or share):
+            continue
+        column = plant.joints.index(place)
+        dof, tendon = own.dof[column], model.tendon(native.rotor_of(kind, place)).id
+        armature = model.dof_armature[dof] if place in new else plant.model.dof_armature[plant.dof[column]]
+        if values[1]:
+            armature = max(armature, native.HIDDEN_ARMATURE)
+        behind = 1 - share if values[1] else share
+        model.tendon_armature[tendon], model.dof_armature[dof] = behind * armature, (1 - behind) * armature
 
 
 def _is_structural(effect: Effect) -> bool:
@@ -110,13 +119,19 @@ def _everywhere(plant: Plant, kind: str) -> tuple[str, ...]:
 
 def _structure(plant: Plant, effects: Sequence[Effect]) -> Plant:
     """The plant compiled with play, shafts and yielding springs; their sizes are set afterwards."""
-    # Where the encoder is decides on the structure.
-    key = tuple(sorted((e.effect, e.where, e.values()[1] if e.effect in native.SUFFIX else 0.0) for e in effects))
+    key = tuple(sorted((e.effect, e.where, _form(e)) for e in effects))
     if key not in plant.compiled:
         spec = plant.spec.copy()
         add_to_spec(spec, effects)
         plant.compiled[key] = make_plant(spec, plant.example, "declared model")
     return plant.compiled[key]
+
+
+def _form(effect: Effect) -> tuple[bool, ...]:
+    """What of play and shafts decides on the structure: where the encoder is, whether the rotor is divided."""
+    if effect.effect not in native.SUFFIX:
+        return ()
+    return tuple(bool(value) for value in (effect.values()[1], *effect.values()[3:]))
 
 
 def _apply(

@@ -25,6 +25,8 @@ class Parameter:
     """Its value where an effect does not give it, and then not written either; None: it must be given."""
     choice: bool = False
     """Whether it is 0 or 1 and names a form of the effect, not a size: never fitted."""
+    matters: float = 0.0
+    """A change of it that matters wherever it shapes the effect; 0: that depends on the data."""
 
 
 @dataclass(frozen=True)
@@ -108,9 +110,12 @@ CATALOGUE: dict[str, Kind] = {
     ),
     # encoder 0: it reads the motor; 1: it reads the joint, behind the play or the shaft, which needs a hook.
     "backlash": _joint(("gap", "rad", 0.0, 0.5), ("encoder", "", 0.0, 1.0, 0.0, True)),
-    # loss: damping of a shaft over its stiffness.
+    # loss: damping of a shaft over its stiffness; share: of the joint's armature that turns with the link.
     "series_elasticity": _joint(
-        ("stiffness", "N m/rad", 1e-2, _INF), ("encoder", "", 0.0, 1.0, 0.0, True), ("loss", "s", 0.0, 0.1, 1e-3)
+        ("stiffness", "N m/rad", 1e-2, _INF),
+        ("encoder", "", 0.0, 1.0, 0.0, True),
+        ("loss", "s", 0.0, 0.1, 1e-3),
+        ("share", "", 0.0, 0.5, 0.0, False, 0.1),
     ),
     # spread 0: what is added sits at the centre of mass; 1: the moments of inertia grow as the mass does.
     "link_mass": _body(("mass", "kg", 1e-3, _INF), ("spread", "", 0.0, 1.0, 0.0)),

@@ -2,7 +2,8 @@
 
 With the encoder on the motor the joint's own hinge is the rotor's and the second one lies between it and the link. With
 the encoder on the joint its hinge is the link's; the rotor is a weightless body behind a hinge of its own, its inertia
-is that of a tendon along the sum of both angles, and `sim.effect_forces` gives it the servo's torque.
+is that of a tendon along the sum of both angles, and `sim.effect_forces` gives it the servo's torque. What of a rotor's
+inertia turns with the link behind a shaft is the hinge's own in the one case and the tendon's in the other.
 """
 
 import math
@@ -49,14 +50,30 @@ def _second_hinge(spec: mujoco.MjSpec, name: str, kind: str, encoder: float) -> 
     hinge = body.add_joint(name=name + native.SUFFIX[kind], type=joint.type, axis=joint.axis, pos=joint.pos)
     hinge.armature = native.HIDDEN_ARMATURE
     if encoder:
+        _explicit(spec)
         hinge.armature, inertia = 0.0, max(float(joint.armature), native.HIDDEN_ARMATURE)
         joint.armature = 0.0
-        tendon = spec.add_tendon(name=body.name, armature=inertia)
-        tendon.wrap_joint(name, 1.0)
-        tendon.wrap_joint(hinge.name, 1.0)
+        _along_both(spec, body.name, name, hinge.name, inertia)
     for key, (qpos, qvel) in zip(spec.keys, keys, strict=True):
         key.qpos, key.qvel = qpos, qvel
     return hinge
+
+
+def _explicit(spec: mujoco.MjSpec) -> None:
+    """Actuators' torques as they are: MuJoCo's implicit integrators would damp the link but not the rotor.
+
+    The servo's torque on the rotor is a hook's. An implicit step adds step * kd to the inertia of the joint that the
+    actuator names, the link's, a third of that of a small arm's wrist at 1 ms.
+    """
+    if spec.option.integrator in (mujoco.mjtIntegrator.mjINT_IMPLICIT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST):
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+
+
+def _along_both(spec: mujoco.MjSpec, name: str, one: str, other: str, inertia: float) -> None:
+    """Inertia [kg m^2] that turns by the sum of two joints' angles."""
+    tendon = spec.add_tendon(name=name, armature=inertia)
+    tendon.wrap_joint(one, 1.0)
+    tendon.wrap_joint(other, 1.0)
 
 
 def _rotor(joint: Any, name: str) -> Any:
@@ -92,11 +109,18 @@ def add_backlash(spec: mujoco.MjSpec, name: str, gap: float, encoder: float) -> 
     play.solimp_limit = [*native.PLAY_SOLIMP, *play.solimp_limit[3:]]
 
 
-def add_elasticity(spec: mujoco.MjSpec, name: str, stiffness: float, encoder: float, loss: float) -> None:
+def add_elasticity(spec: mujoco.MjSpec, name: str, stiffness: float, encoder: float, loss: float, share: float) -> None:
     """A shaft of `stiffness` [N m/rad] between motor and link, damped by `loss` [s] times that.
 
-    `encoder` 0: on the motor, 1: on the joint.
+    `encoder` 0: on the motor, 1: on the joint. The `share` of the joint's armature turns with the link.
     """
+    armature = float(joint_of(spec, name).armature)
     flex = _second_hinge(spec, name, "series_elasticity", encoder)
+    if encoder and share:
+        spec.tendon(native.rotor_of("series_elasticity", name)).armature *= 1 - share
+        joint_of(spec, name).armature = share * max(armature, native.HIDDEN_ARMATURE)
+    elif share:
+        joint_of(spec, name).armature = (1 - share) * armature
+        _along_both(spec, native.rotor_of("series_elasticity", name), name, flex.name, share * armature)
     flex.stiffness = [stiffness, *flex.stiffness[1:]]
     flex.damping = [loss * stiffness, *flex.damping[1:]]

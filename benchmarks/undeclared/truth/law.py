@@ -60,6 +60,8 @@ class Law:
 
     first = False
     """Whether it changes the model before the others do."""
+    parts = 1
+    """Steps of the mechanics in a millisecond that it needs."""
 
     def spec(self, spec: mujoco.MjSpec) -> None:
         """Change the structure before it is compiled."""

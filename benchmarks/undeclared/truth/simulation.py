@@ -1,5 +1,6 @@
 """A robot as it is: 1 ms semi-implicit Euler, torque motors, a servo loop of its own at 1 kHz, and laws.
 
+The mechanics take shorter steps under the same torque where a law needs them (`Law.parts`).
 Dry friction is MuJoCo's constraint (it can hold a joint still) made stiff, its level written every millisecond; all
 other torques are computed here in NumPy.
 """
@@ -30,7 +31,8 @@ class TrueRobots:
 
     def __init__(self, robot: Declared, laws: Sequence[Law], count: int, rng: np.random.Generator) -> None:
         self.robot, self.laws = robot, list(laws)
-        self.model = _true_model(robot, self.laws)
+        self._parts = max((law.parts for law in self.laws), default=1)
+        self.model = _true_model(robot, self.laws, STEP / self._parts)
         self.kp, self.kd = robot.kp.copy(), robot.kd.copy()
         for law in self.laws:
             law.gains(self.kp, self.kd)
@@ -128,6 +130,17 @@ class TrueRobots:
         for law in self.laws:
             torque = law.saturate(world, torque)
         world.torque = torque
+        world.dt = STEP / self._parts
+        for part in range(self._parts):
+            if part:
+                self._see()
+            self._move(torque, robots)
+            world.time = world.time + world.dt
+        world.dt = STEP
+
+    def _move(self, torque: np.ndarray, robots: np.ndarray) -> None:
+        """One step of the mechanics under the drives' torque (R, J)."""
+        world = self.world
         for law in self.laws:
             torque = law.transmit(world, torque)
         push = torque.copy()
@@ -149,16 +162,15 @@ class TrueRobots:
             for law in self.laws:
                 law.push(world, self._wrench)
         self._batch.step(ids=robots)
-        world.time = world.time + STEP
 
 
-def _true_model(robot: Declared, laws: Sequence[Law]) -> mujoco.MjModel:
+def _true_model(robot: Declared, laws: Sequence[Law], step: float) -> mujoco.MjModel:
     spec = robot.spec.copy()
     for law in laws:
         law.spec(spec)
     for key in list(spec.keys):
         spec.delete(key)
-    spec.option.timestep, spec.option.integrator = STEP, mujoco.mjtIntegrator.mjINT_EULER
+    spec.option.timestep, spec.option.integrator = step, mujoco.mjtIntegrator.mjINT_EULER
     spec.option.iterations = spec.option.ls_iterations = 50
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     model = spec.compile()
