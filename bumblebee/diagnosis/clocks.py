@@ -5,7 +5,8 @@ too slow where the joint speeds up, and what that does grows with the horizon: 4
 a joint accelerates by 12 rad/s^2. Over a span the integral of velocities of age e is less than the way made by e times
 the change of velocity; the change that the positions show is the instrument, so that noise of the velocities makes the
 age no smaller. A simulation that moves its positions by the new velocities has them half a step apart: that much, at
-steps of a millisecond, is no age.
+steps of a millisecond, is no age. Nor is half a period where a servo answers new targets within the period: a joint that
+speeds up at the beginning of each period goes further than its velocities at the ticks say.
 """
 
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from bumblebee.measured.rollout import Rollout
 _SPAN = 0.15  # [s] over which velocities are integrated
 _NEAR = 0.02  # [s] around its ends from which the positions' velocities are taken
 _LEAST = 5e-4  # [s] beyond which an age must be, without doubt
+_ANSWER = 0.6  # the same as a share of the period where targets are commanded
 _DOUBT = 4.0  # standard errors
 _MOST = 0.05  # [s]; more is no reading's age
 _ROUNDS = 3  # each with the velocities moved by what was found before
@@ -27,12 +29,12 @@ _ENOUGH = 12  # parts in all, below which nothing is said
 
 def velocity_ages(rollouts: Sequence[Rollout]) -> np.ndarray:
     """Ages (J,) [s] of the logged joint velocities against the positions; 0 where none is beyond doubt."""
-    joints = len(rollouts[0].joints)
+    joints, least = len(rollouts[0].joints), max(map(_least, rollouts))
     ages, sure = np.zeros(joints), np.zeros(joints, dtype=bool)
     for _ in range(_ROUNDS):
         found, error = _ages([in_step(r, ages) for r in rollouts])
         ages = ages + found
-        sure = np.abs(ages) - _LEAST > _DOUBT * error
+        sure = np.abs(ages) - least > _DOUBT * error
         ages = np.where(np.abs(ages) <= _MOST, ages, 0.0)
     return np.where(sure, ages, 0.0)
 
@@ -52,6 +54,12 @@ def age_note(joints: Sequence[str], ages: np.ndarray) -> str:
     """What a person should know of ages (J,) that were found; empty where there are none."""
     late = [f"{name} {1e3 * age:.1f} ms" for name, age in zip(joints, ages, strict=True) if age]
     return f"logged velocities are older than the positions and were moved: {', '.join(late)}" if late else ""
+
+
+def _least(rollout: Rollout) -> float:
+    """What may be no age in a log [s]."""
+    period = float(np.median(np.diff(rollout.time)))
+    return _LEAST if rollout.joint_target is None else max(_LEAST, _ANSWER * period)
 
 
 def _ages(rollouts: Sequence[Rollout]) -> tuple[np.ndarray, np.ndarray]:
