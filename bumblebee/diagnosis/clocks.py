@@ -5,8 +5,8 @@ too slow where the joint speeds up, and what that does grows with the horizon: 4
 a joint accelerates by 12 rad/s^2. Over a span the integral of velocities of age e is less than the way made by e times
 the change of velocity; the change that the positions show is the instrument, so that noise of the velocities makes the
 age no smaller. A simulation that moves its positions by the new velocities has them half a step apart: that much, at
-steps of a millisecond, is no age. Nor is half a period where a servo answers new targets within the period: a joint that
-speeds up at the beginning of each period goes further than its velocities at the ticks say.
+steps of a millisecond, is no age. Nor is half a period where a servo answers new targets within the period: a joint
+that speeds up at the beginning of each period goes further than its velocities at the ticks say.
 """
 
 from collections.abc import Sequence
