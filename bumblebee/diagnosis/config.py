@@ -24,5 +24,7 @@ class DiagnosisConfig:
     seed: int = 0
     beyond: bool = True
     """Whether to look for structure that no effect of the catalogue explains, and for its form."""
+    beyond_seconds: float = 100.0
+    """Time after which nothing more is begun in that search [s]; the notes then say what was not tried."""
     search: SearchConfig = field(default_factory=SearchConfig)
     """How strict the search is."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from bumblebee.diagnosis.arrivals import loss_entries
+from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.discover import Discovery, discover
 from bumblebee.diagnosis.document import document
@@ -47,6 +48,8 @@ class _Found:
     holdout: Holdout
     """Around the last fit."""
     beyond: Discovery | None
+    budget: Budget
+    """Of the look beyond the catalogue, with what it left out."""
 
     @property
     def judging(self) -> Problem:
@@ -73,7 +76,7 @@ def diagnose(
     entries = [*entries, *(rounded if steps else []), *lost]
     if found.beyond is not None:
         notes = [*(f"withdrawn for what explains more: {name}" for name in found.beyond.withdrawn), *notes]
-    notes = [*notes, *unseen_notes(material.session, effects, config.horizon)]
+    notes = [*notes, *found.budget.notes(), *unseen_notes(material.session, effects, config.horizon)]
     told = document(material, config, found.search, found.last, found.beyond, effects, entries, notes)
     return Diagnosis(told, effects, material.session, found.search, found.last.problem)
 
@@ -86,12 +89,12 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
     if last.fit.chosen:
         holdout = holdout.relinearised(last.fit.effects)
     if not config.beyond:
-        return _Found(found, last, holdout, None)
+        return _Found(found, last, holdout, None, Budget())
     say("what is left")
-    offers = offers_of(found, material.candidates)
-    beyond = discover(last.problem, holdout, last.fit, material.typical, material.still, say, offers)
+    offers, budget = offers_of(found, material.candidates), Budget(config.beyond_seconds)
+    beyond = discover(last.problem, holdout, last.fit, material.typical, material.still, say, offers, budget)
     last = _with(beyond, last)
-    return _Found(with_named(found, last.fit), last, beyond.holdout, beyond)
+    return _Found(with_named(found, last.fit), last, beyond.holdout, beyond, budget)
 
 
 def _steps_of_encoders(session: Session, found: _Found) -> tuple[list[dict[str, Any]], list[Effect]]:

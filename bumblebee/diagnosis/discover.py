@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bumblebee.diagnosis.acceptance import wald
+from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.fit import Fit, resolved
 from bumblebee.diagnosis.formula import formula, in_terms, related, stiffer_than_the_drive
 from bumblebee.diagnosis.holdout import Holdout
@@ -73,8 +74,13 @@ def discover(
     still: Sequence[str] = (),
     say: Callable[[str], None] = lambda text: None,
     offers: Offers | None = None,
+    budget: Budget | None = None,
 ) -> Discovery:
-    """Test, name and refit what `fit` leaves; arguments as of `remains`, and the catalogue's `offers` beside `fit`."""
+    """Test, name and refit what `fit` leaves; arguments as of `remains`, and the catalogue's `offers` beside `fit`.
+
+    What there is no time for in `budget` is left out and written down there.
+    """
+    budget = budget or Budget()
     fit = without_idle(problem, holdout, fit)
     left = remains(problem, holdout.problem, fit, typical, still)
     unconfirmed: dict[str, dict[str, float]] = {}
@@ -82,6 +88,8 @@ def discover(
     before = fit
     few = len(fit.chosen) <= _MANY
     for joint in dict.fromkeys(c.where for c in fit.chosen if few and c.where in problem.plant.joints):
+        if not budget.has_time_for(f"one law in the place of the names on {joint}"):
+            break
         form = _instead_of_names(problem, holdout, fit, left, joint, offers or Offers())
         if form is not None:
             problem, holdout, fit, left = _around(problem, holdout, form.fit, typical, still)
@@ -93,7 +101,10 @@ def discover(
         if worst is None:
             break
         tried.append(worst.joint)
-        form = _best_form(problem, fit, left, worst.joint, typical)
+        if not budget.has_time_for(f"a law on {worst.joint}"):
+            break
+        say(f"looking for a law on {worst.joint}")
+        form = _best_form(problem, fit, left, worst.joint, typical, budget)
         if form is None:
             continue
         if not _is_worth_it(problem, holdout, fit, form, left.sought.bound):
@@ -175,7 +186,9 @@ def _instead_of_names(
     return None
 
 
-def _best_form(problem: Problem, fit: Fit, left: Remains, joint: str, typical: np.ndarray) -> _Form | None:
+def _best_form(
+    problem: Problem, fit: Fit, left: Remains, joint: str, typical: np.ndarray, budget: Budget
+) -> _Form | None:
     """The form that explains the fitted windows best for its parameters; None where no strange law was found."""
     column = problem.plant.joints.index(joint)
     ways: list[tuple[Fit, list[Found]]] = [(fit, [f for f in left.sought.found if f.joint == column])]
@@ -187,31 +200,33 @@ def _best_form(problem: Problem, fit: Fit, left: Remains, joint: str, typical: n
         some = library(scene.data, [column])
         sought = seek(problem, scene.evidence, scene.residual, scene.columns, some, most=_LAWS)
         ways += [(bare, sought.found), (fit, sought.found), *((bare, [rival]) for rival in sought.rivals)]
-    forms = [_growing(problem, base, joint, found) for base, found in ways]
+    forms = [_growing(problem, base, joint, found, budget) for base, found in ways]
     return max((f for f in forms if f is not None), key=lambda f: f.score, default=None)
 
 
-def _growing(problem: Problem, base: Fit, joint: str, found: Sequence[Found]) -> _Form | None:
+def _growing(problem: Problem, base: Fit, joint: str, found: Sequence[Found], budget: Budget) -> _Form | None:
     """The form of as many of the laws as are worth it, in the order in which they were found."""
     there = {c.effect for c in base.chosen if c.where == joint}
     strange = [f for f in found if not f.law.known or f.law.known in there]
     best, start = None, score(problem, base)
     for count in range(1, min(len(strange), _LAWS) + 1):
+        if not budget.has_time_for(f"all forms on {joint}"):
+            break
         form = _form(problem, base, joint, strange[:count])
         if form is None:
             break
         if count == 1 and len(base.chosen) <= _MANY:
-            form = _climbed(problem, base, joint, strange[0], form)
+            form = _climbed(problem, base, joint, strange[0], form, budget)
         if best is not None and form.score - best.score < max(_WORTH, _SHARE * (best.score - start)):
             break
         best = form
     return best
 
 
-def _climbed(problem: Problem, base: Fit, joint: str, one: Found, form: _Form) -> _Form:
+def _climbed(problem: Problem, base: Fit, joint: str, one: Found, form: _Form, budget: Budget) -> _Form:
     """The form at the best of the law's two inner numbers, from neighbour to neighbour."""
     seen, law = {one.law.texts}, one.law
-    while True:
+    while budget.has_time_for(f"the best inner numbers of a form on {joint}"):
         tried = {}
         for other in beside(law):
             if other.texts not in seen:
@@ -221,6 +236,7 @@ def _climbed(problem: Problem, base: Fit, joint: str, one: Found, form: _Form) -
         if best is None or best.score < form.score + PARAMETER:
             return form
         law, form = next(other for other, f in tried.items() if f is best), best
+    return form
 
 
 def _form(problem: Problem, base: Fit, joint: str, strange: Sequence[Found]) -> _Form | None:

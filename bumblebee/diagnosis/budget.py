@@ -1,0 +1,36 @@
+"""Time that a search may take: what is begun is ended, what would be begun after it is left out and said."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+
+@dataclass(eq=False)
+class Budget:
+    """Seconds from its making on; the clock is a parameter so that tests need not wait."""
+
+    seconds: float = float("inf")
+    clock: Callable[[], float] = time.monotonic
+    left_out: list[str] = field(default_factory=list)
+    """What was not begun, in words, each once."""
+    began: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.began = self.clock()
+
+    def has_time_for(self, what: str) -> bool:
+        """Whether `what` may begin; else it is written down."""
+        if self.clock() - self.began <= self.seconds:
+            return True
+        if what not in self.left_out:
+            self.left_out.append(what)
+        return False
+
+    def notes(self) -> list[str]:
+        """A line on what was left out; none where nothing was."""
+        if not self.left_out:
+            return []
+        return [
+            f"the search beyond the catalogue was cut after {self.seconds:g} s (`beyond_seconds`); not tried: "
+            + "; ".join(self.left_out)
+        ]

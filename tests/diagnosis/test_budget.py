@@ -1,0 +1,42 @@
+"""A budget of time: what is begun is ended, what it leaves out is said, and what is left is flagged all the same."""
+
+import mujoco
+import pytest
+
+from bumblebee.diagnosis.budget import Budget
+from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.diagnose import diagnose
+from bumblebee.diagnosis.session import make_session
+from tests.diagnosis import cart
+
+
+def test_what_has_no_time_is_written_down_once() -> None:
+    now = [5.0]
+    budget = Budget(10.0, clock=lambda: now[0])
+    assert budget.has_time_for("a law on a") and not budget.notes()
+    now[0] = 15.5
+    assert not budget.has_time_for("a law on b") and not budget.has_time_for("a law on b")
+    assert not budget.has_time_for("a law on c")
+    (note,) = budget.notes()
+    assert note.endswith("not tried: a law on b; a law on c") and "10 s" in note
+
+
+def test_without_a_limit_there_is_always_time() -> None:
+    assert Budget().has_time_for("anything") and not Budget().notes()
+
+
+@pytest.mark.parametrize("seconds", [0.0, 1e9])
+def test_a_search_without_time_flags_the_joint_and_names_no_form(seconds: float) -> None:
+    """A spring of third order on the pole: without time only its joint is said, and that no law was sought."""
+    made = make_session(mujoco.MjSpec.from_string(cart.xml()), cart.record(cubic=0.6), "cart", "memory")
+    config = DiagnosisConfig(
+        max_windows=30, max_holdout_windows=15, report_windows=6, grow=False, beyond_seconds=seconds
+    )
+    found = diagnose(made, config).document
+    cut = [note for note in found["notes"] if "not tried" in note]
+    forms = [e["where"] for e in found["effects"] if e["effect"] == "discovered"]
+    if seconds:
+        assert not cut and forms == [["pole"]]
+    else:
+        assert len(cut) == 1 and "pole" in cut[0] and not forms
+        assert found["unexplained"]["significant"] and "pole" in found["unexplained"]["where"]
