@@ -146,9 +146,10 @@ def _on_joint(plant: Plant, s: Scales, j: int, name: str) -> Iterator[Candidate]
     yield make("armature", 0.1 * s.inertia[j])
     yield make("joint_spring", tenth / max(s.travel[j], 0.05), tenth, free=(0, 1))
     joint = plant.model.joint(name).id
-    for share in () if plant.model.jnt_stiffness[joint] else (0.03, 0.2):  # MJCF has one spring a joint
+    sprung = bool(plant.model.jnt_stiffness[joint])
+    for share in (0.03, 0.2):
         width = share * max(s.travel[j], 0.02)
-        for dahl in (0.0, 1.0):
+        for dahl in (1.0,) if sprung else (0.0, 1.0):  # MJCF has one spring a joint; Dahl's law is a hook
             yield make("hysteresis", tenth, width, dahl, start=(0.0, 0.0, 0.0), shape=0.3 * width)
     hinge = plant.model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_HINGE)
     for n in _HARMONICS if hinge else ():

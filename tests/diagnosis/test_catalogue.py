@@ -38,6 +38,16 @@ def test_an_effect_is_named_up_to_its_class(
         assert found[0]["parameters"][parameter]["value"] == pytest.approx(truth, rel=tolerance)
 
 
+def test_hysteresis_is_found_on_a_joint_with_a_declared_spring() -> None:
+    """MJCF has one spring a joint, so only Dahl's law can be named there; the truth yields at a width."""
+    declared = arm.XML.replace('<joint name="j2"', '<joint name="j2" stiffness="5"')
+    rollouts = simulate({("joint_spring", "j2"): (5.0, 0.0), ("hysteresis", "j2"): (0.8, 0.05)}, seed=5)
+    session = make_session(mujoco.MjSpec.from_string(declared), rollouts, "arm", "memory")
+    found = diagnose(session, CONFIG).document["effects"][0]
+    assert (found["effect"], found["where"], found["parameters"]["dahl"]["value"]) == ("hysteresis", ["j2"], 1.0)
+    assert found["parameters"]["amplitude"]["value"] == pytest.approx(0.8, rel=0.4)
+
+
 @pytest.mark.parametrize("noise", [0.0, 4e-4, 8e-4])
 def test_an_encoders_steps_are_seen_in_its_readings(noise: float) -> None:
     """The grid is found with its step, with noise on top as well; a smooth reading has none."""
