@@ -28,6 +28,7 @@ from bumblebee.sim.effects import Effect
 _LONGEST = 3  # ticks in a row
 _MOST_TICKS = 11  # of a window; of more the patterns are too many, and single ticks too short to matter
 _ODD = 1.6  # whitened power of a window that a lost command may have spoilt
+_FEW_ODD, _HINT = 0.5, 4.0  # share of windows that are odd, below which these alone are asked first; what they must say
 _ALL_OFF = 10.0  # median power of a model that lacks something in every window: that comes first
 _WORTH = 8.0  # log-likelihood on the fitted windows
 _PAYS = 2.0  # log-likelihood on the held-out windows
@@ -107,6 +108,11 @@ def find_loss(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, Probl
     if not driven or not 1 <= ticks <= _MOST_TICKS or (power > _ODD).sum() < 2 or np.median(power) > _ALL_OFF:
         return None
     places = [""] + (driven if 1 < len(driven) <= _FEW_JOINTS else [])
+    if (odd := np.flatnonzero(power > _ODD)).size < _FEW_ODD * len(power):
+        some = problem.part(odd)  # what these do not show at all the others need not be simulated for
+        seen = [losses_of(some, fit.effects, clean[odd], place) for place in places]
+        if max(losses.total(losses.best()) for losses in seen) < _HINT:
+            return None
     tried = [(losses_of(problem, fit.effects, clean, place), place) for place in places]
     gains = [losses.total(losses.best()) for losses, _ in tried]
     best = int(np.argmax(gains))

@@ -7,7 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import INVERSE, Candidate
 from bumblebee.diagnosis.eligible import is_chosen
-from bumblebee.diagnosis.fit import Fit
+from bumblebee.diagnosis.fit import Fit, project, solve
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.scores import Columns, score_tests
 from bumblebee.diagnosis.search import Search
@@ -17,6 +17,7 @@ from bumblebee.sim.effects import CATALOGUE
 _SAME = 0.95
 _KIN = 0.7  # whitened sensitivities this parallel are worth trying in each other's place
 _RIVALS, _ALL_RIVALS = 4, 16  # tried in an effect's place; in all effects' places together, but one each
+_FAR_WORSE, _ENOUGH = 6.0, 20  # standard errors by which slopes make a rival hopeless; windows that can say so
 _POWER_Z = 4.0  # seen four times out of five at a bound of about three standard errors
 
 # What a person would do to tell an effect from those that look the same.
@@ -117,7 +118,8 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
 
     Sensitivities that agree (> 0.95) are the same to these data. Of the next of kin the nearest are put in the effect's
     place in the simulator; one stays a rival unless it is worse by two standard errors on the windows held out from the
-    fit (on the fitted ones where nothing is held out).
+    fit (on the fitted ones where nothing is held out). Not simulated are those that by their slopes are worse by six
+    on the windows of the screening.
     """
     fit, problem = found.fit, found.problem
     most = min(_RIVALS, max(1, _ALL_RIVALS // max(1, len(fit.chosen))))
@@ -127,8 +129,9 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
         rest = _less(fit, i)
         near = [c for c, share in kin if _KIN < share <= _SAME and not is_chosen(c, rest.chosen)][:most]
         for rival in near:
-            columns = Columns([rival], problem.sensitivities([rival], rest.effects))
-            steps = _direction(problem, columns, rest, found.weights)
+            steps = _direction(found, rival, rest)
+            if steps is None:
+                continue
             trial = try_one(problem, rest, rival, steps, found.weights)
             if trial is not None and _no_worse(found, holdout, rest, trial):
                 same.append(rival)
@@ -136,8 +139,19 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
     return out
 
 
-def _direction(problem: Any, columns: Columns, fit: Fit, weights: np.ndarray) -> np.ndarray:
-    return score_tests(problem, columns, fit, weights).steps[0]
+def _direction(found: Search, rival: Candidate, rest: Fit) -> np.ndarray | None:
+    """The steps (F,) that the screened windows suggest for a rival beside `rest`; None where it is far worse there."""
+    small, keep = found.screened, np.isin(_keys(found.problem), _keys(found.screened))
+    weights = found.weights[keep]
+    columns = found.columns.only([found.columns.candidates.index(rival)])
+    beside = replace(rest, residual=rest.residual[keep], columns=rest.columns[:, keep])
+    basis, inverse = project(small, np.concatenate((beside.columns, columns.values)), weights)
+    swapped = beside.residual - np.tensordot(solve(basis, inverse, beside.residual, weights), basis, axes=1)
+    ours = found.fit.clean(found.problem)[keep]
+    loss = np.log1p((swapped**2).mean(axis=1)) - np.log1p((ours**2).mean(axis=1))
+    if len(loss) > _ENOUGH and loss.mean() > _FAR_WORSE * loss.std(ddof=1) / np.sqrt(len(loss)):
+        return None
+    return score_tests(small, columns, beside, weights).steps[0]
 
 
 def _less(fit: Fit, index: int) -> Fit:

@@ -196,7 +196,7 @@ def _best_form(
     own = [c for c in fit.chosen if c.where == joint]
     if own:
         bare = less(problem, fit, own)
-        scene = fitted_scene(problem, bare, typical)
+        scene = fitted_scene(problem, bare, typical, [column])
         some = library(scene.data, [column])
         sought = seek(problem, scene.evidence, scene.residual, scene.columns, some, most=_LAWS)
         ways += [(bare, sought.found), (fit, sought.found), *((bare, [rival]) for rival in sought.rivals)]
@@ -253,7 +253,7 @@ def _form(problem: Problem, base: Fit, joint: str, strange: Sequence[Found]) -> 
             chosen, values = without_one(chosen, values, c)
             terms = parts | terms
     own = formula(joint, terms)
-    fit = refitted(problem, (*chosen, own), np.concatenate((values, list(terms.values()))))
+    fit = refitted(problem, (*chosen, own), np.concatenate((values, list(terms.values()))), base)
     fit = without_needless(problem, fit, own)
     if own not in fit.chosen or stiffer_than_the_drive(problem.plant, own, fit.of(own)):
         return None

@@ -67,4 +67,4 @@ def _refit(
 ) -> Fit:
     chosen = [*rest, *(there[kind] for kind in factors)]
     values = np.concatenate([np.empty(0), *(fit.of(c) for c in rest), *([v] for v in factors.values())])
-    return gauss_newton(problem, chosen, values, weights, iterations=2, coarse=True)
+    return gauss_newton(problem, chosen, values, weights, iterations=2, coarse=True, known=fit)

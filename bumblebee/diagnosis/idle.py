@@ -28,7 +28,7 @@ def without_idle(problem: Problem, holdout: Holdout, fit: Fit) -> Fit:
         if growth[worst] > 0:
             break
         chosen, values = without_one(fit.chosen, fit.values, fit.chosen[worst])
-        less = refitted(problem, chosen, values)
+        less = refitted(problem, chosen, values, fit)
         if holdout.worse_later(fit, less):
             break
         fit = less

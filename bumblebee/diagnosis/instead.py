@@ -123,7 +123,7 @@ def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers) -> Fit | N
     tried = sorted((t for t in trials if t is not None), key=lambda t: t.cost + 2 * len(t.candidate.free))[:_FITS]
     fits = []
     for t in tried:
-        new = refitted(problem, (*fit.chosen, t.candidate), np.concatenate((fit.values, t.values)))
+        new = refitted(problem, (*fit.chosen, t.candidate), np.concatenate((fit.values, t.values)), fit)
         new = without_needless(problem, new, t.candidate)
         if _is_sure(problem, fit, new, t.candidate):
             fits.append(new)

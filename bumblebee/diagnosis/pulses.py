@@ -12,6 +12,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.reach import out_of_reach, without
 from bumblebee.diagnosis.signals import Layout, difference, simulated_readings
 from bumblebee.diagnosis.simulate import at_ticks, inputs_of, threads, with_step
 from bumblebee.diagnosis.variation import Variation
@@ -71,7 +72,8 @@ def answers_of(
     model, size, many = with_step(variation.model, step), len(windows), len(pushed)
     qpos = windows.qpos.copy()
     qpos[:, plant.qpos] -= variation.offset
-    plain = Batch(model, size, threads())
+    with without([model], out_of_reach(plant, windows)):  # a batch runs on a copy
+        plain, batch = Batch(model, size, threads()), Batch(model, many * size, threads())
     plain.bind("qpos")[:], plain.bind("qvel")[:] = qpos, windows.qvel
     out = plain.rollout(count, control, record=("qpos", "qvel"))
     path = Path(
@@ -91,7 +93,6 @@ def answers_of(
 
     base, base_quat = readings(path.qpos, path.qvel)
     change = np.zeros((plant.model.nv, len(edges) - 1, size, *base.shape[2:]))
-    batch = Batch(model, many * size, threads())
     for s, (first, last) in enumerate(itertools.pairwise(edges)):
         batch.reset(stage=0)
         batch.bind("qpos")[:] = np.tile(path.qpos[:, first], (many, 1))

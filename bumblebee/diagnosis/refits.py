@@ -11,6 +11,7 @@ from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.formula import Formula
 from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.slopes import clipped, effects_at
 
 PARAMETER = 4.0  # log-likelihood that a parameter must bring
 SURE = 4.0  # z below which an effect beside a new one is needless
@@ -46,10 +47,15 @@ def numbers(form: Formula) -> int:
     return count + len(found)
 
 
-def refitted(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
-    """All effects at their best from `values` (P,), windows weighed as the first trial leaves them."""
-    start = gauss_newton(problem, chosen, values, np.ones(len(problem.windows)), iterations=0)
-    return gauss_newton(problem, chosen, values, window_weights(start.clean(problem)), iterations=3, coarse=True)
+def refitted(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, known: Fit | None = None) -> Fit:
+    """All effects at their best from `values` (P,), windows weighed as the first trial leaves them.
+
+    Sensitivities of a fit that is `known` are taken over where nothing near has changed.
+    """
+    residual = problem.residual([effects_at(chosen, clipped(chosen, values))])[0]
+    _, nuisance = cost_of(problem, residual, np.ones(len(residual)))
+    weights = window_weights(residual - np.tensordot(nuisance, problem.nuisance, axes=1))
+    return gauss_newton(problem, chosen, values, weights, iterations=3, coarse=True, known=known)
 
 
 def without_needless(problem: Problem, fit: Fit, kept: Candidate) -> Fit:
@@ -62,7 +68,7 @@ def without_needless(problem: Problem, fit: Fit, kept: Candidate) -> Fit:
         if z[worst] >= SURE:
             return fit
         chosen, values = without_one(fit.chosen, fit.values, fit.chosen[worst])
-        fit = gauss_newton(problem, chosen, values, weights, iterations=2, coarse=True)
+        fit = gauss_newton(problem, chosen, values, weights, iterations=2, coarse=True, known=fit)
 
 
 def without_one(
@@ -83,6 +89,6 @@ def less(problem: Problem, fit: Fit, gone: Sequence[Candidate]) -> Fit:
     for c in gone:
         chosen, values = without_one(chosen, values, c)
     ones = np.ones(len(problem.windows))
-    bare = gauss_newton(problem, chosen, values, ones, iterations=0)
+    bare = gauss_newton(problem, chosen, values, ones, iterations=0, known=fit)
     weights = window_weights(bare.clean(problem))
     return replace(bare, nuisance=cost_of(problem, bare.residual, weights)[1])

@@ -92,12 +92,15 @@ def remains(
         still: joints that never move.
     """
     scene = fitted_scene(problem, fit, typical)
-    judged = None if judge is None else judged_scene(judge, fit, typical)
-    excess, again = scene.excess(), None if judged is None else judged.excess()
+    excess, again, judged = scene.excess(), None, None
     names = problem.plant.joints
     moving = [j for j in np.argsort(-excess) if names[j] not in still][:_MOST]
     some = library(scene.data, moving)
     sought = seek(problem, scene.evidence, scene.residual, scene.columns, some)
+    if judge is not None:  # of what is not seen in the fitted windows nothing need be simulated in others
+        asked = sorted({*np.flatnonzero(excess > _POWER).tolist(), *(one.joint for one in sought.found)})
+        judged = judged_scene(judge, fit, typical, asked)
+        again = judged.excess() if asked else np.zeros_like(excess)
     kept = confirmed(scene, sought, judged)
     found = []
     for j, name in enumerate(names):
@@ -163,7 +166,7 @@ def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[
     evidence, found = sought.evidence, sought.found
     sizes = solve(evidence.basis, evidence.inverse, scene.residual, evidence.weights)
     sizes = sizes[len(sizes) - sum(len(one.torque) for one in found) :]
-    kept, left, at = [], None if judged is None else judged.evidence.left.copy(), 0
+    kept, left, at = [], None if judged is None else judged.left.copy(), 0
     for one in found:
         size = sizes[at : at + len(one.torque)]
         at += len(one.torque)

@@ -27,6 +27,7 @@ _ANEW = 0.1  # share of the cost left, below which all candidates are screened a
 _SOME = 2  # effects after which a model that is still far off is taken to lack many
 _LITTLE = 0.5  # share of the median chi-square that the last of them took at most
 _PATIENCE = 2  # rounds that may fail once many were fitted together
+_FAINT = 0.15  # share of the best candidate's gain, below which another can wait for a later round
 _CHANGED = 0.8  # share of the cost that a fit must leave less of, to be worth linearising around
 
 
@@ -110,12 +111,15 @@ class Run:
         tests = self.tests()
         share = np.sqrt(len(self.keep) / len(self.problem.windows))
         found = []
+        sure, least = 2.0 * max(self.fit.cost / self.fit.residual.size, 1.0) * (share * self.bound) ** 2, 0.0
         for k in np.argsort(-tests.gain):
             c = self.columns.candidates[k]
-            if len(found) >= self.config.simulated or tests.gain[k] <= 0:
+            if len(found) >= self.config.simulated or tests.gain[k] <= least:
                 break
             if self.is_open(c, tests, k, 0.7 * share * self.bound, share**2) and not is_like(c, found):
                 found.append(c)
+                if tests.gain[k] > sure and tests.z[k] > self.bound:
+                    least = max(least, _FAINT * tests.gain[k])
         left = self.small_fit().clean(self.small)
         poor = restless(self.small, self.answers, left, self.config.shortlist)
         joints = len(self.problem.plant.joints)
@@ -145,11 +149,12 @@ class Run:
         self.say(f"{len(looked)} of {len(self.candidates)} candidates simulated on all windows")
         tests = score_tests(self.problem, self.sensitivities(looked), self.fit, self.weights)
         order = [k for k in np.argsort(-tests.gain) if self.is_open(looked[k], tests, k, self.bound, 1.0)]
-        tried = [
-            try_one(self.problem, self.fit, looked[k], tests.steps[k], self.weights)
-            for k in order[: self.config.trials]
-        ]
-        return [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2], looked
+        joints, best = len(self.problem.plant.joints), max((tests.gain[k] for k in order), default=0.0)
+        faint = [k for k in order if tests.gain[k] < _FAINT * best and not shortlisted(looked[k], joints)]
+        order = [k for k in order if k not in faint][: self.config.trials]
+        looked_at = [c for k, c in enumerate(looked) if k not in faint]
+        tried = [try_one(self.problem, self.fit, looked[k], tests.steps[k], self.weights) for k in order]
+        return [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2], looked_at
 
     def sensitivities(self, looked: Sequence[Candidate]) -> Columns:
         """Columns of some candidates on all windows; of those near which nothing has changed, as they were."""
@@ -268,7 +273,7 @@ class Run:
         """Drop effects that the others have made needless."""
 
         def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
-            return gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True)
+            return gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True, known=self.fit)
 
         self.fit = pruned(self.problem, self.fit, self.weights, self.bound, refit, self.holdout, self.say)
 

@@ -11,6 +11,7 @@ from mujoco.batch import Batch
 from bumblebee.diagnosis.hidden import Known, earlier, restructured, set_plastic, step_share
 from bumblebee.diagnosis.memory import read_at, remember
 from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.reach import out_of_reach, without
 from bumblebee.diagnosis.signals import (
     Layout,
     conjugate,
@@ -68,6 +69,7 @@ def residuals(
     chunk = max(1, int(_CHUNK_BYTES / (8.0 * np.ceil(windows.span / step - 1e-6) * width * len(windows))))
     out = np.empty((copies, *windows.measured.shape))
     cache: dict[bytes, np.ndarray] = {}
+    far = out_of_reach(plant, windows)
     first = 0
     while first < copies:
         part = _together(variations, first, chunk) if starts is None else range(first, min(first + chunk, copies))
@@ -75,7 +77,9 @@ def residuals(
         short = step * step_share(chosen[0].hidden)
         count = int(np.ceil(windows.span / short - 1e-6))
         inputs = [inputs_of(windows, variation, short, count, cache) for variation in chosen]
-        out[part.start : part.stop] = _run(plant, layout, windows, chosen, inputs, short, count, starts, part)
+        models = [] if chosen[0].plant is not None else list({id(v.model): v.model for v in chosen}.values())
+        with without(models, far):
+            out[part.start : part.stop] = _run(plant, layout, windows, chosen, inputs, short, count, starts, part)
         first = part.stop
     return out
 

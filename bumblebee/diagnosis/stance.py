@@ -19,7 +19,7 @@ def stance_heights(plant: Plant, rollouts: Sequence[Rollout], ids: Iterable[int]
 
 def _heights(plant: Plant, rollout: Rollout) -> np.ndarray:
     model, data = plant.model, mujoco.MjData(plant.model)
-    geoms = [g for g in range(model.ngeom) if _touches(model, g)]
+    geoms = [g for g in range(model.ngeom) if touches(model, g)]
     out = np.zeros(rollout.frames)
     for k in range(rollout.frames):
         data.qpos[:] = model.qpos0
@@ -27,18 +27,19 @@ def _heights(plant: Plant, rollout: Rollout) -> np.ndarray:
         data.qpos[plant.base_qpos + 3 : plant.base_qpos + 7] = rollout.base_quat[k]
         data.qpos[plant.qpos] = rollout.joint_pos[k]
         mujoco.mj_kinematics(model, data)
-        out[k] = -min((_lowest(model, data, g) for g in geoms), default=0.0) - _REST_DEPTH
+        out[k] = -min((lowest(model, data, g) for g in geoms), default=0.0) - _REST_DEPTH
     return out
 
 
-def _touches(model: mujoco.MjModel, geom: int) -> bool:
+def touches(model: mujoco.MjModel, geom: int) -> bool:
+    """Whether a geometry moves and collides."""
     return (
         bool(model.geom_contype[geom] | model.geom_conaffinity[geom])
         and model.body_weldid[model.geom_bodyid[geom]] != 0
     )
 
 
-def _lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
+def lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
     """Lowest point of a geometry [m]: exact for spheres, capsules and boxes, from the bounding box else."""
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     up, z = data.geom_xmat[geom].reshape(3, 3)[2], data.geom_xpos[geom, 2]

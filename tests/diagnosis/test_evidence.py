@@ -57,13 +57,20 @@ def test_power_that_two_windows_hold_is_gone_with_them() -> None:
 
 def test_windows_further_off_than_noise_are_seen_whatever_the_reason() -> None:
     """A residual that no torque makes: noise of one and a half times the size in all that the windows compare."""
-    problem, scene = null()
+    _, scene = null()
     more = np.random.default_rng(3).standard_normal(scene.residual.shape)
-    loud = replace(scene, evidence=scene.evidence.with_columns(problem, scene.residual + more, scene.columns))
+    loud = replace(scene, residual=scene.residual + more)
     assert in_whole(loud, None).significant and in_whole(loud, loud).significant
     assert not in_whole(scene, None).significant
     assert not in_whole(loud, scene).significant and not in_whole(scene, loud).significant
     assert loud.power()[0] == pytest.approx(scene.power()[0] + 1.0, rel=0.1)
+
+
+def test_a_scene_of_one_joint_says_of_it_what_the_whole_one_says() -> None:
+    _, scene = null()
+    one = replace(scene, joints=[1])
+    assert one.quiet_excess(1) == pytest.approx(scene.quiet_excess(1), rel=1e-6)
+    assert one.excess()[0] == 0.0 != scene.excess()[0]
 
 
 def test_a_gain_is_the_fall_of_the_cost_of_a_fit_with_the_column() -> None:
