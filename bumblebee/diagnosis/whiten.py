@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import hadamard
+from scipy.linalg.lapack import dtrtri
 
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.signals import Layout, conjugate, from_rotation_vector, multiply, rotate
@@ -190,5 +191,5 @@ def factors_of(moved: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         covariance = _SHRINK * (x.T @ x) / samples
         diagonal = (1 - _SHRINK) * (x**2).sum(axis=0) / samples + reading / scale**2
         covariance[np.diag_indices(size)] += diagonal
-        out[w] = np.linalg.inv(np.linalg.cholesky(covariance)) / scale
+        out[w] = dtrtri(np.linalg.cholesky(covariance), lower=1)[0] / scale
     return out
