@@ -2,6 +2,7 @@
 
 Keys: time, joint_pos, joint_vel, tau_est, IMU_quaternion (wxyz, Unitree's order), IMU_gyro, joint_pos_cmd, kp, kd and,
 with motion capture, pos, quat (wxyz), lin_vel. The frame of lin_vel depends on the capture software; the data decide.
+PACE's and Isaac Lab's names of the same arrays are taken, too. Without velocities these are differences of positions.
 """
 
 from pathlib import Path
@@ -12,10 +13,26 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.measured.quaternion import conjugate, rotate
 from bumblebee.measured.rollout import Rollout
-from bumblebee.measured.source import Source, measured_rate, open_source, read_arrays, rollout_names
+from bumblebee.measured.source import (
+    NO_VELOCITY,
+    Source,
+    differences,
+    measured_rate,
+    open_source,
+    read_arrays,
+    rollout_names,
+)
 from bumblebee.robot.facts import joint_names
 
-NEEDED = ("time", "joint_pos", "joint_vel", "joint_pos_cmd")
+NEEDED = ("time", "joint_pos", "joint_pos_cmd")
+_JOINTS = ("joint_pos", "joint_vel", "joint_pos_cmd", "tau_est")
+_OTHER_NAMES = {
+    "joint_pos": ("dof_pos",),
+    "joint_vel": ("dof_vel",),
+    "joint_pos_cmd": ("des_dof_pos", "joint_pos_target", "joint_target", "dof_pos_target"),
+    "tau_est": ("dof_torque", "joint_torque", "applied_torque"),
+    "time": ("times", "timestamp"),
+}
 
 
 def import_asap(place: Path, model: mujoco.MjModel, joints: tuple[str, ...] = ()) -> list[Rollout]:
@@ -35,27 +52,32 @@ def import_asap(place: Path, model: mujoco.MjModel, joints: tuple[str, ...] = ()
 
 
 def _read(source: Source, name: str, rollout_id: str, model: mujoco.MjModel, joints: tuple[str, ...]) -> Rollout:
-    where, table = source.where(name), read_arrays(source, name)
+    where, table = source.where(name), _renamed(read_arrays(source, name))
     for key in NEEDED:
         if key not in table:
             raise BadInput(f"{where}: {key}", "this array", f"only {', '.join(table)}")
-    rows = len(np.atleast_1d(table["time"]))
-    for key in ("joint_pos", "joint_vel", "joint_pos_cmd", "tau_est"):
+    time = np.asarray(table["time"], dtype=np.float64).ravel()
+    table |= {key: _flat(table[key]) for key in _JOINTS if key in table}
+    differenced = "joint_vel" not in table
+    if differenced:
+        table["joint_vel"] = differences(time, table["joint_pos"])
+    for key in _JOINTS:
         if key in table and (table[key].ndim != 2 or table[key].shape != table["joint_pos"].shape):
             raise BadInput(f"{where}: {key}", f"shape {table['joint_pos'].shape}", str(table[key].shape))
-    if len(table["joint_pos"]) != rows:
-        raise BadInput(f"{where}: joint_pos", f"{rows} rows like time", str(len(table["joint_pos"])))
+    if len(table["joint_pos"]) != len(time):
+        raise BadInput(f"{where}: joint_pos", f"{len(time)} rows like time", str(len(table["joint_pos"])))
     named = joints or _default_joints(where, model, table["joint_pos"].shape[1])
     known = {model.joint(i).name for i in range(model.njnt)}
     keep = [i for i, joint in enumerate(named) if joint in known] or list(range(len(named)))
     meta = {"motion": rollout_id, "notes": "ASAP logger"}
+    if differenced:
+        meta["notes"] += f"; {NO_VELOCITY}"
     for key in ("kp", "kd"):
         if key in table:
-            meta[key] = np.atleast_2d(table[key])[0][keep].tolist()
+            meta[key] = _gains(f"{where}: {key}", table[key], len(named))[keep].tolist()
     columns = {"joint_target": table["joint_pos_cmd"][:, keep]}
     if "tau_est" in table:
         columns["joint_torque"] = table["tau_est"][:, keep]
-    time = np.asarray(table["time"], dtype=np.float64)
     base, notes = _base(table, time)
     meta["notes"] += notes
     return Rollout(
@@ -69,6 +91,29 @@ def _read(source: Source, name: str, rollout_id: str, model: mujoco.MjModel, joi
         **base,
         meta=meta,
     )
+
+
+def _renamed(table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The arrays under ASAP's names; what has them already stays."""
+    for ours, others in _OTHER_NAMES.items():
+        there = next((name for name in others if name in table), None)
+        if ours not in table and there is not None:
+            table = table | {ours: table[there]}
+    return table
+
+
+def _flat(values: np.ndarray) -> np.ndarray:
+    """(T, J) of an array that a logger of one environment wrote as (T, 1, J)."""
+    return values[:, 0] if values.ndim == 3 and values.shape[1] == 1 else values
+
+
+def _gains(where: str, values: np.ndarray, joints: int) -> np.ndarray:
+    """(J,) gains from one for all, one a joint, or one a joint in every row."""
+    row = np.atleast_1d(values)
+    row = row.reshape(-1, row.shape[-1])[0]
+    if len(row) not in (1, joints):
+        raise BadInput(where, f"one number or {joints}", str(len(row)))
+    return np.broadcast_to(row, (joints,))
 
 
 def _default_joints(where: str, model: mujoco.MjModel, width: int) -> tuple[str, ...]:

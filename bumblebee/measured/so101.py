@@ -7,6 +7,7 @@ current estimates and are left out.
 import contextlib
 import io
 import json
+import re
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -14,7 +15,7 @@ import pandas as pd
 
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
-from bumblebee.measured.source import Source, measured_rate, open_source
+from bumblebee.measured.source import NO_VELOCITY, Source, differences, measured_rate, open_source
 
 JAW_ZERO, JAW_TRAVEL = -0.174533, 2.336  # rad at share 0, rad from share 0 to 1
 NOTES = (
@@ -37,9 +38,12 @@ def _read_motion(source: Source, folder: PurePosixPath) -> Rollout:
     for name in ("state_motor.csv", "joint_list.txt"):
         if str(folder / name) not in source.names:
             raise BadInput(f"{source.place}/{folder}", f"{name} beside control.csv", "no such file")
-    joints = tuple(source.read(str(folder / "joint_list.txt")).decode("utf-8", "replace").split())
+    listed = source.read(str(folder / "joint_list.txt")).decode("utf-8", "replace")
+    joints = tuple(re.findall(r"[^\s,\[\]\"']+", listed))
     stamps, commands = _read_table(source, str(folder / "control.csv"), ("positions",), len(joints))
-    times, states = _read_table(source, str(folder / "state_motor.csv"), ("positions", "velocities"), len(joints))
+    state = str(folder / "state_motor.csv")
+    fast = "velocities" in source.read(state).split(b"\n", 1)[0].decode("utf-8", "replace")
+    times, states = _read_table(source, state, ("positions", "velocities") if fast else ("positions",), len(joints))
     if len(stamps) != len(times) or not np.array_equal(stamps, times):
         came = f"{len(stamps)} and {len(times)} rows with other time stamps"
         raise BadInput(f"{source.place}/{folder}", "control.csv and state_motor.csv row by row", came)
@@ -48,14 +52,14 @@ def _read_motion(source: Source, folder: PurePosixPath) -> Rollout:
             jaw = joints.index("Jaw")
             table["positions"][:, jaw] = JAW_ZERO + JAW_TRAVEL * table["positions"][:, jaw]
     time = times * 1e-6
-    meta = {"robot": "so101", "motion": folder.name, "notes": NOTES}
+    meta = {"robot": "so101", "motion": folder.name, "notes": NOTES if fast else f"{NOTES} {NO_VELOCITY}."}
     return Rollout(
         folder.name or source.place.stem,
         joints,
         measured_rate(time),
         time,
         states["positions"],
-        states["velocities"],
+        states["velocities"] if fast else differences(time, states["positions"]),
         joint_target=commands["positions"],
         meta=meta,
     )

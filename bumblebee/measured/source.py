@@ -21,10 +21,10 @@ class Source:
 
     def read(self, name: str) -> bytes:
         """The bytes of one file."""
-        if not self.place.is_dir() and not zipfile.is_zipfile(self.place):
-            return self.place.read_bytes()
         if self.place.is_dir():
             return (self.place / name).read_bytes()
+        if not _is_archive(self.place):
+            return self.place.read_bytes()
         with zipfile.ZipFile(self.place) as archive:
             info = archive.getinfo(name)
             if info.file_size > LARGEST:
@@ -56,7 +56,7 @@ def open_source(place: Path) -> Source:
         return Source(place, tuple(sorted(path.relative_to(place).as_posix() for path in inside)))
     if not place.is_file():
         raise BadInput(place, "a folder or a file", "neither")
-    if place.suffix.lower() != ".zip":
+    if not _is_archive(place):
         return Source(place, (place.name,))
     try:
         with zipfile.ZipFile(place) as archive:
@@ -70,6 +70,11 @@ def open_source(place: Path) -> Source:
     return Source(place, tuple(sorted(names)))
 
 
+def _is_archive(place: Path) -> bool:
+    """By its name: an .npz file is a zip archive inside, too, but one log."""
+    return place.suffix.lower() == ".zip"
+
+
 def read_arrays(source: Source, name: str) -> dict[str, np.ndarray]:
     """The arrays of an .npz file; pickled objects in it are refused, never run."""
     where = source.where(name)
@@ -80,12 +85,23 @@ def read_arrays(source: Source, name: str) -> dict[str, np.ndarray]:
         raise BadInput(where, "an .npz file of plain arrays", str(error)) from None
 
 
+NO_VELOCITY = "joint_vel was not logged: differences of the positions"
+
+
 def rollout_names(names: list[str], suffix: str) -> dict[str, str]:
     """File name -> rollout id: the stem where the stems differ, the whole path with underscores where not."""
     stems = [PurePosixPath(name).name[: -len(suffix)] for name in names]
     if len(set(stems)) == len(stems):
         return dict(zip(names, (stem.lstrip(".") or "rollout" for stem in stems), strict=True))
     return {name: name[: -len(suffix)].replace("/", "_").lstrip(".") for name in names}
+
+
+def differences(time: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Velocities (T, J) where a log has none: central differences of the positions (T, J) over the stamps (T,)."""
+    if len(time) < 2:
+        return np.zeros_like(place)
+    with np.errstate(all="ignore"):
+        return np.gradient(place, time, axis=0)
 
 
 def measured_rate(time: np.ndarray) -> float:

@@ -15,7 +15,15 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.measured.checks_units import servo_gains
 from bumblebee.measured.rollout import Rollout
-from bumblebee.measured.source import Source, measured_rate, open_source, read_arrays, rollout_names
+from bumblebee.measured.source import (
+    NO_VELOCITY,
+    Source,
+    differences,
+    measured_rate,
+    open_source,
+    read_arrays,
+    rollout_names,
+)
 
 SENSOR, QPOS, QVEL, CTRL = 0, 2, 3, 5
 PART = re.compile(r"[_.-](control|controls|ctrl|sensordata|sensor|sensors|state|states|measured)$")
@@ -51,27 +59,57 @@ def _read(source: Source, files: list[str], rollout_id: str, model: mujoco.MjMod
     controls = {key[1]: signal for key, signal in signals.items() if key[0] == "ctrl"}
     if not controls:
         raise BadInput(where, "control signals with their mapping", f"only {', '.join(table)}")
-    joints, commands = [], []
+    joints, commands, actuators = [], [], []
     for actuator, signal in controls.items():
         number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
         if number < 0:
             raise BadInput(f"{where}: {actuator}_ctrl", "an actuator of the model", actuator)
         joints.append(model.joint(int(model.actuator_trnid[number, 0])).name)
         commands.append(signal)
-    time = commands[0].time
+        actuators.append(number)
+    driven = len(joints)
+    joints += [name for name in _turning(model) if ("pos", name) in signals and name not in joints]
+    known = any(kind == "vel" for kind, _ in signals)
+    kinds = {"pos": "joint_pos"} | ({"vel": "joint_vel"} if known else {})
+    time = _shared(
+        where, [commands[0], *(s for (kind, joint), s in signals.items() if kind in kinds and joint in joints)]
+    )
     state = {}
-    for kind, column in (("pos", "joint_pos"), ("vel", "joint_vel")):
+    for kind, column in kinds.items():
         missing = [joint for joint in joints if (kind, joint) not in signals]
         if missing:
             raise BadInput(
                 f"{where}: {column}", f"a signal for joint {missing[0]}", f"only {', '.join(_said(signals))}"
             )
         state[column] = np.stack([_at(signals[kind, joint], time) for joint in joints], axis=1)
-    given = np.stack([signal.values for signal in commands], axis=1)
+    state.setdefault("joint_vel", differences(time, state["joint_pos"]))
+    given = np.stack([_held(one, time) for one in commands], axis=1)
     gains = servo_gains(model)
-    column = "joint_target" if all(joint in gains for joint in joints) else "joint_torque_cmd"
-    meta = {"motion": rollout_id, "notes": NOTES}
+    column = "joint_target" if all(joint in gains for joint in joints[:driven]) else "joint_torque_cmd"
+    given = _at_the_joints(given, model, actuators, column == "joint_target")
+    # What has no drive got no torque, and a target that nothing follows is where it was.
+    rest = state["joint_pos"][:, driven:]
+    given = np.concatenate((given, rest if column == "joint_target" else np.zeros_like(rest)), axis=1)
+    meta = {"motion": rollout_id, "notes": NOTES if known else f"{NOTES} {NO_VELOCITY}."}
     return Rollout(rollout_id, tuple(joints), measured_rate(time), time, **state, **{column: given}, meta=meta)
+
+
+def _at_the_joints(given: np.ndarray, model: mujoco.MjModel, actuators: list[int], targets: bool) -> np.ndarray:
+    """Controls (T, A) within their ranges, as targets [rad] or torques [N m] at the joints."""
+    low, high = model.actuator_ctrlrange[actuators].T
+    limited = model.actuator_ctrllimited[actuators].astype(bool)
+    given = np.where(limited, np.clip(given, low, high), given)
+    gear = model.actuator_gear[actuators, 0]
+    if targets:
+        return given / gear
+    motor = model.actuator_gaintype[actuators] == int(mujoco.mjtGain.mjGAIN_FIXED)
+    return given * np.where(motor, gear * model.actuator_gainprm[actuators, 0], 1.0)
+
+
+def _turning(model: mujoco.MjModel) -> list[str]:
+    """Names of the hinges and slides."""
+    kinds = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+    return [model.joint(i).name for i in range(model.njnt) if int(model.jnt_type[i]) in kinds]
 
 
 def _signals(where: str, table: dict[str, np.ndarray], model: mujoco.MjModel) -> dict[tuple[str, str], _Signal]:
@@ -80,16 +118,17 @@ def _signals(where: str, table: dict[str, np.ndarray], model: mujoco.MjModel) ->
     for prefix in ("", "control_", "sensordata_", "state_"):  # states replace sensors of the same joint
         if f"{prefix}times" not in table or f"{prefix}data" not in table:
             continue
-        time, data = table[f"{prefix}times"].astype(np.float64), np.atleast_2d(table[f"{prefix}data"])
+        time, data = table[f"{prefix}times"].astype(np.float64), table[f"{prefix}data"]
+        data = data[:, None] if data.ndim == 1 else data
         mapping = _mapping(where, table, prefix, model)
-        if time.ndim != 1 or len(time) != len(data):
+        if time.ndim != 1 or data.ndim != 2 or len(time) != len(data):
             raise BadInput(f"{where}: {prefix}data", f"{time.size} rows like {prefix}times", str(data.shape))
         for name, (kind, columns) in mapping.items():
             place = _place(name, kind, model)
             if place is None or not columns:
                 continue
-            if max(columns) >= data.shape[1]:
-                raise BadInput(f"{where}: {name}", f"a column below {data.shape[1]}", str(max(columns)))
+            if not 0 <= min(columns) <= max(columns) < data.shape[1]:
+                raise BadInput(f"{where}: {name}", f"columns from 0 to {data.shape[1] - 1}", str(columns))
             found[place] = _Signal(time, data[:, columns[0]].astype(np.float64))
     return found
 
@@ -119,6 +158,22 @@ def _place(name: str, kind: int, model: mujoco.MjModel) -> tuple[str, str] | Non
     kinds = {mujoco.mjtSensor.mjSENS_JOINTPOS: "pos", mujoco.mjtSensor.mjSENS_JOINTVEL: "vel"}
     what = kinds.get(mujoco.mjtSensor(int(model.sensor_type[sensor]))) if sensor >= 0 else None
     return (what, model.joint(int(model.sensor_objid[sensor])).name) if what else None
+
+
+def _shared(where: str, signals: list[_Signal]) -> np.ndarray:
+    """Stamps of the first signal, the controls', while all are logged."""
+    time = signals[0].time
+    if any(len(one.time) < 2 for one in signals):
+        raise BadInput(where, "at least 2 rows of controls and states", "fewer")
+    time = time[(time >= max(one.time[0] for one in signals)) & (time <= min(one.time[-1] for one in signals))]
+    if len(time) < 2:
+        raise BadInput(where, "controls and states of the same time", "none that overlap")
+    return time
+
+
+def _held(signal: _Signal, time: np.ndarray) -> np.ndarray:
+    """A control at the stamps `time`: the latest that was given."""
+    return signal.values[np.clip(np.searchsorted(signal.time, time, side="right") - 1, 0, None)]
 
 
 def _at(signal: _Signal, time: np.ndarray) -> np.ndarray:
