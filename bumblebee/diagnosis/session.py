@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.clocks import age_note, in_step, velocity_ages
 from bumblebee.diagnosis.dampers import fold_dampers
 from bumblebee.diagnosis.noise import estimate_noise
 from bumblebee.diagnosis.plant import Plant, load_spec, make_plant
@@ -131,6 +132,9 @@ def make_session(
     search_step = steps[0] if small else max(steps[0], step_for(period, min(_SEARCH, declared)))
     sigma = estimate_noise(long, layout)
     if not plant.floating:
+        ages = velocity_ages(long)
+        notes += filter(None, [age_note(plant.joints, ages)])
+        long = [in_step(rollout, ages) for rollout in long]
         long, sigma, fast = smooth_rollouts(long, layout, sigma)
         if fast:
             notes.append(f"{fast} fast rollouts: joint readings smoothed over +-{1000 * HALF_SPAN:g} ms")
