@@ -5,8 +5,9 @@ import os
 import mujoco
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
-from bumblebee.diagnosis import simulate
+from bumblebee.diagnosis import diagnose, simulate
 from bumblebee.diagnosis.session import make_session
 from bumblebee.diagnosis.simulate import residuals, threads
 from bumblebee.diagnosis.variation import vary
@@ -45,3 +46,26 @@ def test_residuals_are_the_same_on_one_thread_and_on_three(monkeypatch: pytest.M
         monkeypatch.setattr(simulate, "THREADS", count)
         found.append(residuals(session.plant, session.layout, windows, [vary(session.plant, [])], 0.005))
     assert np.array_equal(*found)
+
+
+def test_linear_algebra_takes_one_thread_in_a_diagnosis_and_as_many_as_before_after_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = []
+
+    def gathered(*_: object) -> None:
+        seen.append(_blas_threads())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(diagnose, "gather", gathered)
+    with threadpool_limits(2, user_api="blas"):
+        before = _blas_threads()
+        if before == {1}:
+            pytest.skip("a library that takes one thread at most")
+        with pytest.raises(KeyboardInterrupt):
+            diagnose.diagnose(None)  # type: ignore[arg-type]
+        assert seen == [{1}] and _blas_threads() == before
+
+
+def _blas_threads() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
