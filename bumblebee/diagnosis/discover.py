@@ -19,7 +19,7 @@ from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.fit import Fit, resolved
 from bumblebee.diagnosis.formula import formula, in_terms, related, stiffer_than_the_drive
 from bumblebee.diagnosis.holdout import Holdout
-from bumblebee.diagnosis.idle import without_idle
+from bumblebee.diagnosis.idle import without_idle, without_spent
 from bumblebee.diagnosis.instead import Offers, is_better, named_instead
 from bumblebee.diagnosis.laws import beside, joined
 from bumblebee.diagnosis.problem import Problem, window_weights
@@ -81,7 +81,7 @@ def discover(
     What there is no time for in `budget` is left out and written down there.
     """
     budget = budget or Budget()
-    fit = without_idle(problem, holdout, fit)
+    fit = without_spent(problem, holdout, without_idle(problem, holdout, fit))
     left = remains(problem, holdout.problem, fit, typical, still)
     unconfirmed: dict[str, dict[str, float]] = {}
     kinds: dict[str, str] = {}
@@ -130,6 +130,9 @@ def discover(
             names = [f"{c.effect} on {c.where or 'the whole robot'}" for c in named.chosen if c not in fit.chosen]
             say(f"in a form's place on {worst.joint}: {', '.join(names)}")
         problem, holdout, fit, left = moved, judged, new, rest
+    rest = without_spent(problem, holdout, fit) if kinds else fit
+    if rest is not fit:
+        problem, holdout, fit, left = _around(problem, holdout, rest, typical, still)
     gone = [c for c in before.chosen if c not in fit.chosen]
     names = [f"{c.effect} on {c.where or 'the whole robot'}" for c in gone]
     return Discovery(problem, holdout, fit, left, unconfirmed, kinds, names)

@@ -31,6 +31,7 @@ _TRIALS, _FITS = 4, 2  # of these tried at their size, and refitted jointly
 _ROUNDS = 2  # effects of the catalogue that together may take a form's place
 _HOPELESS = 0.5  # share of what a form gains, above which no second name is tried
 _SURER = 3.0  # standard errors, where windows count to which the fits have bent
+_MANY_FEWER = 2  # numbers saved, from which on a better fit of all windows need not be beyond doubt
 _SHARE = 0.1  # of what a form gains; less is what laws differ by whose torques correlate by 0.95
 
 
@@ -157,7 +158,8 @@ def is_better(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bo
     """Whether `after`, with no more numbers than `before`, is better window by window beyond doubt, and later no worse.
 
     By two standard errors on the windows that judge. With fewer numbers, which fitted windows flatter less, three on
-    those and the fitted ones together do as well, if the ones that judge are no worse.
+    those and the fitted ones together do as well, if the ones that judge are no worse. With two fewer or more, a better
+    fit of both will do: several names that are near a law need not be far from it.
     """
     fewer = parameters(before) - parameters(after)
     if fewer < 0 or score(problem, after) <= score(problem, before):
@@ -166,9 +168,9 @@ def is_better(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bo
     gain = left[0] - left[1]
     sure = gain.mean() > _doubt(gain)
     if fewer and not sure and gain.mean() > 0 and holdout.problem is not None:
-        left = _logs(problem, Holdout(), [before, after])
-        gain = np.concatenate((gain, left[0] - left[1]))
-        sure = gain.mean() > _doubt(gain, _SURER)
+        fitted = np.subtract(*_logs(problem, Holdout(), [before, after]))
+        gain = np.concatenate((gain, fitted))
+        sure = gain.mean() > _doubt(gain, _SURER) or (fewer >= _MANY_FEWER and fitted.mean() > 0)
     return bool(sure) and not holdout.worse_later(before, after)
 
 

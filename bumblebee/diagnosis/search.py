@@ -8,16 +8,19 @@ import numpy as np
 from bumblebee.diagnosis.acceptance import Step
 from bumblebee.diagnosis.arrivals import Loss
 from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.exchange import creeping, exchange
 from bumblebee.diagnosis.fit import Fit
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.limits import limit_trials
+from bumblebee.diagnosis.plays import play_trials
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.run import Run, SearchConfig
 from bumblebee.diagnosis.scores import Columns, Scores
 from bumblebee.diagnosis.trials import Trial, far_trials, simplest
 from bumblebee.sim.effects import Effect
 
+_EXCHANGES = 3
 _MOST_OF_IT = 0.3  # share of the cost that a trial takes away, beside which limits elsewhere can wait
 
 
@@ -60,6 +63,10 @@ def search(
     _select(run, config)
     if run.find_loss():
         _select(run, config)
+    for _ in range(_EXCHANGES):
+        if not (exchange(run) or creeping(run)):
+            break
+        _select(run, config)
     run.prune()
     run.plain()
     steps = [s for s in run.steps if s.candidate in run.fit.chosen]
@@ -94,6 +101,9 @@ def _select(run: Run, config: SearchConfig) -> None:
             judged = (run.fit, some)
             limits = limit_trials(run.problem, run.fit, some, run.weights, run.hopeless, run.changes)
         tried += [t for t in limits if t.candidate not in run.closed]
+        if not tried:
+            tried = play_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+            tried = [t for t in tried if t.candidate not in run.closed]
         if not tried and not looked:
             break
         if not tried:

@@ -6,7 +6,7 @@ import pytest
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import gauss_newton, typical_power
 from bumblebee.diagnosis.holdout import Holdout
-from bumblebee.diagnosis.idle import without_idle
+from bumblebee.diagnosis.idle import without_idle, without_spent
 from tests.diagnosis.test_discover import prepared
 
 COULOMB = Candidate("coulomb_friction", "pole", (0.0,), (0.02,))
@@ -27,6 +27,17 @@ def test_a_limit_that_no_judging_window_feels_stays() -> None:
     _, problem, judge = prepared(friction=(0.0, 0.05))
     fit = gauss_newton(problem, (COULOMB, LIMIT), np.array([0.05, 40.0]), np.ones(len(problem.windows)), 0)
     assert without_idle(problem, Holdout(judge), fit) is fit
+
+
+def test_a_limit_that_nothing_reaches_is_spent_beside_another_effect() -> None:
+    _, problem, judge = prepared(friction=(0.0, 0.05))
+    ones = np.ones(len(problem.windows))
+    fit = gauss_newton(problem, (COULOMB, LIMIT), np.array([0.05, 40.0]), ones, 0)
+    kept = without_spent(problem, Holdout(judge), fit)
+    assert kept.chosen == (COULOMB,)
+    assert kept.values[0] == pytest.approx(0.05, rel=0.05)
+    alone = gauss_newton(problem, (LIMIT,), np.array([40.0]), ones, 0)
+    assert without_spent(problem, Holdout(judge), alone) is alone
 
 
 def test_far_from_the_model_nothing_is_dropped() -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bumblebee.diagnosis import instead
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, gauss_newton
 from bumblebee.diagnosis.formula import formula
@@ -55,3 +56,12 @@ def test_a_law_with_more_numbers_than_the_names_is_never_better() -> None:
     named = refitted(problem, (COULOMB,), np.array([0.02]))
     form = refitted(problem, (formula("pole", {"q": 1.0, "q^3": 1.0}),), np.array([0.0, -0.6]))
     assert not is_better(problem, Holdout(judge), named, form)
+
+
+def test_a_law_that_saves_two_numbers_and_fits_better_need_not_do_so_beyond_doubt(monkeypatch) -> None:
+    _, problem, judge = prepared(cubic=0.6)
+    monkeypatch.setattr(instead, "_doubt", lambda gain, count=2.0: np.inf)
+    form = refitted(problem, (CUBIC,), np.array([-0.6]))
+    for names, start, better in (((SPRING, COULOMB), [0.1, 0.0, 0.01], True), ((COULOMB,), [0.01], False)):
+        named = refitted(problem, names, np.array(start))
+        assert is_better(problem, Holdout(judge), named, form) is better

@@ -19,6 +19,7 @@ class Coulomb(Law):
 
     joint: str
     level: float
+    first = True  # others add to it
 
     def friction(self, world: World, level: np.ndarray) -> None:
         """Absolute, in place of the declared one."""

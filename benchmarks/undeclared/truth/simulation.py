@@ -30,7 +30,7 @@ class TrueRobots:
     """
 
     def __init__(self, robot: Declared, laws: Sequence[Law], count: int, rng: np.random.Generator) -> None:
-        self.robot, self.laws = robot, list(laws)
+        self.robot, self.laws = robot, sorted(laws, key=lambda law: not law.first)
         self._parts = max((law.parts for law in self.laws), default=1)
         self.model = _true_model(robot, self.laws, STEP / self._parts)
         self.kp, self.kd = robot.kp.copy(), robot.kd.copy()

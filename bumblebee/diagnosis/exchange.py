@@ -1,0 +1,151 @@
+"""Each name against its rivals, all others given: what came first need not be what fits best in the end.
+
+A forward search names what explains most of all that is lacking. A force that stands for a mass and another force is
+named before either, and stays, for beside it neither gains much. So once the search has ended, each effect, and each
+two, is taken out and everything is tested in their place; what promises as much is refitted jointly with the others.
+It takes the place if the fitted windows are clearly better with it for its parameters and those that judge no worse.
+The search then goes on, since what a wrong name had hidden can now be seen.
+
+Friction that grows at rest is felt by the few windows that creep through zero speed. Beside the dry friction that
+explains the rest, its score varies too much between windows to be significant; the joint fit tells.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from bumblebee.diagnosis.acceptance import evidence, is_physical, wald
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.eligible import is_chosen
+from bumblebee.diagnosis.fit import Fit, gauss_newton, project, solve
+from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.limits import KINDS as LIMITS
+from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.refits import PARAMETER, score
+from bumblebee.diagnosis.run import Run
+from bumblebee.diagnosis.scores import Columns, Scores, score_tests
+from bumblebee.diagnosis.trials import try_one
+
+_AS_MUCH = 0.95  # share of what the names gain that a rival must promise
+_RIVALS = 2  # tried in the place of the same names
+_FEW = 4  # effects up to which two are taken out together
+_CLEARLY = 2 * PARAMETER  # log-likelihood by which a rival with as many parameters must be better
+_CREEP = (0.06, 0.2)  # of the joint's usual speed: velocities at which friction is tried to grow
+
+
+def exchange(run: Run) -> bool:
+    """Put one better name in the place of one or two of the search's; whether there was one."""
+    free = [c for c in run.fit.chosen[run.given :] if c.effect not in LIMITS]
+    taken = [(c,) for c in free] + (list(combinations(free, 2)) if len(free) <= _FEW else [])
+    best: tuple[float, Fit, Candidate] | None = None
+    start = score(run.problem, run.fit)
+    for gone in taken:
+        for new, rival in _tried(run, gone):
+            gain = score(run.problem, new) - start
+            margin = _CLEARLY if len(gone) == 1 else 0.0
+            if gain > max(margin, best[0] if best else margin) and _is_no_worse(run.holdout, run.fit, new):
+                best = gain, new, rival
+    if best is None:
+        return False
+    _, new, rival = best
+    weights = window_weights(new.clean(run.problem))
+    run.steps.append(evidence(rival, wald(run.problem, new, weights, len(new.chosen) - 1), len(run.candidates)))
+    gone = ", ".join(f"{c.effect} on {c.where}" for c in run.fit.chosen if c not in new.chosen)
+    run.say(f"{rival.effect} on {rival.where or 'the whole robot'} in the place of {gone}")
+    run.renew(new)
+    run.closed.clear()
+    return True
+
+
+def creeping(run: Run) -> bool:
+    """Try friction that grows at rest beside each dry friction that was found; whether one was accepted."""
+    dry = [c for c in run.fit.chosen if c.effect == "coulomb_friction"]
+    found = False
+    for c in dry:
+        kinds = [o for o in run.candidates if (o.effect, o.where) == ("stribeck_friction", c.where)]
+        if not kinds or is_chosen(kinds[0], run.fit.chosen):
+            continue
+        looked = [_slower(max(kinds, key=lambda o: o.step[1]), share) for share in _CREEP]
+        tests = score_tests(run.problem, run.sensitivities(looked), run.fit, run.weights)
+        k = int(np.argmax(tests.gain))
+        power = max(run.fit.power(run.problem), 1.0)
+        if tests.gain[k] < power * run.bound**2 or looked[k] in run.closed:
+            continue
+        values = looked[k].start
+        values[0] = tests.steps[k][0] * looked[k].step[0]
+        found |= bool(values[0] > 0) and run.accept(looked[k], values)
+    return found
+
+
+def _slower(candidate: Candidate, share: float) -> Candidate:
+    """The same friction at a share of its velocity."""
+    speed = share * candidate.step[1]
+    return replace(candidate, step=(candidate.step[0], speed), shape_scale=0.3 * speed)
+
+
+def _tried(run: Run, gone: Sequence[Candidate]) -> Iterator[tuple[Fit, Candidate]]:
+    """Fits with one rival in the place of some names, those that promise most."""
+    rest = _without(run.problem, run.fit, gone)
+    small = replace(rest, residual=rest.residual[run.keep], columns=rest.columns[:, run.keep])
+    weights = run.weights[run.keep]
+    own = _least(run.small, small, weights) - _least(run.small, run.small_fit(), weights)
+    tests = score_tests(run.small, run.columns, small, weights)
+    for k in _promising(run.columns, tests, rest, gone, _AS_MUCH * own):
+        rival = run.columns.candidates[k]
+        trial = try_one(run.problem, rest, rival, tests.steps[k], run.weights)
+        if trial is None:
+            continue
+        chosen, start = (*rest.chosen, rival), np.concatenate((rest.values, trial.values))
+        new = gauss_newton(run.problem, chosen, start, run.weights, iterations=3, coarse=True, known=run.fit)
+        weights_new = window_weights(new.clean(run.problem))
+        if wald(run.problem, new, weights_new, len(chosen) - 1) < run.bound:
+            continue
+        if is_physical(run.problem, rest, new, rival, weights_new):
+            yield new, rival
+
+
+def _promising(columns: Columns, tests: Scores, rest: Fit, gone: Sequence[Candidate], least: float) -> list[int]:
+    """Numbers of the best rivals of other names than those that are gone, one of each name."""
+    found: list[int] = []
+    names = {(c.effect, c.where) for c in gone}
+    for k in np.argsort(-tests.gain):
+        c = columns.candidates[k]
+        if len(found) >= _RIVALS or tests.gain[k] < least:
+            break
+        if (c.effect, c.where) in names or c.effect in LIMITS or is_chosen(c, rest.chosen):
+            continue
+        names.add((c.effect, c.where))
+        found.append(int(k))
+    return found
+
+
+def _without(problem: Problem, fit: Fit, gone: Sequence[Candidate]) -> Fit:
+    """The fit less some effects, the others where they are, with the columns that they had."""
+    keep = [i for i, c in enumerate(fit.chosen) if c not in gone]
+    owner = [i for i, c in enumerate(fit.chosen) for _ in range(int(np.count_nonzero(c.scales)))]
+    effects = [fit.effects[i] for i in keep]
+    values = np.concatenate([np.empty(0), *(fit.values[fit.slices[i]] for i in keep)])
+    return replace(
+        fit,
+        chosen=tuple(fit.chosen[i] for i in keep),
+        values=values,
+        residual=problem.residual([effects])[0],
+        columns=fit.columns[[i in keep for i in owner]],
+    )
+
+
+def _least(problem: Problem, fit: Fit, weights: np.ndarray) -> float:
+    """Cost of a fit, its effects and the nuisances free to move linearly."""
+    basis, inverse = project(problem, fit.columns, weights)
+    left = fit.residual - np.tensordot(solve(basis, inverse, fit.residual, weights), basis, axes=1)
+    return float((weights[:, None] * left**2).sum())
+
+
+def _is_no_worse(holdout: Holdout, before: Fit, after: Fit) -> bool:
+    """Whether the judging windows are no further off, in the mean of log(1 + chi-square), and not later either."""
+    if holdout.problem is None:
+        return True
+    old, new = holdout.logs([before, after])
+    return bool(new.mean() <= old.mean()) and not holdout.worse_later(before, after)

@@ -1,0 +1,59 @@
+"""A name gives way to one that fits better; friction that grows at rest is tried beside dry friction."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.exchange import creeping, exchange
+from bumblebee.diagnosis.fit import gauss_newton
+from bumblebee.diagnosis.material import gather
+from bumblebee.diagnosis.problem import window_weights
+from bumblebee.diagnosis.run import Run
+from bumblebee.diagnosis.session import make_session
+from bumblebee.measured.rollout import Rollout
+from tests.diagnosis import arm, cart
+from tests.diagnosis.strange_arm import simulate
+from tests.diagnosis.test_catalogue import CONFIG
+
+
+def begun(xml: str, rollouts: list[Rollout], chosen: dict[tuple[str, str], float]) -> Run:
+    """A search that has found some effects, of one parameter each, fitted from a value."""
+    session = make_session(mujoco.MjSpec.from_string(xml), rollouts, "robot", "memory")
+    material = gather(session, CONFIG, np.random.default_rng(0), lambda text: None)
+    run = Run(material.problem, material.holdout, material.remade, CONFIG.search, lambda text: None)
+    names = [next(c for c in run.candidates if (c.effect, c.where) == key) for key in chosen]
+    fit = gauss_newton(run.problem, names, list(chosen.values()), run.weights)
+    run.weights = window_weights(fit.clean(run.problem))
+    run.fit = gauss_newton(run.problem, names, fit.values, run.weights)
+    return run
+
+
+def names(run: Run) -> list[tuple[str, str]]:
+    """What it has found."""
+    return [(c.effect, c.where) for c in run.fit.chosen]
+
+
+def test_a_wrong_name_gives_way_to_the_right_one_and_that_stays() -> None:
+    run = begun(cart.xml(), cart.record(friction=(0.0, 0.05)), {("viscous_friction", "pole"): 0.03})
+    assert exchange(run)
+    assert names(run) == [("coulomb_friction", "pole")]
+    assert run.fit.values[0] == pytest.approx(0.05, rel=0.05)
+    assert [s.candidate for s in run.steps] == list(run.fit.chosen)
+    assert not exchange(run)
+
+
+def test_two_names_that_stand_for_one_give_way_to_it() -> None:
+    two = {("viscous_friction", "pole"): 0.03, ("armature", "pole"): 0.001}
+    run = begun(cart.xml(), cart.record(friction=(0.0, 0.05)), two)
+    assert exchange(run)
+    assert names(run) == [("coulomb_friction", "pole")]
+
+
+@pytest.mark.parametrize("stiction", [0.0, 1.5])
+def test_friction_that_grows_at_rest_is_found_beside_dry_friction_only_where_it_is(stiction: float) -> None:
+    truth = {("coulomb_friction", "j2"): (1.0,)} | ({("stribeck_friction", "j2"): (stiction, 0.15)} if stiction else {})
+    run = begun(arm.XML, simulate(truth, seed=3), {("coulomb_friction", "j2"): 1.0})
+    assert creeping(run) is bool(stiction)
+    assert [n for n, _ in names(run)] == ["coulomb_friction", *(["stribeck_friction"] if stiction else [])]
+    if stiction:
+        assert run.fit.of(run.fit.chosen[1])[0] == pytest.approx(stiction, rel=0.15)
