@@ -80,7 +80,7 @@ def _size(truth: Entry, found: Entry) -> dict[str, Any] | None:
         "value": value,
         "ci95": [low, high],
         "relative": abs(value - wanted) / scale,
-        "covered": bool(low <= wanted and (high is None or wanted <= high)),  # a stiffness may have no upper end
+        "covered": bool((low is None or low <= wanted) and (high is None or wanted <= high)),  # it may have no end
     }
 
 

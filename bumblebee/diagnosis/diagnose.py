@@ -13,7 +13,7 @@ from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.discover import Discovery, discover
 from bumblebee.diagnosis.document import document
 from bumblebee.diagnosis.entries import effect_entries
-from bumblebee.diagnosis.fit import gauss_newton, interval
+from bumblebee.diagnosis.fit import gauss_newton
 from bumblebee.diagnosis.guard import standing
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.instead import offers_of, with_named
@@ -21,7 +21,7 @@ from bumblebee.diagnosis.material import Material, gather
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.quantised import entries as rounding_entries
 from bumblebee.diagnosis.quantised import grids
-from bumblebee.diagnosis.refine import Refined, refine
+from bumblebee.diagnosis.refine import Refined, half_widths, refine
 from bumblebee.diagnosis.remains import remains
 from bumblebee.diagnosis.search import Search, search
 from bumblebee.diagnosis.session import Session
@@ -130,4 +130,4 @@ def _with(beyond: Discovery, last: Refined) -> Refined:
     if beyond.fit.chosen == last.fit.chosen:
         return last
     weights = window_weights(beyond.fit.clean(beyond.problem))
-    return Refined(beyond.problem, beyond.fit, weights, interval(beyond.problem, beyond.fit, weights))
+    return Refined(beyond.problem, beyond.fit, weights, half_widths(beyond.problem, beyond.fit, weights))

@@ -106,7 +106,8 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
             low, high = 1.0 / max(ends[1], 1e-12), None if ends[0] <= 0 else 1.0 / ends[0]
             out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": p.unit}
         else:
-            ends = [max(p.lower, ends[0]), min(p.upper, ends[1])]
+            inside = max(p.lower, ends[0]), min(p.upper, ends[1])
+            ends = [end if np.isfinite(end) else None for end in inside]
             known = float(nominal) + 0.0 if np.isfinite(nominal) else None  # no -0
             out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": p.unit}
     return out

@@ -12,6 +12,7 @@ from bumblebee.diagnosis.slopes import clipped, columns_at, effects_at, taken_ov
 from bumblebee.sim.effects import Effect
 
 _ENOUGH_ROLLOUTS = 6  # fewer say little about how much rollouts differ
+_TOLD = 1e-6  # chi-square of a change that matters, below which the windows say nothing of a parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +217,10 @@ def standard_covariance(problem: Problem, fit: Fit, weights: np.ndarray) -> np.n
 
 
 def interval(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
-    """Half-widths (P,) of 95 % intervals: the widest by windows, by the noise and, of enough rollouts, by these."""
+    """Half-widths (P,) of 95 % intervals: the widest by windows, by the noise and, of enough rollouts, by these.
+
+    Infinite where the windows say nothing: how hard a body that only turns about z is to turn about x.
+    """
     each = np.arange(len(weights))
     half = student.ppf(0.975, freedom(problem, fit, weights, each)) * _errors(problem, fit, weights, each)
     half = np.maximum(half, 1.96 * np.sqrt(np.diag(expected_covariance(problem, fit, weights))))
@@ -224,6 +228,8 @@ def interval(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
     if len(np.unique(groups)) >= _ENOUGH_ROLLOUTS:
         wide = student.ppf(0.975, freedom(problem, fit, weights, groups)) * _errors(problem, fit, weights, groups)
         half = np.maximum(half, wide)
+    told = (weights[:, None] * fit.columns**2).sum(axis=(1, 2))
+    half[np.flatnonzero(fit.scales)[told < _TOLD]] = np.inf
     return half
 
 

@@ -7,6 +7,7 @@ what it changes is clearly more than what these would feign of it.
 """
 
 import copy
+from collections.abc import Iterator
 from dataclasses import replace
 
 import mujoco
@@ -26,7 +27,6 @@ def feigned(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> f
 
     Both are compared beside the nuisances and the columns of `before`; 0 where no other integrator runs.
     """
-    variation = vary(problem.plant, before.effects)
     basis, inverse = project(problem, before.columns, weights)
 
     def left(values: np.ndarray) -> np.ndarray:
@@ -34,20 +34,38 @@ def feigned(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> f
 
     change = left(before.residual - after.residual)
     shares = [0.0]
-    for other in _others(variation):
-        raw = residuals(problem.plant, problem.layout, problem.windows, [other], problem.fine)[0]
-        good = np.isfinite(raw).all(axis=(1, 2))
-        if good.mean() < _FINITE:
-            continue
-        differs = np.where(good[:, None], problem.whitener(raw) - before.residual, 0.0)
+    for differs in _differences(problem, before):
         weight = weights[:, None] * change
         shares.append(abs(float((weight * left(differs)).sum() / max((weight * change).sum(), 1e-12))))
     return max(shares) * problem.finest / problem.fine  # of first order in the step
 
 
+def moves(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
+    """By how much (P,) other integrators would move the fitted values, the most of those tried, to first order.
+
+    0 for a parameter that is not fitted and where no other integrator runs.
+    """
+    basis, inverse = project(problem, fit.columns, weights)
+    moving, first = np.flatnonzero(fit.scales), len(problem.nuisance)
+    out = np.zeros(len(fit.scales))
+    for differs in _differences(problem, fit):
+        move = solve(basis, inverse, differs, weights)[first:] * fit.scales[moving]
+        out[moving] = np.maximum(out[moving], np.abs(move))
+    return out
+
+
 def beyond_numerics(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> bool:
     """Whether the change from `before` to `after` is clearly more than another integrator's."""
     return feigned(problem, before, after, weights) < _FEIGNED
+
+
+def _differences(problem: Problem, fit: Fit) -> Iterator[np.ndarray]:
+    """What other integrators change in the whitened residual (W, M) of a fit; 0 in windows that diverge."""
+    for other in _others(vary(problem.plant, fit.effects)):
+        raw = residuals(problem.plant, problem.layout, problem.windows, [other], problem.fine)[0]
+        good = np.isfinite(raw).all(axis=(1, 2))
+        if good.mean() >= _FINITE:
+            yield np.where(good[:, None], problem.whitener(raw) - fit.residual, 0.0)
 
 
 def _others(variation: Variation) -> list[Variation]:

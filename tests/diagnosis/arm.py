@@ -27,13 +27,15 @@ def simulate(
     rng = np.random.default_rng(seed)
     model = mujoco.MjModel.from_xml_string(XML)
     kp, kd = model.actuator_gainprm[:, 0].copy(), -model.actuator_biasprm[:, 2]
-    limit = model.actuator_forcerange[:, 1]
+    limit = model.actuator_forcerange[:, 1].copy()
     model.opt.timestep, model.opt.integrator = 0.001, mujoco.mjtIntegrator.mjINT_EULER
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     table = {kind: np.full(3, start) for kind, start in _NEUTRAL.items()}
     for (kind, place), value in effects.items():
         if kind == "link_mass":
             model.body_mass[model.body(place).id] = value
+        elif kind == "torque_limit":
+            limit[JOINTS.index(place)] = value
         elif kind == "armature":
             model.dof_armature[JOINTS.index(place)] = value
         else:
