@@ -71,7 +71,8 @@ def chi_square(eye: Eye, flight: Flight) -> float:
         return np.inf
     qpos, qvel, target, after = _gather(flight, picks)
     arrived = np.stack([flight.arrived[picks[:, 1] + h, picks[:, 0]] for h in range(_HORIZON)], axis=1)
-    without = _compare(eye.model, _without(eye.robot, qpos, qvel, target), target, after)
+    parts = max(law.parts for law in flight.laws[0])  # the same steps as with the effect: they are no part of it
+    without = _compare(eye.model, _without(eye.robot, qpos, qvel, target, parts), target, after)
     known = _compare(eye.model, _with(eye, flight, picks), arrived, after)
     numeric = without - _compare_declared(eye.model, eye.robot, qpos, qvel, target, after)
     good = np.isfinite(without).all(axis=1) & np.isfinite(known).all(axis=1) & np.isfinite(numeric).all(axis=1)
@@ -165,9 +166,9 @@ def _groups(eye: Eye) -> list[list[int]]:
     return groups
 
 
-def _without(robot: Declared, qpos: np.ndarray, qvel: np.ndarray, target: np.ndarray) -> TrueRobots:
+def _without(robot: Declared, qpos: np.ndarray, qvel: np.ndarray, target: np.ndarray, parts: int = 1) -> TrueRobots:
     """Robots without effects at the readings."""
-    twin = TrueRobots(robot, [], len(qpos), np.random.default_rng(0))
+    twin = TrueRobots(robot, [], len(qpos), np.random.default_rng(0), parts)
     twin.reset(qpos, qvel, target[:, 0])
     return twin
 

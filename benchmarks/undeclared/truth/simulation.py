@@ -27,11 +27,15 @@ class TrueRobots:
         laws: what is not.
         count: R.
         rng: of what is random in the truth.
+        parts: steps of the mechanics in a millisecond, at least.
     """
 
-    def __init__(self, robot: Declared, laws: Sequence[Law], count: int, rng: np.random.Generator) -> None:
+    def __init__(
+        self, robot: Declared, laws: Sequence[Law], count: int, rng: np.random.Generator, parts: int = 1
+    ) -> None:
         self.robot, self.laws = robot, sorted(laws, key=lambda law: not law.first)
         self._parts = max((law.parts for law in self.laws), default=1)
+        self._parts = max(self._parts, parts)
         self.model = _true_model(robot, self.laws, STEP / self._parts)
         self.kp, self.kd = robot.kp.copy(), robot.kd.copy()
         for law in self.laws:
