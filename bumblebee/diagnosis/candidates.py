@@ -122,7 +122,7 @@ def all_candidates(
         if base:
             found.append(Candidate("imu_offset", base, (0.0, 0.0), (0.01, 0.01), (0, 1)))
         for ground in _grounds(plant):
-            for kind, share in (("ground_friction", -0.3), ("ground_compliance", 0.5)):
+            for kind, share in (("ground_friction", -0.1), ("ground_compliance", 0.2)):
                 value = declared_values(plant, kind, ground)[0]
                 if value > 0:
                     found.append(Candidate(kind, ground, (value,), (share * value,)))

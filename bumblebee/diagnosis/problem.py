@@ -20,11 +20,11 @@ from bumblebee.sim.effects import Effect
 
 _GROUP = 24  # models held at once
 _MANY, _LARGEST = 12, 0.2  # windows; share of the others' power that one may have
-# In coarse steps play hits too softly and a limit too late, and late feedback, computed beside the integrator, moves a
-# servo by itself.
+# In coarse steps play hits too softly, a limit too late and feet otherwise than they do, and late feedback, computed
+# beside the integrator, moves a servo by itself.
 _FINE_ONLY = (
     "torque_lag", "encoder_delay", "encoder_quantisation", "backlash", "series_elasticity", "torque_limit",
-    "torque_speed_limit",
+    "torque_speed_limit", "ground_friction", "ground_compliance",
 )  # fmt: skip
 
 

@@ -35,7 +35,7 @@ def start_moves(
     short = _first_ticks(windows, _OUTPUTS)
     found = sample(plant, layout, short, variation, sigma, step, rng)
     raw = residuals(plant, layout, short, [variation], step)[0].reshape(len(windows), -1)
-    factor = factors_of(found.moved - found.moved.mean(axis=0), sigma)
+    factor = factors_of(found, sigma)
     white = np.matmul(factor, np.nan_to_num(raw)[..., None])[..., 0]
     slopes = np.matmul(found.slopes, factor.transpose(0, 2, 1))
     move = -np.einsum("wcm,wm->wc", slopes, white)
