@@ -31,6 +31,6 @@ class Budget:
         if not self.left_out:
             return []
         return [
-            f"the search beyond the catalogue was cut after {self.seconds:g} s (`beyond_seconds`); not tried: "
+            f"the search beyond the catalogue was cut after {self.seconds:.0f} s (`beyond_seconds`); not tried: "
             + "; ".join(self.left_out)
         ]

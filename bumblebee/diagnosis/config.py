@@ -25,6 +25,9 @@ class DiagnosisConfig:
     beyond: bool = True
     """Whether to look for structure that no effect of the catalogue explains, and for its form."""
     beyond_seconds: float = 100.0
-    """Time after which nothing more is begun in that search [s]; the notes then say what was not tried."""
+    """Time after which nothing more is begun in that search [s]; the notes then say what was not tried.
+
+    For up to 12 degrees of freedom; in proportion longer for more, where every trial is.
+    """
     search: SearchConfig = field(default_factory=SearchConfig)
     """How strict the search is."""

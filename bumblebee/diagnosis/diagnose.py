@@ -28,6 +28,8 @@ from bumblebee.diagnosis.session import Session
 from bumblebee.diagnosis.unseen import unseen_notes
 from bumblebee.sim.effects import Effect
 
+_SMALL = 12  # degrees of freedom
+
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
@@ -101,7 +103,8 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
     if not config.beyond:
         return _Found(found, last, holdout, None, Budget())
     say("what is left")
-    offers, budget = offers_of(found, material.candidates), Budget(config.beyond_seconds)
+    larger = max(1.0, material.session.plant.model.nv / _SMALL)
+    offers, budget = offers_of(found, material.candidates), Budget(larger * config.beyond_seconds)
     beyond = discover(last.problem, holdout, last.fit, material.typical, material.still, say, offers, budget)
     last = _with(beyond, last)
     return _Found(with_named(found, last.fit), last, beyond.holdout, beyond, budget)
