@@ -19,6 +19,9 @@ from bumblebee.diagnosis.whiten import null_draws
 # little of the chi-square of the joint's own signals, on all joints at once more.
 _NOISY, _NOISY_GAIN, _NOISY_ALL = ("encoder_delay",), 0.1, 0.05
 
+# What these do grows with no power of their size, in few windows.
+ABRUPT = ("backlash",)
+
 
 @dataclass(eq=False)
 class Step:
@@ -50,6 +53,8 @@ def is_worse(problem: Problem, fit: Fit, less: Fit, z: float) -> bool:
 def wald(problem: Problem, fit: Fit, weights: np.ndarray, index: int) -> float:
     """The z of one chosen effect's free parameters in the joint fit."""
     candidate, part = fit.chosen[index], fit.slices[index]
+    if candidate.effect in ABRUPT:
+        return _lost(problem, fit, weights, index)
     free = part.start + np.array(candidate.free)
     # Windows that feel a limit are too few for a variance between windows.
     of = expected_covariance if candidate.effect in LIMITS else standard_covariance
@@ -57,6 +62,13 @@ def wald(problem: Problem, fit: Fit, weights: np.ndarray, index: int) -> float:
     away = fit.values[free] - np.array(candidate.nominal)[list(candidate.free)]
     value = float(away @ np.linalg.pinv(covariance, rcond=1e-9, hermitian=True) @ away)
     return as_z(value, len(free), len(weights))
+
+
+def _lost(problem: Problem, fit: Fit, weights: np.ndarray, index: int) -> float:
+    """The same for an effect of which slopes say nothing: by what the fit loses without it, the others as they are."""
+    others = [e for k, e in enumerate(fit.effects) if k != index]
+    rise = cost_of(problem, problem.residual([others])[0], weights)[0] - fit.cost
+    return as_z(max(rise, 0.0) / max(fit.power(problem), 1.0), 1, len(weights))
 
 
 def evidence(candidate: Candidate, z: float, count: int) -> Step:

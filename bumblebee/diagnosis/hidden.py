@@ -26,8 +26,9 @@ def step_share(hidden: Sequence[tuple[str, str, tuple[float, ...]]]) -> float:
     """What of the step a model with these structural effects needs.
 
     Behind a shaft the servo's own delay of half a step acts as stiffness: 10 % of it at 1 ms on a joint of an arm.
+    The ends of a gap are met one and a half steps late, which is as if it were wider.
     """
-    return 0.5 if any(kind == "series_elasticity" and values[1] for kind, _, values in hidden) else 1.0
+    return 0.5 if any(kind == "backlash" or (kind in SUFFIX and values[1]) for kind, _, values in hidden) else 1.0
 
 
 def earlier(plant: Plant, windows: Windows) -> tuple[Windows, float, np.ndarray]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bumblebee.diagnosis.acceptance import Step, evidence, is_physical, least_z, pruned, wald
+from bumblebee.diagnosis.acceptance import ABRUPT, Step, evidence, is_physical, least_z, pruned, wald
 from bumblebee.diagnosis.arrivals import Loss, find_loss
 from bumblebee.diagnosis.candidates import Candidate, shortlisted
 from bumblebee.diagnosis.changes import Changes
@@ -177,7 +177,7 @@ class Run:
             return self.refuse(candidate)
         pays = self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain) or (
             pays_where_felt(self.problem, self.holdout, self.fit, fit)
-            if candidate.effect in LIMITS
+            if candidate.effect in (*LIMITS, *ABRUPT)
             else pays_where_rare(self.problem, self.holdout, self.fit, fit)
         )
         if not pays or not is_physical(self.problem, self.fit, fit, candidate, weights):

@@ -13,6 +13,7 @@ from bumblebee.diagnosis.fit import Fit
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.limits import limit_trials
+from bumblebee.diagnosis.plays import play_trials
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.run import Run, SearchConfig
 from bumblebee.diagnosis.scores import Columns, Scores
@@ -100,6 +101,9 @@ def _select(run: Run, config: SearchConfig) -> None:
             judged = (run.fit, some)
             limits = limit_trials(run.problem, run.fit, some, run.weights, run.hopeless, run.changes)
         tried += [t for t in limits if t.candidate not in run.closed]
+        if not tried:
+            tried = play_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+            tried = [t for t in tried if t.candidate not in run.closed]
         if not tried and not looked:
             break
         if not tried:

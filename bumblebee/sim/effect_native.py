@@ -8,7 +8,7 @@ import numpy as np
 # A constant joint torque is a spring so weak and so long that its torque hardly depends on the angle.
 _WEAK = 1e-4
 # Second, coaxial hinges: how hard the ends of the play are, and how fast a shaft's own swing dies.
-PLAY_SOLREF, PLAY_SOLIMP = (0.004, 1.0), (0.95, 0.99, 1e-3)
+PLAY_SOLREF, PLAY_SOLIMP = (0.001, 1.0), (0.95, 0.99, 1e-3)
 HIDDEN_ARMATURE = 1e-5  # [kg m^2] keeps the mass matrix regular where the rotor has no armature
 ROTOR_MASS, ROTOR_INERTIA = 1e-6, 1e-9  # [kg], [kg m^2] of a rotor's body, which must have some
 SUFFIX = {"backlash": "_play", "series_elasticity": "_flex"}
