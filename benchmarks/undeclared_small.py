@@ -60,7 +60,8 @@ def run(effects: dict[tuple[str, str], float], seed: int) -> tuple[int, int, lis
             p = next(iter(entry["parameters"].values()))
             # Relative to what was changed: a mass of 1.1 found as 1.09 is off by a tenth of its change.
             errors.append(abs(p["value"] - effects[key]) / abs(effects[key] - p["nominal"]))
-            covered += p["ci95"][0] <= effects[key] <= p["ci95"][1]
+            low, high = p["ci95"]
+            covered += (low is None or low <= effects[key]) and (high is None or effects[key] <= high)
     spurious = len(document["effects"]) - len(hits)
     text = ", ".join(f"{e['effect']} {''.join(e['where'])}" for e in document["effects"]) or "nothing"
     truth = ", ".join(f"{k} {p} {v:.3g}" for (k, p), v in effects.items()) or "null"

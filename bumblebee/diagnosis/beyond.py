@@ -27,7 +27,7 @@ def discovered_entry(
     `z` is that of Wald's test in the joint fit, `kind` "formula" or "curve".
     """
     terms = [
-        {"term": text, "coefficient": float(v), "ci95": [float(v - h), float(v + h)]}
+        {"term": text, "coefficient": float(v), "ci95": [float(v - h), float(v + h)] if np.isfinite(h) else None}
         for text, v, h in zip(c.texts, values, half, strict=True)
     ]
     p = float(2 * norm.sf(z))
