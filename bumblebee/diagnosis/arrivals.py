@@ -134,6 +134,8 @@ def find_loss(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, Probl
         kept = arrived(holdout.problem, seen.likely(share), place)
         explains = _explained(left, _clean(kept, fit))
         holdout = replace(holdout, problem=kept)
+    elif place and gain < _SURE:
+        return None  # nor may it be believed as easily where it cannot be seen again
     return Loss(place, share, losses.interval(share), gain, paid, explains), fitted, holdout
 
 
