@@ -38,7 +38,10 @@ def play_trials(
     weights: np.ndarray,
     hopeless: set[tuple[str, str]],
 ) -> list[Trial]:
-    """The gap that explains most; none where none does. Joints on which none does join the `hopeless`."""
+    """The gap that explains most; none where none does. Its joint and those on which none does join the `hopeless`.
+
+    These are not tried again: a gap that is refused now would be refused again.
+    """
     clean = fit.clean(problem)
     usual = max(typical_power(clean), 1.0)
     if usual > _NEAR:
@@ -52,7 +55,9 @@ def play_trials(
         if not tried:
             hopeless.add((KIND, where))
         found += tried
-    return sorted(found, key=lambda t: t.cost)[:1]
+    best = sorted(found, key=lambda t: t.cost)[:1]
+    hopeless.update((KIND, t.candidate.where) for t in best)
+    return best
 
 
 def odd_joints(problem: Problem, clean: np.ndarray) -> list[tuple[str, np.ndarray]]:
