@@ -26,7 +26,7 @@ from bumblebee.diagnosis.variation import Variation
 from bumblebee.diagnosis.windows import Windows
 
 # Share of the variance that is not linear in the starts that counts. It grows with their variance squared, and what the
-# next readings leave of that is 0.7 on a G1 that stands or walks.
+# next readings leave of that is 0.6 to 0.7 on a standing G1.
 _CURVED = 0.5
 # Noise of a base height that is not measured but taken from stance [m].
 _HEIGHT_NOISE = 0.002
