@@ -23,6 +23,7 @@ SIMULATED = (
 _SLOW = ("torque_lag", "encoder_delay")
 _FEW_JOINTS = 8
 _STIFF = 0.03  # of a servo's own compliance
+_POINT = 0.01  # of its declared moments, below which no link is: what moments near zero say is lost to their bound
 _HARMONICS = (*range(1, 25), 28, 30, 32, 36, 40, 42, 48, 50, 56, 60, 64, 72, 80, 84, 96, 100, 120, 128, 144)
 
 
@@ -70,6 +71,8 @@ class Candidate:
         if self.effect in INVERSE:
             # An infinitely stiff shaft cannot be simulated: a fiftieth of the first step is as good as absent.
             low[0], high[0] = max(1.0 / high[0], 0.02 * abs(self.step[0])), 1.0 / low[0]
+        if self.effect == "link_inertia":
+            low = np.maximum(low, _POINT * np.array(self.nominal))
         inside = np.clip(np.asarray(values, dtype=float), low, high)
         return physical_inertia(inside) if self.effect == "link_inertia" else inside
 

@@ -42,7 +42,7 @@ def columns_at(
     known: np.ndarray,
     at: np.ndarray,
 ) -> np.ndarray:
-    """Sensitivities (P', W, M) per scale at `values`, by differences of a fifth of it, away from the bound.
+    """Sensitivities (P', W, M) per scale at `values`, by differences of a fifth of it, or of the room to the bounds.
 
     Those of `known` (P', W, M), whose values were `at` (P', P), hold as long as nothing near has moved far; NaN in `at`
     where nothing is known. `at` is brought up to date.
@@ -58,16 +58,26 @@ def columns_at(
     sets, sizes = [], []
     for i in moving[stale]:
         there = values.copy()
-        there[i] += 0.2 * scales[i]
-        if clipped(chosen, there)[i] != there[i]:
-            there[i] = values[i] - 0.2 * scales[i]
-        sizes.append((there[i] - values[i]) / scales[i])
+        there[i] = _aside(chosen, values, int(i), 0.2 * scales[i])
+        sizes.append((there[i] - values[i]) / scales[i] or np.inf)
         sets.append(effects_at(chosen, there))
     coarse = coarse and rough(c.effect for c in chosen)
     change = problem.differences(effects_at(chosen, values), sets, coarse)
     columns, at[stale] = known.copy(), values
     columns[stale] = change / np.array(sizes)[:, None, None]
     return columns
+
+
+def _aside(chosen: Sequence[Candidate], values: np.ndarray, i: int, step: float) -> float:
+    """Parameter `i` a step up or, where that is out of bounds, down; where both are, as far as one may go."""
+    reached = []
+    for sign in (1.0, -1.0):
+        there = values.copy()
+        there[i] += sign * step
+        reached.append(float(clipped(chosen, there)[i]))
+        if reached[-1] == there[i]:
+            return reached[-1]
+    return max(reached, key=lambda value: abs(value - values[i]))
 
 
 def _near(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:

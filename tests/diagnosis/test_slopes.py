@@ -141,3 +141,11 @@ def test_moments_stay_what_a_body_can_have_and_keep_their_intervals(session: Ses
     assert fit.values[1:] == pytest.approx([0.005, 0.001])
     assert (np.abs(fit.columns).max(axis=(1, 2)) > 0).all()
     assert (interval(problem, fit, window_weights(fit.clean(problem))) > 0).all()
+
+
+def test_no_link_shrinks_to_a_point(session: Session, problem: Problem) -> None:
+    """Moments stop at a hundredth of the declared ones, where every one of them still shows in the windows."""
+    inertia = _candidate(session, "link_inertia", "l3")
+    fit = gauss_newton(problem, (inertia,), (1e-9, 1e-9, 1e-9), np.ones(len(problem.windows)), iterations=0)
+    assert fit.values == pytest.approx(0.01 * np.array(inertia.nominal), rel=0.3)
+    assert (np.abs(fit.columns).max(axis=(1, 2)) > 0).all()
