@@ -71,9 +71,8 @@ def chi_square(eye: Eye, flight: Flight) -> float:
         return np.inf
     qpos, qvel, target, after = _gather(flight, picks)
     arrived = np.stack([flight.arrived[picks[:, 1] + h, picks[:, 0]] for h in range(_HORIZON)], axis=1)
-    parts = max(
-        (law.parts for law in flight.laws[0]), default=1
-    )  # the same steps as with the effect: they are no part of it
+    # The same steps as with the effect, of which they are no part.
+    parts = max((law.parts for law in flight.laws[0]), default=1)
     without = _compare(eye.model, _without(eye.robot, qpos, qvel, target, parts), target, after)
     known = _compare(eye.model, _with(eye, flight, picks), arrived, after)
     numeric = without - _compare_declared(eye.model, eye.robot, qpos, qvel, target, after)
