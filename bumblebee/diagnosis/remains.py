@@ -25,7 +25,7 @@ _LOUDEST = 2  # windows of a rollout that do not count there
 _LONE = 20.0  # standard errors of a joint's power in one rollout alone, its loudest windows not counted
 _WHOLE, _WHOLE_ALONE = (2.0, 4.0), 6.0  # standard errors of all windows: each of fitted and judged, both; fitted alone
 _FELT, _PAYS = 9.0, 25.0  # chi-square of a law on judging windows that do not meet it; its gain on half of the fitted
-_SLIGHT = 0.03  # share of a joint's typical torque below which a power that no law explains is no structure in contact
+_SLIGHT = 0.03  # share of a joint's typical torque below which a power that no law explains is no structure by itself
 _HINT = 3.0  # z from which a law says what a power that no law explains depends on
 _MOST = 8  # joints that laws are sought on, those that lack most
 
@@ -101,20 +101,20 @@ def remains(
         asked = sorted({*np.flatnonzero(excess > _POWER).tolist(), *(one.joint for one in sought.found)})
         judged = judged_scene(judge, fit, typical, asked)
         again = judged.excess() if asked else np.zeros_like(excess)
-    kept = confirmed(scene, sought, judged)
+    kept, whole = confirmed(scene, sought, judged), in_whole(scene, judged)
     found = []
     for j, name in enumerate(names):
         own = [(one, size) for one, size in kept if one.joint == j]
         lacks = [np.einsum("fws,f->ws", one.torque, size) for one, size in own]
         rms = float(np.sqrt((np.sum(lacks, axis=0) ** 2).mean())) if own else scene.evidence.implied(j)
         loud = excess[j] > (_ALONE if again is None else _POWER)
-        # Where feet stand or drives saturate, other steps and integrators feign a hundredth or two of a joint's torque.
+        # Other steps and integrators feign a hundredth or two of a joint's torque, in contact all windows' power, too.
         more = rms > _SLIGHT * typical[j]
         if again is None:
             loud &= not problem.plant.floating or scene.quiet_excess(j, _LOUDEST) > _ALONE
         else:
             loud &= again[j] > _AGAIN or _in_two(scene, j, more)
-        loud &= not problem.plant.floating or more
+        loud &= more or whole.significant
         real = bool(own) and rms > _LEAST * typical[j]
         p = [2 * norm.sf(one.verdict.z) * some.count for one, _ in own]
         p.append(float(norm.sf(excess[j])) * len(names))
@@ -130,7 +130,7 @@ def remains(
                 float(typical[j]), tuple(on), bool(real or (loud and name not in still)),
             )
         )  # fmt: skip
-    return Remains(found, scene, judged, sought, some, in_whole(scene, judged))
+    return Remains(found, scene, judged, sought, some, whole)
 
 
 def in_whole(scene: Scene, judged: Scene | None) -> Whole:
