@@ -5,7 +5,8 @@
 - `robots`, `excite`: what is declared of each robot, and the motions it makes;
 - `truth/`: the robots as they are, at 1 ms with semi-implicit Euler and effects of their own; imports nothing of the
   diagnosis or of the simulator's effects;
-- `kinds`, `detectable`, `lottery`: which effects there are, how small one can be seen, which cases the suite holds;
+- `kinds`, `restarts`, `detectable`, `lottery`: which effects there are, how small one can be seen, which cases the
+  suite holds;
 - `case`, `judge`, `rivals/`: one case from draw to score, ours beside the other methods;
 - `stats`, `table`: intervals and the table.
 """

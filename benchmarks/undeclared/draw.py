@@ -49,7 +49,7 @@ def draw(case: Case, seed: int, policy: Path | None = None) -> Drawn:
     laws: list[Law] = []
     if case.kinds:
         null = run([])
-        eye = make_eye(robot, null, case.noise, np.random.default_rng(seeds[4]))
+        eye = make_eye(robot, case.noise)
         for name in case.kinds:
             entry, law = _one(name, case, robot, null, eye, run, rng)
             truth.append(entry)
@@ -72,6 +72,7 @@ def _one(
         first, most = kind.first(place), kind.most(place)
         make = lambda size, place=place: run([kind.make(place, size)[0]])  # noqa: E731
         least = minimal_size(eye, make, first, most, kind.least(place))
+        least = max(least, kind.events / max(float(null.alive.sum()), 1.0))
         size = float(np.clip(case.ratio * least, kind.least(place), most))
         ratio = size / least if np.isfinite(least) else 0.0
         if best is None or ratio > best[0]:

@@ -60,6 +60,8 @@ class Kind:
     """The largest size that is still this robot."""
     least: Callable[[Place], float] = lambda p: 0.0
     """The smallest size that the true robots' simulation can hold."""
+    events: float = 0.0
+    """How often it must strike, on average, to strike at all four times in five; then its size is a share of ticks."""
     robots: str = "both"
     """both, arm or g1."""
     group: str = "joint"
@@ -182,7 +184,7 @@ CATALOGUE: tuple[Kind, ...] = (
     Kind("encoder_delay", "joint", _plain(lambda p, s: signals.EncoderDelay(p.name, s), "delay"),
          _fixed(0.002), _fixed(0.03), group="sensor"),
     Kind("dropped_commands", "whole", _plain(lambda p, s: signals.DroppedCommands(s), "share"),
-         _fixed(0.05), _fixed(0.5)),
+         _fixed(0.05), _fixed(0.5), events=1.6),
     Kind("encoder_offset", "joint", _signed(lambda p, s: signals.EncoderOffset(p.name, s), "offset"),
          _fixed(0.01), _fixed(0.12), group="sensor"),
     Kind("imu_offset", "base", lambda p, s: (signals.ImuOffset(p.draw["axis"] % 2, p.draw["sign"] * s),

@@ -5,13 +5,14 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from benchmarks.undeclared.detectable import CHI2, chi_square, make_eye, minimal_size
+from benchmarks.undeclared.detectable import CHI2, _of_grid, chi_square, make_eye, minimal_size
 from benchmarks.undeclared.excite import make_plan
 from benchmarks.undeclared.flight import fly
 from benchmarks.undeclared.kinds import CATALOGUE, OUTSIDE
 from benchmarks.undeclared.lottery import Suite
 from benchmarks.undeclared.robots import declared
 from benchmarks.undeclared.truth.rubbing import Viscous
+from benchmarks.undeclared.truth.signals import ImuOffset
 
 CONTRACT = {
     "viscous_friction",
@@ -90,7 +91,7 @@ def seen():
 
 def test_chi_square_is_that_of_a_linear_effect_and_none_without_one(seen):
     robot, run = seen
-    eye = make_eye(robot, run(0.0), 1.0, np.random.default_rng(2))
+    eye = make_eye(robot, 1.0)
     assert chi_square(eye, run(0.0)) < 1e-6
     small, twice = chi_square(eye, run(0.05)), chi_square(eye, run(0.1))
     assert twice / small == pytest.approx(4.0, rel=0.1)
@@ -100,9 +101,23 @@ def test_the_minimal_size_has_the_stated_chi_square_and_grows_with_the_noise(see
     robot, run = seen
     sizes = []
     for noise in (1.0, 3.0):
-        eye = make_eye(robot, run(0.0), noise, np.random.default_rng(2))
+        eye = make_eye(robot, noise)
         size = minimal_size(eye, run, 0.1, 3.0)
         assert chi_square(eye, run(size)) == pytest.approx(CHI2, rel=0.2)
         sizes.append(size)
     assert sizes[1] / sizes[0] == pytest.approx(3.0, rel=0.25)
     assert minimal_size(eye, run, 1e-5, 1e-4) == np.inf
+
+
+def test_readings_on_a_grid_show_it_where_the_noise_is_finer():
+    fine, near, wide = (_of_grid(step, 1e-3, 1000) for step in (1e-3, 2.5e-3, 1e-2))
+    assert fine < 1e-3 < 1 < near < 100 < wide
+    assert near == pytest.approx(2 * 1000 * np.exp(-4 * np.pi**2 / 2.5**2), rel=0.05)  # the first harmonic's
+    assert _of_grid(1e-2, 1e-3, 2000) == pytest.approx(2 * wide)
+
+
+def test_a_turn_of_the_imu_of_a_micrometre_in_the_feet_is_not_seen():
+    robot = declared("stand")
+    plan = make_plan(robot, 1, 2.0, np.random.default_rng(0))
+    eye, run = make_eye(robot, 1.0), lambda angle: fly(robot, [ImuOffset(0, angle)], plan, np.random.default_rng(1))
+    assert chi_square(eye, run(2e-6)) < 0.1 < 25 < chi_square(eye, run(5e-3))

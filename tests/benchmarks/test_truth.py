@@ -18,7 +18,7 @@ from benchmarks.undeclared.truth.signals import Line
 from benchmarks.undeclared.truth.simulation import TrueRobots
 
 ARM = declared("arm")
-APART = ("robots", "excite", "flight", "kinds", "detectable", "lottery", "draw", "tracking")
+APART = ("robots", "excite", "flight", "kinds", "restarts", "detectable", "lottery", "draw", "tracking")
 
 
 def _imports(path: Path) -> set[str]:

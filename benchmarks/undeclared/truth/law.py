@@ -62,6 +62,10 @@ class Law:
     """Whether it changes the model before the others do."""
     parts = 1
     """Steps of the mechanics in a millisecond that it needs."""
+    chance = 1.0
+    """Share of the ticks, drawn at random, in which it strikes."""
+    grid = 0.0
+    """Step of the encoder's readings [rad]; 0 for none."""
 
     def spec(self, spec: mujoco.MjSpec) -> None:
         """Change the structure before it is compiled."""

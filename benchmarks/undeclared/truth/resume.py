@@ -5,10 +5,11 @@ remember of the commands and readings before. What they do not determine is gues
 on which play touches, the twist of a shaft, the lean of a mount.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from benchmarks.undeclared.robots import Declared
@@ -24,6 +25,8 @@ def resumed(
     state: tuple[np.ndarray, np.ndarray],
     seen: Seen,
     time: np.ndarray,
+    moved: Callable[[mujoco.MjModel, np.ndarray, np.ndarray], None] | None = None,
+    guess: bool = True,
 ) -> TrueRobots:
     """W robots with the laws that one robot had at each of W moments.
 
@@ -34,11 +37,15 @@ def resumed(
         state: (W, nq') and (W, nv') of the true model then.
         seen: what the sensors said then.
         time: (W,) since the start [s].
+        moved: puts noise into a model's states (W, nq'), (W, nv'), in place.
+        guess: whether what readings do not determine is guessed; else it is as it was.
     """
     laws = gathered(moments, picks)
     robots = TrueRobots(robot, laws, len(picks), np.random.default_rng(0))
     qpos, qvel = (x.copy() for x in state)
-    for law in laws:
+    if moved is not None:
+        moved(robots.model, qpos, qvel)
+    for law in laws if guess else ():
         law.settle(robots.model, seen, qpos, qvel)
     robots.resume(qpos, qvel, seen.torque, time)
     return robots

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
-from benchmarks.undeclared.truth.law import Law, World
+from benchmarks.undeclared.truth.law import Law, Seen, World
 
 
 class Line:
@@ -53,6 +54,11 @@ class DroppedCommands(Law):
     """Each command of the whole robot is lost with probability `share`; the one before goes on."""
 
     share: float
+
+    @property
+    def chance(self) -> float:
+        """Of each tick."""
+        return self.share
 
     def start(self, world: World, target: np.ndarray) -> None:
         """The first is there."""
@@ -117,6 +123,15 @@ class EncoderQuantisation(Law):
 
     joint: str
     step: float
+
+    @property
+    def grid(self) -> float:
+        """Of one joint."""
+        return self.step
+
+    def settle(self, model: mujoco.MjModel, seen: Seen, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Where it reads: what was rounded off is unknown."""
+        qpos[:, model.joint(self.joint).qposadr[0]] = seen.q[:, seen.joints.index(self.joint)]
 
     def sense(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rounded."""
