@@ -6,29 +6,36 @@ two, is taken out and everything is tested in their place; what promises as much
 It takes the place if the fitted windows are clearly better with it for its parameters and those that judge no worse.
 The search then goes on, since what a wrong name had hidden can now be seen.
 
+What a shaft's swing passes for (a lag, an old reading, a rotor) is tried against shafts of many stiffnesses, which no
+test at one of them would show (`diagnosis/shafts.py`).
+
 Friction that grows at rest is felt by the few windows that creep through zero speed. Beside the dry friction that
 explains the rest, its score varies too much between windows to be significant; the joint fit tells.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import chain, combinations
 
 import numpy as np
 
 from bumblebee.diagnosis.acceptance import evidence, is_physical, wald
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.eligible import is_chosen
-from bumblebee.diagnosis.fit import Fit, gauss_newton, project, solve
+from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, project, solve
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.refits import PARAMETER, score
 from bumblebee.diagnosis.run import Run
-from bumblebee.diagnosis.scores import Columns, Scores, score_tests
-from bumblebee.diagnosis.trials import try_one
+from bumblebee.diagnosis.scores import Columns, Scores, as_z, score_tests
+from bumblebee.diagnosis.shafts import KIND as SHAFT
+from bumblebee.diagnosis.shafts import LIKE as SHAFT_LIKE
+from bumblebee.diagnosis.shafts import best_shaft
+from bumblebee.diagnosis.trials import Trial, try_one
 
 _AS_MUCH = 0.95  # share of what the names gain that a rival must promise
+_PART = 0.6  # the same of a shaft, whose loss has not been fitted yet
 _RIVALS = 2  # tried in the place of the same names
 _FEW = 4  # effects up to which two are taken out together
 _CLEARLY = 2 * PARAMETER  # log-likelihood by which a rival with as many parameters must be better
@@ -39,19 +46,18 @@ def exchange(run: Run) -> bool:
     """Put one better name in the place of one or two of the search's; whether there was one."""
     free = [c for c in run.fit.chosen[run.given :] if c.effect not in LIMITS]
     taken = [(c,) for c in free] + (list(combinations(free, 2)) if len(free) <= _FEW else [])
-    best: tuple[float, Fit, Candidate] | None = None
+    best: tuple[float, Fit, float] | None = None
     start = score(run.problem, run.fit)
-    for gone in taken:
-        for new, rival in _tried(run, gone):
-            gain = score(run.problem, new) - start
-            margin = _CLEARLY if len(gone) == 1 else 0.0
-            if gain > max(margin, best[0] if best else margin) and _is_no_worse(run.holdout, run.fit, new):
-                best = gain, new, rival
+    for gone, new, z in chain(*(_tried(run, gone) for gone in taken), _twisted(run, free)):
+        gain = score(run.problem, new) - start
+        margin = _CLEARLY if len(gone) == 1 else 0.0
+        if gain > max(margin, best[0] if best else margin) and _is_no_worse(run.holdout, run.fit, new):
+            best = gain, new, z
     if best is None:
         return False
-    _, new, rival = best
-    weights = window_weights(new.clean(run.problem))
-    run.steps.append(evidence(rival, wald(run.problem, new, weights, len(new.chosen) - 1), len(run.candidates)))
+    _, new, z = best
+    rival = new.chosen[-1]
+    run.steps.append(evidence(rival, z, len(run.candidates)))
     gone = ", ".join(f"{c.effect} on {c.where}" for c in run.fit.chosen if c not in new.chosen)
     run.say(f"{rival.effect} on {rival.where or 'the whole robot'} in the place of {gone}")
     run.renew(new)
@@ -85,7 +91,11 @@ def _slower(candidate: Candidate, share: float) -> Candidate:
     return replace(candidate, step=(candidate.step[0], speed), shape_scale=0.3 * speed)
 
 
-def _tried(run: Run, gone: Sequence[Candidate]) -> Iterator[tuple[Fit, Candidate]]:
+Tried = tuple[Sequence[Candidate], Fit, float]
+"""Names that are gone, the fit without them and with their rival last, and the rival's z."""
+
+
+def _tried(run: Run, gone: Sequence[Candidate]) -> Iterator[Tried]:
     """Fits with one rival in the place of some names, those that promise most."""
     rest = _without(run.problem, run.fit, gone)
     small = replace(rest, residual=rest.residual[run.keep], columns=rest.columns[:, run.keep])
@@ -95,15 +105,48 @@ def _tried(run: Run, gone: Sequence[Candidate]) -> Iterator[tuple[Fit, Candidate
     for k in _promising(run.columns, tests, rest, gone, _AS_MUCH * own):
         rival = run.columns.candidates[k]
         trial = try_one(run.problem, rest, rival, tests.steps[k], run.weights)
-        if trial is None:
+        new = _refitted(run, rest, trial) if trial else None
+        if new:
+            yield gone, *new
+
+
+def _twisted(run: Run, free: Sequence[Candidate]) -> Iterator[Tried]:
+    """Fits with a shaft in the place of what its swing passes for, on each joint that has such a name."""
+    for where in dict.fromkeys(c.where for c in free if c.where and c.effect in SHAFT_LIKE):
+        if (SHAFT, where) in run.hopeless:
             continue
-        chosen, start = (*rest.chosen, rival), np.concatenate((rest.values, trial.values))
-        new = gauss_newton(run.problem, chosen, start, run.weights, iterations=3, coarse=True, known=run.fit)
-        weights_new = window_weights(new.clean(run.problem))
-        if wald(run.problem, new, weights_new, len(chosen) - 1) < run.bound:
-            continue
-        if is_physical(run.problem, rest, new, rival, weights_new):
-            yield new, rival
+        gone = [c for c in free if c.where == where and c.effect in SHAFT_LIKE]
+        if all(c.effect == SHAFT and c not in run.candidates for c in gone):
+            continue  # one of many stiffnesses
+        rest = _without(run.problem, run.fit, gone)
+        own = _least(run.problem, rest, run.weights) - _least(run.problem, run.fit, run.weights)
+        trial = best_shaft(run.problem, rest, run.candidates, run.weights, where, _PART * own)
+        new = _refitted(run, rest, trial) if trial else None
+        run.hopeless.add((SHAFT, where))
+        if trial and new:
+            yield gone, *new
+
+
+def _refitted(run: Run, rest: Fit, trial: Trial) -> tuple[Fit, float] | None:
+    """The joint fit with a rival and the rival's z, if it is sure of it."""
+    rival = trial.candidate
+    chosen, start = (*rest.chosen, rival), np.concatenate((rest.values, trial.values))
+    new = gauss_newton(run.problem, chosen, start, run.weights, iterations=3, coarse=True, known=run.fit)
+    weights = window_weights(new.clean(run.problem))
+    z = _certainty(run, rest, new, weights)
+    if z < run.bound or not is_physical(run.problem, rest, new, rival, weights):
+        return None
+    return new, z
+
+
+def _certainty(run: Run, rest: Fit, new: Fit, weights: np.ndarray) -> float:
+    """The z of a rival; of a shaft, half of which swings out of step, by what the fit loses without it if more."""
+    z = wald(run.problem, new, weights, len(new.chosen) - 1)
+    if new.chosen[-1].effect != SHAFT:
+        return z
+    fall = cost_of(run.problem, rest.residual, weights)[0] - new.cost
+    numbers = int(np.count_nonzero(new.chosen[-1].scales))
+    return max(z, as_z(max(fall, 0.0) / max(new.power(run.problem), 1.0), numbers, len(weights)))
 
 
 def _promising(columns: Columns, tests: Scores, rest: Fit, gone: Sequence[Candidate], least: float) -> list[int]:
@@ -116,6 +159,8 @@ def _promising(columns: Columns, tests: Scores, rest: Fit, gone: Sequence[Candid
             break
         if (c.effect, c.where) in names or c.effect in LIMITS or is_chosen(c, rest.chosen):
             continue
+        if c.effect == SHAFT and any(g.where == c.where and g.effect in SHAFT_LIKE for g in gone):
+            continue  # of many stiffnesses, see `_twisted`
         names.add((c.effect, c.where))
         found.append(int(k))
     return found

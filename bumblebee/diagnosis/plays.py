@@ -97,7 +97,7 @@ def _best(
     none = some.residual([at(_NONE)])[0]
 
     def gain(gap: float) -> float:
-        return float(_gains(some, none, some.residual([at(gap)])[0], usual).sum())
+        return float(falls(some, none, some.residual([at(gap)])[0], usual).sum())
 
     first = _SMALLEST * float(problem.sigma[problem.plant.joints.index(candidate.where)])
     gaps, gains, bad = [], [], 0
@@ -118,7 +118,7 @@ def _best(
                 gap, most = gap * factor, new
                 break
     none, after = problem.residual([at(_NONE), at(gap)])
-    each = _gains(problem, none, after, usual)
+    each = falls(problem, none, after, usual)
     better = each > _BETTER
     if each.sum() < _WORTH or better.sum() < _SEVERAL or each.max() > _ALONE * each.sum():
         return None
@@ -128,7 +128,7 @@ def _best(
     return Trial(own, values, beside.cost(after), beside.left(change))
 
 
-def _gains(problem: Problem, before: np.ndarray, after: np.ndarray, usual: float) -> np.ndarray:
+def falls(problem: Problem, before: np.ndarray, after: np.ndarray, usual: float) -> np.ndarray:
     """Fall (W,) of the robust cost from a residual (W, M) to another, each with its own nuisances."""
     ones = np.ones(len(before))
     left = [r - np.tensordot(cost_of(problem, r, ones)[1], problem.nuisance, axes=1) for r in (before, after)]

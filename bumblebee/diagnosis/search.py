@@ -17,6 +17,7 @@ from bumblebee.diagnosis.plays import play_trials
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.run import Run, SearchConfig
 from bumblebee.diagnosis.scores import Columns, Scores
+from bumblebee.diagnosis.shafts import shaft_trials
 from bumblebee.diagnosis.trials import Trial, far_trials, simplest
 from bumblebee.sim.effects import Effect
 
@@ -104,6 +105,8 @@ def _select(run: Run, config: SearchConfig) -> None:
         if not tried:
             tried = play_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
             tried = [t for t in tried if t.candidate not in run.closed]
+        if not tried:
+            tried = shaft_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
         if not tried and not looked:
             break
         if not tried:

@@ -1,0 +1,133 @@
+"""Shafts, tried at many stiffnesses on the few windows in which their joint is furthest off.
+
+Behind a shaft a link swings. One a fifth too soft or too stiff soon swings out of step with the data, so the score at
+one stiffness says nothing of another, and what the swing does on average passes for a lag, an old reading or a rotor.
+A geometric series of stiffnesses tells: where a name of that kind stands on a joint (`diagnosis/exchange.py`), and
+where nothing is worth a trial any more and a joint's own readings are further off than noise. Only the best of the
+series is simulated on all windows.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.eligible import is_chosen
+from bumblebee.diagnosis.fit import Fit, typical_power
+from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.plays import falls, joint_chi_squares
+from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.trials import Beside, Trial
+
+KIND = "series_elasticity"
+# What a shaft's swing passes for.
+LIKE = ("torque_lag", "encoder_delay", "command_delay", "armature", "kp", "kd", "series_elasticity")
+_NEAR = 2.0  # median chi-square above which all windows are off, for other reasons
+_WINDOWS, _FEW_WINDOWS, _FEW_JOINTS = 16, 8, 8  # fewer windows on robots of more joints
+# Stiffnesses in units of the servo's, by where the encoder is: on the motor, on the joint. Behind a soft shaft a servo
+# that reads the joint shakes it.
+_FIRST, _LAST, _RATIO = 110.0, (3.0, 5.0), 1.18
+_NONE = 1e-4  # of the servo's compliance: as good as stiff
+_DAMPING = 0.1  # of the critical one of the rotor on the shaft, tried first
+_WORTH, _PART, _BETTER, _ALONE = 40.0, 15.0, 5, 0.5  # fall of the cost; on those tried; windows; share one may have
+_STEP = 0.2  # of the compliance: five times what sensitivities are differences of
+_UNEASY = 3.0  # standard errors by which a joint's own readings must be off
+
+
+def shaft_trials(
+    problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, hopeless: set[tuple[str, str]]
+) -> list[Trial]:
+    """The shaft that explains most on the joint that is furthest off; none where none does.
+
+    Each joint is tried once and joins the `hopeless`.
+    """
+    clean = fit.clean(problem)
+    usual = max(typical_power(clean), 1.0)
+    if usual > _NEAR:
+        return []
+    own, freedom = joint_chi_squares(problem, clean)
+    off = (own / usual - freedom).sum(axis=0) / np.sqrt(2.0 * freedom * len(own))
+    worst = problem.plant.joints[int(np.argmax(off))]
+    if off.max() < _UNEASY or (KIND, worst) in hopeless:
+        return []
+    hopeless.add((KIND, worst))
+    best = best_shaft(problem, fit, candidates, weights, worst)
+    return [best] if best else []
+
+
+def best_shaft(
+    problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, where: str, least: float = 0.0
+) -> Trial | None:
+    """The shaft on a joint that explains most, the encoder on either side, or None.
+
+    `least` is the fall of the robust cost on all windows that it must exceed.
+    """
+    clean = fit.clean(problem)
+    usual = max(typical_power(clean), 1.0)
+    chi, _ = joint_chi_squares(problem, clean)
+    count = _WINDOWS if len(problem.plant.joints) <= _FEW_JOINTS else _FEW_WINDOWS
+    odd = np.sort(np.argsort(-chi[:, problem.plant.joints.index(where)])[:count])
+    kinds = [c for c in candidates if (c.effect, c.where) == (KIND, where) and not is_chosen(c, fit.chosen)]
+    found = [(*_sought(problem.part(odd), fit, c, usual), c) for c in kinds]
+    if not found:
+        return None
+    gain, values, c = max(found, key=lambda f: f[0])
+    if gain < _PART:
+        return None
+    none, after = problem.residual([_with(fit, c, _stiff(problem.plant, c)), _with(fit, c, values)])
+    each = falls(problem, none, after, usual)
+    if each.sum() < max(_WORTH, least) or (each > 0).sum() < _BETTER or each.max() > _ALONE * each.sum():
+        return None
+    beside = Beside(problem, fit, weights)
+    own = replace(c, step=(_STEP * float(values[0]), *c.step[1:]))
+    return Trial(own, values, beside.cost(after), beside.left(fit.residual - after))
+
+
+def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tuple[float, np.ndarray]:
+    """The best of the series on some windows: its gain and parameters (P,)."""
+    none = some.residual([_with(fit, candidate, _stiff(some.plant, candidate))])[0]
+    soft = 1.0 / _servo(some.plant, candidate.where)
+    rotor = float(some.plant.model.dof_armature[some.plant.dof[some.plant.joints.index(candidate.where)]])
+
+    def at(compliance: float, damping: float = _DAMPING) -> np.ndarray:
+        values = candidate.start
+        values[0], values[2] = compliance, 2 * damping * np.sqrt(rotor * compliance) or values[2]
+        return values
+
+    def best_of(tried: Sequence[np.ndarray]) -> tuple[float, np.ndarray]:
+        residuals = some.residual([_with(fit, candidate, v) for v in tried])
+        worth = [float(falls(some, none, r, usual).sum()) for r in residuals]
+        k = int(np.argmax(worth))
+        return worth[k], tried[k]
+
+    def scaled(values: np.ndarray, compliance: float = 1.0, loss: float = 1.0) -> np.ndarray:
+        return values * np.array([compliance, 1.0, loss, 1.0])
+
+    count = int(np.log(_FIRST / _LAST[int(candidate.step[1])]) / np.log(_RATIO)) + 1
+    found = best_of([at(soft / _FIRST * _RATIO**k) for k in range(count)])
+    if found[0] < -usual * none.shape[1]:
+        return found
+    for ratio in (_RATIO**0.5, _RATIO**0.25):
+        near = [scaled(found[1], ratio), scaled(found[1], 1 / ratio)]
+        near += [scaled(found[1], loss=f) for f in (0.6, 1.7)]
+        found = max(found, best_of(near), key=lambda f: f[0])
+    return found
+
+
+def _servo(plant: Plant, where: str) -> float:
+    """Stiffness [N m/rad] of a joint's servo; of a drive that has none, 1."""
+    a = plant.actuator[plant.joints.index(where)]
+    return abs(float(plant.model.actuator_gear[a, 0] ** 2 * plant.model.actuator_biasprm[a, 1])) or 1.0
+
+
+def _stiff(plant: Plant, candidate: Candidate) -> np.ndarray:
+    """Parameters (P,) of a shaft as good as stiff: with the encoder on the joint servos are integrated otherwise."""
+    values = candidate.start
+    values[0] = _NONE / _servo(plant, candidate.where)
+    return values
+
+
+def _with(fit: Fit, candidate: Candidate, values: np.ndarray) -> list:
+    """The fit's effects and a shaft, not brought within the bounds of the candidate's own step."""
+    return [*fit.effects, replace(candidate, step=(float(values[0]), *candidate.step[1:])).at(values)]
