@@ -97,12 +97,13 @@ Tried = tuple[Sequence[Candidate], Fit, float]
 
 def _tried(run: Run, gone: Sequence[Candidate]) -> Iterator[Tried]:
     """Fits with one rival in the place of some names, those that promise most."""
-    rest = _without(run.problem, run.fit, gone)
-    small = replace(rest, residual=rest.residual[run.keep], columns=rest.columns[:, run.keep])
-    weights = run.weights[run.keep]
-    own = _least(run.small, small, weights) - _least(run.small, run.small_fit(), weights)
+    weights, all_of = run.weights[run.keep], run.small_fit()
+    small = _without(run.small, all_of, gone)
+    own = _least(run.small, small, weights) - _least(run.small, all_of, weights)
     tests = score_tests(run.small, run.columns, small, weights)
-    for k in _promising(run.columns, tests, rest, gone, _AS_MUCH * own):
+    promising = _promising(run.columns, tests, small, gone, _AS_MUCH * own)
+    rest = _without(run.problem, run.fit, gone) if promising else None
+    for k in promising if rest else ():
         rival = run.columns.candidates[k]
         trial = try_one(run.problem, rest, rival, tests.steps[k], run.weights)
         new = _refitted(run, rest, trial) if trial else None

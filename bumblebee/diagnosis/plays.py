@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg.lapack import dtrtri
 from scipy.stats import chi2
 
 from bumblebee.diagnosis.candidates import Candidate
@@ -71,16 +72,16 @@ def odd_joints(problem: Problem, clean: np.ndarray) -> list[tuple[str, np.ndarra
 
 def joint_chi_squares(problem: Problem, clean: np.ndarray) -> tuple[np.ndarray, int]:
     """Chi-squares (W, J) of each joint's own readings in a whitened residual (W, M), and their degrees of freedom."""
-    factor = np.linalg.inv(problem.whitener.factor.astype(float))
-    raw = np.matmul(factor, clean[:, :, None])[..., 0]
-    spread = np.matmul(factor, factor.transpose(0, 2, 1))
     place, speed = (np.arange(problem.layout.size)[problem.layout.slices[n]] for n in ("joint_pos", "joint_vel"))
     ticks = np.arange(clean.shape[1] // problem.layout.size) * problem.layout.size
+    rows = np.concatenate((ticks[:, None] + place, ticks[:, None] + speed)).T  # (J, 2 N)
     out = np.empty((len(clean), len(place)))
-    for j in range(len(place)):
-        rows = np.concatenate((ticks + place[j], ticks + speed[j]))
-        part = spread[:, rows][:, :, rows]
-        out[:, j] = np.einsum("wi,wi->w", raw[:, rows], np.linalg.solve(part, raw[:, rows, None])[..., 0])
+    for w, whitened in enumerate(clean):
+        factor = dtrtri(problem.whitener.factor[w].astype(float), lower=1)[0]
+        own = factor[rows]  # (J, 2 N, M)
+        raw = own @ whitened
+        spread = np.matmul(own, own.transpose(0, 2, 1))
+        out[w] = np.einsum("ji,ji->j", raw, np.linalg.solve(spread, raw[..., None])[..., 0])
     return out, 2 * len(ticks)
 
 

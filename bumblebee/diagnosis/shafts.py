@@ -23,7 +23,7 @@ from bumblebee.diagnosis.trials import Beside, Trial
 KIND = "series_elasticity"
 # What a shaft's swing passes for.
 LIKE = ("torque_lag", "encoder_delay", "command_delay", "armature", "kp", "kd", "series_elasticity")
-_NEAR = 2.0  # median chi-square above which all windows are off, for other reasons
+_JOINTS = 2  # tried where nothing else is worth a trial
 _WINDOWS, _FEW_WINDOWS, _FEW_JOINTS = 16, 8, 8  # fewer windows on robots of more joints
 # Stiffnesses in units of the servo's, by where the encoder is: on the motor, on the joint. Behind a soft shaft a servo
 # that reads the joint shakes it.
@@ -38,22 +38,22 @@ _UNEASY = 3.0  # standard errors by which a joint's own readings must be off
 def shaft_trials(
     problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, hopeless: set[tuple[str, str]]
 ) -> list[Trial]:
-    """The shaft that explains most on the joint that is furthest off; none where none does.
+    """The shaft that explains most on one of the joints that are furthest off; none where none does.
 
     Each joint is tried once and joins the `hopeless`.
     """
     clean = fit.clean(problem)
-    usual = max(typical_power(clean), 1.0)
-    if usual > _NEAR:
-        return []
     own, freedom = joint_chi_squares(problem, clean)
-    off = (own / usual - freedom).sum(axis=0) / np.sqrt(2.0 * freedom * len(own))
-    worst = problem.plant.joints[int(np.argmax(off))]
-    if off.max() < _UNEASY or (KIND, worst) in hopeless:
-        return []
-    hopeless.add((KIND, worst))
-    best = best_shaft(problem, fit, candidates, weights, worst)
-    return [best] if best else []
+    off = (own / max(typical_power(clean), 1.0) - freedom).sum(axis=0) / np.sqrt(2.0 * freedom * len(own))
+    for j in np.argsort(-off)[:_JOINTS]:
+        where = problem.plant.joints[j]
+        if off[j] < _UNEASY or (KIND, where) in hopeless:
+            continue
+        hopeless.add((KIND, where))
+        best = best_shaft(problem, fit, candidates, weights, where)
+        if best:
+            return [best]
+    return []
 
 
 def best_shaft(
