@@ -5,12 +5,11 @@ import os
 import shutil
 from pathlib import Path
 
-import mujoco
-
 from bumblebee.diagnosis.diagnose import Diagnosis
 from bumblebee.diagnosis.example import examples
 from bumblebee.diagnosis.report import render_report
 from bumblebee.errors import BadInput
+from bumblebee.measured.model_file import name_assets_in_full
 from bumblebee.sim.effects import add_to_spec, write_effects
 
 
@@ -56,15 +55,7 @@ def fill(diagnosis: Diagnosis, folder: Path) -> None:
 def corrected_xml(diagnosis: Diagnosis) -> str:
     """The declared model with every native effect; checked by loading it in plain MuJoCo."""
     spec = diagnosis.session.spec.copy()
-    _find_assets_from_anywhere(spec)
+    name_assets_in_full(spec)
     add_to_spec(spec, diagnosis.effects)
     spec.compile()
     return spec.to_xml()
-
-
-def _find_assets_from_anywhere(spec: mujoco.MjSpec) -> None:
-    """Meshes and textures lie beside the declared model, not beside the corrected one: name their folders in full."""
-    if spec.meshes or spec.hfields or spec.textures or spec.skins:
-        home = Path(spec.modelfiledir or ".").resolve()
-        spec.compiler.meshdir = str(home / spec.compiler.meshdir)
-        spec.compiler.texturedir = str(home / spec.compiler.texturedir)

@@ -15,6 +15,7 @@ from bumblebee.diagnosis.repeats import motion_names
 from bumblebee.diagnosis.signals import Layout, layout_of
 from bumblebee.diagnosis.simulate import step_for
 from bumblebee.diagnosis.smooth import HALF_SPAN, smooth_rollouts
+from bumblebee.diagnosis.unlogged import refuse_unlogged
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.measured.usable import review
@@ -115,6 +116,7 @@ def make_session(
     if folded:
         notes.append(f"position and velocity actuators taken as one servo of one limit: {', '.join(folded[:6])}")
     plant = make_plant(spec, long[0], model)
+    refuse_unlogged(plant, model)
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)
     if plant.floating and not has_pos:

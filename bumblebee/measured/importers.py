@@ -11,6 +11,7 @@ import mujoco
 from bumblebee.errors import BadInput
 from bumblebee.measured.asap_npz import import_asap
 from bumblebee.measured.csv_map import DOUBLE_PENDULUM, import_csv, read_map
+from bumblebee.measured.model_file import copy_model, load_model
 from bumblebee.measured.rollout import Rollout, write_rollout
 from bumblebee.measured.so101 import import_so101
 from bumblebee.measured.sysid_npz import import_sysid
@@ -52,7 +53,7 @@ def import_dataset(
     out = Path(out)
     if out.exists():
         raise BadInput(out, "a new folder", "one that exists", "Choose another name.")
-    model = _load(model_path) if model_path else None
+    model = load_model(model_path) if model_path else None
     rollouts = read_rollouts(Path(source), kind, model, column_map)
     out.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
@@ -60,16 +61,9 @@ def import_dataset(
         for rollout in rollouts:
             write_rollout(temporary / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)
         if model_path:
-            shutil.copyfile(model_path, temporary / "model.xml")
+            copy_model(model_path, temporary / "model.xml")
         temporary.chmod(0o755)
         os.rename(temporary, out)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return [rollout.rollout_id for rollout in rollouts]
-
-
-def _load(path: Path) -> mujoco.MjModel:
-    try:
-        return mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise BadInput(path, "an MJCF model that loads", str(error)) from None
