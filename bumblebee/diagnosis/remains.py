@@ -91,8 +91,10 @@ def remains(
         typical: (J,) RMS torques of the joints [N m].
         still: joints that never move.
     """
+    # Where a foot tips one window holds more than all others: on a base that can fall the loudest do not count.
+    spared = _LOUDEST if problem.plant.floating else 0
     scene = fitted_scene(problem, fit, typical)
-    excess, again, judged = scene.excess(), None, None
+    excess, again, judged = scene.excess(spared), None, None
     names = problem.plant.joints
     moving = [j for j in np.argsort(-excess) if names[j] not in still][:_MOST]
     some = library(scene.data, moving)
@@ -100,7 +102,7 @@ def remains(
     if judge is not None:  # of what is not seen in the fitted windows nothing need be simulated in others
         asked = sorted({*np.flatnonzero(excess > _POWER).tolist(), *(one.joint for one in sought.found)})
         judged = judged_scene(judge, fit, typical, asked)
-        again = judged.excess() if asked else np.zeros_like(excess)
+        again = judged.excess(spared) if asked else np.zeros_like(excess)
     kept, whole = confirmed(scene, sought, judged), in_whole(scene, judged)
     found = []
     for j, name in enumerate(names):
@@ -110,9 +112,7 @@ def remains(
         loud = excess[j] > (_ALONE if again is None else _POWER)
         # Other steps and integrators feign a hundredth or two of a joint's torque, in contact all windows' power, too.
         more = rms > _SLIGHT * typical[j]
-        if again is None:
-            loud &= not problem.plant.floating or scene.quiet_excess(j, _LOUDEST) > _ALONE
-        else:
+        if again is not None:
             loud &= again[j] > _AGAIN or _in_two(scene, j, more)
         loud &= more or whole.significant
         real = bool(own) and rms > _LEAST * typical[j]
@@ -151,8 +151,7 @@ def _in_two(scene: Scene, joint: int, much: bool) -> bool:
     So may what a rollout's loudest windows show: where a foot tips, one of them holds more than all others. A base that
     cannot fall has no such accidents: there one rollout does that shows very much in many windows, if it is `much`.
     """
-    rollouts = scene.problem.windows.rollout
-    excess = [scene.quiet_excess(joint, _LOUDEST, rollouts == i) for i in np.unique(rollouts)]
+    excess = [scene.quiet_excess(joint, _LOUDEST, [i]) for i in np.unique(scene.problem.windows.rollout)]
     if much and not scene.problem.plant.floating and max(excess) > _LONE:
         return True
     return sum(e > _POWER for e in excess) > 1

@@ -65,13 +65,16 @@ class Scene:
         """What a law may depend on."""
         return self._seen[1]
 
-    def excess(self) -> np.ndarray:
-        """(J,) by how many standard errors a joint's torques are larger than noise makes them."""
-        return np.array([self.quiet_excess(j) for j in range(self.evidence.joints)])
+    def excess(self, spared: int = 0) -> np.ndarray:
+        """(J,) by how many standard errors a joint's torques are larger than noise makes them, see `quiet_excess`."""
+        return np.array([self.quiet_excess(j, spared) for j in range(self.evidence.joints)])
 
-    def quiet_excess(self, joint: int, spared: int = 0, some: np.ndarray | None = None) -> float:
-        """The same of one joint on some windows (W,) bool, all by default, less the `spared` ones that say most."""
-        value, count = self.evidence.free(joint, some, spared)
+    def quiet_excess(self, joint: int, spared: int = 0, rollouts: Sequence[int] | None = None) -> float:
+        """The same of one joint on some rollouts, all by default, each less the `spared` windows that say most."""
+        of = self.problem.windows.rollout
+        ids = np.unique(of) if rollouts is None else rollouts
+        parts = [self.evidence.free(joint, of == i, spared) for i in ids] if spared else [self.evidence.free(joint)]
+        value, count = np.sum(parts, axis=0)
         return float((value - count) / np.sqrt(2.0 * max(count, 1)))
 
     def power(self, spared: int = 0) -> tuple[float, float]:

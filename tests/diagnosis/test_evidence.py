@@ -9,7 +9,7 @@ from bumblebee.diagnosis.evidence import Evidence
 from bumblebee.diagnosis.fit import cost_of, gauss_newton
 from bumblebee.diagnosis.laws import Law, all_laws, beside, joined
 from bumblebee.diagnosis.problem import Problem
-from bumblebee.diagnosis.remains import better, in_whole
+from bumblebee.diagnosis.remains import better, in_whole, remains
 from bumblebee.diagnosis.scales import scales_of
 from bumblebee.diagnosis.scene import Scene, fitted_scene
 from bumblebee.diagnosis.seek import library, seek
@@ -53,6 +53,25 @@ def test_power_that_two_windows_hold_is_gone_with_them() -> None:
     assert (loud - count) / np.sqrt(2 * count) > 10 > 4 > (rest - fewer) / np.sqrt(2 * fewer)
     assert fewer < count
     assert evidence.free(1, spared=len(problem.windows) + 1) == (0.0, 0)
+
+
+def test_on_a_base_that_can_fall_the_loudest_windows_of_a_rollout_are_no_structure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two windows of each rollout lack a torque: on a fixed base that counts, where a foot may tip it does not."""
+    problem, scene = null()
+    of = problem.windows.rollout
+    torque = np.zeros((1, *scene.evidence.score.shape[1:]))
+    some = [k for i in np.unique(of) for k in np.flatnonzero(of == i)[[1, 4]]]
+    torque[0, some] = 0.05 * np.random.default_rng(0).choice([-1.0, 1.0], (len(some), torque.shape[-1]))
+    residual = scene.residual + scene.evidence.column(1, torque)[0]
+    loud = replace(scene, residual=residual)
+    assert loud.excess()[1] > 10 > 4 > loud.excess(2)[1]
+    fit = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+    monkeypatch.setattr("bumblebee.diagnosis.remains.fitted_scene", lambda *_: loud)
+    assert remains(problem, None, fit, scene.torque).joints[1].significant
+    may_fall = replace(problem, plant=replace(problem.plant, floating=True))
+    assert not remains(may_fall, None, fit, scene.torque).joints[1].significant
 
 
 def test_windows_further_off_than_noise_are_seen_whatever_the_reason() -> None:
