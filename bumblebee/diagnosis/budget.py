@@ -10,6 +10,10 @@ class Budget:
     """Seconds from its making on; the clock is a parameter so that tests need not wait."""
 
     seconds: float = float("inf")
+    search: str = "beyond the catalogue"
+    """What is sought."""
+    setting: str = "beyond_seconds"
+    """Where the seconds are set."""
     clock: Callable[[], float] = time.monotonic
     left_out: list[str] = field(default_factory=list)
     """What was not begun, in words, each once."""
@@ -31,6 +35,6 @@ class Budget:
         if not self.left_out:
             return []
         return [
-            f"the search beyond the catalogue was cut after {self.seconds:.0f} s (`beyond_seconds`); not tried: "
+            f"the search {self.search} was cut after {self.seconds:.0f} s (`{self.setting}`); not tried: "
             + "; ".join(self.left_out)
         ]

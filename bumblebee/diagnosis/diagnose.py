@@ -51,8 +51,8 @@ class _Found:
     holdout: Holdout
     """Around the last fit."""
     beyond: Discovery | None
-    budget: Budget
-    """Of the look beyond the catalogue, with what it left out."""
+    budgets: tuple[Budget, ...]
+    """Of the search and of the look beyond the catalogue, with what they left out."""
 
     @property
     def judging(self) -> Problem:
@@ -88,26 +88,32 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
     entries = [*entries, *(rounded if steps else []), *lost]
     if found.beyond is not None:
         notes = [*(f"withdrawn for what explains more: {name}" for name in found.beyond.withdrawn), *notes]
-    notes = [*notes, *found.budget.notes(), *unseen_notes(material.session, effects, config.horizon)]
+    notes = [
+        *notes,
+        *(n for b in found.budgets for n in b.notes()),
+        *unseen_notes(material.session, effects, config.horizon),
+    ]
     told = document(material, config, found.search, found.last, found.beyond, effects, entries, notes)
     return Diagnosis(told, effects, material.session, found.search, found.last.problem)
 
 
 def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator, say: Callable[[str], None]) -> _Found:
     """The effects of the catalogue, then what lies beyond it."""
-    found = search(material.problem, material.holdout, material.remade, config.search, say)
+    larger = max(1.0, material.session.plant.model.nv / _SMALL)
+    time = Budget(larger * config.search_seconds, "among the catalogue's effects", "search_seconds")
+    found = search(material.problem, material.holdout, material.remade, config.search, say, time)
+    say(f"the last fit, of {len(found.fit.chosen)} effects")
     holdout = material.holdout.finely()
     last = refine(found.problem, found.fit, rng, holdout)
     if last.fit.chosen:
         holdout = holdout.relinearised(last.fit.effects)
     if not config.beyond:
-        return _Found(found, last, holdout, None, Budget())
+        return _Found(found, last, holdout, None, (time,))
     say("what is left")
-    larger = max(1.0, material.session.plant.model.nv / _SMALL)
     offers, budget = offers_of(found, material.candidates), Budget(larger * config.beyond_seconds)
     beyond = discover(last.problem, holdout, last.fit, material.typical, material.still, say, offers, budget)
     last = _with(beyond, last)
-    return _Found(with_named(found, last.fit), last, beyond.holdout, beyond, budget)
+    return _Found(with_named(found, last.fit), last, beyond.holdout, beyond, (time, budget))
 
 
 def _steps_of_encoders(session: Session, found: _Found) -> tuple[list[dict[str, Any]], list[Effect]]:

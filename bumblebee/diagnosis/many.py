@@ -9,22 +9,34 @@ all drives as far as these can tell.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, standard_covariance
+from bumblebee.diagnosis.eligible import is_chosen
+from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, project, solve, standard_covariance
 from bumblebee.diagnosis.holdout import Holdout
-from bumblebee.diagnosis.problem import Problem, window_weights
+from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
+from bumblebee.diagnosis.screen import screening_windows
+from bumblebee.diagnosis.slopes import clipped, columns_at, effects_at
+from bumblebee.errors import BadInput
+from bumblebee.sim.effects import Effect
 
 # PACE's set (Bjelonic et al. 2025: armature, damping, friction, offset, delay) and the drive's strength.
 KINDS = ("coulomb_friction", "viscous_friction", "armature", "motor_strength", "encoder_offset")
 WHOLE = ("command_delay",)
+BODIES = ("link_mass", "link_com")
 _DAMPING = 1e-3
-_SURE = 4.0  # standard errors
+_SURE, _SURE_OF_BODY = 4.0, 5.0  # standard errors
 _TRIFLE = 0.02  # share of a change that matters
 _ROUNDS = 3
+_STEPS, _MORE = 9, 5  # of the way, and of that with the links
+_STIFF, _STILL, _FREE = 100.0, 0.995, 10.0  # damping and share of the cost that end it; changes that matter
+_WINDOWS = 60  # that the way from the declared values is gone on
 _MUCH = 0.1  # fall of log(1 + chi-square)
+_SMALL = 12  # degrees of freedom up to which links are asked, too
+_LEFT = 2.0  # median chi-square beside the joints' effects, above which they are
 
 
 def usual_effects(candidates: Sequence[Candidate]) -> list[Candidate]:
@@ -32,44 +44,144 @@ def usual_effects(candidates: Sequence[Candidate]) -> list[Candidate]:
     return [c for c in candidates if (c.effect in KINDS and c.where) or (c.effect in WHOLE and not c.where)]
 
 
-def fit_many(problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None]) -> Fit | None:
-    """A fit of the usual effects, and of the others that were `found`, that are sure together; None where none is.
+def is_whole(c: Candidate) -> bool:
+    """Whether a mass takes the moments along, as another link of the same shape would; other effects do."""
+    return c.effect != "link_mass" or c.step[1] != 0
 
-    The usual ones start from the declared values.
+
+def fit_many(problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None]) -> Fit | None:
+    """A fit of the usual effects, from the declared values on, that are sure together; None where none is.
+
+    Or from those that were `found` on, beside the others that were, if this leads nearer to the data. The long way is
+    gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot that is still
+    far from the data masses and centres of mass follow, all at once.
     """
     usual = usual_effects(candidates)
-    others = [c for c in found.chosen if c not in usual]
     if not usual:
         return None
-    fit = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
-    weights = window_weights(fit.clean(problem))
-    chosen = [*usual, *others]
-    values = np.concatenate([*(c.nominal for c in usual), *(found.of(c) for c in others)])
-    for _ in range(_ROUNDS):
-        fit = gauss_newton(problem, chosen, values, weights, iterations=3, coarse=True, damping=_DAMPING)
-        values, weights = fit.values, window_weights(fit.clean(problem))
-    say(f"{len(chosen)} usual effects together: chi-square {fit.power(problem):.3g}")
-    while len(fit.chosen):
-        z = certainty(problem, fit, weights)
-        least = _least_sure(fit.chosen, z)
-        if not least:
-            return fit
-        keep = [c for k, c in enumerate(fit.chosen) if k not in least]
-        values = np.concatenate([np.empty(0), *(fit.of(c) for c in keep)])
-        fit = gauss_newton(problem, keep, values, weights, iterations=2, coarse=True, damping=_DAMPING)
+    some = problem.part(screening_windows(problem, _WINDOWS))
+    fit = _far(some, usual, np.concatenate([c.nominal for c in usual]))
+    if found.chosen:
+        there = {(c.effect, c.where) for c in found.chosen}
+        chosen = [*found.chosen, *(c for c in usual if (c.effect, c.where) not in there)]
+        values = np.concatenate((found.values, *(c.nominal for c in chosen[len(found.chosen) :])))
+        fit = min(fit, _far(some, chosen, values), key=lambda f: f.power(some))
+    say(f"{len(fit.chosen)} usual effects together: chi-square {fit.power(some):.3g}")
+    for kind in BODIES if problem.plant.model.nv <= _SMALL and not problem.plant.floating else ():
+        fit = _with_links(some, fit, [c for c in candidates if c.effect == kind and is_whole(c)], say)
+    return _sure_of(problem, surest(some, fit, window_weights(fit.clean(some))))
+
+
+def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Callable[[str], None]) -> Fit:
+    """The fit with one kind of effect on all links, if it is far from the data and they bring it nearer."""
+    bodies = [c for c in bodies if not is_chosen(c, fit.chosen)]
+    if not bodies or fit.power(problem) < _LEFT:
+        return fit
+    values = np.concatenate((fit.values, *(c.nominal for c in bodies)))
+    larger = _far(problem, [*fit.chosen, *bodies], values, _MORE)
+    say(f"{len(larger.chosen)} with {bodies[0].effect} on all links: chi-square {larger.power(problem):.3g}")
+    return larger if larger.power(problem) < (1 - _MUCH) * fit.power(problem) else fit
+
+
+def _far(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int = _STEPS) -> Fit:
+    """A fit from values (P,) that may be far off: Levenberg's and Marquardt's steps, windows weighed anew at each."""
+    fit = gauss_newton(problem, chosen, values, window_weights(problem.residual([effects_at(chosen, values)])[0]), 0)
+    damping, moving = _DAMPING, np.flatnonzero(fit.scales)
+    at = np.tile(fit.values, (len(moving), 1))
+    for _ in range(steps):
         weights = window_weights(fit.clean(problem))
-    return None
+        cost = cost_of(problem, fit.residual, weights)[0]
+        while damping < _STIFF:
+            trial = _moved(problem, fit, weights, damping)
+            residual = problem.residual([effects_at(chosen, trial)])[0]
+            new, nuisance = cost_of(problem, residual, weights)
+            if new < cost:
+                break
+            damping *= 10.0
+        else:
+            break
+        columns = columns_at(problem, chosen, trial, fit.scales, True, fit.columns, at)
+        fit, damping = Fit(fit.chosen, trial, nuisance, residual, columns, new), max(0.1 * damping, _DAMPING)
+        if new > _STILL * cost:
+            break
+    return fit
 
 
-def _least_sure(chosen: Sequence[Candidate], z: np.ndarray) -> set[int]:
-    """Of each place the effect that is least sure, if it is not: the next one there may be, without it."""
-    out = set()
-    for where in {c.where for c in chosen}:
-        there = [k for k, c in enumerate(chosen) if c.where == where]
-        worst = min(there, key=lambda k: z[k])
-        if z[worst] < _SURE:
-            out.add(worst)
-    return out
+def _moved(problem: Problem, fit: Fit, weights: np.ndarray, damping: float) -> np.ndarray:
+    """Values (P,) after one step; what the data hardly tell stays within ten changes that matter of where it is."""
+    basis, _ = project(problem, fit.columns, weights)
+    flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
+    normal, count = flat @ flat.T, len(problem.nuisance)
+    own = np.arange(len(normal))
+    power = max(float((weights[:, None] * fit.clean(problem) ** 2).mean()), 1.0)
+    normal[own[:count], own[:count]] += 1.0
+    normal[own[count:], own[count:]] += damping * normal[own[count:], own[count:]] + power / _FREE**2
+    move = np.linalg.solve(normal, flat @ (fit.residual * np.sqrt(weights)[:, None]).ravel())[count:]
+    values = fit.values.copy()
+    values[fit.scales > 0] += move * fit.scales[fit.scales > 0]
+    return clipped(fit.chosen, values)
+
+
+def _sure_of(problem: Problem, fit: Fit) -> Fit | None:
+    """The same effects fitted on all windows, less those that are not sure there."""
+    known = None
+    for _ in range(_ROUNDS):
+        if not fit.chosen:
+            return None
+        weights = window_weights(problem.residual([fit.effects])[0])
+        fit = gauss_newton(problem, fit.chosen, fit.values, weights, 2, coarse=True, damping=_DAMPING, known=known)
+        sure = surest(problem, fit, window_weights(fit.clean(problem)))
+        if sure.chosen == fit.chosen:
+            break
+        known, fit = fit, sure
+    return fit
+
+
+def surest(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
+    """The fit less what is not sure, the least sure first, the others moved by the slopes at `fit`."""
+    while fit.chosen:
+        z = certainty(problem, fit, weights) / [_SURE_OF_BODY if c.effect in BODIES else _SURE for c in fit.chosen]
+        least = int(np.argmin(z))
+        if z[least] >= 1.0:
+            break
+        fit = without_some(problem, fit, weights, {least})
+    return fit
+
+
+def without_some(problem: Problem, fit: Fit, weights: np.ndarray, gone: set[int]) -> Fit:
+    """The fit less the effects of the numbers `gone`, all by the slopes that it has: nothing is simulated."""
+    keep = [k for k in range(len(fit.chosen)) if k not in gone]
+    chosen = tuple(fit.chosen[k] for k in keep)
+    stays = np.concatenate([np.full(len(c.nominal), k not in gone) for k, c in enumerate(fit.chosen)])
+    moving = np.flatnonzero(fit.scales)
+    back = (fit.values - np.concatenate([c.nominal for c in fit.chosen]))[moving] / fit.scales[moving]
+    back[stays[moving]] = 0.0
+    residual = fit.residual + np.tensordot(back, fit.columns, axes=1)
+    columns = fit.columns[stays[moving]]
+    basis, inverse = project(problem, columns, weights)
+    move = solve(basis, inverse, residual, weights)
+    values, scales = fit.values[stays], fit.scales[stays]
+    wanted = values.copy()
+    wanted[scales > 0] += move[len(problem.nuisance) :] * scales[scales > 0]
+    wanted = clipped(chosen, wanted)
+    moved = ((wanted - values)[scales > 0]) / scales[scales > 0]
+    residual = residual - np.tensordot(moved, columns, axes=1)
+    cost, nuisance = cost_of(problem, residual, weights)
+    return Fit(chosen, wanted, nuisance, residual, columns, cost)
+
+
+def whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
+    """The problem whitened anew, its windows restarted, around a model with `effects`; only its nuisances if it falls.
+
+    Far from the declared model, starts that were moved to where it says that they were are not nearer to the truth.
+    """
+    p = problem
+    try:
+        steps, rng = (p.fine, p.coarse), np.random.default_rng(0)
+        made = make_problem(p.plant, p.layout, p.read, p.sigma, steps, effects, rng, p.finest)
+    except BadInput:  # it diverges in more than half of the windows
+        return problem.relinearised(effects)
+    return replace(made, between=problem.between)
 
 
 def pays_together(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bool:

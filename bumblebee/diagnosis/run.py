@@ -13,10 +13,11 @@ from bumblebee.diagnosis.eligible import is_chosen, is_like, is_promising
 from bumblebee.diagnosis.far import far_servos
 from bumblebee.diagnosis.fit import Fit, cost_of, effects_at, gauss_newton, resolved, typical_power
 from bumblebee.diagnosis.gains import plain_gains
+from bumblebee.diagnosis.groups import beside_each_other, fitted_with
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.limits import pays_where_felt, pays_where_rare
-from bumblebee.diagnosis.many import certainty, fit_many, pays_together
+from bumblebee.diagnosis.many import certainty, fit_many, pays_together, whitened_around
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.scores import Columns, Scores, score_tests
 from bumblebee.diagnosis.screen import pulse_sizes, restless, screen, screening_windows
@@ -83,7 +84,7 @@ class Run:
         self.loss: Loss | None = None
         self.given = 0
         self.tried_many, self.patience = False, config.patience
-        self.fall = 1.0
+        self.fall, self.groups = 1.0, True
         self.candidates, _ = remake([])
         self.start_far()
         self.rescreen()
@@ -234,24 +235,54 @@ class Run:
     def start_many(self) -> bool:
         """Begin anew with the usual effects of all joints, where some effects leave the data far from the model.
 
-        Only if the last of these explained little: else the next may explain the rest.
+        Only if the last of these explained little, or they are very far: else the next may explain the rest.
         """
-        enough = len(self.fit.chosen) >= _SOME and self.fall < _LITTLE
-        if self.tried_many or self.given or not enough or self.power() < self.config.many:
+        if self.tried_many or self.given or len(self.fit.chosen) < _SOME or self.power() < self.config.many:
+            return False
+        if self.fall >= _LITTLE and self.power() < self.config.far:
             return False
         self.tried_many = True
         fit = fit_many(self.problem, self.candidates, self.fit, self.say)
         if fit is None or not pays_together(self.problem, self.holdout, self.fit, fit):
             return False
+        self.problem = whitened_around(self.problem, fit.effects)
+        if self.holdout.problem is not None:
+            self.holdout = replace(self.holdout, problem=whitened_around(self.holdout.problem, fit.effects))
+        self.keep = screening_windows(self.problem, self.config.screen_windows)
+        weights = window_weights(self.problem.residual([fit.effects])[0])
+        fit = gauss_newton(self.problem, fit.chosen, fit.values, weights, iterations=2, coarse=True)
         weights = window_weights(fit.clean(self.problem))
         z = certainty(self.problem, fit, weights)
         self.steps = [evidence(c, float(least), len(self.candidates)) for c, least in zip(fit.chosen, z, strict=True)]
-        self.say(f"begun anew with {len(fit.chosen)} effects together")
-        self.screened_cost = np.inf
+        self.say(f"begun anew with {len(fit.chosen)} effects together: chi-square {fit.power(self.problem):.3g}")
         self.closed.clear()
         self.hopeless.clear()
         self.given, self.patience = len(fit.chosen), min(self.patience, _PATIENCE)
+        self.weights, self.fit = weights, fit
+        self.rescreen()
+        return True
+
+    def add_group(self) -> bool:
+        """Several effects together, where many were already fitted together; whether some were accepted."""
+        if not (self.tried_many and self.given) or not self.groups:
+            return False
+
+        def is_open(c: Candidate, tests: Scores, k: int) -> bool:
+            return self.is_open(c, tests, k, self.bound, len(self.keep) / len(self.problem.windows))
+
+        new = beside_each_other(self.small, self.columns, self.small_fit(), self.weights[self.keep], is_open)
+        self.say(f"{len(new)} of {len(self.candidates)} candidates beside each other")
+        fit, weights = fitted_with(self.problem, self.fit, new, self.bound)
+        added = fit.chosen[len(self.fit.chosen) :]
+        pays = len(added) > 1 and self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain)
+        self.groups = pays and is_physical(self.problem, self.fit, fit, added[0], weights)
+        if not self.groups:
+            return False
+        for k, c in enumerate(added, len(self.fit.chosen)):
+            self.steps.append(evidence(c, wald(self.problem, fit, weights, k), len(self.candidates)))
+            self.say(f"found {c.effect} on {c.where or 'the whole robot'}: {fit.of(c).round(5)}")
         self.renew(fit)
+        self.rescreen()
         return True
 
     def find_loss(self) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.acceptance import Step
 from bumblebee.diagnosis.arrivals import Loss
+from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.exchange import creeping, exchange
 from bumblebee.diagnosis.fit import Fit
@@ -55,19 +56,23 @@ def search(
     remake: Callable[[Sequence[Effect]], tuple[list[Candidate], np.ndarray]],
     config: SearchConfig,
     say: Callable[[str], None] = lambda text: None,
+    budget: Budget | None = None,
 ) -> Search:
     """Forward selection with joint refits, then pruning.
 
     `remake` gives the candidates with steps for a model with some effects, and its joints' typical torques (J,) [N m].
     """
-    run = Run(problem, holdout, remake, config, say)
-    _select(run, config)
+    run, budget = Run(problem, holdout, remake, config, say), budget or Budget()
+    _select(run, config, budget)
     if run.find_loss():
-        _select(run, config)
+        _select(run, config, budget)
     for _ in range(_EXCHANGES):
+        if not budget.has_time_for("other names in the place of those found"):
+            break
+        say("each name against its rivals")
         if not (exchange(run) or creeping(run)):
             break
-        _select(run, config)
+        _select(run, config, budget)
     run.prune()
     run.plain()
     steps = [s for s in run.steps if s.candidate in run.fit.chosen]
@@ -86,12 +91,16 @@ def search(
     )
 
 
-def _select(run: Run, config: SearchConfig) -> None:
-    """Forward selection until nothing is worth a trial, or too many in a row were in vain."""
+def _select(run: Run, config: SearchConfig, budget: Budget) -> None:
+    """Forward selection until nothing is worth a trial, too many in a row were in vain, or the time is over."""
     vain, judged, limits = 0, None, []
     while len(run.fit.chosen) < config.most + run.given and vain < run.patience:
+        if not budget.has_time_for("more effects"):
+            break
         tried, looked = [], []
         run.start_many()
+        while run.add_group():
+            vain = 0
         if not run.given:
             tried = far_trials(run.problem, run.fit, run.candidates, run.weights, config.far)
             tried = [t for t in tried if t.candidate not in run.closed]

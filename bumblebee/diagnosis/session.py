@@ -13,7 +13,7 @@ from bumblebee.diagnosis.noise import estimate_noise
 from bumblebee.diagnosis.plant import Plant, load_spec, make_plant
 from bumblebee.diagnosis.repeats import motion_names
 from bumblebee.diagnosis.signals import Layout, layout_of
-from bumblebee.diagnosis.simulate import step_for
+from bumblebee.diagnosis.simulate import longest_step, step_for
 from bumblebee.diagnosis.smooth import HALF_SPAN, smooth_rollouts
 from bumblebee.diagnosis.unlogged import refuse_unlogged
 from bumblebee.errors import BadInput
@@ -129,7 +129,7 @@ def make_session(
         notes.append("a single rollout: nothing could be held out; errors are those of the fitted data")
     period = float(np.median(np.diff(long[0].time)))
     declared = float(spec.option.timestep)
-    steps = (step_for(period, min(_FINE, declared)), step_for(period, _COARSE))
+    steps = (step_for(period, min(_FINE, declared)), longest_step(period, _COARSE))
     small = plant.model.nv <= _SMALL
     search_step = steps[0] if small else max(steps[0], step_for(period, min(_SEARCH, declared)))
     sigma = estimate_noise(long, layout)

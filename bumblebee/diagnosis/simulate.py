@@ -29,6 +29,7 @@ THREADS: int | None = None
 """Threads of every simulation; None: see `threads`."""
 _MOST_THREADS = 32
 _CHUNK_BYTES = 48e6
+_UNEVEN = 0.02  # of a step: a median of uneven stamps is no whole number of milliseconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +49,13 @@ def threads() -> int:
 
 
 def step_for(windows_period: float, longest: float) -> float:
-    """The longest step not above `longest` of which a whole number fits the control period [s]."""
-    return windows_period / max(1, int(np.ceil(windows_period / longest - 1e-9)))
+    """The longest step of which a whole number fits the control period [s], above `longest` by a trifle at most."""
+    return windows_period / max(1, int(np.ceil(windows_period / longest - _UNEVEN)))
+
+
+def longest_step(windows_period: float, longest: float) -> float:
+    """The same for sensitivities, of several control periods where these are shorter [s]."""
+    return max(1, int(longest / windows_period + _UNEVEN)) * step_for(windows_period, longest)
 
 
 def residuals(

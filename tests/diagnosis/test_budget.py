@@ -21,6 +21,26 @@ def test_what_has_no_time_is_written_down_once() -> None:
     assert note.endswith("not tried: a law on b; a law on c") and "10 s" in note
 
 
+def test_the_note_says_which_search_was_cut_and_by_what_setting() -> None:
+    now = [0.0]
+    budget = Budget(60.0, "among the catalogue's effects", "search_seconds", clock=lambda: now[0])
+    now[0] = 61.0
+    assert not budget.has_time_for("more effects")
+    (note,) = budget.notes()
+    assert (
+        note
+        == "the search among the catalogue's effects was cut after 60 s (`search_seconds`); not tried: more effects"
+    )
+
+
+def test_a_search_without_time_ends_and_says_so() -> None:
+    made = make_session(mujoco.MjSpec.from_string(cart.xml()), cart.record(cubic=0.6), "cart", "memory")
+    few = {"max_windows": 30, "max_holdout_windows": 15, "report_windows": 6, "grow": False, "beyond": False}
+    found = diagnose(made, DiagnosisConfig(**few, search_seconds=0.0)).document
+    assert not found["effects"]
+    assert [note for note in found["notes"] if "search_seconds" in note and "more effects" in note]
+
+
 def test_without_a_limit_there_is_always_time() -> None:
     assert Budget().has_time_for("anything") and not Budget().notes()
 
