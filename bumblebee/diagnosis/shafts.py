@@ -24,15 +24,14 @@ KIND = "series_elasticity"
 # What a shaft's swing passes for.
 LIKE = ("torque_lag", "encoder_delay", "command_delay", "armature", "kp", "kd", "series_elasticity")
 _JOINTS = 2  # tried where nothing else is worth a trial
-_WINDOWS, _FEW_WINDOWS, _FEW_JOINTS = 16, 8, 8  # fewer windows on robots of more joints
-# Stiffnesses in units of the servo's, by where the encoder is: on the motor, on the joint. Behind a soft shaft a servo
-# that reads the joint shakes it.
-_FIRST, _LAST, _RATIO = 110.0, (3.0, 5.0), 1.18
+_FEW, _SOME = 8, 16  # windows for the series; to refine the best of it
+# Stiffnesses in units of the servo's: the first; where steps get finer; the last, by where the encoder is; the ratios.
+_FIRST, _CLOSE, _LAST, _WIDE, _FINE = 110.0, 40.0, (3.0, 8.0), 1.18, 1.09
 _NONE = 1e-4  # of the servo's compliance: as good as stiff
 _DAMPING = 0.1  # of the critical one of the rotor on the shaft, tried first
 _WORTH, _PART, _BETTER, _ALONE = 40.0, 15.0, 5, 0.5  # fall of the cost; on those tried; windows; share one may have
 _STEP = 0.2  # of the compliance: five times what sensitivities are differences of
-_UNEASY = 3.0  # standard errors by which a joint's own readings must be off
+_UNEASY, _MOST = 2.0, 4.0  # standard errors by which a joint must be off; times noise a window counts at most
 
 
 def shaft_trials(
@@ -44,7 +43,8 @@ def shaft_trials(
     """
     clean = fit.clean(problem)
     own, freedom = joint_chi_squares(problem, clean)
-    off = (own / max(typical_power(clean), 1.0) - freedom).sum(axis=0) / np.sqrt(2.0 * freedom * len(own))
+    own = np.minimum(own / max(typical_power(clean), 1.0), _MOST * freedom)  # a contact spoils a few windows
+    off = (own - freedom).sum(axis=0) / np.sqrt(2.0 * freedom * len(own))
     for j in np.argsort(-off)[:_JOINTS]:
         where = problem.plant.joints[j]
         if off[j] < _UNEASY or (KIND, where) in hopeless:
@@ -66,10 +66,10 @@ def best_shaft(
     clean = fit.clean(problem)
     usual = max(typical_power(clean), 1.0)
     chi, _ = joint_chi_squares(problem, clean)
-    count = _WINDOWS if len(problem.plant.joints) <= _FEW_JOINTS else _FEW_WINDOWS
-    odd = np.sort(np.argsort(-chi[:, problem.plant.joints.index(where)])[:count])
+    odd = np.argsort(-chi[:, problem.plant.joints.index(where)])
+    few, some = (problem.part(np.sort(odd[:count])) for count in (_FEW, _SOME))
     kinds = [c for c in candidates if (c.effect, c.where) == (KIND, where) and not is_chosen(c, fit.chosen)]
-    found = [(*_sought(problem.part(odd), fit, c, usual), c) for c in kinds]
+    found = [(*_sought(few, some, fit, c, usual), c) for c in kinds]
     if not found:
         return None
     gain, values, c = max(found, key=lambda f: f[0])
@@ -84,35 +84,43 @@ def best_shaft(
     return Trial(own, values, beside.cost(after), beside.left(fit.residual - after))
 
 
-def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tuple[float, np.ndarray]:
-    """The best of the series on some windows: its gain and parameters (P,)."""
-    none = some.residual([_with(fit, candidate, _stiff(some.plant, candidate))])[0]
-    soft = 1.0 / _servo(some.plant, candidate.where)
-    rotor = float(some.plant.model.dof_armature[some.plant.dof[some.plant.joints.index(candidate.where)]])
+def _sought(few: Problem, some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tuple[float, np.ndarray]:
+    """The best of the series on the `few` windows, refined on `some`: its gain there and parameters (P,)."""
+    plant = some.plant
+    soft = 1.0 / _servo(plant, candidate.where)
+    rotor = float(plant.model.dof_armature[plant.dof[plant.joints.index(candidate.where)]])
 
-    def at(compliance: float, damping: float = _DAMPING) -> np.ndarray:
+    def at(compliance: float) -> np.ndarray:
         values = candidate.start
-        values[0], values[2] = compliance, 2 * damping * np.sqrt(rotor * compliance) or values[2]
+        values[0], values[2] = compliance, 2 * _DAMPING * np.sqrt(rotor * compliance) or values[2]
         return values
 
-    def best_of(tried: Sequence[np.ndarray]) -> tuple[float, np.ndarray]:
-        residuals = some.residual([_with(fit, candidate, v) for v in tried])
-        worth = [float(falls(some, none, r, usual).sum()) for r in residuals]
+    def best_of(problem: Problem, tried: Sequence[np.ndarray]) -> tuple[float, np.ndarray]:
+        none, *others = problem.residual([_with(fit, candidate, v) for v in (_stiff(plant, candidate), *tried)])
+        worth = [float(falls(problem, none, r, usual).sum()) for r in others]
         k = int(np.argmax(worth))
         return worth[k], tried[k]
 
-    def scaled(values: np.ndarray, compliance: float = 1.0, loss: float = 1.0) -> np.ndarray:
-        return values * np.array([compliance, 1.0, loss, 1.0])
+    best = best_of(few, [at(soft / stiffness) for stiffness in series(bool(candidate.step[1]))])
+    if best[0] < 0:
+        return best
+    best = best_of(some, [best[1]])
+    for ratio in (_FINE**0.5, _FINE**0.25):
+        factors = [(ratio, 1.0), (1 / ratio, 1.0), (1.0, 0.6), (1.0, 1.7)]  # on compliance and loss
+        near = [best[1] * np.array([a, 1.0, b, 1.0]) for a, b in factors]
+        best = max(best, best_of(some, near), key=lambda f: f[0])
+    return best
 
-    count = int(np.log(_FIRST / _LAST[int(candidate.step[1])]) / np.log(_RATIO)) + 1
-    found = best_of([at(soft / _FIRST * _RATIO**k) for k in range(count)])
-    if found[0] < -usual * none.shape[1]:
-        return found
-    for ratio in (_RATIO**0.5, _RATIO**0.25):
-        near = [scaled(found[1], ratio), scaled(found[1], 1 / ratio)]
-        near += [scaled(found[1], loss=f) for f in (0.6, 1.7)]
-        found = max(found, best_of(near), key=lambda f: f[0])
-    return found
+
+def series(on_joint: bool) -> np.ndarray:
+    """Stiffnesses (K,) that are tried, in units of the servo's, by where the encoder is.
+
+    Behind a soft shaft a servo that reads the joint shakes it; shortly before it does, the swing lasts long.
+    """
+    wide = np.geomspace(_FIRST, _CLOSE, round(np.log(_FIRST / _CLOSE) / np.log(_WIDE)), endpoint=False)
+    last = _LAST[int(on_joint)]
+    ratio = _FINE if on_joint else _WIDE
+    return np.concatenate((wide, np.geomspace(_CLOSE, last, round(np.log(_CLOSE / last) / np.log(ratio)) + 1)))
 
 
 def _servo(plant: Plant, where: str) -> float:

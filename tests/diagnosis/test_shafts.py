@@ -1,4 +1,4 @@
-"""A shaft is found by trying many stiffnesses, in the place of what its swing passes for, and none where there is none."""
+"""Shafts are found where their swing passes for something else, and none is found in noise."""
 
 import pytest
 
