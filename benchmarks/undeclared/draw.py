@@ -1,12 +1,13 @@
 """One case drawn: the true robot's laws with their sizes, its flights, and rollouts with noise."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.undeclared.detectable import Eye, make_eye, minimal_size
+from benchmarks.undeclared.detectable import CHI2, Eye, chi_square, make_eye, minimal_size
 from benchmarks.undeclared.excite import HZ, Plan, make_plan
 from benchmarks.undeclared.flight import Flight, fly, rollouts
 from benchmarks.undeclared.kinds import KINDS, Place, places
@@ -18,6 +19,7 @@ from bumblebee.measured.rollout import Rollout
 SECONDS = {"arm": 5.0, "stand": 6.0, "track": 6.0}
 JUDGES = 3  # rollouts that no method sees, for the error
 _PLACES = 8  # tries to find a place where the wanted size is still this robot
+_LARGER, _GROWTH, _HALF = 4, 1.3, 0.5  # tries to find a size that is seen, each so much larger; share that is asked
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,7 @@ def draw(case: Case, seed: int, policy: Path | None = None) -> Drawn:
     laws: list[Law] = []
     if case.kinds:
         null = run([])
-        eye = make_eye(robot, case.noise)
+        eye = make_eye(robot, null, case.noise, np.random.default_rng(seeds[4]))
         for name in case.kinds:
             entry, law = _one(name, case, robot, null, eye, run, rng)
             truth.append(entry)
@@ -74,6 +76,8 @@ def _one(
         least = minimal_size(eye, make, first, most, kind.least(place))
         least = max(least, kind.events / max(float(null.alive.sum()), 1.0))
         size = float(np.clip(case.ratio * least, kind.least(place), most))
+        if kind.least(place) > 0:
+            size = _shown(eye, make, size, most, min(case.ratio, size / least))
         ratio = size / least if np.isfinite(least) else 0.0
         if best is None or ratio > best[0]:
             best = (ratio, place, size, least)
@@ -94,6 +98,18 @@ def _one(
         "group": kind.group,
     }
     return entry, law
+
+
+def _shown(eye: Eye, make: Callable[[float], Flight], size: float, most: float, ratio: float) -> float:
+    """The size, or the next larger one at which an effect that may swing shows as half of `ratio` says it should.
+
+    A stiff shaft that swings can be seen where one half as stiff, which does not, is not.
+    """
+    for _ in range(_LARGER):
+        if size >= most or chi_square(eye, make(size)) >= CHI2 * (_HALF * ratio) ** 2:
+            break
+        size = min(_GROWTH * size, most)
+    return size
 
 
 def _place(where: str, name: str, robot: Declared, null: Flight, rng: np.random.Generator) -> Place:

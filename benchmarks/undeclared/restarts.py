@@ -80,6 +80,10 @@ class Windows:
         """(W, 2 nv) a draw of the starts' noise."""
         return self.sigma * rng.standard_normal((len(self.picks), 2 * self.model.nv))
 
+    def read(self, rng: np.random.Generator) -> np.ndarray:
+        """(W, E) a draw of the compared readings' noise."""
+        return np.tile(self.sigma, len(TICKS)) * rng.standard_normal((len(self.picks), len(TICKS) * len(self.sigma)))
+
     def without(self, off: np.ndarray) -> np.ndarray:
         """Errors of the robot without effects, its starts off by (W, 2 nv)."""
         # The same steps as with the effect, of which they are no part.
@@ -128,7 +132,7 @@ class Windows:
 
         return self._compared(hold, lambda: (batch.bind("qpos"), batch.bind("qvel")), self.target)
 
-    def roots(self, rng: np.random.Generator, more: np.ndarray) -> np.ndarray:
+    def roots(self, rng: np.random.Generator, more: np.ndarray | float = 0.0) -> np.ndarray:
         """(W, E, E) that whiten each window: start noise as the declared model passes it on, noise of readings, `more`.
 
         The starts' coordinates are moved together, by signs from a Hadamard matrix: where the model is linear the

@@ -71,7 +71,7 @@ def test_play_is_guessed_to_touch_where_the_torque_points(on_motor):
 
 def test_shorter_steps_of_the_truth_are_no_effect():
     plan = make_plan(ARM, 2, 2.0, np.random.default_rng(0))
-    eye = make_eye(ARM, 1.0)
+    eye = make_eye(ARM, fly(ARM, [], plan, np.random.default_rng(1)), 1.0, np.random.default_rng(2))
     law = EncoderOffset("roll", 0.0)
     law.parts = 4
     assert chi_square(eye, fly(ARM, [law], plan, np.random.default_rng(1))) < 0.1
@@ -79,7 +79,7 @@ def test_shorter_steps_of_the_truth_are_no_effect():
 
 def test_what_not_even_the_true_law_explains_counts_for_nothing():
     plan = make_plan(ARM, 2, 2.0, np.random.default_rng(0))
-    eye = make_eye(ARM, 1.0)
+    eye = make_eye(ARM, fly(ARM, [], plan, np.random.default_rng(1)), 1.0, np.random.default_rng(2))
     flight = fly(ARM, [Backlash("yaw", 0.02, True)], plan, np.random.default_rng(1))
     assert chi_square(eye, flight) > 100.0
     lost = [tuple(Backlash("yaw", 0.0, True) for _ in moment) for moment in flight.laws]

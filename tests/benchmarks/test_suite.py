@@ -91,7 +91,7 @@ def seen():
 
 def test_chi_square_is_that_of_a_linear_effect_and_none_without_one(seen):
     robot, run = seen
-    eye = make_eye(robot, 1.0)
+    eye = make_eye(robot, run(0.0), 1.0, np.random.default_rng(2))
     assert chi_square(eye, run(0.0)) < 1e-6
     small, twice = chi_square(eye, run(0.05)), chi_square(eye, run(0.1))
     assert twice / small == pytest.approx(4.0, rel=0.1)
@@ -101,7 +101,7 @@ def test_the_minimal_size_has_the_stated_chi_square_and_grows_with_the_noise(see
     robot, run = seen
     sizes = []
     for noise in (1.0, 3.0):
-        eye = make_eye(robot, noise)
+        eye = make_eye(robot, run(0.0), noise, np.random.default_rng(2))
         size = minimal_size(eye, run, 0.1, 3.0)
         assert chi_square(eye, run(size)) == pytest.approx(CHI2, rel=0.2)
         sizes.append(size)
@@ -119,5 +119,8 @@ def test_readings_on_a_grid_show_it_where_the_noise_is_finer():
 def test_a_turn_of_the_imu_of_a_micrometre_in_the_feet_is_not_seen():
     robot = declared("stand")
     plan = make_plan(robot, 1, 2.0, np.random.default_rng(0))
-    eye, run = make_eye(robot, 1.0), lambda angle: fly(robot, [ImuOffset(0, angle)], plan, np.random.default_rng(1))
+    eye, run = (
+        make_eye(robot, fly(robot, [], plan, np.random.default_rng(1)), 1.0, np.random.default_rng(2)),
+        lambda angle: fly(robot, [ImuOffset(0, angle)], plan, np.random.default_rng(1)),
+    )
     assert chi_square(eye, run(2e-6)) < 0.1 < 25 < chi_square(eye, run(5e-3))
