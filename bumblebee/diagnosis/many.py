@@ -85,7 +85,8 @@ def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Ca
 
 def _far(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int = _STEPS) -> Fit:
     """A fit from values (P,) that may be far off: Levenberg's and Marquardt's steps, windows weighed anew at each."""
-    fit = gauss_newton(problem, chosen, values, window_weights(problem.residual([effects_at(chosen, values)])[0]), 0)
+    weights = window_weights(problem.residual([effects_at(chosen, values)])[0])
+    fit = gauss_newton(problem, chosen, values, weights, iterations=0, coarse=True)
     damping, moving = _DAMPING, np.flatnonzero(fit.scales)
     at = np.tile(fit.values, (len(moving), 1))
     for _ in range(steps):
