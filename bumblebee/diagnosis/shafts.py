@@ -31,7 +31,7 @@ _NONE = 1e-4  # of the servo's compliance: as good as stiff
 _DAMPING = 0.1  # of the critical one of the rotor on the shaft, tried first
 _WORTH, _PART, _BETTER, _ALONE = 40.0, 15.0, 5, 0.5  # fall of the cost; on those tried; windows; share one may have
 _STEP = 0.2  # of the compliance: five times what sensitivities are differences of
-_UNEASY, _MOST = 2.0, 4.0  # standard errors by which a joint must be off; times noise a window counts at most
+_UNEASY, _MOST = 3.0, 4.0  # standard errors by which a joint must be off; times noise a window counts at most
 
 
 def shaft_trials(
