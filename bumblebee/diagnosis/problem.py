@@ -89,8 +89,10 @@ class Problem:
         """Change of the prediction for one step of each free parameter, (F, W, M), simulated in coarse steps."""
         return self.sensitivities([candidate], base)
 
-    def sensitivities(self, candidates: Sequence[Candidate], base: Sequence[Effect] = ()) -> np.ndarray:
-        """The columns of several candidates, one after the other, (sum of F, W, M)."""
+    def sensitivities(
+        self, candidates: Sequence[Candidate], base: Sequence[Effect] = (), tame: bool = True
+    ) -> np.ndarray:
+        """The columns of several candidates, one after the other, (sum of F, W, M); tamed if that is not left to do."""
         moves = [(c, f) for c in candidates for f in range(len(c.free))]
         kinds = [e.effect for e in base]
         coarse = np.array([rough([*kinds, c.effect]) for c, _ in moves], dtype=bool)
@@ -104,7 +106,7 @@ class Problem:
                     [*without(base, moves[k][0]), moves[k][0].at(moves[k][0].moved(moves[k][1], 1.0))] for k in part
                 ]
                 change = reference - self.residual(sets, coarse=few)
-                out[part] = self.tamed(change) if few else change
+                out[part] = self.tamed(change) if few and tame else change
         return out
 
     def tamed(self, change: np.ndarray) -> np.ndarray:

@@ -20,7 +20,8 @@ from bumblebee.diagnosis.limits import pays_where_felt, pays_where_rare
 from bumblebee.diagnosis.many import certainty, fit_many, pays_together, whitened_around
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.scores import Columns, Scores, score_tests
-from bumblebee.diagnosis.screen import pulse_sizes, restless, screen, screening_windows
+from bumblebee.diagnosis.screen import Answered, pulse_sizes, restless, screen, screening_windows
+from bumblebee.diagnosis.stages import Stages
 from bumblebee.diagnosis.trials import Trial, try_one
 from bumblebee.sim.effects import Effect
 
@@ -78,7 +79,8 @@ class Run:
         self.keep = screening_windows(problem, config.screen_windows)
         self.closed: set[Candidate] = set()
         self.hopeless: set[tuple[str, str]] = set()  # limits (effect, joint) that only spoilt more when they were tried
-        self.changes, self.slopes = Changes(), Changes()
+        self.changes, self.stages = Changes(), Stages(problem, self.keep)
+        self.answers: Answered | None = None
         self.steps: list[Step] = []
         self.rejected: list[str] = []
         self.loss: Loss | None = None
@@ -94,9 +96,10 @@ class Run:
         """Candidates with steps for the present fit, and the columns of all of them around it."""
         self.small = self.problem.part(self.keep)
         self.candidates, torque = self.remake(self.fit.effects)
-        self.columns, self.answers = screen(
-            self.small, self.candidates, self.fit.effects, pulse_sizes(self.problem, torque)
-        )
+        known = None if self.answers is None else self.answers.on(self.problem)
+        sizes = pulse_sizes(self.problem, torque)
+        self.columns, white = screen(self.small, self.candidates, self.fit.effects, sizes, known)
+        self.answers = Answered(self.fit.effects, white, (self.problem.windows, self.problem.whitener))
         self.screened_cost = self.fit.cost
 
     def small_fit(self) -> Fit:
@@ -122,7 +125,7 @@ class Run:
                 if tests.gain[k] > sure and tests.z[k] > self.bound:
                     least = max(least, _FAINT * tests.gain[k])
         left = self.small_fit().clean(self.small)
-        poor = restless(self.small, self.answers, left, self.config.shortlist)
+        poor = restless(self.small, self.answers.white, left, self.config.shortlist)
         joints = len(self.problem.plant.joints)
         listed = [c for c in self.candidates if c.where in poor and shortlisted(c, joints)]
         listed = [c for c in listed if c not in self.closed and not is_chosen(c, self.fit.chosen)]
@@ -140,6 +143,8 @@ class Run:
         """Whether a candidate, number `k` of `tests`, is worth a trial and was not chosen or tried in vain."""
         if c in self.closed or is_chosen(c, self.fit.chosen):
             return False
+        if c.effect in LIMITS and tests.z[k] < bound:  # those that few windows feel have trials of their own
+            return False
         return is_promising(c, tests, k, bound, share, self.fit.cost, self.fit.cost / self.fit.residual.size)
 
     def trials(self) -> tuple[list[Trial], list[Candidate]]:
@@ -148,23 +153,32 @@ class Run:
         if not looked:
             return [], []
         self.say(f"{len(looked)} of {len(self.candidates)} candidates simulated on all windows")
-        tests = score_tests(self.problem, self.sensitivities(looked), self.fit, self.weights)
-        order = [k for k in np.argsort(-tests.gain) if self.is_open(looked[k], tests, k, self.bound, 1.0)]
+        left = self.left_over(looked)
+        if not left:
+            return [], looked
+        tests = score_tests(self.problem, self.sensitivities(left), self.fit, self.weights)
+        order = [k for k in np.argsort(-tests.gain) if self.is_open(left[k], tests, k, self.bound, 1.0)]
         joints, best = len(self.problem.plant.joints), max((tests.gain[k] for k in order), default=0.0)
-        faint = [k for k in order if tests.gain[k] < _FAINT * best and not shortlisted(looked[k], joints)]
-        order = [k for k in order if k not in faint][: self.config.trials]
-        looked_at = [c for k, c in enumerate(looked) if k not in faint]
-        tried = [try_one(self.problem, self.fit, looked[k], tests.steps[k], self.weights) for k in order]
-        return [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2], looked_at
+        faint = [k for k in order if tests.gain[k] < _FAINT * best and not shortlisted(left[k], joints)]
+        wait, order = [left[k] for k in faint], [k for k in order if k not in faint][: self.config.trials]
+        tried = [try_one(self.problem, self.fit, left[k], tests.steps[k], self.weights) for k in order]
+        tried = [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2]
+        return tried, [c for c in looked if c not in wait]
+
+    def left_over(self, looked: Sequence[Candidate]) -> list[Candidate]:
+        """Those of some candidates that as many windows as were screened do not speak against."""
+        self.stages = self.stages.on(self.problem, self.keep)
+        known, tests = self.stages.tests(self.problem, self.columns, looked, self.fit, self.weights)
+        share = len(self.stages.both) / len(self.problem.windows)
+        least = 0.7 * np.sqrt(share) * self.bound
+        gone = [c for k, c in enumerate(known) if not self.is_open(c, tests, k, least, share)]
+        return [c for c in looked if c not in gone]
 
     def sensitivities(self, looked: Sequence[Candidate]) -> Columns:
         """Columns of some candidates on all windows; of those near which nothing has changed, as they were."""
-        effects, known = self.fit.effects, self.slopes.on(self.problem)
-
-        def simulated(c: Candidate) -> np.ndarray:
-            return known.get(effects, c.where, (c,), lambda: self.problem.sensitivities([c], effects))
-
-        return Columns(looked, np.concatenate([simulated(c) for c in looked]))
+        self.stages = self.stages.on(self.problem, self.keep)
+        every = [self.stages.columns(self.problem, c, self.fit.effects) for c in looked]
+        return Columns(looked, np.concatenate(every))
 
     def accept(self, candidate: Candidate, values: np.ndarray) -> bool:
         """Refit with the candidate; keep it if the joint fit and the held-out windows agree."""

@@ -7,7 +7,8 @@ variance would count as noise that an effect acts more in some windows than in o
 standard errors behind a z of 4.
 """
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,7 +64,7 @@ def score_tests(problem: Problem, columns: Columns, fit: Fit, weights: np.ndarra
     basis, inverse = project(problem, fit.columns, weights)
     left = fit.residual - np.tensordot(solve(basis, inverse, fit.residual, weights), basis, axes=1)
     parts = _Parts(columns.values, basis, inverse, weights)
-    scores, slices = parts.scores(left), columns.slices
+    scores, slices = next(parts.scores(left[None])), columns.slices
     count = len(columns.candidates)
     steps, errors = [np.empty(0)] * count, [np.empty(0)] * count
     z, gain = np.zeros(count), np.zeros(count)
@@ -71,9 +72,8 @@ def score_tests(problem: Problem, columns: Columns, fit: Fit, weights: np.ndarra
     for size in np.unique(sizes):
         which = np.flatnonzero(sizes == size)
         rows = np.stack([np.arange(slices[c].start, slices[c].stop) for c in which])
-        curvature = np.stack([parts.curvature(slices[c]) for c in which])
-        own = np.stack([parts.by_window(slices[c]) for c in which])
-        tested = _tests(scores[rows], curvature, parts.raw[rows], own)
+        own = parts.by_window(rows)
+        tested = _tests(scores[rows], parts.curvature(rows, own), parts.raw[rows], own)
         for c, estimate, error in zip(which, tested[0], tested[1], strict=True):
             steps[c], errors[c] = estimate, error
         z[which], gain[which] = tested[2:]
@@ -84,41 +84,49 @@ class _Parts:
     """Columns with the basis taken out, without ever forming them."""
 
     def __init__(self, values: np.ndarray, basis: np.ndarray, inverse: np.ndarray, weights: np.ndarray) -> None:
-        self._flat, self._values, self._basis, self._weights = values.reshape(len(values), -1), values, basis, weights
-        weighted = (basis * weights[:, None]).reshape(len(basis), -1).astype(np.float32)
-        self._cross = (self._flat @ weighted.T).astype(float)
+        self._values, self._basis, self._weights = values, basis, weights
+        around = (basis * weights[:, None]).transpose(1, 2, 0).astype(np.float32)  # (W, M, B)
+        self._mixed = np.matmul(values.transpose(1, 0, 2), around).astype(float)  # (W, rows, B)
+        self._cross = self._mixed.sum(axis=0)
         self._shares = self._cross @ inverse
-        self._roots = np.sqrt(weights)[:, None, None].astype(np.float32)
-        self._around = self._roots * basis.transpose(1, 2, 0).astype(np.float32)  # (W, M, B)
-        self._normals = np.matmul(self._around.transpose(0, 2, 1), self._around).astype(float)  # (W, B, B)
-        self.raw = np.einsum("cwm,cwm,w->c", values, values, weights, optimize=True)
+        self._normals = np.matmul(basis.transpose(1, 0, 2).astype(np.float32), around).astype(float)  # (W, B, B)
+        self._power = np.einsum("cwm,cwm->cw", values, values) * weights
+        self.raw = self._power.sum(axis=1)
 
-    def scores(self, left: np.ndarray) -> np.ndarray:
-        """Scores (rows, W) of residuals (W, M) that are already free of the basis."""
-        part = (left * self._weights[:, None]).astype(np.float32)
-        own = np.matmul(self._values.transpose(1, 0, 2), part[:, :, None])[..., 0].T
-        return own - self._shares @ np.matmul(self._basis.transpose(1, 0, 2), part[:, :, None])[..., 0].T
+    def scores(self, left: np.ndarray) -> Iterator[np.ndarray]:
+        """Scores (rows, W) of each of some residuals (K, W, M) that are already free of the basis."""
+        part = (left * self._weights[:, None]).astype(np.float32).transpose(1, 2, 0)  # (W, M, K)
+        own = np.matmul(self._values.transpose(1, 0, 2), part)  # (W, rows, K)
+        around = np.matmul(self._basis.transpose(1, 0, 2).astype(np.float32), part)
+        for k in range(len(left)):
+            yield own[:, :, k].T - self._shares @ around[:, :, k].T
 
     def diagonal(self) -> np.ndarray:
         """Power (rows,) of every row beside the basis."""
         return self.raw - (self._shares * self._cross).sum(axis=1)
 
-    def curvature(self, rows: slice) -> np.ndarray:
-        """Normal matrix (F, F) of some rows beside the basis."""
-        flat = self._flat[rows]
-        if len(flat) == 1:
-            own = np.array([[self.raw[rows.start]]])
-        else:
-            own = (flat * np.repeat(self._weights, self._values.shape[2]).astype(np.float32)) @ flat.T
-        return own - self._shares[rows] @ self._cross[rows].T
+    def by_window(self, rows: np.ndarray) -> np.ndarray:
+        """Normal matrices (C, W, F, F), beside the basis, of C candidates' rows (C, F), of each window alone."""
+        count = rows.shape[1]
+        out = np.empty((len(rows), len(self._weights), count, count))
+        for f, g in itertools.combinations_with_replacement(range(count), 2):
+            a, b = rows[:, f], rows[:, g]
+            one = self._power[a] if f == g else self._product(a, b)
+            first, second = self._shares[a], self._shares[b]
+            mixed = (self._mixed[:, a] * second).sum(axis=2) + (self._mixed[:, b] * first).sum(axis=2)
+            both = (np.matmul(first, self._normals) * second).sum(axis=2)
+            out[:, :, f, g] = out[:, :, g, f] = one - (mixed - both).T
+        return out
 
-    def by_window(self, rows: slice) -> np.ndarray:
-        """Normal matrices (W, F, F) of some rows beside the basis, of each window alone."""
-        own = self._values[rows].transpose(1, 0, 2) * self._roots
-        shares = self._shares[rows]
-        mixed = np.matmul(np.matmul(own, self._around).astype(float), shares.T)
-        both = shares @ self._normals @ shares.T
-        return np.matmul(own, own.transpose(0, 2, 1)).astype(float) - mixed - mixed.transpose(0, 2, 1) + both
+    def curvature(self, rows: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Normal matrices (C, F, F) of rows (C, F) beside the basis and its prior, from `own` of `by_window`."""
+        cross, shares = self._cross[rows], self._shares[rows]
+        prior = cross - shares @ self._normals.sum(axis=0)
+        return own.sum(axis=1) + np.matmul(shares, prior.transpose(0, 2, 1))
+
+    def _product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Weighted products (C, W) of the rows `a` (C,) with the rows `b` (C,)."""
+        return np.einsum("cwm,cwm->cw", self._values[a], self._values[b]) * self._weights
 
 
 def _tests(
@@ -188,11 +196,12 @@ def null_maxima(problem: Problem, columns: Columns, fit: Fit, weights: np.ndarra
     parts = _Parts(columns.values, basis, inverse, weights)
     curvature = np.maximum(parts.diagonal(), 0.0)
     seen = (curvature > _SEEN * parts.raw) & (curvature > _LEAST_POWER)
-    own = np.array([parts.by_window(slice(r, r + 1))[:, 0, 0] for r in np.flatnonzero(seen)]).reshape(seen.sum(), -1)
+    own = parts.by_window(np.flatnonzero(seen)[:, None])[..., 0, 0]
     pull = own / curvature[seen, None]
     out = np.zeros(len(draws))
-    for k, draw in enumerate(draws):
-        scores = parts.scores(draw - np.tensordot(solve(basis, inverse, draw, weights), basis, axes=1))[seen]
+    free = [draw - np.tensordot(solve(basis, inverse, draw, weights), basis, axes=1) for draw in draws]
+    for k, drawn in enumerate(parts.scores(np.stack(free))):
+        scores = drawn[seen]
         left = (scores - pull * scores.sum(axis=1, keepdims=True)) / (1 + _LONE - pull)
         spread = (left**2).sum(axis=1) + ((pull * scores) ** 2).sum(axis=1)
         z = np.abs(scores.sum(axis=1)) / np.sqrt(np.maximum(spread, 0.25 * curvature[seen]))

@@ -96,10 +96,10 @@ def read_term(text: str) -> Term:
     except (ValueError, SyntaxError, RecursionError, MemoryError) as error:
         names = ", ".join((*OWN, *_FUNCTIONS, *_SHAPED, *STATES, "curve", "friction"))
         raise BadInput(f"term {text[:60]!r}", f"a formula of {names}", str(error)[:80]) from None
-    inside = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Subscript)}
-    inside |= {id(n.slice) for n in ast.walk(tree) if isinstance(n, ast.Subscript)}
-    used = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in OWN and id(n) not in inside}
-    calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)]
+    nodes = list(ast.walk(tree))
+    inside = {id(part) for n in nodes if isinstance(n, ast.Subscript) for part in (n.value, n.slice)}
+    used = {n.id for n in nodes if isinstance(n, ast.Name) and n.id in OWN and id(n) not in inside}
+    calls = [n for n in nodes if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)]
     states = {_state(n): tuple(_number(a) for a in n.args) for n in calls if n.func.id in STATES}
     return Term(text, rubs, tuple(dict.fromkeys(others)), frozenset(used), tuple(states.items()), tree)
 
