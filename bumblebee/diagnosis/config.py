@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from bumblebee.diagnosis.search import SearchConfig
+from bumblebee.diagnosis.search_config import SearchConfig
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The state of one search: what is chosen, what is left to try, and the moves from one state to the next."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from bumblebee.diagnosis.many import certainty, fit_many, pays_together, whitene
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.scores import Columns, Scores, score_tests
 from bumblebee.diagnosis.screen import Answered, pulse_sizes, restless, screen, screening_windows
+from bumblebee.diagnosis.search_config import SearchConfig
 from bumblebee.diagnosis.stages import Stages
 from bumblebee.diagnosis.trials import Trial, try_one
 from bumblebee.sim.effects import Effect
@@ -31,34 +32,6 @@ _LITTLE = 0.5  # share of the median chi-square that the last of them took at mo
 _PATIENCE = 2  # rounds that may fail once many were fitted together
 _FAINT = 0.15  # share of the best candidate's gain, below which another can wait for a later round
 _CHANGED = 0.8  # share of the cost that a fit must leave less of, to be worth linearising around
-
-
-@dataclass(frozen=True)
-class SearchConfig:
-    """How strict and how long the search is."""
-
-    level: float = 0.005
-    """False alarms allowed for a whole null dataset, shared among the candidates (Bonferroni, or by simulation)."""
-    screen_windows: int = 40
-    """Windows that all candidates are screened on."""
-    simulated: int = 10
-    """Best candidates of the screening a round, whose sensitivities are simulated on all windows."""
-    trials: int = 4
-    """Candidates a round that are tried at their size in the simulator."""
-    shortlist: int = 2
-    """Joints a round on which play and flexible shafts are tried."""
-    most: int = 24
-    """Effects at most, beside those that the search began with."""
-    patience: int = 4
-    """Rounds that may fail, one after the other, before the search ends."""
-    holdout_z: float = 2.0
-    """Held-out gain must exceed this many of its standard errors."""
-    least_gain: float = 0.01
-    """Held-out gain must exceed this share of what all effects gain together: no law is exactly the catalogue's."""
-    far: float = 30.0
-    """Median chi-square above which gains far from the declared ones are tried first."""
-    many: float = 4.0
-    """Median chi-square above which, after two effects, the second little, the usual ones of all joints are fitted."""
 
 
 class Run:

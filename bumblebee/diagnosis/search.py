@@ -16,8 +16,9 @@ from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.limits import limit_trials
 from bumblebee.diagnosis.plays import play_trials
 from bumblebee.diagnosis.problem import Problem
-from bumblebee.diagnosis.run import Run, SearchConfig
+from bumblebee.diagnosis.run import Run
 from bumblebee.diagnosis.scores import Columns, Scores
+from bumblebee.diagnosis.search_config import SearchConfig
 from bumblebee.diagnosis.shafts import shaft_trials
 from bumblebee.diagnosis.trials import Trial, far_trials, simplest
 from bumblebee.sim.effects import Effect
