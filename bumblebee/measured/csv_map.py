@@ -41,10 +41,10 @@ class ColumnMap:
 
     Without joint_vel velocities are differences of the positions.
     """
-    time: str = "time"
-    """Name of the column of time stamps."""
+    time: tuple[str, ...] = ("time",)
+    """Name of the column of time stamps; or of two, of whole seconds and of nanoseconds, as ROS stamps are."""
     time_unit: Literal["s", "ms", "us", "ns"] = "s"
-    """Unit of the time stamps."""
+    """Unit of the time stamps; of two columns the first is in s, the second in ns."""
     angle_unit: Literal["rad", "deg"] = "rad"
     """Unit of joint positions, velocities, targets and of the gyro."""
     quat_order: Literal["wxyz", "xyzw"] = "wxyz"
@@ -104,6 +104,10 @@ def read_map(path: Path) -> ColumnMap:
     for key, allowed in units.items():
         if table.get(key, allowed[0]) not in allowed:
             raise BadInput(f"{path}: {key}", f"one of {', '.join(allowed)}", repr(table[key]))
+    time = table.get("time", "time")
+    time = tuple(map(str, time)) if isinstance(time, list) else (str(time),)
+    if len(time) not in (1, 2):
+        raise BadInput(f"{path}: time", "a column, or two: seconds and nanoseconds", ", ".join(time) or "none")
     joints = (table["joints"],) if isinstance(table["joints"], str) else tuple(map(str, table["joints"] or ()))
     if not joints or len(set(joints)) < len(joints):
         raise BadInput(f"{path}: joints", "names of joints, each once", ", ".join(joints) or "none")
@@ -113,7 +117,7 @@ def read_map(path: Path) -> ColumnMap:
     if not isinstance(table.get("meta", {}), dict):
         raise BadInput(f"{path}: meta", "keys and values", repr(table["meta"])[:60])
     linear = {key: _linear(f"{path}: {key}", table.get(key), len(joints)) for key in ("scale", "offset")}
-    return ColumnMap(**(table | {"joints": joints, "columns": columns} | linear))
+    return ColumnMap(**(table | {"joints": joints, "columns": columns, "time": time} | linear))
 
 
 def _linear(where: str, table: Any, width: int) -> dict[str, tuple[float, ...]]:
@@ -151,7 +155,7 @@ def _short(key: object) -> str:
 
 
 def _rollout(where: str, table: pd.DataFrame, rollout_id: str, chosen: ColumnMap) -> Rollout:
-    time = _numbers(where, table, (chosen.time,), 1)[:, 0] * SECONDS[chosen.time_unit]
+    time = _stamps(where, table, chosen)
     count = len(chosen.joints)
     values = {
         column: _numbers(where, table, names, count if WIDTHS[column] == "J" else int(WIDTHS[column]))
@@ -170,6 +174,14 @@ def _rollout(where: str, table: pd.DataFrame, rollout_id: str, chosen: ColumnMap
         values["joint_vel"] = differences(time, values["joint_pos"])
         meta["notes"] = "; ".join(filter(None, (str(meta.get("notes", "")), NO_VELOCITY)))
     return Rollout(rollout_id, chosen.joints, measured_rate(time), time, **values, meta=meta)
+
+
+def _stamps(where: str, table: pd.DataFrame, chosen: ColumnMap) -> np.ndarray:
+    """Time stamps (T,) [s]; seconds since 1970 lose no digits to the nanoseconds beside them."""
+    stamps = _numbers(where, table, chosen.time, len(chosen.time))
+    if len(chosen.time) == 1:
+        return stamps[:, 0] * SECONDS[chosen.time_unit]
+    return stamps[:, 0] - stamps[0, 0] + SECONDS["ns"] * stamps[:, 1]
 
 
 def _table(where: str, content: bytes, name: str) -> pd.DataFrame:
@@ -197,7 +209,7 @@ def _body(content: bytes) -> bytes:
 
 
 def _wanted(one: ColumnMap) -> list[str]:
-    names = [one.time, *(name for names in one.columns.values() for name in names), one.episode]
+    names = [*one.time, *(name for names in one.columns.values() for name in names), one.episode]
     return list(dict.fromkeys(name for name in names if name))
 
 

@@ -133,3 +133,17 @@ def test_a_joint_list_may_have_commas_and_velocities_may_be_missing(tmp_path: Pa
     (rollout,) = read_rollouts(tmp_path, "so101")
     assert rollout.joints == JOINTS and "not logged" in rollout.meta["notes"]
     np.testing.assert_allclose(rollout.joint_vel, np.gradient(rollout.joint_pos, rollout.time, axis=0))
+
+
+def test_stamps_in_seconds_and_nanoseconds_keep_every_digit(tmp_path: Path) -> None:
+    """As ROS writes them: whole seconds since 1970, and the rest beside them."""
+    stamps = 1_700_000_000_990_000_000 + np.round(ROWS * 1e9).astype(np.int64)
+    rows = [[t // 10**9, t % 10**9, *q, *q] for t, q in zip(stamps.tolist(), WAYS, strict=True)]
+    text = "\n".join(["secs,nsecs,q1,q2,u1,u2", *(",".join(map(str, row)) for row in rows)])
+    (rollout,) = written(tmp_path, text + "\n", SMALL_MAP + "time: [secs, nsecs]\n")
+    np.testing.assert_allclose(rollout.time - rollout.time[0], ROWS, atol=1e-9)
+
+
+def test_a_third_column_of_time_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"time.*seconds and nanoseconds"):
+        written(tmp_path, lines(), SMALL_MAP + "time: [a, b, c]\n")
