@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from benchmarks.undeclared.detectable import CHI2, _of_grid, chi_square, make_eye, minimal_size
+from benchmarks.undeclared.draw import draw
 from benchmarks.undeclared.excite import make_plan
 from benchmarks.undeclared.flight import fly
 from benchmarks.undeclared.kinds import CATALOGUE, OUTSIDE
-from benchmarks.undeclared.lottery import Suite
+from benchmarks.undeclared.lottery import Case, Suite
 from benchmarks.undeclared.robots import declared
 from benchmarks.undeclared.truth.rubbing import Viscous
-from benchmarks.undeclared.truth.signals import ImuOffset
+from benchmarks.undeclared.truth.signals import DroppedCommands, ImuOffset
 
 CONTRACT = {
     "viscous_friction",
@@ -124,3 +125,26 @@ def test_a_turn_of_the_imu_of_a_micrometre_in_the_feet_is_not_seen():
         lambda angle: fly(robot, [ImuOffset(0, angle)], plan, np.random.default_rng(1)),
     )
     assert chi_square(eye, run(2e-6)) < 0.1 < 25 < chi_square(eye, run(5e-3))
+
+
+class _Announced(DroppedCommands):
+    """Lost commands of which one knows which."""
+
+    chance = 1.0
+
+
+def test_which_commands_were_lost_is_not_known(seen):
+    robot, run = seen
+    eye = make_eye(robot, run(0.0), 3.0, np.random.default_rng(2))
+    plan = make_plan(robot, 2, 2.0, np.random.default_rng(0))
+    guessed, told = (
+        chi_square(eye, fly(robot, [law(0.02)], plan, np.random.default_rng(1)))
+        for law in (DroppedCommands, _Announced)
+    )
+    assert 0 < guessed < told - 2 * np.log(1 / 0.02)  # the price of one of them, at the least
+
+
+def test_a_share_of_lost_commands_is_drawn_that_loses_some():
+    case = Case(0, "arm", "single", ("dropped_commands",), 5.0, 1.0, 1, False)
+    truth = draw(case, 1).truth[0]
+    assert truth["minimal"] * 250 >= 1.6 and truth["size"] == pytest.approx(5 * truth["minimal"])
