@@ -13,6 +13,7 @@ from bumblebee.diagnosis.numerics import moves
 from bumblebee.diagnosis.paying import still_paying
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.slopes import effects_at
+from bumblebee.diagnosis.stencil import last_step
 from bumblebee.errors import BadInput
 
 _SURE = 3.0  # standard errors
@@ -104,7 +105,7 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
         return Refined(problem, fit, window_weights(fit.clean(problem)), np.empty(0))
     found = fit
     problem, fit, weights = _settled(problem, fit, rng)
-    whole = gauss_newton(problem, fit.chosen, fit.values, weights, iterations=1)
+    whole = last_step(problem, fit.chosen, fit.values, weights)
 
     def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
         return gauss_newton(problem, chosen, values, weights, iterations=1, coarse=True, known=whole)
@@ -113,10 +114,16 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
     if holdout is not None:
         fit = still_paying(fit, refit, holdout, problem)
     if fit.chosen != whole.chosen:
-        fit = gauss_newton(problem, fit.chosen, fit.values, weights, iterations=1)
-    if holdout is not None and holdout.worse_later(found, fit):  # short windows alone led it astray
+        fit = last_step(problem, fit.chosen, fit.values, weights)
+    if holdout is not None and holdout.worse_later(_with_nuisance(problem, found, weights), fit):
+        # Short windows alone led it astray.
         fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
     return Refined(problem, fit, weights, half_widths(problem, fit, weights) if fit.chosen else np.empty(0))
+
+
+def _with_nuisance(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
+    """A fit of the search with the numerical differences that it has in the steps of the last fit."""
+    return replace(fit, nuisance=cost_of(problem, problem.residual([fit.effects])[0], weights)[1])
 
 
 def half_widths(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
