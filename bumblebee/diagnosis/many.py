@@ -17,6 +17,7 @@ from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.eligible import is_chosen
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, project, solve, standard_covariance
 from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.misfit import by_misfit
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.screen import screening_windows
 from bumblebee.diagnosis.slopes import clipped, columns_at, effects_at
@@ -25,6 +26,8 @@ from bumblebee.sim.effects import Effect
 
 # PACE's set (Bjelonic et al. 2025: armature, damping, friction, offset, delay) and the drive's strength.
 KINDS = ("coulomb_friction", "viscous_friction", "armature", "motor_strength", "encoder_offset")
+# Of a drive that is told its torque: its gears rub with it, and an offset shows as a centre of mass does.
+KINDS_OF_TORQUE = (*(kind for kind in KINDS if kind != "encoder_offset"), "load_dependent_friction")
 WHOLE = ("command_delay",)
 BODIES = ("link_mass", "link_com")
 _DAMPING = 1e-3
@@ -39,9 +42,10 @@ _SMALL = 12  # degrees of freedom up to which links are asked, too
 _LEFT = 2.0  # median chi-square beside the joints' effects, above which they are
 
 
-def usual_effects(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Of `candidates` those that every joint of a real robot has."""
-    return [c for c in candidates if (c.effect in KINDS and c.where) or (c.effect in WHOLE and not c.where)]
+def usual_effects(candidates: Sequence[Candidate], torque: bool = False) -> list[Candidate]:
+    """Of `candidates` those that every joint of a real robot has; `torque`: whose drives are told torques."""
+    kinds = KINDS_OF_TORQUE if torque else KINDS
+    return [c for c in candidates if (c.effect in kinds and c.where) or (c.effect in WHOLE and not c.where)]
 
 
 def is_whole(c: Candidate) -> bool:
@@ -56,7 +60,7 @@ def fit_many(problem: Problem, candidates: Sequence[Candidate], found: Fit, say:
     gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot that is still
     far from the data masses and centres of mass follow, all at once.
     """
-    usual = usual_effects(candidates)
+    usual = usual_effects(candidates, problem.plant.torque_input)
     if not usual:
         return None
     some = problem.part(screening_windows(problem, _WINDOWS))
@@ -69,7 +73,9 @@ def fit_many(problem: Problem, candidates: Sequence[Candidate], found: Fit, say:
     say(f"{len(fit.chosen)} usual effects together: chi-square {fit.power(some):.3g}")
     for kind in BODIES if problem.plant.model.nv <= _SMALL and not problem.plant.floating else ():
         fit = _with_links(some, fit, [c for c in candidates if c.effect == kind and is_whole(c)], say)
-    return _sure_of(problem, surest(some, fit, window_weights(fit.clean(some))))
+    if fit.power(some) < _LEFT:
+        return _sure_of(problem, surest(some, fit, window_weights(fit.clean(some))))
+    return _sure_by_misfit(problem, fit)
 
 
 def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Callable[[str], None]) -> Fit:
@@ -138,6 +144,21 @@ def _sure_of(problem: Problem, fit: Fit) -> Fit | None:
     return fit
 
 
+def _sure_by_misfit(problem: Problem, fit: Fit) -> Fit | None:
+    """The same where the windows stay far from the noise: what is sure is asked by what is left, not by the noise.
+
+    On a real double pendulum, 300 times the noise away, the noise's measure left 2 of 17 effects, this one 8.
+    """
+
+    def fitted(here: Problem, fit: Fit, iterations: int) -> Fit:
+        weights = window_weights(here.residual([fit.effects])[0])
+        return gauss_newton(here, fit.chosen, fit.values, weights, iterations, coarse=True, damping=_DAMPING)
+
+    other = by_misfit(problem, fitted(problem, fit, 0).clean(problem))
+    sure = _sure_of(other, fitted(other, fit, 2))
+    return None if sure is None else fitted(problem, sure, 0)
+
+
 def surest(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
     """The fit less what is not sure, the least sure first, the others moved by the slopes at `fit`."""
     while fit.chosen:
@@ -195,7 +216,8 @@ def pays_together(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -
         old, new = (cost_of(problem, fit.residual, weights)[0] for fit in (before, after))
         return new < (1.0 - _MUCH) * old
     gain = np.subtract(*holdout.logs([before, after]))
-    return bool(gain.mean() > _MUCH + 2.0 * gain.std() / np.sqrt(len(gain))) and not holdout.worse_later(before, after)
+    doubt = 2.0 * gain.std() / np.sqrt(len(gain))
+    return bool(gain.mean() > max(_MUCH, doubt)) and not holdout.worse_later(before, after)
 
 
 def certainty(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
