@@ -192,7 +192,16 @@ def without_some(problem: Problem, fit: Fit, weights: np.ndarray, gone: set[int]
     return Fit(chosen, wanted, nuisance, residual, columns, cost)
 
 
-def whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
+def anew(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Problem, Holdout, Fit]:
+    """Windows to fit and to judge whitened anew around a fit that is far from the declared model, and fitted there."""
+    problem = _whitened_around(problem, fit.effects)
+    if holdout.problem is not None:
+        holdout = replace(holdout, problem=_whitened_around(holdout.problem, fit.effects))
+    weights = window_weights(problem.residual([fit.effects])[0])
+    return problem, holdout, gauss_newton(problem, fit.chosen, fit.values, weights, iterations=2, coarse=True)
+
+
+def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
     """The problem whitened anew, its windows restarted, around a model with `effects`; only its nuisances if it falls.
 
     Far from the declared model, starts that were moved to where it says that they were are not nearer to the truth.

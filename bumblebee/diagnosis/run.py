@@ -13,11 +13,10 @@ from bumblebee.diagnosis.eligible import is_chosen, is_like, is_promising
 from bumblebee.diagnosis.far import far_servos
 from bumblebee.diagnosis.fit import Fit, cost_of, effects_at, gauss_newton, resolved, typical_power
 from bumblebee.diagnosis.gains import plain_gains
-from bumblebee.diagnosis.groups import beside_each_other, fitted_with
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.limits import pays_where_felt, pays_where_rare
-from bumblebee.diagnosis.many import certainty, fit_many, pays_together, whitened_around
+from bumblebee.diagnosis.many import anew, certainty, fit_many, pays_together
 from bumblebee.diagnosis.problem import Problem, window_weights
 from bumblebee.diagnosis.scores import Columns, Scores, score_tests
 from bumblebee.diagnosis.screen import Answered, pulse_sizes, restless, screen, screening_windows
@@ -59,7 +58,7 @@ class Run:
         self.loss: Loss | None = None
         self.given = 0
         self.tried_many, self.patience = False, config.patience
-        self.fall, self.groups = 1.0, True
+        self.fall = 1.0
         self.candidates, _ = remake([])
         self.start_far()
         self.rescreen()
@@ -232,12 +231,8 @@ class Run:
         fit = fit_many(self.problem, self.candidates, self.fit, self.say)
         if fit is None or not pays_together(self.problem, self.holdout, self.fit, fit):
             return False
-        self.problem = whitened_around(self.problem, fit.effects)
-        if self.holdout.problem is not None:
-            self.holdout = replace(self.holdout, problem=whitened_around(self.holdout.problem, fit.effects))
+        self.problem, self.holdout, fit = anew(self.problem, self.holdout, fit)
         self.keep = screening_windows(self.problem, self.config.screen_windows)
-        weights = window_weights(self.problem.residual([fit.effects])[0])
-        fit = gauss_newton(self.problem, fit.chosen, fit.values, weights, iterations=2, coarse=True)
         weights = window_weights(fit.clean(self.problem))
         z = certainty(self.problem, fit, weights)
         self.steps = [evidence(c, float(least), len(self.candidates)) for c, least in zip(fit.chosen, z, strict=True)]
@@ -246,29 +241,6 @@ class Run:
         self.hopeless.clear()
         self.given, self.patience = len(fit.chosen), min(self.patience, _PATIENCE)
         self.weights, self.fit = weights, fit
-        self.rescreen()
-        return True
-
-    def add_group(self) -> bool:
-        """Several effects together, where many were already fitted together; whether some were accepted."""
-        if not (self.tried_many and self.given) or not self.groups:
-            return False
-
-        def is_open(c: Candidate, tests: Scores, k: int) -> bool:
-            return self.is_open(c, tests, k, self.bound, len(self.keep) / len(self.problem.windows))
-
-        new = beside_each_other(self.small, self.columns, self.small_fit(), self.weights[self.keep], is_open)
-        self.say(f"{len(new)} of {len(self.candidates)} candidates beside each other")
-        fit, weights = fitted_with(self.problem, self.fit, new, self.bound)
-        added = fit.chosen[len(self.fit.chosen) :]
-        pays = len(added) > 1 and self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain)
-        self.groups = pays and is_physical(self.problem, self.fit, fit, added[0], weights)
-        if not self.groups:
-            return False
-        for k, c in enumerate(added, len(self.fit.chosen)):
-            self.steps.append(evidence(c, wald(self.problem, fit, weights, k), len(self.candidates)))
-            self.say(f"found {c.effect} on {c.where or 'the whole robot'}: {fit.of(c).round(5)}")
-        self.renew(fit)
         self.rescreen()
         return True
 

@@ -100,8 +100,6 @@ def _select(run: Run, config: SearchConfig, budget: Budget) -> None:
             break
         tried, looked = [], []
         run.start_many()
-        while run.add_group():
-            vain = 0
         if not run.given:
             tried = far_trials(run.problem, run.fit, run.candidates, run.weights, config.far)
             tried = [t for t in tried if t.candidate not in run.closed]

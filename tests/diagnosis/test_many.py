@@ -7,7 +7,7 @@ import pytest
 from bumblebee.diagnosis.candidates import all_candidates
 from bumblebee.diagnosis.fit import gauss_newton
 from bumblebee.diagnosis.holdout import Holdout
-from bumblebee.diagnosis.many import certainty, fit_many, pays_together
+from bumblebee.diagnosis.many import certainty, fit_many, pays_together, without_some
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.session import Session, make_session
 from bumblebee.diagnosis.windows import choose_starts, cut
@@ -70,3 +70,17 @@ def test_what_is_found_on_a_robot_like_its_model_does_not_pay() -> None:
     declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
     assert fit is None or not pays_together(problem, Holdout(other), declared, fit)
+
+
+def test_an_effect_taken_out_by_slopes_leaves_what_a_refit_in_the_simulator_leaves() -> None:
+    session, problem, _ = _opened({("viscous_friction", "j1"): 0.1, ("viscous_friction", "j2"): 0.1})
+    three = [c for c in all_candidates(session.plant, session.rollouts, []) if c.effect == "viscous_friction"]
+    weights = window_weights(problem.residual([[]])[0])
+    full = gauss_newton(problem, three, [c.nominal[0] for c in three], weights, iterations=3)
+    less = without_some(problem, full, weights, {2})
+    again = gauss_newton(problem, less.chosen, less.values, weights, iterations=3)
+    assert less.chosen == tuple(three[:2])
+    assert less.values == pytest.approx(again.values, abs=0.002)
+    assert less.cost == pytest.approx(again.cost, rel=0.01)
+    declared = gauss_newton(problem, (), (), weights)
+    assert without_some(problem, full, weights, {0, 1, 2}).cost == pytest.approx(declared.cost, rel=0.05)
