@@ -2,10 +2,11 @@
 
 A robot on which every joint rubs and comes late is found one effect at a time only by a long way round: each
 effect alone explains a twentieth, and what stands for the others' share has a strange name. Where the windows are far
-from the noise still after some effects, and the last of these explained little, the usual ones of all joints are fitted
-together from the declared values on, beside those found; what is not sure is taken out again, and the rest has to pay
-on windows that took no part. The search goes on from there. It never begins so: a load at the end of an arm weakens
-all drives as far as these can tell.
+from the noise still after two effects, and the second explained little or they are very far, the usual ones of all
+joints are fitted together from the declared values on, or from those found. Of a small robot that stays far off masses
+and centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows that
+took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It never begins so: a
+load at the end of an arm weakens all drives as far as these can tell.
 """
 
 from collections.abc import Callable, Sequence
