@@ -12,12 +12,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.changes import Changes
 from bumblebee.diagnosis.fit import Fit
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.plant import Plant
+from bumblebee.diagnosis.plays import joint_chi_squares
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.trials import Beside, Trial
 from bumblebee.diagnosis.variation import vary
@@ -28,6 +30,7 @@ from bumblebee.sim.servo import Servos, servos_of
 
 KINDS = ("torque_limit", "torque_speed_limit")
 _ODD, _FIRST = 1.6, 4  # power of a window that is off; windows that a limit reaches first
+_CHANCE = 0.01  # that noise puts a joint's own readings of one window as far off
 _WORTH, _SHARE = 15.0, 2e-3  # fall of the cost; share of it that a size must gain to be looked at closer
 _REACHED = (1, 2, 4, 7, 12, 24, 50, 100, 200)  # windows that the sizes tried reach
 _HOPELESS = 1.5  # rise of log(1 + power / s), summed, by each of two sizes from which on no more are tried
@@ -62,9 +65,10 @@ def limit_trials(
 ) -> list[Trial]:
     """The limit that explains most of the windows that are far off; none where no limit does.
 
-    Of the four windows that a limit reaches first one must be off, or it is not simulated. Where it acts in a few only
-    it must bring them down to noise, which one number does not do by chance. One that only makes the windows worse that
-    it reaches first joins the `hopeless` (effect, place), which are not tried. `changes` are what was simulated before.
+    Of the four windows that a limit reaches first one must be off, and its joint in it, or it is not simulated. Where
+    it acts in a few only it must bring them down to noise, which one number does not do by chance. One that only makes
+    the windows worse that it reaches first joins the `hopeless` (effect, place), which are not tried. `changes` are
+    what was simulated before.
     """
     clean = fit.clean(problem)
     power = (clean**2).mean(axis=1)
@@ -74,6 +78,7 @@ def limit_trials(
     odd = power > _ODD
     if not odd.any() or not kinds:
         return []
+    own_off = _own_off(problem, clean, odd, usual)
     demand = _demand(problem, fit.effects)
     beside = Beside(problem, fit, weights)
     changes = (changes or Changes()).on(problem)
@@ -81,7 +86,7 @@ def limit_trials(
     for kind, where in dict.fromkeys((c.effect, c.where) for c in kinds):
         own = [c for c in kinds if (c.effect, c.where) == (kind, where)]
         reach = demand.reach(kind, problem.plant.joints.index(where))
-        if not odd[np.argsort(reach)[:_FIRST]].any():
+        if not own_off[np.argsort(reach)[:_FIRST], problem.plant.joints.index(where)].any():
             continue
         changes.taken = False
         best = _profile(problem, fit, clean, usual, own[0], reach, changes)
@@ -96,6 +101,14 @@ def limit_trials(
                 continue
             found.append(Trial(nearest, np.array([best[0]]), beside.cost(fit.residual - change), beside.left(change)))
     return sorted(found, key=lambda t: t.cost)[:1]
+
+
+def _own_off(problem: Problem, clean: np.ndarray, odd: np.ndarray, usual: float) -> np.ndarray:
+    """(W, J) whether a window is `odd` (W,) and a joint's own readings in it are off: what its limit spoils first."""
+    out = np.zeros((len(clean), len(problem.plant.joints)), dtype=bool)
+    own, freedom = joint_chi_squares(problem.part(odd), clean[odd])
+    out[odd] = own / usual > chi2.isf(_CHANCE, freedom)
+    return out
 
 
 def _plausible(clean: np.ndarray, change: np.ndarray) -> bool:
