@@ -31,7 +31,7 @@ from bumblebee.diagnosis.run import Run
 from bumblebee.diagnosis.scores import Columns, Scores, as_z, score_tests
 from bumblebee.diagnosis.shafts import KIND as SHAFT
 from bumblebee.diagnosis.shafts import LIKE as SHAFT_LIKE
-from bumblebee.diagnosis.shafts import best_shaft
+from bumblebee.diagnosis.shafts import best_shaft, is_of_series
 from bumblebee.diagnosis.trials import Trial, try_one
 
 _AS_MUCH = 0.95  # share of what the names gain that a rival must promise
@@ -117,8 +117,8 @@ def _twisted(run: Run, free: Sequence[Candidate]) -> Iterator[Tried]:
         if (SHAFT, where) in run.hopeless:
             continue
         gone = [c for c in free if c.where == where and c.effect in SHAFT_LIKE]
-        if all(c.effect == SHAFT and c not in run.candidates for c in gone):
-            continue  # one of many stiffnesses
+        if len(gone) == 1 and is_of_series(gone[0], run.fit.of(gone[0])):
+            continue
         rest = _without(run.problem, run.fit, gone)
         own = _least(run.problem, rest, run.weights) - _least(run.problem, run.fit, run.weights)
         trial = best_shaft(run.problem, rest, run.candidates, run.weights, where, _PART * own)

