@@ -113,8 +113,8 @@ def _select(run: Run, config: SearchConfig, budget: Budget) -> None:
         if not tried:
             tried = play_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
             tried = [t for t in tried if t.candidate not in run.closed]
-        if not tried:
-            tried = shaft_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+        if not tried or vain == run.patience - 1:
+            tried += shaft_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
         if not tried and not looked:
             break
         if not tried:
