@@ -18,7 +18,7 @@ from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect, single
 
 _SAMPLES = 20_000
-_SMALLEST, _CELLS = 5e-4, 20  # a step is at least half a milliradian, and the joint crosses at least so many
+_SMALLEST, _CELLS = 5e-4, 12  # a step is at least half a milliradian, and the joint crosses at least so many
 _ON_GRID = 0.8  # of the resultant that the noise leaves of a grid
 _CHANCE = 1e-5  # of a joint without a grid
 _COARSEST = 0.7  # of the largest resultant: a grid's multiples in frequency fit as well as itself
