@@ -12,7 +12,7 @@ td,th{padding:.28rem .7rem .28rem 0;border-bottom:1px solid #e4e7ee;text-align:l
 th{color:#6b7385;font-weight:500}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .note{color:#6b7385;font-size:.86rem}.warn{border-left:4px solid #c8553d;background:#fbeeea;padding:.5rem .9rem;
 margin:.8rem 0}
-.bar{display:inline-block;height:.6rem;background:#1b8a6b;border-radius:2px;vertical-align:middle;margin-right:.4rem}
+.share{white-space:nowrap}.bar{display:inline-block;height:.6rem;background:#1b8a6b;border-radius:2px;vertical-align:middle;margin-right:.4rem}
 svg{max-width:100%;height:auto;font-size:11px}.row{display:flex;flex-wrap:wrap;gap:.6rem}.row figure{flex:1 1 18rem}
 figure{margin:.4rem 0}.row figure{max-width:20rem}figcaption{color:#6b7385;font-size:.86rem}
 code{font-size:.86rem;white-space:normal;overflow-wrap:anywhere}

@@ -83,7 +83,7 @@ def _effects(effects: Sequence[dict[str, Any]]) -> str:
     for e in effects:
         place = escape(", ".join(e["where"]) or "whole robot")
         share = 100 * e["explains"]
-        bar = f"<span class='bar' style='width:{0.04 * share:.2f}rem'></span>{share:.0f} %"
+        bar = f"<span class='share'><span class='bar' style='width:{0.04 * share:.2f}rem'></span>{share:.0f} %</span>"
         values, declared = _values(e)
         rows.append(
             [
