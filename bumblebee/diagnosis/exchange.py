@@ -91,19 +91,21 @@ def _slower(candidate: Candidate, share: float) -> Candidate:
     return replace(candidate, step=(candidate.step[0], speed), shape_scale=0.3 * speed)
 
 
-Tried = tuple[Sequence[Candidate], Fit, float]
+_Tried = tuple[Sequence[Candidate], Fit, float]
 """Names that are gone, the fit without them and with their rival last, and the rival's z."""
 
 
-def _tried(run: Run, gone: Sequence[Candidate]) -> Iterator[Tried]:
+def _tried(run: Run, gone: Sequence[Candidate]) -> Iterator[_Tried]:
     """Fits with one rival in the place of some names, those that promise most."""
     weights, all_of = run.weights[run.keep], run.small_fit()
     small = _without(run.small, all_of, gone)
     own = _least(run.small, small, weights) - _least(run.small, all_of, weights)
     tests = score_tests(run.small, run.columns, small, weights)
     promising = _promising(run.columns, tests, small, gone, _AS_MUCH * own)
-    rest = _without(run.problem, run.fit, gone) if promising else None
-    for k in promising if rest else ():
+    if not promising:
+        return
+    rest = _without(run.problem, run.fit, gone)
+    for k in promising:
         rival = run.columns.candidates[k]
         trial = try_one(run.problem, rest, rival, tests.steps[k], run.weights)
         new = _refitted(run, rest, trial) if trial else None
@@ -111,7 +113,7 @@ def _tried(run: Run, gone: Sequence[Candidate]) -> Iterator[Tried]:
             yield gone, *new
 
 
-def _twisted(run: Run, free: Sequence[Candidate]) -> Iterator[Tried]:
+def _twisted(run: Run, free: Sequence[Candidate]) -> Iterator[_Tried]:
     """Fits with a shaft in the place of what its swing passes for, on each joint that has such a name."""
     for where in dict.fromkeys(c.where for c in free if c.where and c.effect in SHAFT_LIKE):
         if (SHAFT, where) in run.hopeless:
@@ -121,10 +123,10 @@ def _twisted(run: Run, free: Sequence[Candidate]) -> Iterator[Tried]:
             continue
         rest = _without(run.problem, run.fit, gone)
         own = _least(run.problem, rest, run.weights) - _least(run.problem, run.fit, run.weights)
+        run.hopeless.add((SHAFT, where))
         trial = best_shaft(run.problem, rest, run.candidates, run.weights, where, _PART * own)
         new = _refitted(run, rest, trial) if trial else None
-        run.hopeless.add((SHAFT, where))
-        if trial and new:
+        if new:
             yield gone, *new
 
 

@@ -50,7 +50,7 @@ class Run:
         self.fit = gauss_newton(problem, (), (), self.weights)
         self.keep = screening_windows(problem, config.screen_windows)
         self.closed: set[Candidate] = set()
-        self.hopeless: set[tuple[str, str]] = set()  # limits (effect, joint) that only spoilt more when they were tried
+        self.hopeless: set[tuple[str, str]] = set()  # limits, plays, shafts (effect, joint) that were tried in vain
         self.changes, self.stages = Changes(), Stages(problem, self.keep)
         self.answers: Answered | None = None
         self.steps: list[Step] = []

@@ -28,4 +28,7 @@ class SearchConfig:
     far: float = 30.0
     """Median chi-square above which gains far from the declared ones are tried first."""
     many: float = 4.0
-    """Median chi-square above which, after two effects, the second little, the usual ones of all joints are fitted."""
+    """Median chi-square above which, after two effects, the usual ones of all joints are fitted.
+
+    If the last explained little, or the chi-square is above `far`.
+    """

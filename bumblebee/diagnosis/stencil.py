@@ -2,7 +2,7 @@
 
 Where feet touch the floor a simulation jumps with the parameters: a foot that lands a step earlier changes one window
 by more than a percent of an encoder's offset changes all. The cost along a parameter is a parabola with steps of tens
-of chi-squares on it, and a descent stops in the first hollow: dry friction of 0.2733 N m stayed at 0.2652, seven
+of chi-squares on it, and a descent stops in the first hollow: dry friction of 0.2733 N m stayed at 0.2655, four
 standard errors off, because a tenth of the right step raised the cost by 82 where the whole step lowered it by 112. So
 there the last step compares no costs. Slopes are central differences over a fifth of a change that matters, residuals
 the mean over the points that these need, and the step is the least-squares solution.
