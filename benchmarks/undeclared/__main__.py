@@ -17,6 +17,7 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,7 @@ def main(argv: list[str] | None = None) -> int:
             return 0
         suite = Suite(options.seed)
         cases = [case for case in suite.cases() if chosen(case, options)]
+        cases = [replace(case, rivals=case.rivals and case.robot in options.rivals.split(",")) for case in cases]
         if options.policy is not None and not (options.policy / "policy.onnx").is_file():
             raise BadInput(options.policy, "a folder with policy.onnx and contract.json", "none there")
         if options.policy is None and not options.list:
@@ -205,6 +207,8 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=1, help="processes, one core each")
     parser.add_argument("--only", action="append", default=[], metavar="A,B",
                         help="robots, groups, kinds or case numbers; given several times, all must hold")  # fmt: skip
+    parser.add_argument("--rivals", default="arm,stand,track", metavar="A,B",
+                        help="robots on which the other methods run too, where the suite has them (default: all)")  # fmt: skip
     parser.add_argument("--limit", type=int, default=None, help="cases at most")
     parser.add_argument(
         "--seconds", type=float, default=np.inf, help="begin no case after this long, drop what is unfinished"
