@@ -208,7 +208,7 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--only", action="append", default=[], metavar="A,B",
                         help="robots, groups, kinds or case numbers; given several times, all must hold")  # fmt: skip
     parser.add_argument("--rivals", default="arm,stand,track", metavar="A,B",
-                        help="robots on which the other methods run too, where the suite has them (default: all)")  # fmt: skip
+                        help="robots on which other methods run too, where the suite has them")  # fmt: skip
     parser.add_argument("--limit", type=int, default=None, help="cases at most")
     parser.add_argument(
         "--seconds", type=float, default=np.inf, help="begin no case after this long, drop what is unfinished"

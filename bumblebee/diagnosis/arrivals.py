@@ -34,6 +34,7 @@ _WORTH = 8.0  # log-likelihood on the fitted windows
 _PAYS = 2.0  # log-likelihood on the held-out windows
 _SURE, _RARE = 30.0, -3.0  # of a fit so sure the held-out windows need only not contradict: few of them may have any
 _MOSTLY = 0.7  # share of the excess of log(1 + power) that must go in the windows said to have lost commands
+_MOST_OF = 0.5  # share of the held-out excess of chi-square that must go with a joint's own lost commands
 _HALF = 1.92  # fall of the log-likelihood at the ends of a 95 % interval
 _FEW_JOINTS = 8
 
@@ -133,6 +134,8 @@ def find_loss(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, Probl
             return None
         kept = arrived(holdout.problem, seen.likely(share), place)
         explains = _explained(left, _clean(kept, fit))
+        if place and explains < _MOST_OF:  # sticking, too, looks like a command that comes late, here and there
+            return None
         holdout = replace(holdout, problem=kept)
     elif place and gain < _SURE:
         return None  # nor may it be believed as easily where it cannot be seen again

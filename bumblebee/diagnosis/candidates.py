@@ -15,6 +15,8 @@ from bumblebee.sim.effects import CATALOGUE, Effect, single
 
 # Of these the fit moves the inverse: where the effect is absent the parameter is infinite.
 INVERSE = ("torque_speed_limit", "series_elasticity")
+# Dry friction of a shape, which sits on a level that is dry friction again.
+SHAPED = ("asymmetric_friction", "stribeck_friction")
 # What no torque on the robot's joints can stand for: always simulated, never screened.
 SIMULATED = (
     "encoder_offset", "imu_offset", "ground_friction", "ground_compliance", "backlash", "series_elasticity",

@@ -7,7 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.acceptance import wald
 from bumblebee.diagnosis.beyond import discovered_entry
-from bumblebee.diagnosis.candidates import INVERSE, Candidate
+from bumblebee.diagnosis.candidates import INVERSE, SHAPED, Candidate
 from bumblebee.diagnosis.classes import EXPERIMENTS, alike, label, rivals
 from bumblebee.diagnosis.discover import Discovery
 from bumblebee.diagnosis.fit import Fit
@@ -21,7 +21,6 @@ from bumblebee.diagnosis.variation import declared_values
 from bumblebee.sim.effect_catalogue import is_native
 from bumblebee.sim.effects import CATALOGUE
 
-_SHAPED = ("asymmetric_friction", "stribeck_friction")
 _COMPARABLE = 0.25
 
 
@@ -83,7 +82,7 @@ def _levels(fit: Fit) -> dict[Candidate, Candidate]:
     The largest, where a joint has two that change.
     """
     dry = {c.where: c for c in fit.chosen if c.effect == "coulomb_friction"}
-    shaped = [c for c in fit.chosen if c.effect in _SHAPED and c.where in dry]
+    shaped = [c for c in fit.chosen if c.effect in SHAPED and c.where in dry]
     largest = {c.where: c for c in sorted(shaped, key=lambda c: abs(fit.of(c)[0]))}
     return {
         c: dry[where]

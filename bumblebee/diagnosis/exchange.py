@@ -10,7 +10,9 @@ What a shaft's swing passes for (a lag, an old reading, a rotor) is tried agains
 test at one of them would show (`diagnosis/shafts.py`).
 
 Friction that grows at rest is felt by the few windows that creep through zero speed. Beside the dry friction that
-explains the rest, its score varies too much between windows to be significant; the joint fit tells.
+explains the rest, its score varies too much between windows to be significant; the joint fit tells. Where it was found
+first it takes the level that it sits on for its own: stiction of 0.40 N m came out as 0.66. As dry friction is then no
+further name but a parameter of the same, it needs three standard errors and not the bound of all candidates.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,7 +22,7 @@ from itertools import chain, combinations
 import numpy as np
 
 from bumblebee.diagnosis.acceptance import evidence, is_physical, wald
-from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.candidates import SHAPED, Candidate
 from bumblebee.diagnosis.eligible import is_chosen
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, project, solve
 from bumblebee.diagnosis.holdout import Holdout
@@ -39,6 +41,7 @@ _PART = 0.6  # the same of a shaft, whose loss has not been fitted yet
 _RIVALS = 2  # tried in the place of the same names
 _FEW = 4  # effects up to which two are taken out together
 _CLEARLY = 2 * PARAMETER  # log-likelihood by which a rival with as many parameters must be better
+_LEVEL = 3.0  # standard errors of the dry friction on which other friction sits
 _CREEP = (0.06, 0.2)  # of the joint's usual speed: velocities at which friction is tried to grow
 
 
@@ -83,6 +86,33 @@ def creeping(run: Run) -> bool:
         values[0] = tests.steps[k][0] * looked[k].step[0]
         found |= bool(values[0] > 0) and run.accept(looked[k], values)
     return found
+
+
+def levelled(run: Run) -> None:
+    """Fit dry friction beside friction of its joint that depends on direction or speed, where that was found alone."""
+    for c in [c for c in run.fit.chosen if c.effect in SHAPED]:
+        dry = next((o for o in run.candidates if (o.effect, o.where) == ("coulomb_friction", c.where)), None)
+        if dry is None or is_chosen(dry, run.fit.chosen):
+            continue
+        chosen = (*run.fit.chosen, dry)
+        fit = gauss_newton(
+            run.problem, chosen, _on_level(run.fit, c, dry), run.weights, iterations=4, coarse=True, known=run.fit
+        )
+        z = wald(run.problem, fit, run.weights, len(chosen) - 1)
+        if z < _LEVEL or fit.of(dry)[0] < dry.nominal[0] or not _is_no_worse(run.holdout, run.fit, fit):
+            continue
+        run.say(f"{c.effect} on {c.where} sits on dry friction: {fit.of(dry).round(5)}")
+        run.steps.append(evidence(dry, z, 1))
+        run.renew(fit)
+
+
+def _on_level(fit: Fit, candidate: Candidate, dry: Candidate) -> np.ndarray:
+    """Values (P,) from which the two are fitted: with a velocity far too high the first is dry friction already."""
+    values = fit.values.copy()
+    mine = values[fit.slices[fit.chosen.index(candidate)]]
+    shaping = [i for i in range(len(mine)) if i not in candidate.free]
+    mine[shaping] = candidate.start[shaping]
+    return np.concatenate((values, dry.start))
 
 
 def _slower(candidate: Candidate, share: float) -> Candidate:

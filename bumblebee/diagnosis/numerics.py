@@ -61,11 +61,13 @@ def beyond_numerics(problem: Problem, before: Fit, after: Fit, weights: np.ndarr
 
 def _differences(problem: Problem, fit: Fit) -> Iterator[np.ndarray]:
     """What other integrators change in the whitened residual (W, M) of a fit; 0 in windows that diverge."""
-    for other in _others(vary(problem.plant, fit.effects)):
+    tilted = problem.tilted(fit.effects)
+    residual = fit.residual if tilted is None else fit.residual - tilted
+    for other in _others(vary(problem.plant, problem.as_whitened(fit.effects))):
         raw = residuals(problem.plant, problem.layout, problem.windows, [other], problem.fine)[0]
         good = np.isfinite(raw).all(axis=(1, 2))
         if good.mean() >= _FINITE:
-            yield np.where(good[:, None], problem.whitener(raw) - fit.residual, 0.0)
+            yield np.where(good[:, None], problem.whitener(raw) - residual, 0.0)
 
 
 def _others(variation: Variation) -> list[Variation]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from bumblebee.diagnosis.recall import Recall
 from bumblebee.diagnosis.restart import restarted, start_moves
 from bumblebee.diagnosis.signals import Layout
 from bumblebee.diagnosis.simulate import residuals
+from bumblebee.diagnosis.tilts import KIND as TILT
+from bumblebee.diagnosis.tilts import angles, retilted, tilt_columns, tilt_of
 from bumblebee.diagnosis.variation import vary
 from bumblebee.diagnosis.whiten import Whitener, fit_whitener
 from bumblebee.diagnosis.windows import Windows, select
@@ -21,10 +24,10 @@ from bumblebee.sim.effects import Effect
 _GROUP = 24  # models held at once
 _MANY, _LARGEST = 12, 0.2  # windows; share of the others' power that one may have
 # In coarse steps play hits too softly, a limit too late and feet otherwise than they do, and late feedback, computed
-# beside the integrator, moves a servo by itself.
+# beside the integrator, moves a servo by itself. A tilt is not simulated.
 _FINE_ONLY = (
     "torque_lag", "encoder_delay", "encoder_quantisation", "backlash", "series_elasticity", "torque_limit",
-    "torque_speed_limit", "ground_friction", "ground_compliance",
+    "torque_speed_limit", "ground_friction", "ground_compliance", TILT,
 )  # fmt: skip
 
 
@@ -50,6 +53,8 @@ class Problem:
     """(5 or 6, W, M) whitened: numerical differences, and last the start noise's curvature."""
     read: Windows = field(repr=False)
     """The windows with their starts as measured."""
+    tilt: Effect | None = None
+    """Of the base's sensor, with which the windows were whitened; residuals are linear in it."""
     recall: Recall = field(default_factory=Recall, repr=False)
 
     def residual(self, effects: Sequence[Sequence[Effect]], coarse: bool = False) -> np.ndarray:
@@ -60,7 +65,26 @@ class Problem:
             variations = [vary(self.plant, e) for e in new]
             return self.finite(residuals(self.plant, self.layout, self.windows, variations, step))
 
-        return self.recall.get((self.windows, self.whitener), effects, step, simulated)
+        models = [self.as_whitened(e) for e in effects]
+        out = self.recall.get((self.windows, self.whitener), models, step, simulated)
+        for own, e in zip(out, effects, strict=True):
+            if (tilted := self.tilted(e)) is not None:
+                own += tilted
+        return out
+
+    def as_whitened(self, effects: Sequence[Effect]) -> list[Effect]:
+        """The effects with the tilt that the windows were whitened with, as they are simulated."""
+        return retilted(effects, self.tilt) if self.tilt or tilt_of(effects) else list(effects)
+
+    def tilted(self, effects: Sequence[Effect]) -> np.ndarray | None:
+        """(W, M) what the effects' own tilt adds to the whitened residual of `as_whitened`; None for nothing."""
+        away = angles(tilt_of(effects)) - angles(self.tilt)
+        return np.tensordot(away, self._tilting, axes=1) if away.any() else None
+
+    @cached_property
+    def _tilting(self) -> np.ndarray:
+        """(2, W, M)."""
+        return tilt_columns(self.whitener, self.layout, self.sigma, self.windows.out_time.shape[1])
 
     def differences(self, effects: Sequence[Effect], moved: Sequence[Sequence[Effect]], coarse: bool) -> np.ndarray:
         """How the prediction changes from a model to several others, (V, W, M), both sides simulated in one step."""
@@ -73,8 +97,9 @@ class Problem:
     def on(self, keep: np.ndarray, effects: Sequence[Effect], coarse: bool = False) -> np.ndarray:
         """Whitened residuals (K, M) of one model on the windows at the indices `keep` (K,) alone."""
         some, step = select(self.windows, keep), self.coarse if coarse else self.fine
-        raw = residuals(self.plant, self.layout, some, [vary(self.plant, effects)], step)
-        return self.finite(raw, keep)[0]
+        raw = residuals(self.plant, self.layout, some, [vary(self.plant, self.as_whitened(effects))], step)
+        out, tilted = self.finite(raw, keep)[0], self.tilted(effects)
+        return out if tilted is None else out + tilted[keep]
 
     def finite(self, raw: np.ndarray, keep: np.ndarray | None = None) -> np.ndarray:
         """Whiten, on the windows `keep` if given; a window that diverged counts as a very bad one, not as none."""
@@ -189,7 +214,8 @@ def make_problem(
     windows, raw, whitener = select(windows, keep), raw[:, keep], whitener.part(keep)
     columns = _columns(whitener, raw)
     finest = fine if finest is None else finest
-    return Problem(plant, layout, windows, sigma, fine, finest, fine, coarse, whitener, columns, select(read, keep))
+    read, tilt = select(read, keep), tilt_of(effects)
+    return Problem(plant, layout, windows, sigma, fine, finest, fine, coarse, whitener, columns, read, tilt)
 
 
 def _columns(whitener: Whitener, raw: np.ndarray) -> np.ndarray:

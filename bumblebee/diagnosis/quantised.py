@@ -3,7 +3,9 @@
 Readings on a grid of step s add up in phase at the frequency 1 / s: |mean exp(2 pi i x / s)| is 1 without further noise
 and exp(-2 (pi sigma / s)^2) with noise of standard deviation sigma, and nearly 0 where there is no grid. A thousand
 readings show a tenth, so a grid is seen under noise of a third of its step. Places where the joint rests would feign
-one: readings of places that are crowded weigh less, and a stay within a step counts as one reading.
+one: readings of places that are crowded weigh less, and a stay within a step counts as one reading. A grid's overtones
+fit nearly as well as itself: of steps that fit the largest is taken, also where the joint crosses few of them, once an
+overtone has shown that there is a grid.
 """
 
 from collections.abc import Sequence
@@ -22,6 +24,7 @@ _SMALLEST, _CELLS = 5e-4, 12  # a step is at least half a milliradian, and the j
 _ON_GRID = 0.8  # of the resultant that the noise leaves of a grid
 _CHANCE = 1e-5  # of a joint without a grid
 _COARSEST = 0.7  # of the largest resultant: a grid's multiples in frequency fit as well as itself
+_OVERTONES, _FEWEST = (5, 4, 3, 2), 3  # of a grid that is looked for; cells of it that the joint crosses at least
 _PLACES = 40  # in which the crowd is counted
 _DENSE = 0.25  # of the width of a peak
 
@@ -109,16 +112,35 @@ def _grid(joint: str, x: np.ndarray, noise: float) -> Grid | None:
         return None
     first = high[frequency[high] <= frequency[high[0]] + 2 / span]
     best = frequency[first[np.argmax(resultant[first])]]
-    near = np.linspace(best - width, best + width, 41)
-    fine = np.abs(np.exp(2j * np.pi * np.outer(near, x)) @ weights)
-    value, top = float(near[np.argmax(fine)]), float(fine.max())
+    value, top = _peak(x, weights, best, width)
     p = len(frequency) * float(np.exp(-min(_readings(x, weights, 1.0 / value) * top**2, 600.0)))
     if p > _CHANCE or top < _ON_GRID * _left_of(value, noise):
         return None
+    value, top = _undertone(x, weights, value, top, width)
     # Phase noise of each reading, and how well a slope of phase over x is known from them.
     spread = np.sqrt(-2.0 * np.log(min(top, 1 - 1e-6)))
     error = spread / (2 * np.pi * np.sqrt(len(x)) * x.std())
     return Grid(joint, 1.0 / value, float(error / value**2), min(1.0, p))
+
+
+def _peak(x: np.ndarray, weights: np.ndarray, frequency: float, width: float) -> tuple[float, float]:
+    """The frequency within `width` at which readings (N,) are most in phase, and their resultant there."""
+    near = np.linspace(frequency - width, frequency + width, 41)
+    fine = np.abs(np.exp(2j * np.pi * np.outer(near, x)) @ weights)
+    return float(near[np.argmax(fine)]), float(fine.max())
+
+
+def _undertone(
+    x: np.ndarray, weights: np.ndarray, frequency: float, resultant: float, width: float
+) -> tuple[float, float]:
+    """The grid of which a grid found is an overtone, if the readings are as much in phase there; else the same."""
+    for number in _OVERTONES:
+        if frequency / number < _FEWEST / float(np.ptp(x)):
+            continue
+        lower = _peak(x, weights, frequency / number, width / number)
+        if lower[1] >= resultant:
+            return lower
+    return frequency, resultant
 
 
 def _left_of(frequency: np.ndarray | float, noise: float) -> np.ndarray | float:

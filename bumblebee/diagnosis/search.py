@@ -9,7 +9,7 @@ from bumblebee.diagnosis.acceptance import Step
 from bumblebee.diagnosis.arrivals import Loss
 from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.exchange import creeping, exchange
+from bumblebee.diagnosis.exchange import creeping, exchange, levelled
 from bumblebee.diagnosis.fit import Fit
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.limits import KINDS as LIMITS
@@ -76,6 +76,7 @@ def search(
         _select(run, config, budget)
     run.prune()
     run.plain()
+    levelled(run)
     steps = [s for s in run.steps if s.candidate in run.fit.chosen]
     return Search(
         run.fit,

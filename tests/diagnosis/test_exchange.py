@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.exchange import creeping, exchange
+from bumblebee.diagnosis.exchange import creeping, exchange, levelled
 from bumblebee.diagnosis.fit import gauss_newton
 from bumblebee.diagnosis.material import gather
 from bumblebee.diagnosis.problem import window_weights
@@ -16,13 +16,13 @@ from tests.diagnosis.strange_arm import simulate
 from tests.diagnosis.test_catalogue import CONFIG
 
 
-def begun(xml: str, rollouts: list[Rollout], chosen: dict[tuple[str, str], float]) -> Run:
-    """A search that has found some effects, of one parameter each, fitted from a value."""
+def begun(xml: str, rollouts: list[Rollout], chosen: dict[tuple[str, str], float | tuple[float, ...]]) -> Run:
+    """A search that has found some effects, fitted from some values."""
     session = make_session(mujoco.MjSpec.from_string(xml), rollouts, "robot", "memory")
     material = gather(session, CONFIG, np.random.default_rng(0), lambda text: None)
     run = Run(material.problem, material.holdout, material.remade, CONFIG.search, lambda text: None)
     names = [next(c for c in run.candidates if (c.effect, c.where) == key) for key in chosen]
-    fit = gauss_newton(run.problem, names, list(chosen.values()), run.weights)
+    fit = gauss_newton(run.problem, names, np.concatenate([np.atleast_1d(v) for v in chosen.values()]), run.weights)
     run.weights = window_weights(fit.clean(run.problem))
     run.fit = gauss_newton(run.problem, names, fit.values, run.weights)
     return run
@@ -57,3 +57,14 @@ def test_friction_that_grows_at_rest_is_found_beside_dry_friction_only_where_it_
     assert [n for n, _ in names(run)] == ["coulomb_friction", *(["stribeck_friction"] if stiction else [])]
     if stiction:
         assert run.fit.of(run.fit.chosen[1])[0] == pytest.approx(stiction, rel=0.15)
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0])
+def test_friction_that_grows_at_rest_is_told_from_the_dry_friction_that_it_sits_on(level: float) -> None:
+    truth = {("stribeck_friction", "j2"): (1.5, 0.15)} | ({("coulomb_friction", "j2"): (level,)} if level else {})
+    run = begun(arm.XML, simulate(truth, seed=3), {("stribeck_friction", "j2"): (1.0, 0.3)})
+    levelled(run)
+    assert [n for n, _ in names(run)] == ["stribeck_friction", *(["coulomb_friction"] if level else [])]
+    assert run.fit.of(run.fit.chosen[0])[0] == pytest.approx(1.5, rel=0.15)
+    if level:
+        assert run.fit.of(run.fit.chosen[1])[0] == pytest.approx(level, rel=0.1)

@@ -25,5 +25,11 @@ def test_a_joint_that_crosses_sixteen_steps_shows_them():
     assert found.step == pytest.approx(0.02, rel=0.01)
 
 
+@pytest.mark.parametrize("cells", [7, 9])
+def test_of_a_grid_of_few_steps_no_overtone_is_taken_for_it(cells: float):
+    for seed in range(4):
+        assert [g.step for g in grids([_rollout(0.02, cells, seed)], [NOISE])] == [pytest.approx(0.02, rel=0.01)]
+
+
 def test_a_smooth_motion_of_the_same_reach_shows_none():
     assert all(grids([_rollout(0.0, 18, seed)], [NOISE]) == [] for seed in range(20))
