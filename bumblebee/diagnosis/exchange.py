@@ -42,6 +42,7 @@ _RIVALS = 2  # tried in the place of the same names
 _FEW = 4  # effects up to which two are taken out together
 _CLEARLY = 2 * PARAMETER  # log-likelihood by which a rival with as many parameters must be better
 _LEVEL = 3.0  # standard errors of the dry friction on which other friction sits
+_REST = 0.6  # share of such friction that is left when its level is taken from it
 _CREEP = (0.06, 0.2)  # of the joint's usual speed: velocities at which friction is tried to grow
 
 
@@ -95,9 +96,11 @@ def levelled(run: Run) -> None:
         if dry is None or is_chosen(dry, run.fit.chosen):
             continue
         chosen = (*run.fit.chosen, dry)
-        fit = gauss_newton(
-            run.problem, chosen, _on_level(run.fit, c, dry), run.weights, iterations=4, coarse=True, known=run.fit
-        )
+        tried = [
+            gauss_newton(run.problem, chosen, start, run.weights, iterations=5, coarse=True, known=run.fit)
+            for start in _on_level(run.fit, c, dry)
+        ]
+        fit = min(tried, key=lambda one: one.cost)
         z = wald(run.problem, fit, run.weights, len(chosen) - 1)
         if z < _LEVEL or fit.of(dry)[0] < dry.nominal[0] or not _is_no_worse(run.holdout, run.fit, fit):
             continue
@@ -106,13 +109,18 @@ def levelled(run: Run) -> None:
         run.renew(fit)
 
 
-def _on_level(fit: Fit, candidate: Candidate, dry: Candidate) -> np.ndarray:
-    """Values (P,) from which the two are fitted: with a velocity far too high the first is dry friction already."""
-    values = fit.values.copy()
-    mine = values[fit.slices[fit.chosen.index(candidate)]]
-    shaping = [i for i in range(len(mine)) if i not in candidate.free]
-    mine[shaping] = candidate.start[shaping]
-    return np.concatenate((values, dry.start))
+def _on_level(fit: Fit, candidate: Candidate, dry: Candidate) -> list[np.ndarray]:
+    """Values (P,) from which the two are fitted: the first less a share that is level, or at the velocity of a trial.
+
+    With a velocity far too high it is all level already, and no slope leads from there.
+    """
+    mine = fit.slices[fit.chosen.index(candidate)]
+    shaping = [mine.start + i for i in range(mine.stop - mine.start) if i not in candidate.free]
+    near, far = fit.values.copy(), fit.values.copy()
+    near[mine] *= _REST
+    far[shaping] = candidate.start[[i - mine.start for i in shaping]]
+    level = dry.nominal[0] + (1 - _REST) * abs(fit.values[mine.start])
+    return [np.append(near, level), np.append(far, dry.start)]
 
 
 def _slower(candidate: Candidate, share: float) -> Candidate:
