@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bumblebee.diagnosis.acceptance import pruned
+from bumblebee.diagnosis.acceptance import ABRUPT, pruned
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, interval
 from bumblebee.diagnosis.holdout import Holdout
+from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.numerics import moves
 from bumblebee.diagnosis.paying import still_paying
 from bumblebee.diagnosis.problem import Problem, make_problem, window_weights
@@ -118,7 +119,29 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
     if holdout is not None and holdout.worse_later(_with_nuisance(problem, found, weights), fit):
         # Short windows alone led it astray.
         fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
-    return Refined(problem, fit, weights, half_widths(problem, fit, weights) if fit.chosen else np.empty(0))
+    return _sure_of(problem, fit, weights)
+
+
+def _sure_of(problem: Problem, fit: Fit, weights: np.ndarray) -> Refined:
+    """The fit with its intervals, less limits and gaps of which not even these say that there is one.
+
+    A single odd window may find a limit or a gap that explains it: a torque limit of 39 N m in the place of 50, with an
+    interval from none to 5e8.
+    """
+    half = half_widths(problem, fit, weights) if fit.chosen else np.empty(0)
+    kept = [c for c in fit.chosen if c.effect not in (*LIMITS, *ABRUPT) or _is_there(fit, half, c)]
+    if len(kept) == len(fit.chosen):
+        return Refined(problem, fit, weights, half)
+    values = np.concatenate([np.empty(0), *(fit.of(c) for c in kept)])
+    less = last_step(problem, kept, values, weights) if kept else gauss_newton(problem, (), (), weights)
+    return _sure_of(problem, less, weights)
+
+
+def _is_there(fit: Fit, half: np.ndarray, candidate: Candidate) -> bool:
+    """Whether the interval of any of its free parameters leaves the declared value out."""
+    part, free = fit.slices[fit.chosen.index(candidate)], list(candidate.free)
+    away = np.abs(fit.values[part] - np.array(candidate.nominal))[free]
+    return bool((away > half[part][free]).any())
 
 
 def _with_nuisance(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:

@@ -44,3 +44,16 @@ def test_whitened_as_often_as_the_model_changes(
     last = refine(problem, begun, np.random.default_rng(0))
     assert least <= len(whitened) <= most
     assert last.fit.values[0] == pytest.approx(LIMIT, rel=0.02)
+
+
+def test_a_limit_whose_interval_holds_the_declared_one_is_not_named(
+    limited: tuple[Problem, list], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, chosen = limited
+    begun = gauss_newton(problem, chosen, [LIMIT], window_weights(problem.residual([[]])[0]), iterations=0)
+    declared = chosen[0].nominal[0]
+    for half, named in ((0.9 * (declared - LIMIT), True), (1.1 * (declared - LIMIT), False)):
+        monkeypatch.setattr(refining, "half_widths", lambda *_, half=half: np.array([half]))
+        last = refine(problem, begun, np.random.default_rng(0))
+        assert [c.effect for c in last.fit.chosen] == (["torque_limit"] if named else [])
+        assert len(last.half) == len(last.fit.chosen)
