@@ -7,7 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import INVERSE, Candidate
 from bumblebee.diagnosis.eligible import is_chosen
-from bumblebee.diagnosis.fit import Fit, project, solve
+from bumblebee.diagnosis.fit import Fit, gauss_newton, project, solve
 from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.scores import Columns, score_tests
 from bumblebee.diagnosis.search import Search
@@ -118,8 +118,8 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
 
     Sensitivities that agree (> 0.95) are the same to these data. Of the next of kin the nearest are put in the effect's
     place in the simulator; one stays a rival unless it is worse by two standard errors on the windows held out from the
-    fit (on the fitted ones where nothing is held out). Not simulated are those that by their slopes are worse by six
-    on the windows of the screening.
+    fit (on the fitted ones where nothing is held out), or fits the fitted ones better. Not simulated are those that by
+    their slopes are worse by six on the windows of the screening.
     """
     fit, problem = found.fit, found.problem
     most = min(_RIVALS, max(1, _ALL_RIVALS // max(1, len(fit.chosen))))
@@ -133,7 +133,7 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
             if steps is None:
                 continue
             trial = try_one(problem, rest, rival, steps, found.weights)
-            if trial is not None and _no_worse(found, holdout, rest, trial):
+            if trial is not None and _no_worse(found, holdout, _in_place(found, rest, trial)):
                 same.append(rival)
         out.append(same)
     return out
@@ -175,9 +175,19 @@ def _less(fit: Fit, index: int) -> Fit:
     )
 
 
-def _no_worse(found: Search, holdout: Holdout, rest: Fit, trial: Trial) -> bool:
-    """Whether the rival in the effect's place is not worse beyond two standard errors."""
-    swapped = replace(rest, chosen=(*rest.chosen, trial.candidate), values=np.concatenate((rest.values, trial.values)))
+def _in_place(found: Search, rest: Fit, trial: Trial) -> Fit:
+    """The fit with a rival; cogging is fitted in its periods, too, of which few over a short way look like a spring."""
+    rival = trial.candidate
+    chosen, values = (*rest.chosen, rival), np.concatenate((rest.values, trial.values))
+    if rival.effect == "cogging":
+        return gauss_newton(found.problem, chosen, values, found.weights, iterations=3, coarse=True, known=found.fit)
+    return replace(rest, chosen=chosen, values=values, cost=np.inf)
+
+
+def _no_worse(found: Search, holdout: Holdout, swapped: Fit) -> bool:
+    """Whether the fit with a rival in an effect's place is not worse beyond two standard errors, or even better."""
+    if swapped.cost < found.fit.cost:
+        return True
     if holdout.problem is not None:
         logs = holdout.logs([found.fit, swapped])
     else:

@@ -22,7 +22,8 @@ def begun(xml: str, rollouts: list[Rollout], chosen: dict[tuple[str, str], float
     material = gather(session, CONFIG, np.random.default_rng(0), lambda text: None)
     run = Run(material.problem, material.holdout, material.remade, CONFIG.search, lambda text: None)
     names = [next(c for c in run.candidates if (c.effect, c.where) == key) for key in chosen]
-    fit = gauss_newton(run.problem, names, np.concatenate([np.atleast_1d(v) for v in chosen.values()]), run.weights)
+    values = np.concatenate([np.empty(0), *(np.atleast_1d(v) for v in chosen.values())])
+    fit = gauss_newton(run.problem, names, values, run.weights)
     run.weights = window_weights(fit.clean(run.problem))
     run.fit = gauss_newton(run.problem, names, fit.values, run.weights)
     return run
