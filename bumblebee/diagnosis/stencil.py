@@ -6,14 +6,19 @@ of chi-squares on it, and a descent stops in the first hollow: dry friction of 0
 standard errors off, because a tenth of the right step raised the cost by 82 where the whole step lowered it by 112. So
 there the last step compares no costs. Slopes are central differences over a fifth of a change that matters, residuals
 the mean over the points that these need, and the step is the least-squares solution.
+
+Fits with a limit or a gap are left out of it: these act in few windows and from a size on, through which no plane
+leads. A torque limit of 1.62 N m, which the search had found as 1.63, went to 2.47.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from bumblebee.diagnosis.acceptance import ABRUPT
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.fit import Fit, cost_of, gauss_newton, project, solve
+from bumblebee.diagnosis.limits import KINDS as LIMITS
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.slopes import clipped, effects_at
 
@@ -23,8 +28,8 @@ _FEW = 4  # parameters
 
 
 def last_step(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, weights: np.ndarray) -> Fit:
-    """The fit near `values` (P,), with columns around it; on a fixed base by Gauss and Newton as before."""
-    if not problem.plant.floating:
+    """The fit near `values` (P,), with columns around it; on a fixed base, or with a limit, by Gauss and Newton."""
+    if not problem.plant.floating or any(c.effect in (*LIMITS, *ABRUPT) for c in chosen):
         return gauss_newton(problem, chosen, values, weights, iterations=1)
     start = found = clipped(chosen, np.asarray(values, dtype=float))
     scales = np.concatenate([c.scales for c in chosen])

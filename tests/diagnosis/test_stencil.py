@@ -73,3 +73,9 @@ def test_a_fixed_base_is_fitted_as_before() -> None:
     problem, ones = Rough(floating=False), np.ones(W)
     as_before = gauss_newton(problem, (RUBS,), (STARTS[0],), ones, iterations=1)
     assert last_step(problem, (RUBS,), (STARTS[0],), ones).values == pytest.approx(as_before.values)
+
+
+def test_a_limit_is_fitted_as_before() -> None:
+    problem, limit = Rough(), Candidate("torque_limit", "j", (1.0,), (-0.18,))
+    as_before = gauss_newton(problem, (limit,), (1.05 * FRICTION,), np.ones(W), iterations=1)
+    assert last_step(problem, (limit,), (1.05 * FRICTION,), np.ones(W)).values[0] == as_before.values[0]
