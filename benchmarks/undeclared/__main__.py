@@ -26,6 +26,8 @@ import numpy as np
 from benchmarks.undeclared.lottery import VERSION, Case, Suite
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 
+_ROBOTS = ("arm", "stand", "track")
+
 
 def main(argv: list[str] | None = None) -> int:
     """Run, list or tabulate; returns the exit status."""
@@ -38,7 +40,10 @@ def main(argv: list[str] | None = None) -> int:
             return 0
         suite = Suite(options.seed)
         cases = [case for case in suite.cases() if chosen(case, options)]
-        cases = [replace(case, rivals=case.rivals and case.robot in options.rivals.split(",")) for case in cases]
+        with_rivals = options.rivals.split(",")
+        if unknown := set(with_rivals) - {"", *_ROBOTS}:
+            raise BadInput("--rivals", f"some of {', '.join(_ROBOTS)}", ", ".join(sorted(unknown)))
+        cases = [replace(case, rivals=case.rivals and case.robot in with_rivals) for case in cases]
         if options.policy is not None and not (options.policy / "policy.onnx").is_file():
             raise BadInput(options.policy, "a folder with policy.onnx and contract.json", "none there")
         if options.policy is None and not options.list:
@@ -207,7 +212,7 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=1, help="processes, one core each")
     parser.add_argument("--only", action="append", default=[], metavar="A,B",
                         help="robots, groups, kinds or case numbers; given several times, all must hold")  # fmt: skip
-    parser.add_argument("--rivals", default="arm,stand,track", metavar="A,B",
+    parser.add_argument("--rivals", default=",".join(_ROBOTS), metavar="A,B",
                         help="robots on which other methods run too, where the suite has them")  # fmt: skip
     parser.add_argument("--limit", type=int, default=None, help="cases at most")
     parser.add_argument(

@@ -4,12 +4,14 @@ import mujoco
 import numpy as np
 import pytest
 
+from bumblebee.diagnosis import classes
 from bumblebee.diagnosis.exchange import creeping, exchange, levelled
 from bumblebee.diagnosis.fit import gauss_newton
 from bumblebee.diagnosis.material import gather
 from bumblebee.diagnosis.problem import window_weights
 from bumblebee.diagnosis.run import Run
 from bumblebee.diagnosis.session import make_session
+from bumblebee.diagnosis.trials import Trial
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import arm, cart
 from tests.diagnosis.strange_arm import simulate
@@ -69,3 +71,15 @@ def test_friction_that_grows_at_rest_is_told_from_the_dry_friction_that_it_sits_
     assert run.fit.of(run.fit.chosen[0])[0] == pytest.approx(1.5, rel=0.15)
     if level:
         assert run.fit.of(run.fit.chosen[1])[0] == pytest.approx(level, rel=0.1)
+
+
+def test_cogging_is_fitted_in_its_periods_before_a_spring_is_said_to_have_no_rival() -> None:
+    run = begun(arm.XML, simulate({("cogging", "j2"): (1.5, 0.0, 4.0)}, seed=3), {("joint_spring", "j2"): (1.0, 0.0)})
+    rest = classes._less(run.fit, 0)
+    there = [c for c in run.candidates if (c.effect, c.where) == ("cogging", "j2")]
+    rival = min((c for c in there if c.start[2] > 4.5), key=lambda c: c.start[2])
+    first = Trial(rival, rival.start, np.inf, np.zeros(0))
+    placed = classes._in_place(run, rest, first)
+    assert placed.values[2] == pytest.approx(4.0, rel=0.05)
+    assert placed.cost < run.fit.cost
+    assert classes._no_worse(run, run.holdout, placed)
