@@ -128,7 +128,8 @@ def read_clip(path: Path) -> Clip:
     facts = read_facts(path, metadata[_META])
     if facts["name"] != path.stem:
         raise BadInput(f"{path}: name", f"{path.stem!r}, as the file is called", repr(facts["name"])[:80])
-    values = np.stack([column.to_numpy() for column in table.columns], axis=1).astype(np.float32)
+    with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite and is refused below
+        values = np.stack([column.to_numpy() for column in table.columns], axis=1).astype(np.float32)
     root_pos, root_quat, joint_pos, key_pos = np.split(values, [3, 7, 7 + len(joint_names())], axis=1)
     key_pos = key_pos.reshape(-1, len(KEY_BODIES), 3)
     arrays = {"root_pos": root_pos, "root_quat": root_quat, "joint_pos": joint_pos, "key_pos": key_pos}

@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 
-_LIMITS = Limits(text_bytes=1 << 20, nodes=60_000)
+_LIMITS = Limits(text_bytes=1 << 20, nodes=30_000)
 _MOST = 2000  # effects of a file: a robot has some dozens of joints, the catalogue some dozens of effects
 _LONGEST = 200  # characters of a joint's name
 _LARGEST = 1e9  # of a parameter or a coefficient, in SI units
