@@ -16,4 +16,6 @@ class BadInput(Exception):
     def __init__(self, where: object, expected: str, came: str, do: str = "") -> None:
         self.where, self.expected, self.came, self.do = str(where), expected, came, do
         line = f"{where}: expected {expected}, came {came}"
-        super().__init__(" ".join((f"{line}. {do}" if do else line).split()))
+        words = " ".join((f"{line}. {do}" if do else line).split())
+        # Names and values come from files: no control character of theirs reaches a terminal or a log.
+        super().__init__("".join(sign if sign.isprintable() else "\ufffd" for sign in words))

@@ -1,14 +1,15 @@
 """A policy as it is deployed: the ONNX file and the contract that says what goes in and out."""
 
 import hashlib
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bumblebee.deploy.policy_checks import check_fields, check_self_contained
 from bumblebee.errors import BadInput
+from bumblebee.io.read import read_bytes, read_json
 from bumblebee.robot.facts import joint_names, joints
 from bumblebee.robot.model import gains
 from bumblebee.tracking.config import ObservationConfig
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 FEED_FORWARDS = (None, "quasi-static")
 ACTION_BASES = ("reference", "default")
+MAX_BYTES = 256 << 20  # of policy.onnx; ours have a few MB
 _REQUIRED = ("joints", "kp", "kd", "control_hz", "action", "observation", "onnx_sha256")
 
 
@@ -40,7 +42,7 @@ class ExportedPolicy:
 
         folder = Path(folder)
         contract = read_policy_contract(folder / "contract.json")
-        model = _read(folder / "policy.onnx")
+        model = read_bytes(folder / "policy.onnx", MAX_BYTES)
         actual = hashlib.sha256(model).hexdigest()
         if actual != contract["onnx_sha256"]:
             raise BadInput(
@@ -49,15 +51,17 @@ class ExportedPolicy:
                 actual[:12],
                 "Export the policy again.",
             )
+        check_self_contained(folder / "policy.onnx", model)
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 3
+        options.log_severity_level = 4  # what it refuses becomes our one line
         try:
             session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
         except Exception as error:  # onnxruntime raises its own types for a file that is no model
-            raise BadInput(folder / "policy.onnx", "an ONNX model", str(error)) from None
+            raise BadInput(folder / "policy.onnx", "an ONNX model", str(error)[:200]) from None
         policy = cls(folder, contract, session)
         _check_sizes(policy)
+        _check_answer(policy)
         return policy
 
     @property
@@ -86,22 +90,24 @@ class ExportedPolicy:
 
 
 def read_policy_contract(path: Path) -> dict[str, Any]:
-    """Read and check contract.json: keys, joint order and observation layout."""
-    try:
-        contract = json.loads(_read(path))
-    except ValueError as error:
-        raise BadInput(path, "JSON", str(error)) from None
+    """Read and check contract.json: keys, types, joint order, gains, rates and observation layout."""
+    contract = read_json(path)
     missing = [key for key in _REQUIRED if key not in contract] if isinstance(contract, dict) else list(_REQUIRED)
     if missing:
         raise BadInput(f"{path}: field {missing[0]}", "a policy contract", "no such field", "Export the policy again.")
+    check_fields(path, contract)
     _check_joints(path, contract)
     if contract["action"].get("feed_forward") not in FEED_FORWARDS:
-        raise BadInput(f"{path}: action.feed_forward", str(FEED_FORWARDS), str(contract["action"]["feed_forward"]))
+        came = str(contract["action"]["feed_forward"])[:80]
+        raise BadInput(f"{path}: action.feed_forward", str(FEED_FORWARDS), came)
     if contract["action"].setdefault("base", ACTION_BASES[0]) not in ACTION_BASES:
-        raise BadInput(f"{path}: action.base", " or ".join(ACTION_BASES), str(contract["action"]["base"]))
+        raise BadInput(f"{path}: action.base", " or ".join(ACTION_BASES), str(contract["action"]["base"])[:80])
     seen = observed(contract)
     for key, terms in (("observation", seen.terms), ("observation_now", seen.now)):
         _check_parts(f"{path}: {key}", terms, contract, key)
+    if "ahead" in contract and len(contract["ahead"]) != ahead_frames(contract):
+        came = str(len(contract["ahead"]))
+        raise BadInput(f"{path}: ahead", f"{ahead_frames(contract)} times, as in the observation", came)
     return contract
 
 
@@ -137,17 +143,16 @@ def ahead_frames(contract: dict[str, Any]) -> int:
 
 
 def _check_joints(path: Path, contract: dict[str, Any]) -> None:
-    expected, came = list(joint_names()), list(contract["joints"])
+    expected, came = list(joint_names()), contract["joints"]
     if came != expected:
         index = next(
             (i for i, pair in enumerate(zip(expected, came, strict=False)) if pair[0] != pair[1]),
             min(len(expected), len(came)),
         )
-        one, other = (str(names[index]) if index < len(names) else "nothing" for names in (expected, came))
+        one, other = (str(names[index])[:80] if index < len(names) else "nothing" for names in (expected, came))
         raise BadInput(f"{path}: joints[{index}]", one, other, "The policy was made for another robot or joint order.")
-    sizes = {"kp": contract["kp"], "kd": contract["kd"], "action.scale": contract["action"]["scale"]}
-    for field, values in sizes.items():
-        if len(values) != len(expected):
+    for field, values in {**contract, "action.scale": contract["action"]["scale"]}.items():
+        if field in ("kp", "kd", "action.scale", "default_pos") and len(values) != len(expected):
             raise BadInput(f"{path}: {field}", f"{len(expected)} numbers", str(len(values)))
     servo = [gains(joint) for joint in joints()]
     for field, index in (("kp", 0), ("kd", 1)):
@@ -165,14 +170,27 @@ def _check_sizes(policy: ExportedPolicy) -> None:
     inputs = {value.name: value.shape for value in policy.session.get_inputs()}
     outputs = {value.name: value.shape for value in policy.session.get_outputs()}
     where = policy.folder / "policy.onnx"
-    if set(inputs) != {"obs"} or inputs["obs"][-1] != size:
-        raise BadInput(f"{where}: inputs", f"obs (N, {size})", str(inputs))
-    if "actions" not in outputs or outputs["actions"][-1] != len(policy.contract["joints"]):
-        raise BadInput(f"{where}: outputs", f"actions (N, {len(policy.contract['joints'])})", str(outputs))
+    if set(inputs) != {"obs"} or len(inputs["obs"]) != 2 or inputs["obs"][-1] != size:
+        raise BadInput(f"{where}: inputs", f"obs (N, {size})", str(inputs)[:200])
+    joints_out = len(policy.contract["joints"])
+    if "actions" not in outputs or len(outputs["actions"]) != 2 or outputs["actions"][-1] != joints_out:
+        raise BadInput(f"{where}: outputs", f"actions (N, {joints_out})", str(outputs)[:200])
+    types = {value.name: value.type for value in (*policy.session.get_inputs(), *policy.session.get_outputs())}
+    for name in ("obs", "actions"):
+        if types[name] != "tensor(float)":
+            raise BadInput(f"{where}: {name}", "tensor(float)", types[name])
 
 
-def _read(path: Path) -> bytes:
+def _check_answer(policy: ExportedPolicy) -> None:
+    """Ask the policy once: whoever answers nothing, or no finite numbers, is not let near a robot."""
+    (obs,) = policy.session.get_inputs()
+    rows = 2  # the runner steps several robots at once
+    where = policy.folder / "policy.onnx"
     try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise BadInput(path, "a file of an exported policy", error.strerror or str(error)) from None
+        actions = policy.act(np.zeros((rows, obs.shape[-1])))
+    except Exception as error:  # onnxruntime raises its own types
+        raise BadInput(where, f"actions for {rows} observations at once", str(error)[:200]) from None
+    wanted = (rows, len(policy.contract["joints"]))
+    if actions.shape != wanted or not np.isfinite(actions).all():
+        came = f"shape {actions.shape}" if actions.shape != wanted else "NaN or infinity"
+        raise BadInput(where, f"finite actions of shape {wanted} for an observation of zeros", came)

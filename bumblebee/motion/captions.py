@@ -1,9 +1,16 @@
 """Captions in HumanML3D's line format: `a person walks.#a/DET person/NOUN walk/VERB#0.0#0.0`, times in seconds."""
 
+import math
+import os
 import re
 from pathlib import Path
 
 from bumblebee.errors import BadInput
+from bumblebee.io.read import read_text
+from bumblebee.motion.texts import require_line
+
+_MAX_BYTES = 1 << 20  # of a caption file; HumanML3D's have a few hundred
+_LONGEST_TIME = 1e6  # s
 
 # What a word in a file's name says about the kind of motion; the first that is found decides.
 _FAMILIES = (
@@ -27,9 +34,9 @@ def read_captions(path: Path) -> tuple[str, ...]:
     """The lines of a caption file.
 
     Raises:
-        BadInput: a line that is not `caption#tokens/POS#from#to`.
+        BadInput: no text, or a line that is not `caption#tokens/POS#from#to`.
     """
-    lines = [line.strip() for line in path.read_text(encoding="utf-8", errors="replace").splitlines()]
+    lines = [line.strip() for line in read_text(path, _MAX_BYTES).splitlines()]
     for number, line in enumerate(lines, 1):
         if line:
             parse_caption(line, f"{path}, line {number}")
@@ -38,7 +45,7 @@ def read_captions(path: Path) -> tuple[str, ...]:
 
 def parse_caption(line: str, where: object = "caption") -> tuple[str, str, float, float]:
     """Caption, tokens, from [s], to [s]; 0 and 0 mean the whole motion."""
-    parts = line.split("#")
+    parts = require_line(where, line).split("#")
     if len(parts) != 4 or not parts[0].strip():
         raise BadInput(where, "caption#tokens/POS#from#to", repr(line)[:80])
     try:
@@ -46,6 +53,8 @@ def parse_caption(line: str, where: object = "caption") -> tuple[str, str, float
         start, end = (0.0 if part.strip().lower() == "nan" else float(part) for part in parts[2:])
     except ValueError:
         raise BadInput(where, "times in seconds after the tokens", f"{parts[2]!r} and {parts[3]!r}"[:80]) from None
+    if not all(math.isfinite(time) and 0 <= time <= _LONGEST_TIME for time in (start, end)):
+        raise BadInput(where, f"times from 0 to {_LONGEST_TIME:g} s", f"{parts[2]!r} and {parts[3]!r}"[:80])
     return parts[0].strip(), parts[1].strip(), start, end
 
 
@@ -54,14 +63,14 @@ def find_captions(motion: Path, folder: str | Path) -> tuple[str, ...]:
     places = [Path(folder)] if str(folder) else []
     for place in [*places, motion.parent]:
         path = place / f"{motion.stem}.txt"
-        if path.is_file():
+        if os.path.lexists(path):
             return read_captions(path)
     return ()
 
 
 def caption_from_name(name: str) -> str:
     """A caption made of the words of a file's name."""
-    text = words(name) or ["move"]
+    text = words(name)[:40] or ["move"]
     tokens = " ".join(["a/DET", "person/NOUN", "perform/VERB", *(f"{word}/OTHER" for word in text)])
     return f"a person performs {' '.join(text)}#{tokens}#0.0#0.0"
 

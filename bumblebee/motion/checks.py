@@ -5,12 +5,19 @@ from collections.abc import Callable
 import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.io.read import require_within
 from bumblebee.motion import quaternions
-from bumblebee.motion.kinematics import lowest
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.kinematics import forward_key_positions, lowest
 from bumblebee.motion.raw import RawMotion
-from bumblebee.robot.facts import joint_names
+from bumblebee.robot.facts import KEY_BODIES, joint_names
 
 MIN_FRAMES = 10
+MAX_FRAMES = 4_000_000  # of one motion: an hour at the fastest rate
+_RATES = (1.0, 1000.0)  # Hz
+_MAX_SECONDS = 3600.0
+_REACH = 1000.0  # m from the world's origin
+_KEY_ERROR = 0.02  # m between keypoints and what the joint angles say
 _FULL_TURN = 2 * np.pi  # rad: no joint of the G1 goes half as far
 _MAX_HEIGHT = 5.0  # m of the pelvis
 _NORM_TOLERANCE = 0.02
@@ -31,6 +38,11 @@ def enough_frames(raw: RawMotion) -> None:
     frames = len(raw.root_pos)
     if frames < MIN_FRAMES:
         raise BadInput(raw.where, f"at least {MIN_FRAMES} frames", f"{frames} frame{'s' * (frames != 1)}")
+
+
+def frame_rate(raw: RawMotion) -> None:
+    """A rate that motions have, and a length that resampling does not blow up."""
+    _check_rate(raw.where, raw.fps, len(raw.root_pos))
 
 
 def finite(raw: RawMotion) -> None:
@@ -69,6 +81,15 @@ def metres(raw: RawMotion) -> None:
         raise BadInput(where, "metres", f"{height:.4g} in the median", "Centimetres? Convert the position to metres.")
 
 
+def near(raw: RawMotion) -> None:
+    """A robot that walks does not go further than a kilometre, nor jump there."""
+    for axis, values in zip("xyz", raw.root_pos.T, strict=True):
+        bad = np.flatnonzero(np.abs(values) > _REACH)
+        if len(bad):
+            where = f"{raw.where}, {raw.row(bad[0])}, root position {axis}"
+            raise BadInput(where, f"at most {_REACH:g} m", f"{values[bad[0]]:.4g}")
+
+
 def quaternion_order(raw: RawMotion) -> None:
     """The file holds xyzw: read the other way round, the robot must not stand better.
 
@@ -93,12 +114,50 @@ def quaternion_order(raw: RawMotion) -> None:
 
 CHECKS: tuple[Callable[[RawMotion], None], ...] = (
     enough_frames,
+    frame_rate,
     finite,
     unit_quaternions,
     radians,
     metres,
+    near,
     quaternion_order,
 )
+
+
+def check_clip(where: object, clip: Clip) -> None:
+    """What every clip must satisfy that is read or written.
+
+    Raises:
+        BadInput: unequal lengths, a rate or a length that no motion has, NaN or infinity, values beyond all sense,
+            quaternions of another length than 1, keypoints that do not belong to the joint angles.
+    """
+    frames, sizes = clip.frames, {"root_pos": (3,), "root_quat": (4,), "joint_pos": (len(joint_names()),)}
+    for field, size in {**sizes, "key_pos": (len(KEY_BODIES), 3)}.items():
+        values = getattr(clip, field)
+        if values.shape != (frames, *size) or not frames:
+            raise BadInput(f"{where}: {field}", f"shape {('at least 1', *size)}", str(values.shape))
+    _check_rate(where, clip.fps, frames)
+    require_within(f"{where}: root_pos", clip.root_pos, _REACH, "m")
+    require_within(f"{where}: root_quat", clip.root_quat, 1 + _NORM_TOLERANCE)
+    require_within(f"{where}: joint_pos", clip.joint_pos, 2 * _FULL_TURN, "rad")
+    require_within(f"{where}: key_pos", clip.key_pos, _REACH + 10, "m")
+    norm = np.linalg.norm(clip.root_quat, axis=1)
+    bad = np.flatnonzero(np.abs(norm - 1) > _NORM_TOLERANCE)
+    if len(bad):
+        raise BadInput(f"{where}: root_quat, row {bad[0]}", "length 1", f"{norm[bad[0]]:.3g}")
+    some = np.unique([0, frames // 2, frames - 1])
+    wanted = forward_key_positions(clip.root_pos[some], clip.root_quat[some], clip.joint_pos[some])
+    error = np.abs(clip.key_pos[some] - wanted).max()
+    if error > _KEY_ERROR:
+        raise BadInput(f"{where}: key_pos", "keypoints that follow from the joint angles", f"{error:.3g} m beside them")
+
+
+def _check_rate(where: object, fps: float, frames: int) -> None:
+    if not _RATES[0] <= fps <= _RATES[1]:  # also for NaN
+        raise BadInput(f"{where}: fps", f"frames a second from {_RATES[0]:g} to {_RATES[1]:g}", f"{fps:g}")
+    if (frames - 1) / fps > _MAX_SECONDS:
+        came = f"{(frames - 1) / fps:.0f} s"
+        raise BadInput(where, f"a motion of at most {_MAX_SECONDS:g} s", came, "Cut it into parts.")
 
 
 def _named(raw: RawMotion) -> list[tuple[np.ndarray, tuple[str, ...]]]:

@@ -2,30 +2,37 @@
 
 import hashlib
 import os
-import re
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import pandas as pd
 
 from bumblebee.errors import BadInput
+from bumblebee.io.names import safe_stem
+from bumblebee.io.read import read_bytes
 from bumblebee.motion.asap_pickle import read_asap_pickle
 from bumblebee.motion.captions import caption_from_name, family_of, find_captions
-from bumblebee.motion.checks import check_raw
+from bumblebee.motion.checks import check_clip, check_raw
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.g1_csv import read_g1_csv
 from bumblebee.motion.grounding import GroundingConfig, ground
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.licences import licence_of
-from bumblebee.motion.pieces import motion_of, split_long
+from bumblebee.motion.naming import distinct
+from bumblebee.motion.pieces import split_long
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
-from bumblebee.motion.store import read_library
+from bumblebee.motion.store import read_index, read_indexed, read_library
+from bumblebee.motion.texts import shown
+from bumblebee.motion.walk import INDEX, motion_files
 
-# Formats that come in such folders and are not read; what is no motion at all (notes, licences) is passed over.
+Result = TypeVar("Result")
+
+# Formats that come in such folders and are not read.
 _NOT_YET = {
     ".npz": "SMPL motions cannot be read yet",
     ".npy": "NumPy arrays cannot be read yet",
@@ -37,8 +44,10 @@ _NOT_YET = {
     ".gz": "archives cannot be read yet: unpack it",
     ".7z": "archives cannot be read yet: unpack it",
 }
+_PICKLES = (".pkl", ".pickle", ".joblib", ".p")
+_END_OF_ZIP = 22 + (1 << 16)  # bytes: the record at a zip's end with the longest comment
+_MAX_DIRECTORY = 16 << 20  # bytes of a zip's list of files
 _UNKNOWN = "a format that is not known"
-_NO_MOTION = {"", ".txt", ".md", ".pdf", ".png", ".jpg", ".gif", ".mp4", ".html", ".json", ".yaml", ".yml", ".py"}
 
 
 @dataclass(frozen=True)
@@ -79,23 +88,20 @@ def read_folder(path: Path, config: ReadConfig | None = None, tell: Callable[[],
         BadInput: no such folder, or no motion in it, or the single file cannot be used.
     """
     path, config = Path(path), config or ReadConfig()
-    if path.is_file():
-        return Reading(read_file(path, config), skipped_table([]))
     if not path.is_dir():
-        raise BadInput(path, "a folder with motion files", "no such folder")
+        return Reading(read_file(path, config), skipped_table([]))
     files = motion_files(path)
     found: list[tuple[Path, list[Clip]]] = []
     skipped: list[tuple[str, str]] = []
     for file in files:
-        try:
-            found.append((file, read_file(file, config)))
-        except BadInput as error:
-            skipped.append((str(file.relative_to(path)), _reason(error, file)))
-        except OSError as error:
-            skipped.append((str(file.relative_to(path)), error.strerror or str(error)))
+        for part, group in _parts(file, config):
+            if isinstance(group, str):
+                skipped.append((shown(os.path.relpath(part, path)), group))
+            else:
+                found.append((file, group))
         if tell:
             tell()
-    clips = _distinct(found)
+    clips = distinct(found)
     if not clips:
         first = f"; the first: {skipped[0][0]}: {skipped[0][1]}" if skipped else ""
         came = f"{len(files)} files, none of them usable{first}"
@@ -106,12 +112,70 @@ def read_folder(path: Path, config: ReadConfig | None = None, tell: Callable[[],
 def read_file(path: Path, config: ReadConfig | None = None) -> list[Clip]:
     """The clips of one file: a G1 CSV, an ASAP pickle, or the index of a motion library."""
     path, config = Path(path), config or ReadConfig()
-    if path.name == "index.parquet":
-        return [piece for clip in read_library(path.parent) for piece in split_long(clip, config.max_seconds)]
-    if not path.is_file():
-        raise BadInput(path, "a motion file", "no such file")
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    return [piece for raw in _raw(path, config) for piece in prepare(raw, config, digest)]
+    if path.name == INDEX:
+        clips = read_library(path.parent)
+        return distinct([(path, group) for group in _apart([split_long(clip, config.max_seconds) for clip in clips])])
+    return distinct([(path, group) for group in _motions(path, config)])
+
+
+def _parts(file: Path, config: ReadConfig) -> Iterator[tuple[Path, list[Clip] | str]]:
+    """What a file of a folder gives: groups of clips whose names stay together, or the reason why there are none.
+
+    A clip of a library counts by itself, so that a damaged one does not take the others with it.
+    """
+    if file.name != INDEX:
+        groups = _tried(lambda: _motions(file, config), file)
+        yield from [(file, groups)] if isinstance(groups, str) else [(file, group) for group in groups]
+        return
+    rows = _tried(lambda: read_index(file.parent).to_dict("records"), file)
+    if isinstance(rows, str):
+        yield file, rows
+        return
+    whole: list[list[Clip]] = []
+    for row in rows:
+        part = file.parent / "clips" / f"{row['name']}.parquet"
+        clip = _tried(lambda row=row: split_long(read_indexed(file.parent, row), config.max_seconds), part)
+        if isinstance(clip, str):
+            yield part, clip
+        else:
+            whole.append(clip)
+    yield from ((file, group) for group in _apart(whole))
+
+
+def _tried(read: Callable[[], Result], file: Path) -> Result | str:
+    """What `read` returns, or why it does not."""
+    try:
+        return read()
+    except BadInput as error:
+        return shown(_reason(error, file), 1000)
+    except OSError as error:  # a file that vanished, a disk that was unplugged
+        return shown(error.strerror or str(error))
+    except Exception as error:  # a mistake of ours about one file must not cost the user all the others
+        return shown(f"it could not be read ({type(error).__name__}: {error}): please report this")
+
+
+def _apart(clips: list[list[Clip]]) -> list[list[Clip]]:
+    """A library's clips as one group, or each with its pieces as its own where cutting made equal names."""
+    names = [clip.name.casefold() for pieces in clips for clip in pieces]
+    return [[clip for pieces in clips for clip in pieces]] if len(set(names)) == len(names) else clips
+
+
+def _motions(path: Path, config: ReadConfig) -> list[list[Clip]]:
+    """The pieces of each motion of a file."""
+    if path.is_dir():
+        came = "a link to a folder, which is not followed" if path.is_symlink() else "one that cannot be listed"
+        raise BadInput(path, "a folder with motions", came)
+    suffix = path.suffix.lower()
+    if suffix not in (*_PICKLES, ".csv"):
+        reason = _inside_zip(path) if suffix == ".zip" else _NOT_YET.get(suffix, _UNKNOWN)
+        if not os.path.lexists(path):
+            raise BadInput(path, "a folder with motion files, or a motion file", "no such folder or file")
+        raise BadInput(path, "a G1 CSV file, an ASAP pickle or a motion library", reason)
+    data = read_bytes(path)
+    digest = hashlib.sha256(data).hexdigest()
+    is_csv = suffix == ".csv"
+    raws = [read_g1_csv(path, _csv_fps(path, config), data)] if is_csv else read_asap_pickle(path, data)
+    return [prepare(raw, config, digest) for raw in raws]
 
 
 def prepare(raw: RawMotion, config: ReadConfig, digest: str = "") -> list[Clip]:
@@ -123,38 +187,31 @@ def prepare(raw: RawMotion, config: ReadConfig, digest: str = "") -> list[Clip]:
     if not captions:
         captions, source = (caption_from_name(raw.name),), "name"
     clip = make_clip(
-        _file_name(raw.name),
+        safe_stem(raw.name, "motion"),
         raw.fps,
         root_pos,
         raw.root_quat,
         joint_pos,
         captions=captions,
         caption_source=source,
-        source=str(Path(raw.file.parent.name) / raw.file.name),
+        source=shown(str(Path(raw.file.parent.name) / raw.file.name)),
         licence=licence_of(raw.file),
         sha256=digest,
         family=family_of(raw.name),
     )
+    check_clip(raw.where, clip)
     return split_long(clip, config.max_seconds)
-
-
-def _raw(path: Path, config: ReadConfig) -> list[RawMotion]:
-    suffix = path.suffix.lower()
-    if suffix in (".pkl", ".pickle", ".joblib", ".p"):
-        return read_asap_pickle(path)
-    if suffix == ".csv":
-        return [read_g1_csv(path, _csv_fps(path, config))]
-    reason = _inside_zip(path) if suffix == ".zip" else _NOT_YET.get(suffix, _UNKNOWN)
-    raise BadInput(path, "a G1 CSV file, an ASAP pickle or a motion library", reason)
 
 
 def _inside_zip(path: Path) -> str:
     """Why an archive is skipped, with what it holds."""
     reason = _NOT_YET[".zip"]
     try:
+        if not path.is_file() or not _short_directory(path):
+            return reason
         with zipfile.ZipFile(path) as archive:
-            kinds = Counter(Path(name).suffix.lower() for name in archive.namelist())
-    except (zipfile.BadZipFile, OSError, ValueError):
+            kinds = Counter(shown(Path(name).suffix.lower(), 12) for name in archive.namelist())
+    except Exception:  # zipfile raises anything from BadZipFile to NotImplementedError for a damaged directory
         return reason
     kinds.pop("", None)
     if not kinds:
@@ -163,29 +220,21 @@ def _inside_zip(path: Path) -> str:
     return f"{reason} ({count} {kind} files in it" + (f"; {_NOT_YET[kind]})" if kind in _NOT_YET else ")")
 
 
+def _short_directory(path: Path) -> bool:
+    """Whether an archive's list of files is small enough to look into: its length stands at the file's end."""
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        stream.seek(max(0, size - _END_OF_ZIP))
+        end = stream.read(_END_OF_ZIP)
+    at = end.rfind(b"PK\x05\x06")
+    return at >= 0 and len(end) >= at + 16 and int.from_bytes(end[at + 12 : at + 16], "little") <= _MAX_DIRECTORY
+
+
 def _csv_fps(path: Path, config: ReadConfig) -> float:
-    for folder in path.resolve().parents:
+    for folder in Path(os.path.realpath(path)).parents:
         if folder.name in config.csv_fps_by_folder:
             return config.csv_fps_by_folder[folder.name]
     return config.csv_fps
-
-
-def motion_files(path: Path) -> list[Path]:
-    """The files that `read_folder` tries, in its order."""
-    return [path] if path.is_file() else list(_walk(path))
-
-
-def _walk(folder: Path) -> Iterator[Path]:
-    """The motion files below a folder, sorted; a motion library counts as one file, its index."""
-    for place, below, names in os.walk(folder):
-        below[:] = sorted(name for name in below if not name.startswith("."))
-        if "index.parquet" in names and "clips" in below:
-            below.clear()
-            yield Path(place) / "index.parquet"
-            continue
-        for name in sorted(names):
-            if not name.startswith(".") and Path(name).suffix.lower() not in _NO_MOTION:
-                yield Path(place) / name
 
 
 def _reason(error: BadInput, file: Path) -> str:
@@ -198,31 +247,3 @@ def _reason(error: BadInput, file: Path) -> str:
 def skipped_table(rows: list[tuple[str, str]]) -> pd.DataFrame:
     """Files without clips, columns `file` and `reason`."""
     return pd.DataFrame(rows, columns=["file", "reason"])
-
-
-def _distinct(found: list[tuple[Path, list[Clip]]]) -> list[Clip]:
-    """Names that occur in several files get the folder's name in front, and a number if that is not enough."""
-    taken: set[str] = set()
-    clips: list[Clip] = []
-    for file, group in found:
-        names = [clip.name for clip in group]
-        if taken & set(names):
-            names = [f"{_file_name(file.parent.name)}_{name}" for name in names]
-        first, number = names, 2
-        while taken & set(names):
-            names = [_numbered(name, number) for name in first]
-            number += 1
-        taken |= set(names)
-        clips += [replace(clip, name=name) for clip, name in zip(group, names, strict=True)]
-    return clips
-
-
-def _numbered(name: str, number: int) -> str:
-    """`walk_p3` -> `walk_2_p3`: the piece stays at the end."""
-    motion = motion_of(name)
-    return f"{motion}_{number}{name[len(motion) :]}"
-
-
-def _file_name(name: str) -> str:
-    """A name that is safe as a file's."""
-    return re.sub(r"[^A-Za-z0-9_.+-]+", "_", name).strip("._") or "motion"

@@ -8,9 +8,7 @@ are checked. joblib writes the bytes of each array behind its description, after
 import bz2
 import io
 import lzma
-import math
 import pickle
-import re
 import struct
 import zlib
 from collections.abc import Callable
@@ -20,28 +18,30 @@ from typing import Any, ClassVar
 import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.io.read import read_bytes
+from bumblebee.motion.pickle_values import CALLABLE, KNOWN, MAX_BYTES, Array, DType, JoblibWrapper, RefusedError
 
-MAX_BYTES = 1 << 30  # of a file, and of what it unpacks to
-_MAX_DIMENSIONS = 8
-_NUMERIC = re.compile(r"[<>=|]?[biuf][1248]|bool")
+MAX_STEPS = 2_000_000  # instructions of the pickle's program: a motion has a few dozen
+_MAX_DICTIONARY = 256 << 20  # bytes that an xz or lzma stream may ask for itself; xz -9 asks for 65 MiB
+_KEYS = str | int | float | bytes | None  # what a dict's keys may be: hashing a tuple of tuples can take for ever
 
 
 _BROKEN = (ValueError, TypeError, LookupError, AttributeError, OverflowError, MemoryError, RecursionError)
 
 
-class RefusedError(Exception):
-    """The pickle holds something that is neither a plain value nor a numeric array."""
-
-
-def load(path: Path) -> Any:
+def load(path: Path, data: bytes | None = None) -> Any:
     """The pickle's content: dicts, lists, tuples, strings, numbers, and numpy arrays.
+
+    Args:
+        path: the file.
+        data: its bytes, where they have been read.
 
     Raises:
         BadInput: empty, truncated or hostile file, or arrays of objects.
     """
     try:
-        data = _unpacked(path)
-        return _plain(_SafeUnpickler(data).load(), {})
+        raw = read_bytes(path, MAX_BYTES) if data is None else data
+        return _plain(_SafeUnpickler(_unpacked(path, raw)).load(), {})
     except RefusedError as refusal:
         raise BadInput(
             path, "a pickle of plain values and numeric arrays", str(refusal), "Nothing of it was executed."
@@ -57,11 +57,8 @@ def load(path: Path) -> Any:
         raise BadInput(path, "a whole pickle", came, "Copy the file again.") from None
 
 
-def _unpacked(path: Path) -> bytes:
+def _unpacked(path: Path, raw: bytes) -> bytes:
     """The file's bytes, decompressed as joblib compresses, within `MAX_BYTES`."""
-    if path.stat().st_size > MAX_BYTES:
-        raise RefusedError(f"a file of more than {MAX_BYTES >> 20} MiB")
-    raw = path.read_bytes()
     if not raw:
         raise BadInput(path, "a pickle", "an empty file", "Copy the file again.")
     for magic, maker in _DECOMPRESSORS.items():
@@ -85,120 +82,9 @@ _DECOMPRESSORS: dict[bytes, Callable[[], Any]] = {
     b"\x78": zlib.decompressobj,
     b"\x1f\x8b": lambda: zlib.decompressobj(wbits=31),
     b"BZ": bz2.BZ2Decompressor,
-    b"\xfd7zXZ": lzma.LZMADecompressor,
-    b"\x5d\x00": lzma.LZMADecompressor,
+    b"\xfd7zXZ": lambda: lzma.LZMADecompressor(memlimit=_MAX_DICTIONARY),
+    b"\x5d\x00": lambda: lzma.LZMADecompressor(memlimit=_MAX_DICTIONARY),
 }
-
-
-class _NDArray:
-    """Stands for `numpy.ndarray` where a pickle names it; never made."""
-
-
-class _DType:
-    """Stands for `numpy.dtype`: a description as text."""
-
-    def __init__(self, text: Any, *_: object) -> None:
-        self.text = text
-
-    def set_state(self, state: Any) -> None:
-        if isinstance(state, tuple) and len(state) > 1 and state[1] in ("<", ">", "|", "="):
-            self.text = f"{state[1]}{str(self.text).lstrip('<>=|')}"
-
-    def numpy(self) -> np.dtype:
-        if not isinstance(self.text, str) or not _NUMERIC.fullmatch(self.text):
-            raise RefusedError(f"an array of dtype {self.text!r}, which is not numeric")
-        return np.dtype(self.text)
-
-
-class _Array:
-    """Stands for an array that numpy pickled itself."""
-
-    def __init__(self) -> None:
-        self.value: np.ndarray | None = None
-
-    def set_state(self, state: Any) -> None:
-        _, shape, dtype, fortran, raw = state
-        self.value = _array(raw, dtype, shape, "F" if fortran else "C")
-
-
-class _JoblibWrapper:
-    """Stands for `joblib.numpy_pickle.NumpyArrayWrapper`: describes an array whose bytes follow in the file."""
-
-    def __init__(self) -> None:
-        self.facts: dict[str, Any] = {}
-
-    def set_state(self, state: Any) -> None:
-        if not isinstance(state, dict):
-            raise RefusedError("an array wrapper without its facts")
-        self.facts = state
-
-    def read(self, file: io.BytesIO) -> np.ndarray:
-        dtype, count = _dtype(self.facts["dtype"]), _count(self.facts["shape"])
-        if self.facts.get("numpy_array_alignment_bytes") is not None:
-            padding = file.read(1)
-            if not padding:
-                raise EOFError("in the padding of an array")
-            file.read(padding[0])
-        raw = file.read(_checked_size(count, dtype))
-        return _array(raw, self.facts["dtype"], self.facts["shape"], self.facts["order"])
-
-
-def _dtype(description: Any) -> np.dtype:
-    return (description if isinstance(description, _DType) else _DType(description)).numpy()
-
-
-def _count(shape: Any) -> int:
-    whole = isinstance(shape, tuple) and all(type(n) is int and n >= 0 for n in shape)
-    if not whole or len(shape) > _MAX_DIMENSIONS:
-        raise RefusedError(f"an array of shape {str(shape)[:60]}")
-    return math.prod(shape)
-
-
-def _checked_size(count: int, dtype: np.dtype) -> int:
-    if count * dtype.itemsize > MAX_BYTES:
-        raise RefusedError(f"an array of more than {MAX_BYTES >> 20} MiB")
-    return count * dtype.itemsize
-
-
-def _array(raw: Any, dtype: Any, shape: Any, order: Any) -> np.ndarray:
-    kind, count = _dtype(dtype), _count(shape)
-    if not isinstance(raw, bytes | bytearray):
-        raise RefusedError(f"an array made of {type(raw).__name__}, not of bytes")
-    if len(raw) != _checked_size(count, kind):
-        raise EOFError(f"an array has {len(raw)} of {count * kind.itemsize} bytes")
-    values = np.frombuffer(bytes(raw), kind).reshape(shape, order="F" if order == "F" else "C")
-    return values.astype(kind.newbyteorder("="))
-
-
-def _reconstruct(*_: object) -> _Array:
-    return _Array()
-
-
-def _scalar(dtype: Any, raw: Any) -> float | int | bool:
-    return _array(raw, dtype, (), "C").item()
-
-
-def _encode(text: Any, encoding: Any = "latin1") -> bytes:
-    if not isinstance(text, str) or encoding != "latin1":
-        raise RefusedError(f"text in encoding {encoding!r}")
-    return text.encode("latin1")
-
-
-def _no_bytes() -> bytes:
-    return b""  # so protocols 0 to 2 write the bytes of an empty array
-
-
-_NAMES: dict[tuple[str, str], Any] = {
-    ("numpy", "ndarray"): _NDArray,
-    ("numpy", "dtype"): _DType,
-    ("joblib.numpy_pickle", "NumpyArrayWrapper"): _JoblibWrapper,
-    ("_codecs", "encode"): _encode,
-    ("__builtin__", "bytes"): _no_bytes,
-    **{(f"numpy.{core}.multiarray", "_reconstruct"): _reconstruct for core in ("core", "_core")},
-    **{(f"numpy.{core}.multiarray", "scalar"): _scalar for core in ("core", "_core")},
-    **{(f"numpy.{core}.numeric", "_frombuffer"): _array for core in ("core", "_core")},
-}
-_CALLABLE = (_DType, _reconstruct, _scalar, _array, _encode, _no_bytes)
 
 
 class _SafeUnpickler(pickle._Unpickler):  # the one in Python: it reads no further than joblib's arrays begin
@@ -210,12 +96,26 @@ class _SafeUnpickler(pickle._Unpickler):  # the one in Python: it reads no furth
     def __init__(self, data: bytes) -> None:
         self._stream = io.BytesIO(data)
         self._size = len(data)
+        self._steps = self._made = 0
         super().__init__(self._stream)
 
+    def count_step(self) -> None:
+        self._steps += 1
+        if self._steps > MAX_STEPS:
+            raise RefusedError(f"a program of more than {MAX_STEPS:,} instructions")
+
+    def spend(self, made: Any) -> Any:
+        """Count the bytes of an array: a pickle can make one of the same bytes again and again."""
+        value = made.value if isinstance(made, Array) else made
+        self._made += value.nbytes if isinstance(value, np.ndarray) else len(value) if isinstance(value, bytes) else 0
+        if self._made > MAX_BYTES:
+            raise RefusedError(f"arrays of more than {MAX_BYTES >> 20} MiB")
+        return made
+
     def find_class(self, module: str, name: str) -> Any:
-        if (module, name) not in _NAMES:
+        if (module, name) not in KNOWN:
             raise RefusedError(f"the name {module}.{name}"[:120])
-        return _NAMES[module, name]
+        return KNOWN[module, name]
 
     def persistent_load(self, pid: Any) -> Any:
         raise RefusedError("a persistent id")
@@ -225,26 +125,27 @@ class _SafeUnpickler(pickle._Unpickler):  # the one in Python: it reads no furth
 
     def load_reduce(self) -> None:
         args, function = self.stack.pop(), self.stack[-1]
-        if not any(function is known for known in _CALLABLE) or not isinstance(args, tuple):
+        if not any(function is known for known in CALLABLE) or not isinstance(args, tuple):
             raise RefusedError(f"a call of {_called(function)}")
-        self.stack[-1] = function(*args)
+        self.stack[-1] = self.spend(function(*args))
 
     def load_newobj(self) -> None:
         args, kind = self.stack.pop(), self.stack.pop()
-        if kind is not _JoblibWrapper or args != ():
+        if kind is not JoblibWrapper or args != ():
             raise RefusedError(f"an object of {_called(kind)}")
-        self.append(_JoblibWrapper())
+        self.append(JoblibWrapper())
 
     def load_refused(self) -> None:
         raise RefusedError("an instruction that makes objects in a way arrays do not need")
 
     def load_build(self) -> None:
         state, made = self.stack.pop(), self.stack[-1]
-        if not isinstance(made, _DType | _Array | _JoblibWrapper):
+        if not isinstance(made, DType | Array | JoblibWrapper):
             raise RefusedError(f"a state for a {type(made).__name__}")
         made.set_state(state)
-        if isinstance(made, _JoblibWrapper):
+        if isinstance(made, JoblibWrapper):
             self.stack[-1] = made.read(self._stream)
+        self.spend(self.stack[-1])
 
     def load_bytearray8(self) -> None:
         (length,) = struct.unpack("<Q", self.read(8))
@@ -252,12 +153,58 @@ class _SafeUnpickler(pickle._Unpickler):  # the one in Python: it reads no furth
             raise EOFError("a byte array longer than the file")
         self.append(bytearray(self.read(length)))
 
+    def load_setitem(self) -> None:
+        self.check_keys(self.stack[-2:-1])
+        super().load_setitem()  # type: ignore[misc]
+
+    def load_setitems(self) -> None:
+        self.check_keys(self.stack[::2])
+        super().load_setitems()  # type: ignore[misc]
+
+    def load_dict(self) -> None:
+        self.check_keys(self.stack[::2])
+        super().load_dict()  # type: ignore[misc]
+
+    def check_keys(self, keys: list[Any]) -> None:
+        for key in keys:
+            if not isinstance(key, _KEYS):
+                raise RefusedError(f"a {type(key).__name__} as a key")
+
     dispatch[pickle.REDUCE[0]] = load_reduce
     dispatch[pickle.NEWOBJ[0]] = load_newobj
     dispatch[pickle.BUILD[0]] = load_build
     dispatch[pickle.BYTEARRAY8[0]] = load_bytearray8
+    dispatch[pickle.SETITEM[0]] = load_setitem
+    dispatch[pickle.SETITEMS[0]] = load_setitems
+    dispatch[pickle.DICT[0]] = load_dict
     for _opcode in (pickle.NEWOBJ_EX, pickle.INST, pickle.OBJ, pickle.EXT1, pickle.EXT2, pickle.EXT4):
         dispatch[_opcode[0]] = load_refused
+    for _opcode in (pickle.EMPTY_SET, pickle.ADDITEMS, pickle.FROZENSET):  # a set hashes what it holds
+        dispatch[_opcode[0]] = load_refused
+
+
+def _counted(instruction: Callable[[Any], None]) -> Callable[[Any], None]:
+    def run(unpickler: _SafeUnpickler) -> None:
+        unpickler.count_step()
+        instruction(unpickler)
+
+    return run
+
+
+def _short(instruction: Callable[[Any], None]) -> Callable[[Any], None]:
+    """An instruction that reads a whole number; one may have a gigabyte, and no motion needs more than eight."""
+
+    def run(unpickler: _SafeUnpickler) -> None:
+        instruction(unpickler)
+        if not -(2**63) <= unpickler.stack[-1] < 2**64:
+            raise RefusedError("a whole number of more than 64 bits")
+
+    return run
+
+
+_dispatch = _SafeUnpickler.dispatch
+_dispatch |= {code[0]: _short(_dispatch[code[0]]) for code in (pickle.INT, pickle.LONG, pickle.LONG1, pickle.LONG4)}
+_dispatch |= {opcode: _counted(instruction) for opcode, instruction in _dispatch.items()}
 
 
 def _called(function: Any) -> str:
@@ -267,7 +214,7 @@ def _called(function: Any) -> str:
 def _plain(value: Any, done: dict[int, Any]) -> Any:
     """Arrays in place of their stand-ins, in a dict or a dict of dicts; what the file repeats is converted once."""
     if id(value) not in done:
-        if isinstance(value, _Array):
+        if isinstance(value, Array):
             if value.value is None:
                 raise RefusedError("an array without its values")
             done[id(value)] = value.value

@@ -9,8 +9,9 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,13 +19,28 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from bumblebee.errors import BadInput
+from bumblebee.io.names import require_stem
+from bumblebee.motion.checks import MAX_FRAMES, check_clip
 from bumblebee.motion.clip import Clip
+from bumblebee.motion.clip_facts import FACTS, read_facts
+from bumblebee.motion.parquet import Kind, read_table
 from bumblebee.robot.facts import KEY_BODIES, joint_names
 
-INDEX_COLUMNS = (
-    "name", "family", "split", "source", "licence", "sha256", "frames", "duration", "captions", "caption_source",
-)  # fmt: skip
-_FACTS = ("captions", "source", "licence", "sha256", "family", "split", "caption_source")
+_INDEX: dict[str, Kind] = {
+    "name": "text",
+    "family": "text",
+    "split": "text",
+    "source": "text",
+    "licence": "text",
+    "sha256": "text",
+    "frames": "whole",
+    "duration": "number",
+    "captions": "texts",
+    "caption_source": "text",
+}
+INDEX_COLUMNS = tuple(_INDEX)
+_TOLD_TWICE = ("family", "split", "source", "licence", "sha256", "frames", "caption_source")  # by index and clip
+_MAX_CLIPS = 100_000
 _META = b"bumblebee.clip"
 
 
@@ -55,25 +71,36 @@ def write_library(folder: Path, clips: Iterable[Clip], skipped: pd.DataFrame | N
 def read_library(folder: Path, names: Sequence[str] | None = None) -> list[Clip]:
     """All clips of a library in the index's order, or those that are named, in that order."""
     folder = Path(folder)
-    known = list(read_index(folder)["name"])
+    index = read_index(folder)
+    rows = {row["name"]: row for row in index.to_dict("records")}
     for name in names or ():
-        if name not in known:
-            raise BadInput(folder / "index.parquet", f"a clip named {name!r}", f"{len(known)} clips without it")
-    return [read_clip(folder / "clips" / f"{name}.parquet") for name in (known if names is None else names)]
+        if name not in rows:
+            raise BadInput(folder / "index.parquet", f"a clip named {name!r}", f"{len(rows)} clips without it")
+    return [read_indexed(folder, rows[name]) for name in (rows if names is None else names)]
+
+
+def read_indexed(folder: Path, row: Mapping[str, Any]) -> Clip:
+    """The clip of one row of the index, which must say the same about it as its own file."""
+    path = folder / "clips" / f"{row['name']}.parquet"
+    clip = read_clip(path)
+    for fact in _TOLD_TWICE:
+        if getattr(clip, fact) != row[fact]:
+            came = f"{getattr(clip, fact)!r}"[:80]
+            raise BadInput(f"{path}: {fact}", f"{row[fact]!r} as in the index"[:80], came, "Write the library again.")
+    return clip
 
 
 def read_index(folder: Path) -> pd.DataFrame:
-    """The library's table, one row a clip, columns `INDEX_COLUMNS`."""
+    """The library's table, one row a clip, columns `INDEX_COLUMNS`; each name can name a file, and names one clip."""
     path = Path(folder) / "index.parquet"
-    if not path.is_file():
+    if not os.path.lexists(path):
         raise BadInput(path, "the index of a motion library", "no such file", "Run the stage that writes it.")
-    try:
-        index = pd.read_parquet(path)
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise BadInput(path, "a readable Parquet file", str(error)) from error
-    missing = [column for column in INDEX_COLUMNS if column not in index]
-    if missing:
-        raise BadInput(path, f"columns {', '.join(INDEX_COLUMNS)}", f"none named {missing[0]}")
+    index = read_table(path, _INDEX, _MAX_CLIPS).to_pandas()
+    taken: dict[str, int] = {}
+    for row, name in enumerate(index["name"]):
+        require_stem(f"{path}, row {row}: name", name)
+        if (first := taken.setdefault(name.casefold(), row)) != row:
+            raise BadInput(f"{path}, row {row}: name", f"another name than in row {first}", repr(name)[:80])
     return index
 
 
@@ -82,31 +109,34 @@ def write_clip(path: Path, clip: Clip) -> None:
     table = np.concatenate(
         [clip.root_pos, clip.root_quat, clip.joint_pos, clip.key_pos.reshape(clip.frames, -1)], axis=1
     )
-    facts = {"name": clip.name, "fps": clip.fps, **{fact: getattr(clip, fact) for fact in _FACTS}}
+    facts = {"name": clip.name, "fps": clip.fps, **{fact: getattr(clip, fact) for fact in FACTS}}
     schema = pa.schema([(name, pa.float32()) for name in _columns()], metadata={_META: json.dumps(facts)})
     arrays = [pa.array(column) for column in np.ascontiguousarray(table.T, dtype=np.float32)]
     pq.write_table(pa.Table.from_arrays(arrays, schema=schema), path, compression="zstd")
 
 
 def read_clip(path: Path) -> Clip:
-    """Read one clip that `write_clip` wrote."""
-    try:
-        table = pq.read_table(path)
-    except FileNotFoundError:
-        raise BadInput(path, "a clip of a motion library", "no such file") from None
-    except (pa.ArrowException, OSError) as error:
-        raise BadInput(path, "a clip of a motion library (Parquet)", str(error)) from error
+    """Read one clip that `write_clip` wrote; whatever else is found there is a `BadInput`."""
+    path = Path(path)
+    if not os.path.lexists(path):
+        raise BadInput(path, "a clip of a motion library", "no such file")
+    columns: dict[str, Kind] = dict.fromkeys(_columns(), "number")
+    table = read_table(path, columns, MAX_FRAMES)
     metadata = table.schema.metadata or {}
-    if _META not in metadata or tuple(table.column_names) != tuple(_columns()):
-        raise BadInput(path, "the columns and metadata of a bumblebee clip", f"{table.num_columns} other columns")
-    facts = json.loads(metadata[_META])
-    facts["captions"] = tuple(facts["captions"])
-    values = np.stack([column.to_numpy() for column in table.columns], axis=1)
+    if _META not in metadata:
+        raise BadInput(path, "the metadata of a bumblebee clip", "none")
+    facts = read_facts(path, metadata[_META])
+    if facts["name"] != path.stem:
+        raise BadInput(f"{path}: name", f"{path.stem!r}, as the file is called", repr(facts["name"])[:80])
+    with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite and is refused below
+        values = np.stack([column.to_numpy() for column in table.columns], axis=1).astype(np.float32)
     root_pos, root_quat, joint_pos, key_pos = np.split(values, [3, 7, 7 + len(joint_names())], axis=1)
     key_pos = key_pos.reshape(-1, len(KEY_BODIES), 3)
     arrays = {"root_pos": root_pos, "root_quat": root_quat, "joint_pos": joint_pos, "key_pos": key_pos}
     facts.update({name: np.ascontiguousarray(values) for name, values in arrays.items()})
-    return Clip(**facts)
+    clip = Clip(**facts)
+    check_clip(path, clip)
+    return clip
 
 
 def index_of(clips: Iterable[Clip]) -> pd.DataFrame:
@@ -125,9 +155,13 @@ def _columns() -> list[str]:
 def _fill(folder: Path, clips: Iterable[Clip], skipped: pd.DataFrame | None) -> None:
     (folder / "clips").mkdir()
     rows: list[Clip] = []
+    taken: set[str] = set()  # a file system may not tell cases apart
     for clip in clips:
-        if any(clip.name == row.name for row in rows):
+        require_stem(f"{clip.source or 'a clip'}: name", clip.name)
+        if clip.name.casefold() in taken:
             raise BadInput(clip.source or clip.name, "distinct clip names", f"two clips named {clip.name!r}")
+        taken.add(clip.name.casefold())
+        check_clip(f"{clip.source or 'a clip'}: {clip.name}", clip)
         write_clip(folder / "clips" / f"{clip.name}.parquet", clip)
         rows.append(clip)
     index_of(rows).to_parquet(folder / "index.parquet", index=False)

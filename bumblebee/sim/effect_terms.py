@@ -21,6 +21,7 @@ losses of a joint, each `coefficient * term`, add up with the one that it has; t
 """
 
 import ast
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -32,6 +33,7 @@ from bumblebee.errors import BadInput
 
 OWN = ("q", "v", "u", "tau", "t")
 _LONGEST = 2000  # characters
+_DEEPEST = 100  # levels: a term is evaluated by a function that calls itself
 _FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "sin": np.sin,
     "cos": np.cos,
@@ -86,14 +88,18 @@ def read_term(text: str) -> Term:
     try:
         if len(text) > _LONGEST:
             raise ValueError(f"{len(text)} characters")
-        tree = ast.parse(text.replace("^", "**"), mode="eval").body
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Python's own about formulas such as 1(q), which are refused below
+            tree = ast.parse(text.replace("^", "**"), mode="eval").body
         rubs = False
         if isinstance(tree, ast.Call) and isinstance(tree.func, ast.Name) and tree.func.id == "friction":
             rubs = True
+            if tree.keywords:
+                raise ValueError("friction of something named")
             (tree,) = tree.args
         others: list[str] = []
         _check(tree, others)
-    except (ValueError, SyntaxError, RecursionError, MemoryError) as error:
+    except (ValueError, SyntaxError, RecursionError, MemoryError, OverflowError) as error:
         names = ", ".join((*OWN, *_FUNCTIONS, *_SHAPED, *STATES, "curve", "friction"))
         raise BadInput(f"term {text[:60]!r}", f"a formula of {names}", str(error)[:80]) from None
     nodes = list(ast.walk(tree))
@@ -104,30 +110,31 @@ def read_term(text: str) -> Term:
     return Term(text, rubs, tuple(dict.fromkeys(others)), frozenset(used), tuple(states.items()), tree)
 
 
-def _check(node: ast.expr, others: list[str]) -> None:
+def _check(node: ast.expr, others: list[str], depth: int = 0) -> None:
     """Raise ValueError on anything that is not in the language; collect other joints' names."""
+    if depth > _DEEPEST:
+        raise ValueError(f"more than {_DEEPEST} levels of nesting")
     if isinstance(node, ast.Constant):
-        if isinstance(node.value, bool) or not isinstance(node.value, int | float) or abs(node.value) > 1e9:
-            raise ValueError(f"the constant {node.value!r}")
+        _number(node)
     elif isinstance(node, ast.Name):
         if node.id not in OWN:
             raise ValueError(f"the name {node.id}")
     elif isinstance(node, ast.Subscript):
         others.append(_other(node))
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
-        _check(node.operand, others)
+        _check(node.operand, others, depth + 1)
     elif isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
-        _check(node.left, others)
-        _check(node.right, others)
+        _check(node.left, others, depth + 1)
+        _check(node.right, others, depth + 1)
         if isinstance(node.op, ast.Pow) and not (isinstance(node.right, ast.Constant) and node.right.value in range(9)):
             raise ValueError("a power that is no whole number from 0 to 8")
     elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
-        _check_call(node.func.id, node.args, others)
+        _check_call(node.func.id, node.args, others, depth + 1)
     else:
         raise ValueError(type(node).__name__)
 
 
-def _check_call(name: str, arguments: list[ast.expr], others: list[str]) -> None:
+def _check_call(name: str, arguments: list[ast.expr], others: list[str], depth: int) -> None:
     if name == "curve":
         if len(arguments) < 5 or len(arguments) % 2 == 0:
             raise ValueError("curve without x and at least two points")
@@ -146,7 +153,7 @@ def _check_call(name: str, arguments: list[ast.expr], others: list[str]) -> None
     elif name not in _FUNCTIONS or len(arguments) != 1:
         raise ValueError(f"the function {name} of {len(arguments)}")
     for argument in arguments:
-        _check(argument, others)
+        _check(argument, others, depth)
 
 
 def _state(node: ast.Call) -> str:
@@ -159,8 +166,10 @@ def _number(node: ast.expr) -> float:
     sign = 1.0
     while isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         sign, node = -sign, node.operand
-    if not isinstance(node, ast.Constant) or not isinstance(node.value, int | float):
-        raise ValueError("a point that is no number")
+    if not isinstance(node, ast.Constant) or not isinstance(node.value, int | float) or isinstance(node.value, bool):
+        raise ValueError("no number where one must be")
+    if abs(node.value) > 1e9:
+        raise ValueError("a number of more than 1e9")
     return sign * float(node.value)
 
 

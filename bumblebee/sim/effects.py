@@ -4,15 +4,16 @@ Values are absolute (N m, kg, s, rad ...), so that the effects applied to the de
 model; `motor_strength`, `kp` and `kd` alone are factors on the declared gains.
 """
 
-import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from bumblebee.errors import BadInput
+from bumblebee.io.limits import Limits
+from bumblebee.io.read import parse_yaml, read_text
 from bumblebee.sim.effect_catalogue import CATALOGUE, Effect, Kind, Parameter, single
 from bumblebee.sim.effect_hooks import RuntimeHooks, runtime_hooks
 from bumblebee.sim.effect_spec import add_to_spec
@@ -31,6 +32,12 @@ __all__ = [
 ]
 
 
+_LIMITS = Limits(text_bytes=1 << 20, nodes=30_000)
+_MOST = 2000  # effects of a file: a robot has some dozens of joints, the catalogue some dozens of effects
+_LONGEST = 200  # characters of a joint's name
+_LARGEST = 1e9  # of a parameter or a coefficient, in SI units
+
+
 def write_effects(path: Path, effects: Sequence[Effect]) -> None:
     """Write `effects.yaml`; it appears whole or not at all."""
     path = Path(path)
@@ -42,21 +49,23 @@ def write_effects(path: Path, effects: Sequence[Effect]) -> None:
 
 def read_effects(path: Path) -> list[Effect]:
     """Read `effects.yaml`; a key, an id or a value that is not the catalogue's is named in a `BadInput`."""
-    try:
-        document = yaml.safe_load(Path(path).read_text())
-    except FileNotFoundError:
-        raise BadInput(path, "an effects file", "no such file") from None
-    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
-        raise BadInput(
-            path, "YAML of plain values", type(error).__name__, "Write it with `bumblebee diagnose`."
-        ) from None
+    text = read_text(Path(path), _LIMITS.text_bytes)
+    _refuse_repeated_keys(path, text)
+    document = parse_yaml(path, text, _LIMITS)
     _only_keys(path, document, {"schema", "effects"})
-    if document.get("schema") != 1:
-        raise BadInput(f"{path}: schema", "1", repr(document.get("schema")))
+    if type(document.get("schema")) is not int or document["schema"] != 1:
+        raise BadInput(f"{path}: schema", "1", repr(document.get("schema"))[:80])
     entries = document.get("effects")
     if not isinstance(entries, list):
         raise BadInput(f"{path}: effects", "a list", type(entries).__name__)
-    return [_effect(f"{path}: effects[{i}]", entry) for i, entry in enumerate(entries)]
+    if len(entries) > _MOST:
+        raise BadInput(f"{path}: effects", f"at most {_MOST:,} effects", f"{len(entries):,}")
+    effects = [_effect(f"{path}: effects[{i}]", entry) for i, entry in enumerate(entries)]
+    for i, effect in enumerate(effects):
+        if effect in effects[:i]:
+            first = effects.index(effect)
+            raise BadInput(f"{path}: effects[{i}]", "each effect once", f"the same as effects[{first}]")
+    return effects
 
 
 def _written(effect: Effect) -> dict[str, Any]:
@@ -69,7 +78,45 @@ def _only_keys(where: object, table: Any, keys: set[str]) -> None:
     if not isinstance(table, dict):
         raise BadInput(where, f"a mapping with keys {sorted(keys)}", type(table).__name__)
     if unknown := sorted(str(key) for key in table if key not in keys):
-        raise BadInput(where, f"only the keys {sorted(keys)}", f"unknown key {unknown[0]!r}")
+        raise BadInput(where, f"only the keys {sorted(keys)}", f"unknown key {unknown[0][:80]!r}")
+
+
+def _refuse_repeated_keys(path: Path, text: str) -> None:
+    """YAML's reader lets the last of two equal keys win in silence; the file's author meant one of them."""
+    # Each entry is a mapping's keys so far, or None for a list; `expects` says whether a key comes next.
+    keys: list[set[str] | None] = []
+    expects: list[bool] = []
+    for number, event in enumerate(_events(path, text)):
+        if number > _LIMITS.nodes:
+            raise BadInput(path, f"at most {_LIMITS.nodes:,} values", "more")
+        if isinstance(event, yaml.CollectionEndEvent):
+            keys.pop()
+            expects.pop()
+            continue
+        if not isinstance(event, yaml.NodeEvent):
+            continue
+        if keys and (known := keys[-1]) is not None:
+            if expects[-1] and isinstance(event, yaml.ScalarEvent):
+                if event.value in known:
+                    where = f"{path}, line {event.start_mark.line + 1}"
+                    raise BadInput(where, "each key once", f"a second {event.value[:80]!r}")
+                known.add(event.value)
+            expects[-1] = not expects[-1]
+        if isinstance(event, yaml.CollectionStartEvent):
+            if len(keys) >= _LIMITS.depth:
+                where = f"{path}, line {event.start_mark.line + 1}"
+                raise BadInput(where, f"at most {_LIMITS.depth} levels of nesting", "more")
+            keys.append(set() if isinstance(event, yaml.MappingStartEvent) else None)
+            expects.append(True)
+
+
+def _events(path: Path, text: str) -> Iterator[yaml.Event]:
+    try:
+        yield from yaml.parse(text, Loader=yaml.SafeLoader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"{path}, line {mark.line + 1}" if mark else path
+        raise BadInput(place, "YAML of plain values", str(getattr(error, "problem", None) or error)[:200]) from None
 
 
 def _effect(where: str, entry: Any) -> Effect:
@@ -81,6 +128,12 @@ def _effect(where: str, entry: Any) -> Effect:
     every = kind.whole or kind.on == "whole"
     if not isinstance(places, list) or (not places and not every) or not all(isinstance(p, str) for p in places):
         raise BadInput(f"{where}: where", f"a list of {kind.on} names", repr(places)[:80])
+    for place in places:
+        if not 0 < len(place) <= _LONGEST:
+            raise BadInput(f"{where}: where", f"names of 1 to {_LONGEST} characters", f"{len(place):,}")
+    if len(set(places)) != len(places):
+        twice = next(place for place in places if places.count(place) > 1)
+        raise BadInput(f"{where}: where", f"each {kind.on} once", f"{twice[:80]!r} twice")
     if name == "discovered":
         return Effect(name, tuple(places), _terms(f"{where}: parameters", entry.get("parameters")))
     _only_keys(f"{where}: parameters", entry.get("parameters"), set(kind.names))
@@ -98,17 +151,35 @@ def _terms(where: str, table: Any) -> dict[str, float]:
     out = {}
     for i, entry in enumerate(terms):
         _only_keys(f"{where}.terms[{i}]", entry, {"term", "coefficient"})
-        value = entry.get("coefficient")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise BadInput(f"{where}.terms[{i}].coefficient", "a finite number", repr(value)[:80])
-        out[read_term(str(entry.get("term"))).text] = float(value)
+        value, term = entry.get("coefficient"), entry.get("term")
+        if not _is_number(value):
+            raise BadInput(f"{where}.terms[{i}].coefficient", f"a number of at most {_LARGEST:g}", _shown(value))
+        if not isinstance(term, str):
+            raise BadInput(f"{where}.terms[{i}].term", "a formula", _shown(term))
+        try:
+            text = read_term(term).text
+        except BadInput as error:
+            raise BadInput(f"{where}.terms[{i}].term", error.expected, f"{term[:60]!r}: {error.came}") from None
+        if text in out:
+            raise BadInput(f"{where}.terms[{i}].term", "each term once", f"{text[:60]!r} twice")
+        out[text] = float(value)
     return out
 
 
 def _value(where: str, value: Any, parameter: Parameter) -> float:
     """A finite number within the parameter's bounds."""
-    number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    if not number or not parameter.lower <= value <= parameter.upper:
-        expected = f"a number from {parameter.lower:g} to {parameter.upper:g} {parameter.unit}".strip()
-        raise BadInput(f"{where}: parameters.{parameter.name}", expected, repr(value)[:80])
+    if not _is_number(value) or not parameter.lower <= value <= parameter.upper:
+        lower, upper = max(parameter.lower, -_LARGEST), min(parameter.upper, _LARGEST)
+        expected = f"a number from {lower:g} to {upper:g} {parameter.unit}".strip()
+        raise BadInput(f"{where}: parameters.{parameter.name}", expected, _shown(value))
     return float(value)
+
+
+def _is_number(value: Any) -> bool:
+    """A number that physics can have: neither NaN nor infinite nor beyond `_LARGEST`."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and -_LARGEST <= value <= _LARGEST
+
+
+def _shown(value: Any) -> str:
+    large = isinstance(value, int) and abs(value) > _LARGEST
+    return "a larger number" if large else repr(value)[:80]

@@ -1,0 +1,45 @@
+"""Names of clips that are read together: distinct, and short enough for files."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from bumblebee.io.names import LONGEST, safe_stem
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.pieces import motion_of
+
+
+def distinct(found: list[tuple[Path, list[Clip]]]) -> list[Clip]:
+    """Names that occur in several groups get the folder's name in front, and a number if that is not enough.
+
+    Names that differ in case only count as equal: some file systems do not tell them apart.
+    """
+    taken: set[str] = set()
+    clips: list[Clip] = []
+    for file, group in found:
+        names = [_fitting(motion_of(clip.name), _tail(clip.name)) for clip in group]
+        if taken & _folded(names):
+            folder = safe_stem(file.parent.name, "folder")[:20]
+            names = [_fitting(f"{folder}_{motion_of(name)}", _tail(name)) for name in names]
+        first, number = names, 2
+        while taken & _folded(names):
+            names = [_fitting(motion_of(name), f"_{number}{_tail(name)}") for name in first]  # walk_p3 -> walk_2_p3
+            number += 1
+        taken |= _folded(names)
+        clips += [replace(clip, name=name) for clip, name in zip(group, names, strict=True)]
+    return clips
+
+
+def _folded(names: list[str]) -> set[str]:
+    return {name.casefold() for name in names}
+
+
+def _tail(name: str) -> str:
+    """The number of a piece, `_p3`, or nothing."""
+    return name[len(motion_of(name)) :]
+
+
+def _fitting(motion: str, tail: str) -> str:
+    """`motion` with `tail`, cut in between to what a name may have."""
+    while len((motion + tail).encode()) > LONGEST:
+        motion = motion[:-1]
+    return motion + tail
