@@ -17,10 +17,12 @@ export MLFLOW_DISABLE_TELEMETRY := true
 export DVC_NO_ANALYTICS := 1
 export HF_HUB_OFFLINE := 1
 # TORCH_INDEX: the address of PyTorch's index of CPU builds, where pip would otherwise fetch CUDA's (several GB). Its
-# builds have other hashes than the lock names: torch alone is then taken from there, by its version.
+# builds have other hashes than those of the lock: torch, and torch alone, is then taken from there by its version.
 TORCH = $(shell sed -n 's/^\(torch==[^ ]*\) .*/\1/p' requirements-torch.lock)
+WHEEL := $(VENV)/.torch
 ifdef TORCH_INDEX
-PIP_TORCH = --index-url $(TORCH_INDEX) $(TORCH)
+PIP_TORCH_INDEX = --index-url $(TORCH_INDEX)
+PIP_TORCH = $(TORCH)
 else
 PIP_TORCH = --require-hashes -r requirements-torch.lock
 endif
@@ -37,8 +39,11 @@ $(STAMP): requirements.lock requirements-torch.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or later is needed: make PYTHON=<path>." >&2; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { echo "make: $(PYTHON) -m venv $(VENV) failed. On Debian and Ubuntu: install python3-venv." >&2; rm -rf $(VENV); exit 2; }
 	$(BIN)/python -m pip install -q $(PIP_OPTIONS) --no-deps --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install -q $(PIP_OPTIONS) --no-deps $(PIP_TORCH)
-	$(BIN)/python -m pip install -q $(PIP_OPTIONS) $(TORCH)  # what a CUDA build needs beside; nothing for others
+	@rm -rf $(WHEEL)
+	$(BIN)/python -m pip download -q $(PIP_OPTIONS) $(PIP_TORCH_INDEX) --no-deps --only-binary :all: -d $(WHEEL) $(TORCH)
+	$(BIN)/python -m pip install -q --no-deps --no-index --find-links $(WHEEL) $(PIP_TORCH)
+	@rm -rf $(WHEEL)
+	$(BIN)/python -m pip install -q $(PIP_OPTIONS) $(TORCH)  # adds what a CUDA build needs beside, nothing to others
 	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
 	@touch $@
 
