@@ -55,7 +55,7 @@ def _prepared(workspace: Path) -> "MlflowClient":
         client = mlflow.MlflowClient(tracking_uri=uri, registry_uri=uri)
         name = experiment_name()
         if client.get_experiment_by_name(name) is None:
-            client.create_experiment(name, artifact_location=f"{SCHEME}:/runs")
+            client.create_experiment(name, f"{SCHEME}:/runs", {"mlflow.experimentKind": "custom_model_development"})
     mlflow.set_experiment(name)
     return client
 
@@ -170,13 +170,14 @@ def register(name: str, folder: Path, tags: dict[str, str], metrics: dict[str, f
             return str(version.version)
     settings = card_settings(folder)
     origin = _text(lineage(history(folder), {**settings, **tags}, settings.get("seed")))
-    labels = _fitted_tags({"stage": "publish", **_origin_tags(origin), **tags})
-    with mlflow.start_run(run_name=f"publish {tags.get('policy', name)}", tags=labels):
+    labels = {"stage": "publish", **_origin_tags(origin)}
+    policy = tags.get("policy", name)
+    with mlflow.start_run(run_name=f"publish {policy}", tags={"policy": policy, **labels}, description=card or None):
         logged = _log_onnx(folder, name, {LINEAGE: origin, CARD: card})
         mlflow.log_metrics({key: value for key, value in metrics.items() if value is not None})
         mlflow.log_text(origin, LINEAGE)
         mlflow.log_text(card, CARD)
-    made = mlflow.register_model(logged.model_uri, name, tags=labels)
+    made = mlflow.register_model(logged.model_uri, name, tags=_fitted_tags({**labels, **tags}))
     if card:
         client.update_model_version(name, made.version, fitted(card, LONGEST_DESCRIPTION, CARD))
     return str(made.version)

@@ -83,6 +83,7 @@ def test_an_expert_without_results_is_left_out_and_named(
     publish.main()
     assert set(written()["models"]) == {"base", "expert-c0", "generalist"} == set(registry.champions)
     assert "expert-c1-r0: not published" in capsys.readouterr().out
+    assert registry.described == registry.cards and "- from: base" in registry.cards["expert-c0"]
 
 
 def test_an_engine_that_was_not_evaluated_is_refused_with_its_key(registry: Registry) -> None:
