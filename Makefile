@@ -16,9 +16,15 @@ export PREFECT_SERVER_ANALYTICS_ENABLED := false
 export MLFLOW_DISABLE_TELEMETRY := true
 export DVC_NO_ANALYTICS := 1
 export HF_HUB_OFFLINE := 1
-# TORCH_INDEX: the address of PyTorch's index of CPU builds, where pip would otherwise fetch CUDA's (several GB)
+# TORCH_INDEX: the address of PyTorch's index of CPU builds, where pip would otherwise fetch CUDA's (several GB). Its
+# builds have other hashes than those of the lock: torch, and torch alone, is then taken from there by its version.
+TORCH = $(shell sed -n 's/^\(torch==[^ ]*\) .*/\1/p' requirements-torch.lock)
+WHEEL := $(VENV)/.torch
 ifdef TORCH_INDEX
-PIP_OPTIONS += --extra-index-url $(TORCH_INDEX)
+PIP_TORCH_INDEX = --index-url $(TORCH_INDEX)
+PIP_TORCH = $(TORCH)
+else
+PIP_TORCH = --require-hashes -r requirements-torch.lock
 endif
 
 .PHONY: help setup demo smoke serve test unit e2e format check type lock clean
@@ -28,11 +34,16 @@ help:  ## these lines
 
 setup: $(STAMP)  ## a virtual environment with the locked packages; does nothing when it is up to date
 
-$(STAMP): requirements.lock pyproject.toml
+$(STAMP): requirements.lock requirements-torch.lock pyproject.toml
 	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found. Install Python 3.11 or later, or say make PYTHON=<path>." >&2; exit 2; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or later is needed: make PYTHON=<path>." >&2; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { echo "make: $(PYTHON) -m venv $(VENV) failed. On Debian and Ubuntu: install python3-venv." >&2; rm -rf $(VENV); exit 2; }
-	$(BIN)/python -m pip install -q $(PIP_OPTIONS) -r requirements.lock
+	$(BIN)/python -m pip install -q $(PIP_OPTIONS) --no-deps --require-hashes -r requirements.lock
+	@rm -rf $(WHEEL)
+	$(BIN)/python -m pip download -q $(PIP_OPTIONS) $(PIP_TORCH_INDEX) --no-deps --only-binary :all: -d $(WHEEL) $(TORCH)
+	$(BIN)/python -m pip install -q --no-deps --no-index --find-links $(WHEEL) $(PIP_TORCH)
+	@rm -rf $(WHEEL)
+	$(BIN)/python -m pip install -q $(PIP_OPTIONS) $(TORCH)  # adds what a CUDA build needs beside, nothing to others
 	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
 	@touch $@
 
@@ -64,8 +75,8 @@ check: setup  ## ruff's rules
 type: setup  ## mypy
 	$(BIN)/mypy
 
-lock: setup  ## write requirements.lock from what is installed
-	$(BIN)/python -m tests.lock > requirements.lock.new && mv requirements.lock.new requirements.lock
+lock:  ## write requirements.lock and requirements-torch.lock from what is installed in VENV
+	$(BIN)/python -m tests.lock
 
 clean:  ## remove caches, workspaces and servers' data; keeps .venv, data/ and models/
 	rm -rf runs .servers .scratch .pytest_cache .ruff_cache .mypy_cache build *.egg-info

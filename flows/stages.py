@@ -1,11 +1,23 @@
-"""The stages of dvc.yaml as a graph: who needs whom, and who has something to do."""
+"""The stages of dvc.yaml as a graph: who needs whom, and who has something to do.
 
+python -m flows.stages [--workspace runs/demo]     # each stage with its state, in at most 100 columns
+"""
+
+import argparse
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+from rich.console import Console
+from rich.table import Table
+
 from bumblebee.errors import BadInput
+from bumblebee.last_line import guarded
+
+WIDTH = 100
+STALE, AFTER, LACKS, DONE = "stale", "after a stale one", "waits for", "up to date"
 
 
 @dataclass(frozen=True)
@@ -105,3 +117,58 @@ def changed_stages(workspace: Path) -> set[str]:
 def downstream(stages: list[Stage], name: str) -> set[str]:
     """Names of all stages that read, directly or not, what the stage `name` makes."""
     return to_run(stages, {name}) - {name}
+
+
+def state_of(stage: Stage, changed: set[str], busy: set[str]) -> str:
+    """What a stage is about to do: nothing, run, run after another, or wait for a file that no stage makes."""
+    if stage.lacks:
+        return f"{LACKS} {', '.join(sorted(stage.lacks))}"
+    if stage.name in changed:
+        return STALE
+    return AFTER if stage.name in busy else DONE
+
+
+def by_level(stages: list[Stage]) -> list[list[Stage]]:
+    """Stages that can run side by side, in the order in which they come up."""
+    level: dict[str, int] = {}
+    for stage in in_order(stages):
+        level[stage.name] = 1 + max((level[name] for name in stage.needs), default=-1)
+    return [[s for s in in_order(stages) if level[s.name] == n] for n in range(1 + max(level.values(), default=-1))]
+
+
+def table(stages: list[Stage], changed: set[str]) -> Table:
+    """A row a stage: its turn, name, state, and the stages that it reads directly from the turn before or earlier."""
+    busy, titles = to_run(stages, changed), {stage.name: stage.title for stage in stages}
+    shown = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("turn", "stage", "state", "after"):
+        shown.add_column(heading, overflow="fold", justify="right" if heading == "turn" else "left")
+    for turn, level in enumerate(by_level(stages), start=1):
+        for index, stage in enumerate(level):
+            reads = ", ".join(titles[name] for name in sorted(stage.needs - _indirect(stages, stage)))
+            shown.add_row("" if index else str(turn), stage.title, state_of(stage, changed, busy), reads)
+    return shown
+
+
+def _indirect(stages: list[Stage], stage: Stage) -> set[str]:
+    """What a stage would read through another of those that it needs: left out of the picture."""
+    return {name for name in stage.needs if stage.needs & downstream(stages, name)}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print the table; returns the exit status."""
+    made = argparse.ArgumentParser(prog="python -m flows.stages", description="The stages of a workspace, their state.")
+    made.add_argument("--workspace", type=Path, default=Path("."), help="folder with dvc.yaml (default: this one)")
+    workspace = made.parse_args(argv).workspace
+
+    def show() -> None:
+        if not (workspace / "dvc.yaml").exists():
+            raise BadInput(workspace / "dvc.yaml", "a workspace's stages", "no file", "Give --workspace.")
+        stages = read_stages(workspace)
+        shown = table(stages, changed_stages(workspace))
+        Console(width=min(WIDTH, Console().width) if sys.stdout.isatty() else WIDTH).print(shown)
+
+    return guarded(show)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,9 +1,12 @@
-"""What a stage was made from: the MD5 of each of its inputs as DVC counts it, and the git commit."""
+"""What a stage was made from: the MD5 of each of its inputs as DVC counts it, the git commit, the versions."""
 
 import hashlib
+import importlib.metadata
 import json
 import os
+import platform
 import subprocess
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -62,23 +65,30 @@ def upstream(output: Path, lock: Path = Path("dvc.lock")) -> dict[str, str]:
 
     Parameters are `params:<section>` -> hash of their values. Empty where DVC has not made the output.
     """
+    return {entry["path"]: entry["md5"] for entry in history(output, lock)}
+
+
+def history(output: Path, lock: Path = Path("dvc.lock")) -> list[dict[str, str]]:
+    """The same as a list of `path`, `md5` and, where a stage made it, `stage`."""
     if not lock.exists():
-        return {}
+        return []
     stages = _locked_stages(lock.read_text())
-    makers = {out["path"]: stage for stage in stages.values() for out in stage.get("outs", [])}
-    found: dict[str, str] = {}
+    makers = {out["path"]: name for name, stage in stages.items() for out in stage.get("outs", [])}
+    found: dict[str, dict[str, str]] = {}
     waiting = [output.as_posix()]
     while waiting:
-        path = waiting.pop()
-        stage = _maker(path, makers)
-        for dep in stage.get("deps", []):
-            if dep["path"] not in found:
-                found[dep["path"]] = str(dep.get("md5", "missing"))
-                waiting.append(dep["path"])
-        for section, values in stage.get("params", {}).get("params.yaml", {}).items():
-            text = json.dumps(values, sort_keys=True, default=str)
-            found[f"params:{section}"] = hashlib.md5(text.encode()).hexdigest()
-    return found
+        for name in _makers(waiting.pop(), makers):
+            for dep in stages[name].get("deps", []):
+                if dep["path"] not in found:
+                    made_by = ", ".join(_makers(dep["path"], makers))
+                    entry = {"path": dep["path"], "md5": str(dep.get("md5", "missing"))}
+                    found[dep["path"]] = entry | ({"stage": made_by} if made_by else {})
+                    waiting.append(dep["path"])
+            for section, values in stages[name].get("params", {}).get("params.yaml", {}).items():
+                text = json.dumps(values, sort_keys=True, default=str)
+                entry = {"path": f"params:{section}", "md5": hashlib.md5(text.encode()).hexdigest()}
+                found[entry["path"]] = entry
+    return list(found.values())
 
 
 @cache
@@ -89,17 +99,55 @@ def _locked_stages(text: str) -> dict[str, Any]:
     return dict(yaml.safe_load(text).get("stages", {}))
 
 
-def _maker(path: str, makers: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """The stage that makes `path`, a folder around it, or files in it."""
+def _makers(path: str, makers: Mapping[str, str]) -> list[str]:
+    """The stage that makes `path` or a folder around it, else all that make files in it."""
     for made, stage in makers.items():
         if made == path or path.startswith(made + "/"):
-            return stage
-    inside = [stage for made, stage in makers.items() if made.startswith(path + "/")]
-    if not inside:
-        return {}
-    merged: dict[str, Any] = {"deps": [dep for stage in inside for dep in stage.get("deps", [])]}
-    sections = {k: v for stage in inside for k, v in stage.get("params", {}).get("params.yaml", {}).items()}
-    return {**merged, "params": {"params.yaml": sections}}
+            return [stage]
+    return list(dict.fromkeys(stage for made, stage in makers.items() if made.startswith(path + "/")))
+
+
+def lineage(made_from: list[dict[str, str]], settings: Mapping[str, str], seed: object = None) -> dict[str, Any]:
+    """All that a run or a model was made from, for `lineage.json`; equal origins give equal content.
+
+    Args:
+        made_from: `path`, `md5` and, where it is known, `stage` of each input.
+        settings: the configuration, flat.
+        seed: of the training, where it is known.
+    """
+    commit, _, dirty = git_sha().partition("-")
+    return {
+        "schema": 1,
+        "dvc_stage": os.environ.get("DVC_STAGE") or None,
+        "code": {"commit": commit, "dirty": bool(dirty)},
+        "versions": versions(),
+        "seed": seed,
+        "settings": dict(settings),
+        "inputs": sorted(made_from, key=lambda entry: entry["path"]),
+    }
+
+
+def inputs_of_stage() -> list[dict[str, str]]:
+    """The inputs of the stage that DVC runs in this process, with who made each."""
+    lock = Path("dvc.lock")
+    stages = _locked_stages(lock.read_text()) if lock.exists() else {}
+    makers = {out["path"]: name for name, stage in stages.items() for out in stage.get("outs", [])}
+    found = []
+    for path, md5 in current_inputs().items():
+        made_by = ", ".join(_makers(path, makers))
+        found.append({"path": path, "md5": md5} | ({"stage": made_by} if made_by else {}))
+    return found
+
+
+def versions() -> dict[str, str]:
+    """Of Python and of what decides a result."""
+    found = {"python": platform.python_version()}
+    for name in ("torch", "mujoco", "rsl-rl-lib", "numpy", "bumblebee"):
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found
 
 
 @cache

@@ -13,12 +13,14 @@ from bumblebee.errors import BadInput
 from bumblebee.evaluation.summary import compare
 from tasks import registry
 from tasks.lineage import path_hash
+from tasks.model_card import Evaluated, licences_of, model_card
 from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both
 from tasks.rollouts import RolloutsConfig
 from tasks.sections import Loop, loop
 from tasks.stage import load, output_file, run_stage
 
 EVALUATION, OUT = Path("data/evaluation"), Path("data/published.json")
+MOTIONS = Path("data/filtered")
 
 
 @dataclass(frozen=True)
@@ -133,9 +135,13 @@ def publish(candidate: Candidate, result: dict[str, Any], standard: Standard, re
     tags |= {"evaluation_contract": standard.contract, "evaluation_engine": standard.engine}
     tags |= {"dvc_policy": path_hash(candidate.folder), "promotion": verdict.reason}
     tags |= {name: f"{value:.6g}" for name, value in metrics.items() if value is not None}
-    version = registry.register(candidate.model, candidate.folder, tags, metrics)
+    evaluated = Evaluated(standard.contract, standard.engine, result)
+    licences = licences_of(MOTIONS)
+    card = model_card(candidate.model, candidate.policy, candidate.folder, candidate.parent, evaluated, licences)
+    version = registry.register(candidate.model, candidate.folder, tags, metrics, card)
     if verdict.promoted:
         registry.set_alias(candidate.model, CHAMPION, version)
+        registry.describe(candidate.model, card)
     facts = {"version": version, "policy": candidate.policy, "folder": str(candidate.folder)}
     return {**facts, "promoted": verdict.promoted, "reason": verdict.reason, **metrics, "onnx_sha256": policy.sha256}
 

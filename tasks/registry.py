@@ -4,27 +4,32 @@ Runs and models are written straight into the workspace's database and artifact 
 and the flow leave the same history; the server only shows it. Why: docs/decisions/mlflow-store.md.
 """
 
-import csv
 import fcntl
+import hashlib
 import json
 import logging
 import os
-import re
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, is_dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tasks.lineage import current_inputs, git_sha, upstream
+from bumblebee.errors import BadInput
+from tasks.lineage import git_sha, history, inputs_of_stage, lineage
+from tasks.run_form import card_settings, fitted, flatten, metric_name, read_curve
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
 
 SERVERS = Path(".servers")
 SCHEME = "mlflow-artifacts"
-LONGEST = 480  # characters of a parameter or a tag that are kept
+# Characters that MLflow's tables hold; what is longer says so there and is whole in the file that it names.
+LONGEST_PARAM, LONGEST_TAG, LONGEST_DESCRIPTION = 6000, 5000, 5000
+LINEAGE, CARD = "lineage.json", "README.md"
+POLICY_FILES = ("policy.onnx", "contract.json", "card.json", "curve.csv")
+EXTRA = "extra_files"  # MLflow's own name of the folder for files beside a model
 
 
 def prepare() -> "MlflowClient":
@@ -50,7 +55,7 @@ def _prepared(workspace: Path) -> "MlflowClient":
         client = mlflow.MlflowClient(tracking_uri=uri, registry_uri=uri)
         name = experiment_name()
         if client.get_experiment_by_name(name) is None:
-            client.create_experiment(name, artifact_location=f"{SCHEME}:/runs")
+            client.create_experiment(name, f"{SCHEME}:/runs", {"mlflow.experimentKind": "custom_model_development"})
     mlflow.set_experiment(name)
     return client
 
@@ -102,18 +107,21 @@ def log_run(
     title = " ".join(str(part) for part in (stage, cluster, f"r{round}" if round is not None else None) if part)
     run = client.create_run(experiment.experiment_id, run_name=title)
     run_id, now = run.info.run_id, run.info.start_time
-    labels = {"stage": stage, **run_tags(), **tags}
+    settings_of = flatten(params)
+    origin = _text(lineage(inputs_of_stage(), settings_of, settings_of.get("seed")))
+    labels = {"stage": stage, **_origin_tags(origin), **tags}
     labels |= {key: str(value) for key, value in (("cluster", cluster), ("round", round)) if value is not None}
     points = [Metric(metric_name(name), float(value), now, 0) for name, value in metrics.items()]
     points += [Metric(metric_name(name), value, now, step) for name, step, value in read_curve(curve)] if curve else []
-    settings = [Param(key, value[:LONGEST]) for key, value in flatten(params).items()]
-    written = [RunTag(key, str(value)[:LONGEST]) for key, value in labels.items()]
+    settings = [Param(key, fitted(value, LONGEST_PARAM, LINEAGE)) for key, value in settings_of.items()]
+    written = [RunTag(key, value) for key, value in _fitted_tags(labels).items()]
     for start in range(0, max(len(points), 1), 1000):
         client.log_batch(run_id, metrics=points[start : start + 1000])
     for start in range(0, len(settings), 100):
         client.log_batch(run_id, params=settings[start : start + 100])
     for start in range(0, len(written), 100):
         client.log_batch(run_id, tags=written[start : start + 100])
+    client.log_text(run_id, origin, LINEAGE)
     for artifact in artifacts:
         if artifact.is_dir():
             client.log_artifacts(run_id, str(artifact), artifact.name)
@@ -123,52 +131,33 @@ def log_run(
     return str(run_id)
 
 
-def metric_name(name: str) -> str:
-    """A name that MLflow accepts: no empty part between slashes, no sign it does not know."""
-    parts = (re.sub(r"[^\w.\- ]", "_", part).strip() or "unknown" for part in name.split("/"))
-    return "/".join(parts)
+def _origin_tags(origin: str) -> dict[str, str]:
+    """What to filter runs by: commit, DVC's stage, and the hash of all inputs, which are in lineage.json."""
+    digest = hashlib.sha256(origin.encode()).hexdigest()
+    return {"git_sha": git_sha(), "dvc_stage": os.environ.get("DVC_STAGE", ""), "lineage": digest}
 
 
-def run_tags() -> dict[str, str]:
-    """What this stage was made from, as tags: `git_sha` and `dvc.<path>` = hash of each of its inputs."""
-    inputs = {f"dvc.{name.replace(':', '.')}": value for name, value in current_inputs().items()}
-    return {"git_sha": git_sha(), "dvc_stage": os.environ.get("DVC_STAGE", ""), **inputs}
+def _fitted_tags(tags: Mapping[str, object]) -> dict[str, str]:
+    return {key: fitted(str(value), LONGEST_TAG, LINEAGE) for key, value in tags.items()}
 
 
-def flatten(params: object, prefix: str = "") -> dict[str, str]:
-    """Nested settings as `a.b` -> text."""
-    if params is None:
-        return {}
-    values = asdict(params) if is_dataclass(params) and not isinstance(params, type) else params
-    if not isinstance(values, Mapping):
-        return {prefix.rstrip("."): str(values)}
-    flat: dict[str, str] = {}
-    for key, value in values.items():
-        nested = isinstance(value, Mapping) or is_dataclass(value)
-        flat |= flatten(value, f"{prefix}{key}.") if nested else {f"{prefix}{key}": str(value)}
-    return flat
+def _text(content: Mapping[str, Any]) -> str:
+    return json.dumps(content, indent=1) + "\n"
 
 
-def read_curve(path: Path) -> list[tuple[str, int, float]]:
-    """(name, step, value) of each number in a CSV file whose first column is the step."""
-    points = []
-    with path.open(newline="") as file:
-        for row in csv.DictReader(file):
-            columns = list(row.items())
-            step = int(float(columns[0][1]))
-            for name, text in columns[1:]:
-                try:
-                    points.append((name, step, float(text)))
-                except (TypeError, ValueError):
-                    continue
-    return [point for point in points if point[2] == point[2]]
+def register(name: str, folder: Path, tags: dict[str, str], metrics: dict[str, float | None], card: str = "") -> str:
+    """A new version of the model `name` from a policy folder; returns the version's number.
 
+    The version is a plain ONNX model (MLflow's onnx flavour) with its signature; beside it in `extra_files` lie the
+    policy's own files, its card and lineage.json. A version of the same file under the same evaluation is not made
+    twice.
 
-def register(name: str, folder: Path, tags: dict[str, str], metrics: dict[str, float | None]) -> str:
-    """A new version of the model `name` from a policy folder, with its contract; returns the version's number.
-
-    The version is a plain ONNX model (MLflow's onnx flavour) with contract.json and card.json beside it. A version of
-    the same file under the same evaluation is not made twice.
+    Args:
+        name: the registered model.
+        folder: the exported policy.
+        tags: by which versions are compared and told apart.
+        metrics: numbers; None where there is none.
+        card: Markdown for the version's page.
     """
     import mlflow
 
@@ -176,35 +165,107 @@ def register(name: str, folder: Path, tags: dict[str, str], metrics: dict[str, f
     same = ("onnx_sha256", "evaluation_contract", "dvc_policy")
     for version in _versions(client, name):
         if all(version.tags.get(key) == tags.get(key) for key in same):
+            if card and not version.description:  # made before versions had cards
+                client.update_model_version(name, version.version, fitted(card, LONGEST_DESCRIPTION, CARD))
             return str(version.version)
-    made_from = {f"dvc.{path.replace(':', '.')}": value for path, value in upstream(folder).items()}
-    with mlflow.start_run(run_name=f"publish {tags.get('policy', name)}", tags={"stage": "publish", **_short(tags)}):
-        logged = _log_onnx(folder, name)
-        mlflow.set_tags(_short(run_tags()))
+    settings = card_settings(folder)
+    origin = _text(lineage(history(folder), {**settings, **tags}, settings.get("seed")))
+    labels = {"stage": "publish", **_origin_tags(origin)}
+    policy = tags.get("policy", name)
+    with mlflow.start_run(run_name=f"publish {policy}", tags={"policy": policy, **labels}, description=card or None):
+        logged = _log_onnx(folder, name, {LINEAGE: origin, CARD: card})
         mlflow.log_metrics({key: value for key, value in metrics.items() if value is not None})
-        for extra in ("contract.json", "card.json", "curve.csv"):
-            if (folder / extra).exists():
-                mlflow.log_artifact(str(folder / extra), "policy")
-    # With its tags from the first moment: one set at a time, hundreds take MLflow half a minute.
-    made = mlflow.register_model(logged.model_uri, name, tags=_short({**run_tags(), **made_from, **tags}))
+        mlflow.log_text(origin, LINEAGE)
+        mlflow.log_text(card, CARD)
+    made = mlflow.register_model(logged.model_uri, name, tags=_fitted_tags({**labels, **tags}))
+    if card:
+        client.update_model_version(name, made.version, fitted(card, LONGEST_DESCRIPTION, CARD))
     return str(made.version)
 
 
-def _log_onnx(folder: Path, name: str) -> Any:
+def _log_onnx(folder: Path, name: str, texts: Mapping[str, str]) -> Any:
     import mlflow
-    import numpy as np
     import onnx
 
     model = onnx.load(str(folder / "policy.onnx"))
-    size = model.graph.input[0].type.tensor_type.shape.dim[1].dim_value
-    return mlflow.onnx.log_model(
-        onnx_model=model,
-        name=name,
-        onnx_execution_providers=["CPUExecutionProvider"],
-        input_example=np.zeros((1, size), np.float32),
-        pip_requirements=["onnxruntime", "numpy"],  # named: to find them out takes MLflow many seconds
-        metadata={"contract": json.loads((folder / "contract.json").read_text())},
-    )
+    with tempfile.TemporaryDirectory() as made:
+        files = [str(folder / file) for file in POLICY_FILES if (folder / file).exists()]
+        for file, text in texts.items():
+            (Path(made) / file).write_text(text)
+            files.append(str(Path(made) / file))
+        return mlflow.onnx.log_model(
+            onnx_model=model,
+            name=name,
+            onnx_execution_providers=["CPUExecutionProvider"],
+            signature=_signature(model),
+            pip_requirements=["onnxruntime", "numpy"],  # named: to find them out takes MLflow many seconds
+            metadata={"contract": json.loads((folder / "contract.json").read_text())},
+            extra_files=files,
+        )
+
+
+def _signature(model: Any) -> Any:
+    """Names, shapes and types of the graph's ends; -1 for any number of robots."""
+    import numpy as np
+    from mlflow.models import ModelSignature
+    from mlflow.types import Schema, TensorSpec
+
+    def schema(values: Any) -> Any:
+        sizes = [[d.dim_value or -1 for d in value.type.tensor_type.shape.dim] for value in values]
+        return Schema([TensorSpec(np.dtype("float32"), tuple(s), v.name) for v, s in zip(values, sizes, strict=True)])
+
+    return ModelSignature(inputs=schema(model.graph.input), outputs=schema(model.graph.output))
+
+
+def describe(name: str, text: str) -> None:
+    """What the page of the registered model says."""
+    prepare().update_registered_model(name, fitted(text, LONGEST_DESCRIPTION, CARD))
+
+
+def fetch(name: str, wanted: str, out: Path) -> Path:
+    """Copy a version's files from the store of the workspace in this folder; no server is needed.
+
+    Args:
+        name: the registered model.
+        wanted: an alias such as "champion", or a version's number.
+        out: a folder that is not there yet.
+
+    Raises:
+        BadInput: where there is no store, no such version, or something at `out`.
+    """
+    import mlflow
+    from mlflow.exceptions import MlflowException
+
+    if not (SERVERS / "mlflow.db").exists():
+        raise BadInput(Path.cwd() / SERVERS / "mlflow.db", "a workspace's registry", "no file", "Give its --workspace.")
+    if out.exists():
+        raise BadInput(out, "a new folder", "one that exists", "Choose another --out.")
+    client = prepare()
+    try:
+        numbered = wanted.isdecimal()
+        found = client.get_model_version(name, wanted) if numbered else client.get_model_version_by_alias(name, wanted)
+    except MlflowException:
+        known = ", ".join(model.name for model in client.search_registered_models()) or "none"
+        raise BadInput(f"{name}@{wanted}", "a version in this workspace's registry", f"models: {known}") from None
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=out.parent) as made:
+        whole = Path(mlflow.artifacts.download_artifacts(f"models:/{name}/{found.version}", dst_path=made))
+        _policy_files(whole).rename(out)
+    return out
+
+
+def _policy_files(whole: Path) -> Path:
+    """The policy's own folder in a version's files; versions from before had only the model and its metadata."""
+    if (whole / EXTRA).is_dir():
+        return whole / EXTRA
+    import yaml
+
+    folder = whole / "policy"
+    folder.mkdir()
+    (whole / "model.onnx").rename(folder / "policy.onnx")
+    contract = yaml.safe_load((whole / "MLmodel").read_text())["metadata"]["contract"]
+    (folder / "contract.json").write_text(_text(contract))
+    return folder
 
 
 def set_alias(name: str, alias: str, version: str) -> None:
@@ -235,7 +296,3 @@ def _champion(name: str) -> Any:
 
 def _versions(client: "MlflowClient", name: str) -> list[Any]:
     return list(client.search_model_versions(f"name = '{name}'"))
-
-
-def _short(tags: Mapping[str, str]) -> dict[str, str]:
-    return {key: str(value)[:LONGEST] for key, value in tags.items()}

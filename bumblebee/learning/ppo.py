@@ -17,7 +17,7 @@ import torch
 from rsl_rl.algorithms import PPO
 
 from bumblebee.errors import BadInput
-from bumblebee.files import save_tensors
+from bumblebee.learning.checkpoint import load_checkpoint, save_checkpoint
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.curve import CurveWriter
 from bumblebee.learning.policy import Policy, load_policy, model_config, new_actor, shape_of
@@ -185,14 +185,13 @@ class Trainer:
             "seconds": self._seconds,
             "ranks": each,
         }
-        save_tensors(self.folder / CHECKPOINT, content)
+        save_checkpoint(self.folder / CHECKPOINT, content)
 
     def _resume(self) -> None:
         path = self.folder / CHECKPOINT
         if not path.exists():
             return
-        # Our own file of this run, with NumPy arrays in it.
-        content = torch.load(path, weights_only=False, map_location="cpu")
+        content = load_checkpoint(path)
         self.algorithm.load(content["algorithm"], None, True)
         self.algorithm.learning_rate = content["learning_rate"]
         self.iteration, self._seconds = content["iteration"], content["seconds"]

@@ -152,7 +152,7 @@ def test_the_registry_resolves_its_aliases_through_the_server(loop: Loop, monkey
             version = fetch(f"{addresses.mlflow}/api/2.0/mlflow/{query}")["model_version"]
             assert version["version"] == facts["champion"]
             tags = {tag["key"]: tag["value"] for tag in version["tags"]}
-            assert {"git_sha", "onnx_sha256", "evaluation_contract", "dvc.models/generalist"} <= set(tags)
+            assert {"git_sha", "onnx_sha256", "evaluation_contract", "lineage"} <= set(tags)
         pids = addresses.pids
     assert not any(servers.alive(pid) for pid in pids)
     assert servers.running(loop.folder) is None

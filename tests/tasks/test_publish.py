@@ -23,13 +23,19 @@ class Registry:
     def __init__(self) -> None:
         self.versions: list[tuple[str, dict[str, str]]] = []
         self.champions: dict[str, str] = {}
+        self.cards: dict[str, str] = {}
+        self.described: dict[str, str] = {}
 
-    def register(self, name: str, folder: Path, tags: dict[str, str], metrics: dict[str, Any]) -> str:
+    def register(self, name: str, folder: Path, tags: dict[str, str], metrics: dict[str, Any], card: str) -> str:
+        self.cards[name] = card
         self.versions.append((name, tags))
         return str(len(self.versions))
 
     def set_alias(self, name: str, alias: str, version: str) -> None:
         self.champions[name] = version
+
+    def describe(self, name: str, text: str) -> None:
+        self.described[name] = text
 
     def champion_version(self, name: str) -> str | None:
         return self.champions.get(name)
@@ -77,6 +83,7 @@ def test_an_expert_without_results_is_left_out_and_named(
     publish.main()
     assert set(written()["models"]) == {"base", "expert-c0", "generalist"} == set(registry.champions)
     assert "expert-c1-r0: not published" in capsys.readouterr().out
+    assert registry.described == registry.cards and "- from: base" in registry.cards["expert-c0"]
 
 
 def test_an_engine_that_was_not_evaluated_is_refused_with_its_key(registry: Registry) -> None:

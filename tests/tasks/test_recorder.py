@@ -35,7 +35,7 @@ def test_the_run_is_written_with_everything_in_it(workspace: Path) -> None:
     assert found.data.params == {"a.b": "2"}
     assert found.data.metrics == {"x": 0.5, "reward": 0.75}
     assert (found.data.tags["cluster"], found.data.tags["round"]) == ("c0", "1")
-    assert [item.path for item in client.list_artifacts(found.info.run_id)] == ["curve.csv"]
+    assert [item.path for item in client.list_artifacts(found.info.run_id)] == ["curve.csv", "lineage.json"]
 
 
 def test_a_failure_is_the_stages(workspace: Path) -> None:

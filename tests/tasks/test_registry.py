@@ -95,7 +95,11 @@ def test_runs_and_models_can_be_found_again_even_when_the_workspace_has_moved(
     run = client.get_run(run_id)
     assert run.data.params["ppo.clip"] == "0.2"
     assert [point.value for point in client.get_metric_history(run_id, "loss")] == [2.0, 1.0]
-    assert {"stage", "round", "note", "git_sha"} <= set(run.data.tags)
+    own = {name for name in run.data.tags if not name.startswith("mlflow.")}
+    assert own == {"stage", "round", "note", "git_sha", "dvc_stage", "lineage"}, "a few that help, not one an input"
+    whole = Path(".servers/artifacts/runs", run_id, "artifacts/lineage.json").read_bytes()
+    assert hashlib.sha256(whole).hexdigest() == run.data.tags["lineage"]
+    assert json.loads(whole)["settings"] == {"steps": "4", "ppo.clip": "0.2"}
     assert run.info.artifact_uri.startswith("mlflow-artifacts:/")
     tags = registry.champion_tags("generalist")
     assert tags is not None and tags["onnx_sha256"] == "1" and "git_sha" in tags
@@ -103,7 +107,9 @@ def test_runs_and_models_can_be_found_again_even_when_the_workspace_has_moved(
     import mlflow
 
     loaded = mlflow.pyfunc.load_model("models:/generalist@champion")
-    assert np.allclose(loaded.predict(np.ones((1, 5), np.float32))["actions"], 10.0)
+    assert np.allclose(loaded.predict({"obs": np.ones((1, 5), np.float32)})["actions"], 10.0)
+    with pytest.raises(mlflow.exceptions.MlflowException, match="shape"):
+        loaded.predict({"obs": np.ones((1, 4), np.float32)})
 
 
 def test_upstream_is_everything_back_to_the_first_stage(tmp_path: Path) -> None:
@@ -127,6 +133,9 @@ def test_upstream_is_everything_back_to_the_first_stage(tmp_path: Path) -> None:
     expected = {"models/experts/r0": "e", "models/base": "c", "data/motions": "b", "code": "a"}
     assert {k: v for k, v in found.items() if not k.startswith("params:")} == expected
     assert "params:base" in found
+    by_path = {entry["path"]: entry for entry in lineage.history(Path("models/generalist"), lock)}
+    assert by_path["models/experts/r0"] == {"path": "models/experts/r0", "md5": "e", "stage": "expert"}
+    assert by_path["data/motions"]["stage"] == "motions" and "stage" not in by_path["code"]
     assert lineage.upstream(Path("models/generalist"), tmp_path / "none") == {}
 
 
