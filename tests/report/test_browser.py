@@ -141,6 +141,7 @@ def test_lines_stay_readable_and_figures_fill_the_width(browser: Any, file: Path
     shown.goto(file.as_uri())
     longest = "Math.max(...[...document.querySelectorAll('p, li')].map(e => e.getBoundingClientRect().width))"
     assert shown.evaluate(longest) < 900
-    right = "Math.max(...[...document.querySelectorAll('.figures figure, table')].map(e => e.getBoundingClientRect().right))"
+    wide = "[...document.querySelectorAll('.figures figure, table')]"
+    right = f"Math.max(...{wide}.map(e => e.getBoundingClientRect().right))"
     assert shown.evaluate(right) > 0.7 * width
     shown.close()
