@@ -78,7 +78,7 @@ def expect(stages: Iterable[Stage], earlier: Mapping[str, list[float]], seen: Ma
     known = {stage.name: median(earlier[stage.name]) for stage in stages if stage.name in earlier}
     typical = {stage.name: float(TYPICAL.get(stage.kind, _OTHER)) for stage in stages}
     measured = known | dict(seen)
-    scale = sum(measured.values()) / max(sum(typical[name] for name in measured), 1e-9) if measured else 1.0
+    scale = (sum(measured.values()) + _TRUST) / (sum(typical[name] for name in measured) + _TRUST)
     seconds = {name: known.get(name, scale * value) for name, value in typical.items()}
     compared = [name for name in seen if name in known]
     pace = (sum(seen[name] for name in compared) + _TRUST) / (sum(known[name] for name in compared) + _TRUST)

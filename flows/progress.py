@@ -195,7 +195,7 @@ def bar(percent: float, width: int = 20) -> str:
 
 def terminal() -> Console | None:
     """The console that Prefect's log lines go through, if it is a terminal: lines then appear above the bar."""
-    for handler in logging.getLogger("prefect").handlers:
+    for handler in [*logging.getLogger("prefect").handlers, *logging.getLogger().handlers]:
         console = getattr(handler, "console", None)
         if isinstance(console, Console) and console.is_terminal and not console.is_dumb_terminal:
             return console

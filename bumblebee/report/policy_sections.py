@@ -76,8 +76,15 @@ def success_section(results: LoopResults) -> Section:
                     image(picture, f"Success by {group}, {ENGINES[engine]}", "All motions; lines: 95 % intervals.")
                 )
     parts = {"all": "all", "test": "held out"}
+    where = {engine: name.removeprefix("on the ") for engine, name in ENGINES.items()}
     rows = [
-        (f"{c['from']} → {c['to']}", ENGINES[engine], parts[c["split"]], str(c["motions"]), change(c))
+        (
+            f"{c['from']} → {c['to']}",
+            where[engine],
+            parts[c["split"]],
+            str(c["motions"]),
+            change(c),
+        )
         for engine in engines(results)
         for c in results.evaluation["comparisons"]
         if c["engine"] == engine and c["split"] in parts

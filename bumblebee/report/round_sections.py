@@ -15,7 +15,7 @@ _MEASURES = (
     ("joint_vel_rmse", "joint velocities", 1.0, "rad/s"),
     ("base_pos_rmse", "base position", 1e3, "mm"),
     ("base_rot_rmse", "base rotation", 1e3, "mrad"),
-    ("chi2", "chi\u00b2 per reading (1: noise alone)", 1.0, ""),
+    ("chi2", "chi² (1: noise alone)", 1.0, ""),
 )
 
 
@@ -35,7 +35,7 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
                 "Bars by joint: error of the declared and of the corrected model, beside the noise floor.",
             )
         )
-    blocks += [_error_table(diagnosis["error"]), note(noise_floor.WHAT)]
+    blocks += [heading("Error by horizon"), _error_table(diagnosis["error"]), note(noise_floor.WHAT)]
     measures = {key: (name, factor, unit) for key, name, factor, unit in _MEASURES if key != "chi2"}
     under, lines = noise_floor.summary(diagnosis["error"], measures)
     blocks += [note(under)] if under else []
