@@ -152,10 +152,15 @@ def film_section(config: ReportConfig) -> Section:
     spec = build_spec()
     spec.compile()
     shown = film(rollout, spec.to_xml())
-    blocks: list[Block] = [text(f"The generalist follows '{motion}' on the stand-in robot, {why}.")]
+    blocks: list[Block] = [
+        text(
+            f"'{motion}' on the stand-in robot: {why}. The film is one more episode, with its own start and sensor noise, "
+            "so it may end otherwise than those that were counted."
+        )
+    ]
     if shown.sheet is not None:
         caption = "Measured joint angles and base pose, drawn off-screen, at real speed. Arrow keys step on the slider."
-        blocks.append(film_block(shown.sheet, f"Film of '{motion}'", caption, f"The robot follows '{motion}'."))
+        blocks.append(film_block(shown.sheet, f"Film of '{motion}'", caption, f"The robot during '{motion}'."))
     blocks += [still(uri, f"{at:.1f} s", f"The robot {at:.1f} s after the start.") for at, uri in shown.stills]
     return Section("film", "Film", (*blocks, note(shown.note)))
 
@@ -163,7 +168,7 @@ def film_section(config: ReportConfig) -> Section:
 def chosen_motion(config: ReportConfig) -> tuple[str, str]:
     """The motion asked for; else the liveliest that the generalist followed on the robot, else the longest followed."""
     if config.film_motion:
-        return config.film_motion, "as asked"
+        return config.film_motion, "the motion that was asked for"
     episodes = pd.read_parquet("data/evaluation/episodes.parquet")
     own = episodes[(episodes["policy"] == "generalist") & (episodes["engine"] == "stand_in")]
     speed = pd.read_csv("data/clusters/statistics.csv").set_index("name")["speed"]
@@ -172,8 +177,10 @@ def chosen_motion(config: ReportConfig) -> tuple[str, str]:
     if len(good):
         return str(
             good.sort_values("speed").iloc[-1]["motion"]
-        ), "the fastest of the motions that it followed to the end"
-    return str(own.sort_values("frames").iloc[-1]["motion"]), "which it followed longest, though not to the end"
+        ), "the fastest motion that the generalist followed to the end in the evaluation"
+    return str(
+        own.sort_values("frames").iloc[-1]["motion"]
+    ), "the motion that the generalist followed longest in the evaluation, though not to the end"
 
 
 def run_once(motion: str, seed: int) -> Rollout:

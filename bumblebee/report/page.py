@@ -38,7 +38,7 @@ class Fact:
 class Block:
     """One piece of a section; which fields count depends on `kind`.
 
-    Kinds: text, note, heading, list, table; and, side by side where there is room: image, film, still.
+    Kinds: text, note, heading, list, table, film; and, side by side where there is room: image, still.
     """
 
     kind: str
@@ -90,7 +90,7 @@ class Part:
 
 
 def _row(block: Block) -> str:
-    return {"image": "figures", "film": "figures", "still": "stills"}.get(block.kind, "flow")
+    return {"image": "figures", "still": "stills"}.get(block.kind, "flow")
 
 
 def text(words: str) -> Block:
