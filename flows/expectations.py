@@ -76,9 +76,9 @@ def expect(stages: Iterable[Stage], earlier: Mapping[str, list[float]], seen: Ma
     """
     stages = list(stages)
     known = {stage.name: median(earlier[stage.name]) for stage in stages if stage.name in earlier}
-    typical = {stage.name: float(TYPICAL.get(stage.kind, _OTHER)) for stage in stages}
-    measured = known | dict(seen)
-    scale = (sum(measured.values()) + _TRUST) / (sum(typical[name] for name in measured) + _TRUST)
+    typical = {stage.name: _typical(stage.name) for stage in stages}
+    measured = {name: median(values) for name, values in earlier.items()} | dict(seen)
+    scale = (sum(measured.values()) + _TRUST) / (sum(_typical(name) for name in measured) + _TRUST)
     seconds = {name: known.get(name, scale * value) for name, value in typical.items()}
     compared = [name for name in seen if name in known]
     pace = (sum(seen[name] for name in compared) + _TRUST) / (sum(known[name] for name in compared) + _TRUST)
@@ -86,6 +86,10 @@ def expect(stages: Iterable[Stage], earlier: Mapping[str, list[float]], seen: Ma
     most = max((len(earlier[name]) for name in known), default=0)
     told = "from this workspace's last run" if most == 1 else "from this workspace's earlier runs"
     return Expectation(seconds, told if known.keys() >= typical.keys() - seen.keys() and known else "estimate")
+
+
+def _typical(name: str) -> float:
+    return float(TYPICAL.get(name.partition("@")[0], _OTHER))
 
 
 def seconds_left(

@@ -154,8 +154,8 @@ def film_section(config: ReportConfig) -> Section:
     shown = film(rollout, spec.to_xml())
     blocks: list[Block] = [
         text(
-            f"'{motion}' on the stand-in robot: {why}. The film is one more episode, with its own start and sensor noise, "
-            "so it may end otherwise than those that were counted."
+            f"'{motion}' on the stand-in robot: {why}. The film is one more episode, with its own start and sensor "
+            "noise, so it may end otherwise than those that were counted."
         )
     ]
     if shown.sheet is not None:

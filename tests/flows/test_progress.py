@@ -64,6 +64,8 @@ def test_without_earlier_runs_shares_of_typical_durations_take_their_scale_from_
     typical = expectations.TYPICAL
     seen = expectations.expect(CHAIN, {}, {"motions": 3 * typical["motions"], "experts@c0": 3 * typical["experts"]})
     assert 2 * typical["distill"] < seen.seconds["distill"] < 3 * typical["distill"]
+    slow_place = expectations.expect(CHAIN[3:], {"base": [9.0 * typical["base"]]}, {})
+    assert slow_place.seconds["distill"] > 4 * typical["distill"] and slow_place.source == "estimate"
     slow_start = expectations.expect(CHAIN, {}, {"motions": 10 + typical["motions"]})
     assert slow_start.seconds["distill"] < 1.3 * typical["distill"]
     assert expectations.expect(CHAIN, {"motions": [9.0]}, {}).source == "estimate"
