@@ -17,7 +17,7 @@ from prefect.futures import PrefectFuture
 from prefect.states import Completed, Failed, State
 from prefect.task_runners import ThreadPoolTaskRunner
 
-from flows import gates
+from flows import gates, progress
 from flows.environment import environment
 from flows.stages import Stage, changed_stages, downstream, read_stages, to_run
 
@@ -36,21 +36,26 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
     log = get_run_logger()
     command = [sys.executable, "-m", "flows.reproduce", name]
     last: deque[str] = deque(maxlen=KEPT)
-    with subprocess.Popen(
-        command,
-        cwd=workspace,
-        env=environment(Path(workspace)),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        errors="replace",
-    ) as process:
+    with (
+        progress.stage(workspace, name) as told,
+        subprocess.Popen(
+            command,
+            cwd=workspace,
+            env=environment(Path(workspace)),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+        ) as process,
+    ):
         assert process.stdout is not None
         for line in process.stdout:
+            told["worked"] |= line.startswith("Running stage")
             if line.strip() and not is_chatter(line):
                 last.append(line.rstrip())
                 log.info(line.rstrip())
+        told["worked"] &= process.wait() == 0
     if process.returncode:
         return Failed(message=f"{title}: " + " / ".join(last))
     return Completed()
@@ -75,6 +80,7 @@ def loop(workspace: str = "") -> State[Any]:
     stages = read_stages(folder)
     busy = to_run(stages, changed_stages(folder))
     log.info(f"{len(busy)} of {len(stages)} stages have work to do" if busy else "everything is up to date")
+    close = progress.begin(folder, stages, busy, log)
     running: dict[str, PrefectFuture[Any]] = {}
     waiting: str | None = None
     for stage in gates_last(stages):
@@ -90,7 +96,9 @@ def loop(workspace: str = "") -> State[Any]:
                 log.warning(question)
                 continue
         running[stage.name] = run_stage.submit(stage.title, stage.name, str(folder.resolve()), wait_for=before)
-    return outcome(running, stages, waiting)
+    state = outcome(running, stages, waiting)
+    close("done" if state.is_completed() else "waits for an answer" if waiting else "failed")
+    return state
 
 
 def failed(future: PrefectFuture[Any]) -> bool:

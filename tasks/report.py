@@ -15,11 +15,13 @@ from bumblebee.motion.store import read_index
 from bumblebee.report.data_sections import clusters_section, motions_section
 from bumblebee.report.filmstrip import film
 from bumblebee.report.loop_picture import Box, loop_picture
-from bumblebee.report.page import Block, Section, image, note, render, text
+from bumblebee.report.page import Block, Section, note, render, still, text
+from bumblebee.report.page import film as film_block
 from bumblebee.report.policy_sections import registry_section, success_section, training_section
 from bumblebee.report.results import LoopResults, RoundResults
 from bumblebee.report.round_sections import round_section
-from bumblebee.report.verdict import verdict
+from bumblebee.report.verdict import facts, verdict
+from bumblebee.report.wording import plural
 from bumblebee.robot.model import build_spec
 from tasks.lineage import git_sha
 from tasks.rollouts import FILTERED, SEALED, RolloutsConfig, start_stand_in
@@ -55,7 +57,7 @@ def main() -> None:
     sections.append(registry_section(results))
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     subtitle = f"{when} · code {git_sha()[:12]} · evaluation contract {results.evaluation['contract_sha256'][:12]}"
-    page = render(config.title, subtitle, verdict(results), picture(results), sections)
+    page = render(config.title, subtitle, verdict(results), picture(results), sections, facts(results))
     with output_file(OUT) as file:
         file.write_text(page)
     print(f"report: {OUT} ({OUT.stat().st_size / 1e6:.1f} MB)")
@@ -121,27 +123,26 @@ def picture(results: LoopResults) -> str:
     top = [
         Box("motions", f"{len(results.library)} read"),
         Box("filter", f"{kept} kept"),
-        Box("cluster", f"K = {k}, {len(labels)} clips"),
+        Box("cluster", f"K = {k}, {plural(len(labels), 'clip')}"),
         Box("base", "one policy for all", "learn"),
         Box("experts", f"{k}, one a cluster", "learn"),
         Box("distill", "one generalist", "learn"),
-        Box("evaluate", f"{len(results.contract['motions'])} motions"),
-        Box("publish", f"{published} models"),
+        Box("evaluate", plural(len(results.contract["motions"]), "motion")),
+        Box("publish", plural(published, "model")),
     ]
     if not results.rounds:
         return loop_picture(top, [], "")
     last = results.rounds[-1]
     effects, kept_deltas = len(last.diagnosis["effects"]), sum(card["promoted"] for card in last.deltas.values())
     bottom = [
-        Box("robot", f"{last.intake['accepted'] + last.intake['quarantined']} rollouts", "robot"),
+        Box("robot", plural(last.intake["accepted"] + last.intake["quarantined"], "rollout"), "robot"),
         Box("ingest", f"{last.intake['quarantined']} set aside"),
         Box("gate", last.gate["status"], "person"),
-        Box("diagnose", f"{effects} effect{'' if effects == 1 else 's'} found"),
+        Box("diagnose", f"{plural(effects, 'effect')} found"),
         Box("delta", f"{kept_deltas} of {len(last.deltas)} kept", "learn"),
         Box("refine", "corrected model", "learn"),
     ]
-    rounds = len(results.rounds)
-    return loop_picture(top, bottom, f"{rounds} round{'' if rounds == 1 else 's'}: measured, explained, refined")
+    return loop_picture(top, bottom, f"{plural(len(results.rounds), 'round')}: measured, explained, refined")
 
 
 def film_section(config: ReportConfig) -> Section:
@@ -151,17 +152,23 @@ def film_section(config: ReportConfig) -> Section:
     spec = build_spec()
     spec.compile()
     shown = film(rollout, spec.to_xml())
-    blocks: list[Block] = [text(f"The generalist follows '{motion}' on the stand-in robot, {why}.")]
-    if shown.animation:
-        blocks.append(image(shown.animation, "Measured joint angles and base pose, drawn off-screen."))
-    blocks += [image(shown.strip, "The same in eight frames."), note(shown.note)]
-    return Section("film", "Film", tuple(blocks))
+    blocks: list[Block] = [
+        text(
+            f"'{motion}' on the stand-in robot: {why}. The film is one more episode, with its own start and sensor "
+            "noise, so it may end otherwise than those that were counted."
+        )
+    ]
+    if shown.sheet is not None:
+        caption = "Measured joint angles and base pose, drawn off-screen, at real speed. Arrow keys step on the slider."
+        blocks.append(film_block(shown.sheet, f"Film of '{motion}'", caption, f"The robot during '{motion}'."))
+    blocks += [still(uri, f"{at:.1f} s", f"The robot {at:.1f} s after the start.") for at, uri in shown.stills]
+    return Section("film", "Film", (*blocks, note(shown.note)))
 
 
 def chosen_motion(config: ReportConfig) -> tuple[str, str]:
     """The motion asked for; else the liveliest that the generalist followed on the robot, else the longest followed."""
     if config.film_motion:
-        return config.film_motion, "as asked"
+        return config.film_motion, "the motion that was asked for"
     episodes = pd.read_parquet("data/evaluation/episodes.parquet")
     own = episodes[(episodes["policy"] == "generalist") & (episodes["engine"] == "stand_in")]
     speed = pd.read_csv("data/clusters/statistics.csv").set_index("name")["speed"]
@@ -170,8 +177,10 @@ def chosen_motion(config: ReportConfig) -> tuple[str, str]:
     if len(good):
         return str(
             good.sort_values("speed").iloc[-1]["motion"]
-        ), "the fastest of the motions that it followed to the end"
-    return str(own.sort_values("frames").iloc[-1]["motion"]), "which it followed longest, though not to the end"
+        ), "the fastest motion that the generalist followed to the end in the evaluation"
+    return str(
+        own.sort_values("frames").iloc[-1]["motion"]
+    ), "the motion that the generalist followed longest in the evaluation, though not to the end"
 
 
 def run_once(motion: str, seed: int) -> Rollout:

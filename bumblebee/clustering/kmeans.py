@@ -96,6 +96,13 @@ def project(latents: np.ndarray, fitted: np.ndarray) -> np.ndarray:
     return np.pad(flat, ((0, 0), (0, 2 - size)))
 
 
+def plane_shares(latents: np.ndarray, fitted: np.ndarray) -> list[float]:
+    """Shares of the fitted rows' variance along the two axes of `project`; 0 for an axis that there is not."""
+    size = min(2, int(fitted.sum()), latents.shape[1])
+    shares = np.nan_to_num(PCA(size, svd_solver="full").fit(latents[fitted]).explained_variance_ratio_)
+    return [float(share) for share in np.pad(shares, (0, 2 - size))]
+
+
 def _kmeans(latents: np.ndarray, k: int, seed: int, starts: int = 10) -> KMeans:
     return KMeans(k, n_init=starts, random_state=seed).fit(latents)
 

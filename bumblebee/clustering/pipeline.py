@@ -124,6 +124,7 @@ def _summary(
             "with_captions": sum(bool(clip.captions) for clip in clips),
         },
         "clusters": by_name,
+        "plane_variance": kmeans.plane_shares(latents, fitted),
         "moved_to_fill": [train_clips[i].name for i in clusters.moved],
         "loss": {name: float(curve.iloc[-1][name]) for name in curve.columns if name != "epoch"},
         "audit": audit.audit(train_statistics, families, latents[fitted], clusters, config.audit_seeds, config.seed),

@@ -1,8 +1,9 @@
 """Sections about the data: motions read and dropped, clusters."""
 
-from bumblebee.report.clusters_figure import clusters_figure
+from bumblebee.report.clusters_figure import elbow_figure, plane_figure
 from bumblebee.report.page import Block, Section, heading, image, note, table, text
-from bumblebee.report.results import LoopResults
+from bumblebee.report.results import Json, LoopResults
+from bumblebee.report.wording import plural, signed
 
 _MOST_ROWS = 12
 
@@ -15,8 +16,8 @@ def motions_section(results: LoopResults) -> Section:
     minutes = library["duration"].sum() / 60
     blocks: list[Block] = [
         text(
-            f"{len(library)} motions were read ({minutes:.1f} minutes, {held_out} held out from training); "
-            f"the filter dropped {dropped}."
+            f"{plural(len(library), 'motion')} read ({minutes:.1f} minutes in all, {held_out} held out from training); "
+            f"the filter dropped {dropped}, so {len(library) - dropped} are used."
         )
     ]
     families = library.assign(family=library["family"].replace("", "unknown")).groupby("family")
@@ -24,14 +25,18 @@ def motions_section(results: LoopResults) -> Section:
         (str(name), str(len(part)), str(int((part["split"] == "test").sum())), f"{part['duration'].sum():.0f} s")
         for name, part in families
     ]
-    blocks.append(table(("family", "motions", "held out", "length"), rows))
+    blocks.append(table(("family", "motions", "held out", "length"), rows, title="motions by family"))
     sources = library.groupby("licence").size()
-    blocks.append(note("Licences: " + "; ".join(f"{name} ({count} motions)" for name, count in sources.items()) + "."))
+    licences = "; ".join(f"{name} ({plural(count, 'motion')})" for name, count in sources.items())
+    blocks.append(note(f"Licences: {licences}."))
     if len(drops):
         first = drops.drop_duplicates("motion")
         dropped_rows = [(r["motion"], r["rule"], str(r["explanation"])) for _, r in first.head(_MOST_ROWS).iterrows()]
         caption = f"{len(first) - _MOST_ROWS} more in data/filtered/drops.csv." if len(first) > _MOST_ROWS else ""
-        blocks += [heading("Dropped"), table(("motion", "rule", "why"), dropped_rows, caption)]
+        blocks += [
+            heading("Dropped by the filter"),
+            table(("motion", "rule", "why"), dropped_rows, caption, "dropped motions"),
+        ]
     if len(results.skipped):
         reasons = results.skipped.groupby("reason").size().sort_values(ascending=False)
         unread = [(str(reason), str(count)) for reason, count in reasons.head(_MOST_ROWS).items()]
@@ -42,7 +47,6 @@ def motions_section(results: LoopResults) -> Section:
 def clusters_section(results: LoopResults) -> Section:
     """The latent plane, the elbow, the paper's table 2 and the audit."""
     summary = results.clusters
-    picture = clusters_figure(results.labels, results.elbow, summary["k"], summary["suggested_k"])
     rows = [
         (
             name,
@@ -56,18 +60,37 @@ def clusters_section(results: LoopResults) -> Section:
         for name, row in summary["clusters"].items()
     ]
     header = ("cluster", "label", "clips + held out", "speed [m/s]", "displacement [m]", "z-move [mm]", "keywords")
-    audit, stability = summary["audit"], summary["audit"]["stability"]
-    agreement = audit["family_ari"]
-    words = f"Agreement between restarts {stability['seeds']:.2f}, between subsamples {stability['subsamples']:.2f}"
-    if agreement is not None:
-        words += f", with the families {agreement:.2f}"
-    words += " (adjusted Rand index, 1 = the same). Share of the speed's variance that lies between clusters: "
-    words += f"{audit['separation']['speed']:.2f}, in random splits {audit['separation_random_split']['speed']:.2f}."
     losses = ", ".join(f"{name} {value:.3g}" for name, value in summary["loss"].items())
+    plane = plane_figure(results.labels, summary.get("plane_variance"))
+    elbow = elbow_figure(results.elbow, summary["k"], summary["suggested_k"])
     blocks = (
-        image(picture, "Left: first two principal components of the motion latents. Right: how K was judged."),
-        table(header, rows),
-        text(words),
+        image(
+            plane,
+            "Motions in the latent plane",
+            "First two principal components of the autoencoder's motion latents (no unit); filled: trained on.",
+            f"Scatter plot: {plural(len(results.labels), 'motion')} in {plural(summary['k'], 'cluster')}.",
+        ),
+        image(
+            elbow,
+            "How K was judged",
+            "Spread inside the clusters against their number; the elbow is the point farthest below the chord.",
+            f"Line that falls with K; the elbow suggests K = {summary['suggested_k']}, used is K = {summary['k']}.",
+        ),
+        heading("The clusters"),
+        table(header, rows, "Means over the training clips.", "clusters"),
+        text(_audit(summary["audit"])),
         note(f"Autoencoder losses at the end: {losses}."),
     )
     return Section("clusters", "Clusters", blocks)
+
+
+def _audit(audit: Json) -> str:
+    stability, agreement = audit["stability"], audit["family_ari"]
+    words = f"Agreement between restarts {signed(stability['seeds'], 2)}, "
+    words += f"between subsamples {signed(stability['subsamples'], 2)}"
+    if agreement is not None:
+        words += f", with the families {signed(agreement, 2)}"
+    words += " (adjusted Rand index: 1 the same, 0 chance). Share of the speed's variance that lies between clusters: "
+    return (
+        words + f"{audit['separation']['speed']:.2f}; in random splits {audit['separation_random_split']['speed']:.2f}."
+    )

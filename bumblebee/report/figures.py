@@ -1,4 +1,8 @@
-"""Small helpers for pictures that stand inside one HTML file: matplotlib to SVG or PNG as data URIs, no scripts."""
+"""Small helpers for pictures that stand inside one HTML file: matplotlib to SVG or PNG as data URIs, no scripts.
+
+Every figure holds one plot and is as wide as a phone's page: the page lays them side by side where there is room, so
+that letters keep their size on any screen.
+"""
 
 import base64
 import io
@@ -10,17 +14,19 @@ matplotlib.use("Agg")
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-INK, QUIET, GRID = "#22262b", "#6b7480", "#e3e7ec"
+INK, QUIET, GRID = "#22262b", "#59626d", "#e3e7ec"
 PALETTE = ("#d9880f", "#2f6db5", "#3a8f5c", "#a4478f", "#7a6a52", "#c2423b", "#4aa3a8", "#85858f")
+WIDTH = 3.35
+"""Of a figure [inch]: 322 CSS pixels."""
+SMALLEST = 9.7
+"""Size of letters [pt]: 12.9 CSS pixels."""
 
 _STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
-    "font.size": 9.5,
+    "font.size": SMALLEST,
+    "axes.labelsize": SMALLEST,
     "axes.edgecolor": QUIET,
     "axes.labelcolor": INK,
-    "axes.titlesize": 10.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -29,17 +35,32 @@ _STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
     "xtick.color": QUIET,
     "ytick.color": QUIET,
+    "xtick.labelsize": SMALLEST,
+    "ytick.labelsize": SMALLEST,
     "text.color": INK,
+    "text.parse_math": False,  # a name from the data may hold a $
     "legend.frameon": False,
+    "legend.fontsize": SMALLEST,
     "svg.hashsalt": "bumblebee",
 }
 
 
-def canvas(columns: int = 1, width: float = 10.3, height: float = 3.2) -> tuple[Figure, list[Axes]]:
-    """A figure of `columns` axes side by side, in inches; by default as wide as the page."""
+def canvas(height: float = 3.0, width: float = WIDTH) -> tuple[Figure, Axes]:
+    """A figure with one pair of axes, in inches."""
     matplotlib.rcParams.update(_STYLE)  # legends and titles, which are made later, read it too
     figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, [figure.add_subplot(1, columns, i + 1) for i in range(columns)]
+    return figure, figure.add_subplot()
+
+
+def legend_below(figure: Figure, axis: Axes, columns: int = 2) -> None:
+    """A legend under the plot, for which the figure grows: the plot keeps its height."""
+    handles, labels = axis.get_legend_handles_labels()
+    if not handles:
+        return
+    rows = -(-len(handles) // columns)
+    figure.set_figheight(figure.get_figheight() + 0.19 * rows + 0.1)
+    figure.legend(handles, [short(label, 40 // columns) for label in labels], loc="outside lower left", ncols=columns,
+                  columnspacing=1.0, handletextpad=0.5, borderaxespad=0.2)  # fmt: skip
 
 
 def svg_uri(figure: Figure) -> str:
@@ -57,6 +78,12 @@ def image_uri(data: bytes, kind: str) -> str:
 def colour(index: int) -> str:
     """The palette, repeated."""
     return PALETTE[index % len(PALETTE)]
+
+
+def short(name: str, most: int) -> str:
+    """A name of at most so many letters; one line."""
+    name = " ".join(name.split())
+    return name if len(name) <= most else name[: most - 1] + "…"
 
 
 def short_joint(name: str) -> str:

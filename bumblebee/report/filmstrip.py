@@ -1,4 +1,8 @@
-"""A filmstrip and a short animation of a measured rollout; a stick figure where nothing can be rendered."""
+"""Stills and a film of a measured rollout; a stick figure where nothing can be rendered.
+
+The film is one picture that holds all frames in rows, which the page's player shows one at a time: no video format,
+no decoder to ask for, and a still without scripts.
+"""
 
 import io
 from dataclasses import dataclass
@@ -21,12 +25,31 @@ _BONES = (
 )
 
 
+_COLUMNS = 9
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """All frames of a film in one picture, row by row."""
+
+    uri: str
+    frames: int
+    columns: int
+    rows: int
+    fps: float
+    width: int
+    """Of a frame [pixels]."""
+    height: int
+    """Of a frame [pixels]."""
+
+
 @dataclass(frozen=True)
 class Film:
-    """Pictures as `data:` URIs; `animation` is "" where nothing could be rendered, and `note` says why."""
+    """Pictures as `data:` URIs; `sheet` is None where nothing could be rendered, and `note` says why."""
 
-    strip: str
-    animation: str
+    stills: tuple[tuple[float, str], ...]
+    """(seconds from the start, picture)."""
+    sheet: Sheet | None
     note: str
 
 
@@ -42,35 +65,49 @@ def film(rollout: Rollout, model_xml: str, panels: int = 8, fps: int = 12, secon
     step = max(round(rollout.control_hz / fps), 1)
     rows = np.arange(0, min(len(qpos), round(seconds * rollout.control_hz)), step)
     frames, note = render_frames(model_xml, qpos[rows])
-    if frames is None:
-        return Film(_stick_strip(qpos, model_xml, panels), "", f"This machine cannot render off-screen ({note}).")
     chosen = np.linspace(0, len(rows) - 1, panels).round().astype(int)
-    strip = np.concatenate(list(frames[chosen][:, :, 50:-50]), axis=1)
-    return Film(
-        image_uri(_webp([strip]), "webp"), image_uri(_webp(list(frames), 1000 // fps), "webp"), f"rendered by {note}"
-    )
+    times = [float(rows[i] / rollout.control_hz) for i in chosen]
+    if frames is None:
+        stills = _stick_stills(qpos[rows[chosen]], model_xml)
+        return Film(tuple(zip(times, stills, strict=True)), None, f"This machine cannot render off-screen ({note}).")
+    stills = [image_uri(_webp(frames[i]), "webp") for i in chosen]
+    shown = sheet(frames, rollout.control_hz / step)
+    return Film(tuple(zip(times, stills, strict=True)), shown, f"Rendered with {note}.")
 
 
-def _webp(frames: list[np.ndarray], milliseconds: int = 100) -> bytes:
-    images = [Image.fromarray(frame) for frame in frames]
+def sheet(frames: np.ndarray, fps: float) -> Sheet:
+    """Lay frames (F, H, W, 3) uint8 out in rows."""
+    count, height, width, _ = frames.shape
+    columns = min(_COLUMNS, count)
+    rows = -(-count // columns)
+    padded = np.concatenate([frames, np.repeat(frames[-1:], rows * columns - count, axis=0)])
+    grid = padded.reshape(rows, columns, height, width, 3).swapaxes(1, 2).reshape(rows * height, columns * width, 3)
+    return Sheet(image_uri(_webp(grid), "webp"), count, columns, rows, fps, width, height)
+
+
+def _webp(pixels: np.ndarray) -> bytes:
     buffer = io.BytesIO()
-    images[0].save(buffer, "webp", quality=70, save_all=True, append_images=images[1:], duration=milliseconds, loop=0)
+    Image.fromarray(pixels).save(buffer, "webp", quality=70, method=5)
     return buffer.getvalue()
 
 
-def _stick_strip(qpos: np.ndarray, model_xml: str, panels: int) -> str:
-    """The key bodies joined by lines, seen from the side, in a row."""
+def _stick_stills(qpos: np.ndarray, model_xml: str) -> list[str]:
+    """The key bodies joined by lines, seen from the side; lines on the ground and at every half metre."""
     model = mujoco.MjModel.from_xml_string(model_xml)
     data = mujoco.MjData(model)
-    figure, (axis,) = canvas(1, height=2.4)
-    for i, row in enumerate(np.linspace(0, len(qpos) - 1, panels).round().astype(int)):
-        data.qpos[:] = qpos[row]
+    pictures = []
+    for state in qpos:
+        data.qpos[:] = state
         mujoco.mj_kinematics(model, data)
-        at = {name: data.body(name).xpos - [qpos[row, 0], qpos[row, 1], 0] for name in KEY_BODIES}
+        at = {name: data.body(name).xpos - [state[0], state[1], 0] for name in KEY_BODIES}
+        figure, axis = canvas(height=1.9, width=1.7)
         for bone in _BONES:
             points = np.array([at[name] for name in bone])
             shade = colour(1) if "left" in bone[-1] else colour(0)
-            axis.plot(points[:, 1] * 0.8 + points[:, 0] * 0.6 + i, points[:, 2], "-o", ms=2.5, color=shade, lw=1.8)
-    axis.axhline(0, color=GRID)
-    axis.set(aspect="equal", xticks=[], ylabel="height [m]")
-    return svg_uri(figure)
+            axis.plot(points[:, 1] * 0.8 + points[:, 0] * 0.6, points[:, 2], "-o", ms=2.5, color=shade, lw=1.8)
+        for height in (0.0, 0.5, 1.0):
+            axis.axhline(height, color=GRID, zorder=0)
+        axis.set(aspect="equal", xlim=(-0.6, 0.6), ylim=(-0.05, 1.4))
+        axis.set_axis_off()
+        pictures.append(svg_uri(figure))
+    return pictures

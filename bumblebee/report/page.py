@@ -1,14 +1,20 @@
-"""The report as one self-contained HTML file: sections of texts, tables and images through one template.
+"""The report as one self-contained HTML file: sections of texts, tables and pictures through one template.
 
-Every text is escaped, images are `data:` URIs, and the page's own policy forbids scripts and anything from outside.
+Every text is escaped and pictures are `data:` URIs. The page's own policy forbids everything from outside and every
+script but the film's player, which it names by its hash; a page without a film runs none.
 """
 
+import base64
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from itertools import groupby
 
 from jinja2 import Environment, select_autoescape
 from markupsafe import Markup
+
+from bumblebee.report.filmstrip import Sheet
 
 
 @dataclass(frozen=True)
@@ -20,16 +26,31 @@ class Cell:
 
 
 @dataclass(frozen=True)
+class Fact:
+    """One of the numbers at the top of the page."""
+
+    label: str
+    value: str
+    detail: str
+
+
+@dataclass(frozen=True)
 class Block:
-    """One piece of a section; which fields count depends on `kind`: text, note, heading, list, image or table."""
+    """One piece of a section; which fields count depends on `kind`.
+
+    Kinds: text, note, heading, list, table, film; and, side by side where there is room: image, still.
+    """
 
     kind: str
     text: str = ""
     lines: tuple[str, ...] = ()
     uri: str = ""
+    title: str = ""
     caption: str = ""
+    alt: str = ""
     header: tuple[str, ...] = ()
     rows: tuple[tuple[str | Cell, ...], ...] = ()
+    sheet: Sheet | None = None
 
 
 @dataclass(frozen=True)
@@ -39,6 +60,37 @@ class Section:
     id: str
     title: str
     blocks: tuple[Block, ...]
+
+    @property
+    def parts(self) -> list["Part"]:
+        """Blocks under each heading: what the page lays out side by side."""
+        parts: list[list[Block]] = [[]]
+        for block in self.blocks:
+            if block.kind == "heading" and parts[-1]:
+                parts.append([])
+            parts[-1].append(block)
+        return [Part(tuple(part)) for part in parts]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A heading and what follows up to the next."""
+
+    blocks: tuple[Block, ...]
+
+    @property
+    def lead(self) -> bool:
+        """Whether these are introductory words alone, which stand above the other parts."""
+        return all(block.kind in ("text", "note") for block in self.blocks)
+
+    @property
+    def runs(self) -> list[tuple[str, list[Block]]]:
+        """Blocks in runs of one kind: figures beside each other, the rest below each other."""
+        return [(name, list(run)) for name, run in groupby(self.blocks, key=_row)]
+
+
+def _row(block: Block) -> str:
+    return {"image": "figures", "still": "stills"}.get(block.kind, "flow")
 
 
 def text(words: str) -> Block:
@@ -61,22 +113,61 @@ def bullets(lines: Sequence[str]) -> Block:
     return Block("list", lines=tuple(lines))
 
 
-def image(uri: str, caption: str) -> Block:
-    """A picture as a `data:` URI."""
+def image(uri: str, title: str, caption: str = "", alt: str = "") -> Block:
+    """A figure as a `data:` URI; `alt` says in words what it shows, by default its title and caption."""
+    return Block("image", uri=_inside(uri), title=title, caption=caption, alt=alt or f"{title}. {caption}".strip())
+
+
+def still(uri: str, caption: str, alt: str) -> Block:
+    """A small picture, one of a row."""
+    return Block("still", uri=_inside(uri), caption=caption, alt=alt)
+
+
+def film(sheet: Sheet, title: str, caption: str, alt: str) -> Block:
+    """A film with its player."""
+    return Block("film", uri=_inside(sheet.uri), title=title, caption=caption, alt=alt, sheet=sheet)
+
+
+def _inside(uri: str) -> str:
     if not uri.startswith("data:image/"):
         raise ValueError("a report holds its images in itself")
-    return Block("image", uri=uri, caption=caption)
+    return uri
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str | Cell]], caption: str = "") -> Block:
-    """A table."""
-    return Block("table", header=tuple(header), rows=tuple(tuple(row) for row in rows), caption=caption)
+def table(header: Sequence[str], rows: Sequence[Sequence[str | Cell]], caption: str = "", title: str = "") -> Block:
+    """A table; `title` names it for a screen reader."""
+    filled = tuple(tuple(row) for row in rows)
+    return Block("table", header=tuple(header), rows=filled, caption=caption, title=title or ", ".join(header[:2]))
 
 
-def render(title: str, subtitle: str, verdict: Sequence[str], picture_svg: str, sections: Sequence[Section]) -> str:
-    """The page; `picture_svg` is the only markup that is passed through, and must come from `loop_picture`."""
+def render(
+    title: str,
+    subtitle: str,
+    verdict: Sequence[str],
+    picture: str,
+    sections: Sequence[Section],
+    facts: Sequence[Fact] = (),
+) -> str:
+    """The page; `picture` is the only markup that is passed through, and must come from `loop_picture`."""
     environment = Environment(autoescape=select_autoescape(default=True), trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string(files("bumblebee.report").joinpath("page.html.j2").read_text())
-    return template.render(
-        title=title, subtitle=subtitle, verdict=list(verdict), picture=Markup(picture_svg), sections=list(sections)
+    folder = files("bumblebee.report")
+    films = any(block.kind == "film" for section in sections for block in section.blocks)
+    player = folder.joinpath("player.js").read_text() if films else ""
+    return environment.from_string(folder.joinpath("page.html.j2").read_text()).render(
+        title=title,
+        subtitle=subtitle,
+        verdict=list(verdict),
+        picture=Markup(picture),
+        sections=list(sections),
+        facts=list(facts),
+        style=Markup(folder.joinpath("page.css").read_text()),
+        player=Markup(player),
+        policy=policy(player),
     )
+
+
+def policy(script: str) -> str:
+    """The Content-Security-Policy: nothing from anywhere, and of scripts this one alone (none if empty)."""
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    scripts = f"; script-src 'sha256-{digest}'" if script else ""
+    return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'{scripts}"

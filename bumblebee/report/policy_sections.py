@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from bumblebee.report.curves_figure import curves_figure
+from bumblebee.report.curves_figure import curves_figures
 from bumblebee.report.page import Block, Section, heading, image, note, table, text
 from bumblebee.report.results import LoopResults
 from bumblebee.report.success_figure import pick, success_figure
-from bumblebee.report.wording import change, number, percent
+from bumblebee.report.wording import change, duration, number, percent, plural
 
 NOT_YOURS = (
     "Policies were evaluated in simulation only: on the declared model and on a stand-in robot with made-up effects. "
@@ -36,18 +36,19 @@ def training_section(results: LoopResults) -> Section:
     rest = {n: c for n, c in results.curves.items() if n == "generalist"}
     blocks: list[Block] = []
     start = "from the policy that comes along" if results.pretrained else "from scratch"
-    captions = (
-        f"Base policy, {start}; episodes start anywhere in a clip, with noise and a shrinking threshold.",
-        "Experts (r0: fine-tuned from base; r1 ...: refined in the corrected simulator).",
-        "Generalist, by DAgger from the final experts.",
-    )
-    for curves, caption in zip((base, experts, rest), captions, strict=True):
-        picture = curves_figure(curves)
-        if picture:
-            blocks.append(image(picture, caption))
+    groups = {
+        f"Base policy, {start}": (base, "Episodes start anywhere in a clip, with noise and a shrinking threshold."),
+        "Experts": (experts, "r0: fine-tuned from the base policy; r1 and later: refined in the corrected simulator."),
+        "Generalist": (rest, "By DAgger from the final experts."),
+    }
+    measures = {"success": "episodes that end well", "key_error": "key body error"}
+    for name, (curves, caption) in groups.items():
+        for measure, picture in curves_figures(curves).items():
+            alt = f"Learning curves of {', '.join(curves)}: {measures[measure]} against simulated frames."
+            blocks.append(image(picture, f"{name}: {measures[measure]}", caption, alt))
     seconds = {n: c["seconds"].iloc[-1] for n, c in results.curves.items() if "seconds" in c and len(c)}
     if seconds:
-        blocks.append(note("Training time: " + ", ".join(f"{n} {s / 60:.1f} min" for n, s in seconds.items()) + "."))
+        blocks.append(note("Training time: " + ", ".join(f"{n} {duration(s)}" for n, s in seconds.items()) + "."))
     return Section("training", "Learning", tuple(blocks))
 
 
@@ -57,10 +58,11 @@ def success_section(results: LoopResults) -> Section:
     contract = results.contract
     blocks: list[Block] = [
         text(
-            f"Frozen evaluation {results.evaluation['contract_sha256'][:12]}: {len(contract['motions'])} motions, "
-            f"seeds {', '.join(map(str, contract['seeds']))}. Success: no fall, and every key body within the "
-            "threshold of its reference from the first frame to the last. Intervals are 95 %, and motions are "
-            "the unit of evidence."
+            f"Frozen evaluation {results.evaluation['contract_sha256'][:12]}: "
+            f"{plural(len(contract['motions']), 'motion')}, seed{'' if len(contract['seeds']) == 1 else 's'} "
+            f"{', '.join(map(str, contract['seeds']))}. Success: no fall, and every key body within the "
+            "threshold of its reference from the first frame to the last. Intervals are over motions: episodes of "
+            "one motion are not independent."
         )
     ]
     if results.real_robot:
@@ -71,17 +73,24 @@ def success_section(results: LoopResults) -> Section:
             picture = success_figure(entries, policies, engine, group)
             if picture:
                 blocks.append(
-                    image(picture, f"Success by {group} {ENGINES[engine]}, all motions; lines are 95 % intervals.")
+                    image(picture, f"Success by {group}, {ENGINES[engine]}", "All motions; lines: 95 % intervals.")
                 )
     parts = {"all": "all", "test": "held out"}
+    where = {engine: name.removeprefix("on the ") for engine, name in ENGINES.items()}
     rows = [
-        (f"{c['from']} → {c['to']}", ENGINES[engine], parts[c["split"]], str(c["motions"]), change(c))
+        (
+            f"{c['from']} → {c['to']}",
+            where[engine],
+            parts[c["split"]],
+            str(c["motions"]),
+            change(c),
+        )
         for engine in engines(results)
         for c in results.evaluation["comparisons"]
         if c["engine"] == engine and c["split"] in parts
     ]
     header = ("step", "where", "motions", "n", "success")
-    blocks += [heading("Which step helped"), table(header, rows, _CLAIMS)]
+    blocks += [heading("Which step helped"), table(header, rows, _CLAIMS, "steps of the loop")]
     return Section("success", "Success", tuple(blocks))
 
 
@@ -94,7 +103,11 @@ def _rates(entries: list[dict[str, Any]], policies: list[str], engine: str) -> B
                 errors = (number(e["mpjpe_rad"]), number(e["mpkpe_mm"], 0))
                 rows.append((policy, name, str(e["n"]), percent(e["success"]), *errors))
     header = ("policy", "motions", "episodes", "success", "MPJPE [rad]", "MPKPE [mm]")
-    return table(header, rows, "Errors over all episodes up to their end.")
+    caption = (
+        "MPJPE, MPKPE: mean error of joint angles and of key bodies' positions, over all episodes up to their end. "
+        "Their intervals come from few motions where they are wide."
+    )
+    return table(header, rows, caption, f"success {ENGINES[engine]}")
 
 
 def registry_section(results: LoopResults) -> Section:
@@ -105,7 +118,7 @@ def registry_section(results: LoopResults) -> Section:
         champion = "–" if model.get("champion") is None else f"version {model['champion']}"
         rows.append((name, str(model["version"]), versions, champion, model["reason"], str(model["onnx_sha256"])[:12]))
     blocks: tuple[Block, ...] = (
-        table(("model", "newest", "in this run", "@champion", "why", "ONNX sha256"), rows),
+        table(("model", "newest", "in this run", "@champion", "why", "ONNX sha256"), rows, "", "registered models"),
         note("Look one up: mlflow.pyfunc.load_model('models:/generalist@champion'), with the server of `make serve`."),
     )
     return Section("registry", "Registry", blocks)

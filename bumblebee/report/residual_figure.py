@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.report.figures import GRID, QUIET, canvas, colour, short_joint, svg_uri
+from bumblebee.report.figures import INK, canvas, colour, legend_below, short, short_joint, svg_uri
 
 _BLOCKS = ("before", "after", "floor")
-_SHADES = {"before": "#b9c0c9", "after": colour(0), "floor": QUIET}
-_NAMES = {"before": "declared model", "after": "corrected model", "floor": "sensor noise alone"}
+_SHADES = {"before": "#b9c0c9", "after": colour(0), "floor": INK}
+_NAMES = {"before": "declared model", "after": "corrected model", "floor": "noise floor"}
 
 
 def value_and_interval(entry: Any) -> tuple[float, float, float]:
@@ -34,15 +34,17 @@ def residual_figure(error: dict[str, dict[str, Any]], horizon: str = "0.2") -> s
     joints = list(values["before"])
     if not joints:
         return None
-    figure, (axis,) = canvas(1, height=3.6)
-    x = np.arange(len(joints))
+    figure, axis = canvas(height=0.7 + 0.215 * len(joints))
+    y = np.arange(len(joints))
     for name, shift in (("before", -0.2), ("after", 0.2)):
-        heights = [1e3 * values[name].get(joint, np.nan) for joint in joints]
-        axis.bar(x + shift, heights, 0.38, color=_SHADES[name], label=_NAMES[name])
+        widths = [1e3 * values[name].get(joint, np.nan) for joint in joints]
+        axis.barh(y + shift, widths, 0.38, color=_SHADES[name], label=_NAMES[name])
     floor = [1e3 * values["floor"].get(joint, np.nan) for joint in joints]
-    axis.hlines(floor, x - 0.42, x + 0.42, color=_SHADES["floor"], lw=1.2, label=_NAMES["floor"])
-    axis.set_xticks(x, [short_joint(joint) for joint in joints], rotation=55, ha="right", fontsize=8)
-    axis.set(ylabel="mrad", title=f"Joint position error after {horizon} s, held-out rollouts")
-    axis.grid(axis="x", color=GRID, lw=0)
-    axis.legend(ncols=3, fontsize=8.5, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    if np.isfinite(floor).any():
+        axis.vlines(floor, y - 0.42, y + 0.42, color=_SHADES["floor"], lw=1.4, label=_NAMES["floor"])
+    axis.set_yticks(y, [short(short_joint(joint), 18) for joint in joints])
+    axis.set_ylim(len(joints) - 0.4, -0.6)
+    axis.set(xlabel=f"RMS error after {horizon} s [mrad]")
+    axis.grid(axis="y", visible=False)
+    legend_below(figure, axis)
     return svg_uri(figure)

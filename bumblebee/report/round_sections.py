@@ -2,11 +2,12 @@
 
 from typing import Any
 
+from bumblebee.report import noise_floor
 from bumblebee.report.page import Block, Cell, Section, bullets, heading, image, note, table, text
 from bumblebee.report.residual_figure import residual_figure, value_and_interval
 from bumblebee.report.results import LoopResults, RoundResults
 from bumblebee.report.truth import Match, match
-from bumblebee.report.wording import effect_line
+from bumblebee.report.wording import effect_line, plural, signed
 
 Json = dict[str, Any]
 _MEASURES = (
@@ -14,7 +15,7 @@ _MEASURES = (
     ("joint_vel_rmse", "joint velocities", 1.0, "rad/s"),
     ("base_pos_rmse", "base position", 1e3, "mm"),
     ("base_rot_rmse", "base rotation", 1e3, "mrad"),
-    ("chi2", "chi2 (1 = sensor noise)", 1.0, ""),
+    ("chi2", "chi² (1: noise alone)", 1.0, ""),
 )
 
 
@@ -27,9 +28,18 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
     picture = residual_figure(diagnosis["error"])
     if picture:
         blocks.append(
-            image(picture, f"Round {turn.n}: {len(diagnosis['holdout'])} rollouts that took no part in fitting.")
+            image(
+                picture,
+                "Joint position error by joint",
+                f"After 0.2 s, on {plural(len(diagnosis['holdout']), 'rollout')} that took no part in fitting.",
+                "Bars by joint: error of the declared and of the corrected model, beside the noise floor.",
+            )
         )
-    blocks.append(_error_table(diagnosis["error"]))
+    blocks += [heading("Error by horizon"), _error_table(diagnosis["error"]), note(noise_floor.WHAT)]
+    measures = {key: (name, factor, unit) for key, name, factor, unit in _MEASURES if key != "chi2"}
+    under, lines = noise_floor.summary(diagnosis["error"], measures)
+    blocks += [note(under)] if under else []
+    blocks += [bullets(lines)] if lines else []
     blocks.append(text(_remains(diagnosis)))
     blocks += [heading("Delta actions"), *_deltas(turn.deltas)]
     return Section(f"round-{turn.n}", f"Round {turn.n} with the robot", tuple(blocks))
@@ -37,10 +47,14 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
 
 def _arrived(turn: RoundResults) -> str:
     seen, gate = turn.intake, turn.gate
-    words = f"{seen['accepted']} rollouts accepted ({seen['seconds']:.0f} s), {seen['quarantined']} set aside. "
-    return (
-        words + f"The gate was {gate['status']} by {gate.get('by', 'nobody')} at {gate.get('at', 'an unknown time')}."
+    words = (
+        f"{plural(seen['accepted'], 'rollout')} accepted ({seen['seconds']:.0f} s), {seen['quarantined']} set aside. "
     )
+    when = str(gate.get("at", "an unknown time")).replace("T", " ").replace("+00:00", " UTC")
+    by, said = str(gate.get("by", "nobody")), f" \u201c{gate['note']}\u201d" if gate.get("note") else ""
+    if by.startswith("automatic"):
+        return f"{words}The gate was {gate['status']} without asking a person (gate.mode: auto), {when}.{said}"
+    return f"{words}The gate was {gate['status']} by {by}, {when}.{said}"
 
 
 def _effects(sealed: Json | None, diagnosis: Json) -> list[Block]:
@@ -48,7 +62,7 @@ def _effects(sealed: Json | None, diagnosis: Json) -> list[Block]:
     if sealed is None:
         rows = [(*effect_line(effect), _share(effect)) for effect in found]
         nothing = [] if rows else [text("No effect passed the tests: the declared model stands.")]
-        return [*nothing, table(("effect", "estimate [95 %]", "declared", "explains"), rows)]
+        return [*nothing, table(("effect", "estimate [95 %]", "declared", "explains"), rows, "", "effects found")]
     compared = [_truth_row(pair) for pair in match(sealed["effects"], found)]
     if not compared:
         return [text("Nothing was sealed and nothing was found: no false alarm.")]
@@ -56,7 +70,7 @@ def _effects(sealed: Json | None, diagnosis: Json) -> list[Block]:
     caption = (
         "Explains: share of the held-out excess error that the effect removes. The diagnosis cannot read the seal."
     )
-    return [table(header, compared, caption)]
+    return [table(header, compared, caption, "effects sealed and found")]
 
 
 def _truth_row(pair: Match) -> tuple[str | Cell, ...]:
@@ -71,7 +85,7 @@ def _truth_row(pair: Match) -> tuple[str | Cell, ...]:
     name, estimate, _ = effect_line(pair.found)
     if pair.relative_error is not None:
         inside = {True: ", interval holds it", False: ", outside the interval", None: ""}[pair.covered]
-        estimate += f" ({100 * pair.relative_error:+.1f} %{inside})"
+        estimate += f" ({signed(100 * pair.relative_error, 1)} %{inside})"
     if pair.sealed is None:
         return truth, value, Cell(f"{name} (not sealed)", "missed"), estimate, _share(pair.found)
     mark = Cell("found" if pair.through == "exact" else f"its class: {name}", "found")
@@ -94,7 +108,7 @@ def _error_table(error: Json) -> Block:
             if cells[0] != "–":
                 rows.append((shown, f"{name} [{unit}]" if unit else name, *cells))
                 shown = ""
-    return table(("after", "error", "declared model", "corrected model", "noise alone"), rows)
+    return table(("after", "error", "declared model", "corrected model", "noise floor"), rows, "", "error by horizon")
 
 
 def _cell(entry: Any, factor: float) -> str:
@@ -123,14 +137,22 @@ def _deltas(cards: dict[str, Json]) -> list[Block]:
     for cluster, card in cards.items():
         held = card["held_out"]
         for horizon, c in held["change"].items():
-            interval = "–" if c["low"] != c["low"] else f"[{100 * c['low']:+.1f}, {100 * c['high']:+.1f}]"
-            change = f"{100 * c['relative']:+.1f} % {interval}"
             verdict = Cell("kept", "found") if card["promoted"] else "not kept"
-            rows.append((cluster, f"{horizon} s", f"{c['without']:.4f}", f"{c['with']:.4f}", change, verdict))
+            rows.append((cluster, f"{horizon} s", f"{c['without']:.4f}", f"{c['with']:.4f}", _change(c), verdict))
         if not held["change"]:
             lines.append(f"{cluster}: no held-out rollouts, so nothing was kept.")
-    header = ("cluster", "after", "without delta [rad]", "with delta [rad]", "change [95 %]", "")
+    header = ("cluster", "after", "without delta [rad]", "with delta [rad]", "change [95 %]", "delta")
     explained = note(
-        "State error on held-out rollouts; a delta is kept only if the interval after 1 s lies below zero."
+        "Joint position error on held-out rollouts. A delta is kept only if the interval of the change after 1 s lies "
+        "below zero; one rollout gives no interval."
     )
-    return [table(header, rows), explained, *([bullets(lines)] if lines else [])]
+    return [table(header, rows, "", "delta actions"), explained, *([bullets(lines)] if lines else [])]
+
+
+def _change(c: Json) -> str:
+    """A relative change in percent with its interval, where there is one."""
+    low, high = c["low"], c["high"]
+    words = f"{signed(100 * c['relative'], 1)} %"
+    if low is None or low != low:
+        return f"{words}, no interval"
+    return f"{words} [{signed(100 * low, 1)}, {signed(100 * high, 1)}]"

@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from bumblebee.report.figures import INK, canvas, colour, svg_uri
+from bumblebee.report.figures import GRID, canvas, colour, legend_below, short, svg_uri
+from bumblebee.report.wording import plural
 
 
 def pick(results: list[dict[str, Any]], **wanted: Any) -> list[dict[str, Any]]:
@@ -13,7 +14,7 @@ def pick(results: list[dict[str, Any]], **wanted: Any) -> list[dict[str, Any]]:
 def success_figure(
     results: list[dict[str, Any]], policies: list[str], engine: str, group_by: str, split: str = "all"
 ) -> str | None:
-    """Image URI of one group of bars a family or cluster; None where there is nothing to show."""
+    """Image URI: a point with its 95 % interval for each policy, by family or cluster; None for nothing."""
     entries = {
         (entry["policy"], entry["group"]): entry
         for entry in pick(results, engine=engine, split=split, group_by=group_by)
@@ -22,20 +23,24 @@ def success_figure(
     groups = sorted({group for _, group in entries})
     if not groups:
         return None
-    figure, (axis,) = canvas(1, height=2.9)
-    width = 0.82 / len(policies)
+    step = 0.8 / len(policies)
+    figure, axis = canvas(height=0.7 + len(groups) * max(0.5, 0.13 * len(policies)))
     for i, policy in enumerate(policies):
         for g, group in enumerate(groups):
             entry = entries.get((policy, group))
             if entry is None or entry["success"]["value"] is None:
                 continue
             value, (low, high) = entry["success"]["value"], entry["success"]["ci95"]
-            x = g - 0.41 + (i + 0.5) * width
-            axis.bar(x, value, width * 0.9, color=colour(i), label=policy if g == 0 else None)
-            axis.plot([x, x], [low, high], color=INK, lw=1)
+            y = g - 0.4 + (i + 0.5) * step
+            axis.plot([100 * low, 100 * high], [y, y], color=colour(i), lw=1.5)
+            axis.plot([100 * value], [y], "o", ms=4.5, color=colour(i))
+        axis.plot([], [], "-o", ms=4.5, lw=1.5, color=colour(i), label=policy)
     counts = {group: entries[p, group]["success"]["motions"] for p, group in entries}
-    axis.set_xticks(range(len(groups)), [f"{group}\n{counts[group]} motions" for group in groups])
-    axis.set(ylim=(0, 1.04), ylabel="success rate")
-    axis.grid(axis="x", visible=False)
-    axis.legend(fontsize=8, ncols=min(len(policies), 5), loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    names = [f"{short(group or 'unknown', 14)}\n{plural(counts[group], 'motion')}" for group in groups]
+    axis.set_yticks(range(len(groups)), names)
+    for g in range(1, len(groups)):
+        axis.axhline(g - 0.5, color=GRID)
+    axis.set(xlim=(-3, 103), ylim=(len(groups) - 0.5, -0.5), xlabel="motions followed to the end [%]")
+    axis.grid(axis="y", visible=False)
+    legend_below(figure, axis)
     return svg_uri(figure)

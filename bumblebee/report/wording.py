@@ -3,6 +3,25 @@
 from typing import Any
 
 ALPHA = 0.05
+_IRREGULAR = {"policy": "policies"}
+
+
+def plural(count: int, noun: str) -> str:
+    """`1 motion`, `2 motions`."""
+    return f"{count} {noun if count == 1 else _IRREGULAR.get(noun, noun + 's')}"
+
+
+def signed(value: float, digits: int = 0) -> str:
+    """`+5`, `−5` with a minus sign as wide as the plus, and `0` without any."""
+    words = f"{value:+.{digits}f}"
+    return words[1:] if float(words) == 0 else words.replace("-", "\u2212")
+
+
+def duration(seconds: float) -> str:
+    """`0.9 s`, `14 s`, `2.5 min`, `3.1 h`: never a rounded zero."""
+    if seconds < 90:
+        return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s"
+    return f"{seconds / 60:.1f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
 def percent(entry: dict[str, Any]) -> str:
@@ -14,25 +33,36 @@ def percent(entry: dict[str, Any]) -> str:
 
 
 def number(entry: dict[str, Any], digits: int = 3, factor: float = 1.0) -> str:
-    """`{"value", "ci95"}` as `0.103 [0.094, 0.112]`; a dash where nothing was measured."""
+    """`{"value", "ci95"}` of an error as `0.103 [0.094, 0.112]`; a dash where nothing was measured.
+
+    An error is never negative, so an interval from few motions is cut at 0.
+    """
     if entry.get("value") is None:
         return "–"
     low, high = entry["ci95"]
     text = f"{factor * entry['value']:.{digits}f}"
-    return text if low is None or high is None else f"{text} [{factor * low:.{digits}f}, {factor * high:.{digits}f}]"
+    if low is None or high is None:
+        return text
+    return f"{text} [{max(factor * low, 0.0):.{digits}f}, {factor * high:.{digits}f}]"
 
 
 def change(entry: dict[str, Any]) -> str:
-    """A difference of rates in points with its interval and what it shows."""
+    """A difference of rates in percentage points with its interval and what it shows.
+
+    Two rates differ by 100 points at most, so an interval from few motions is cut there.
+    """
     difference = entry["success"]
     if difference["value"] is None:
         return "not comparable"
     low, high = difference["ci95"]
-    points = f"{100 * difference['value']:+.0f} points"
+    points = f"{signed(100 * difference['value'])} points"
     if low is None or high is None:
         return f"{points}, too few motions for an interval"
     p = difference["p"]
-    return f"{points} [{100 * low:+.0f}, {100 * high:+.0f}], p = {p:.2g}: {shown(low, high, p)}"
+    if difference["value"] == low == high == 0:
+        return "the same on every motion: no difference shown"
+    low, high = max(low, -1.0), min(high, 1.0)
+    return f"{points} [{signed(100 * low)}, {signed(100 * high)}], p = {p:.2g}: {shown(low, high, p)}"
 
 
 def shown(low: float, high: float, p: float) -> str:

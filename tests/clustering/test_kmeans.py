@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from sklearn.metrics import adjusted_rand_score
 
-from bumblebee.clustering.kmeans import elbow_curve, fill_small, fit_clusters, knee, project
+from bumblebee.clustering.kmeans import elbow_curve, fill_small, fit_clusters, knee, plane_shares, project
 from bumblebee.errors import BadInput
 
 
@@ -72,3 +72,9 @@ def test_projection_keeps_two_dimensions_exactly() -> None:
     between = np.linalg.norm(flat[:, None] - flat[None], axis=-1)
     np.testing.assert_allclose(np.linalg.norm(plane[:, None] - plane[None], axis=-1), between, atol=1e-9)
     assert project(np.array([[0.0], [1.0], [5.0]]), np.ones(3, bool)).shape == (3, 2)
+
+
+def test_the_planes_axes_say_how_much_variance_they_hold() -> None:
+    wide = np.array([[3.0, 1, 0], [-3, 1, 0], [3, -1, 0], [-3, -1, 0], [99, 99, 99]])
+    np.testing.assert_allclose(plane_shares(wide, np.arange(5) < 4), [0.9, 0.1], atol=1e-12)
+    assert plane_shares(np.ones((4, 1)), np.ones(4, bool)) == [0.0, 0.0]

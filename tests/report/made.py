@@ -5,7 +5,13 @@ from typing import Any
 
 import pandas as pd
 
+from bumblebee.report.data_sections import clusters_section, motions_section
+from bumblebee.report.loop_picture import Box, loop_picture
+from bumblebee.report.page import Section, render
+from bumblebee.report.policy_sections import registry_section, success_section, training_section
 from bumblebee.report.results import LoopResults, RoundResults
+from bumblebee.report.round_sections import round_section
+from bumblebee.report.verdict import facts, verdict
 
 RATES = {"untrained": 0.0, "base": 0.6, "experts-r0": 0.7, "experts-r1": 0.8, "generalist": 0.9}
 TRUTH = {"effect": "coulomb_friction", "where": ["left_knee_joint"], "parameters": {"frictionloss": 1.2}, "unit": "N m"}
@@ -54,9 +60,12 @@ def published(name: str) -> dict[str, Any]:
     return {**facts, "promoted": True, "reason": why, "onnx_sha256": "f" * 64}
 
 
-def loop_results(effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | None) -> LoopResults:
-    names = ["wave", "<b>walk</b>", "squat"]
-    library = pd.DataFrame({"name": names, "family": ["stand", "walk", "squat"], "split": ["train", "test", "train"]})
+def loop_results(
+    effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | None, name: str = "<b>walk</b>", note: str = ""
+) -> LoopResults:
+    """Results of a loop; `name` is a motion's and a family's, `note` what the gate's answer says."""
+    names = ["wave", name, "squat"]
+    library = pd.DataFrame({"name": names, "family": ["stand", name, "squat"], "split": ["train", "test", "train"]})
     library = library.assign(source="made", licence="Apache-2.0", duration=4.0)
     labels = pd.DataFrame({"name": names, "cluster": ["c0", "c1", "c0"], "x": [0.0, 1, 2], "y": [1.0, 0, 2]})
     labels = labels.assign(split=library["split"], family=library["family"])
@@ -76,6 +85,7 @@ def loop_results(effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | N
         "separation_random_split": {"speed": 0.1},
     }
     clusters = {"k": 2, "suggested_k": 3, "clusters": {"c0": row, "c1": row}, "audit": audit, "loss": {"infonce": 0.5}}
+    clusters["plane_variance"] = [0.5, 0.25]
     entries = [
         entry(policy, "stand_in", split, by, group, rate)
         for policy, rate in RATES.items()
@@ -93,7 +103,7 @@ def loop_results(effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | N
     turn = RoundResults(
         n=1,
         intake={"accepted": 9, "quarantined": 1, "seconds": 45.0},
-        gate={"status": "approved", "by": "Ada <script>", "at": "2026-01-01"},
+        gate={"status": "approved", "by": "Ada <script>", "at": "2026-01-01", "note": note},
         diagnosis=diagnosis(effects),
         deltas={"c0": {"promoted": False, "held_out": held}},
     )
@@ -114,3 +124,15 @@ def loop_results(effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | N
         sealed=None if sealed is None else {"effects": sealed},
         rounds=(turn,),
     )
+
+
+def page(
+    effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | None, more: list[Section] | None = None, **named: str
+) -> str:
+    """The whole page of such a loop, with further sections."""
+    results = loop_results(effects, sealed, **named)
+    sections = [motions_section(results), clusters_section(results), training_section(results)]
+    sections += [round_section(results, turn) for turn in results.rounds]
+    sections += [success_section(results), registry_section(results), *(more or [])]
+    picture = loop_picture([Box("a", "1")], [Box("b", "2")], "back")
+    return render("Title", "sub", verdict(results), picture, sections, facts(results))

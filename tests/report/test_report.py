@@ -10,25 +10,15 @@ import pytest
 from bumblebee.evaluation.intervals import bootstrap_mean, sign_flip_test
 from bumblebee.measured.rollout import Rollout
 from bumblebee.report import filmstrip
-from bumblebee.report.data_sections import clusters_section, motions_section
 from bumblebee.report.loop_picture import Box, loop_picture
-from bumblebee.report.page import image, render
-from bumblebee.report.policy_sections import registry_section, success_section, training_section
-from bumblebee.report.round_sections import round_section
+from bumblebee.report.page import image
+from bumblebee.report.policy_sections import training_section
 from bumblebee.report.truth import match
 from bumblebee.report.verdict import PRETRAINED, verdict
-from bumblebee.report.wording import change, effect_line, percent, shown
+from bumblebee.report.wording import change, duration, effect_line, number, percent, plural, shown, signed
 from bumblebee.robot.facts import joint_names, stand_pose
 from bumblebee.robot.model import build_spec
-from tests.report.made import TRUTH, estimate, found, loop_results
-
-
-def page(effects: list, sealed: list | None) -> str:
-    results = loop_results(effects, sealed)
-    sections = [motions_section(results), clusters_section(results), training_section(results)]
-    sections += [round_section(results, turn) for turn in results.rounds]
-    sections += [success_section(results), registry_section(results)]
-    return render("Title", "sub", verdict(results), loop_picture([Box("a", "1")], [Box("b", "2")], "back"), sections)
+from tests.report.made import TRUTH, estimate, found, loop_results, page
 
 
 def test_a_page_loads_nothing_and_runs_nothing() -> None:
@@ -46,15 +36,15 @@ def test_images_must_be_inside() -> None:
 def test_a_found_effect_stands_beside_the_truth_with_its_error() -> None:
     html = page([found()], [TRUTH])
     assert '<td class="found">found</td>' in html
-    assert "(-4.2 %, interval holds it)" in html
-    assert "1 of 1 sealed effects found; 0 reported" in html
+    assert "(\u22124.2 %, interval holds it)" in html
+    assert "1 of 1 sealed effect found; 0 reported" in html
 
 
 def test_a_missed_and_a_false_effect_are_said() -> None:
     html = page([found("viscous_friction", "right_knee_joint")], [TRUTH])
     assert '<td class="missed">not found</td>' in html
     assert "(not sealed)" in html
-    assert "0 of 1 sealed effects found; 1 reported that were not sealed" in html
+    assert "0 of 1 sealed effect found; 1 reported that was not sealed" in html
 
 
 def test_an_effect_of_the_same_class_counts_as_found_but_not_as_exact() -> None:
@@ -105,7 +95,7 @@ def test_a_base_policy_that_was_not_made_here_is_said() -> None:
     assert PRETRAINED not in verdict(made)
     told = replace(made, pretrained=True)
     assert PRETRAINED in verdict(told)
-    captions = "".join(getattr(block, "caption", "") or str(block) for block in training_section(told).blocks)
+    captions = "".join(f"{block.title} {block.caption}" for block in training_section(told).blocks)
     assert "from the policy that comes along" in captions and "from scratch" not in captions
 
 
@@ -115,13 +105,35 @@ def test_an_interval_across_zero_is_no_gain_in_the_verdict() -> None:
     assert "untrained: 0 %" in lines[0]
 
 
+def test_a_name_with_a_dollar_is_no_formula_in_a_figure() -> None:
+    assert page([found()], [TRUTH], name="$x_{$").count("data:image/svg") > 5
+
+
+def test_every_figure_says_what_it_is_and_shows_in_words() -> None:
+    html = page([found()], [TRUTH])
+    images = re.findall(r'<figure><figcaption><b>(.*?)</b></figcaption><img [^>]*alt="(.*?)"', html, re.S)
+    assert len(images) == html.count("<img ") > 5
+    assert all(title and len(alt) > 20 for title, alt in images)
+
+
+def test_numbers_that_say_nothing_are_said_in_words() -> None:
+    same = {"success": {"value": 0.0, "ci95": [0.0, 0.0], "p": 1.0}}
+    assert change(same) == "the same on every motion: no difference shown"
+    few = {"success": {"value": 0.5, "ci95": [-4.08, 5.08], "p": 1.0}}
+    assert "[\u2212100, +100]" in change(few)
+    assert number({"value": 0.076, "ci95": [-0.196, 0.347]}) == "0.076 [0.000, 0.347]"
+    assert signed(-0.2) == "0" and signed(3.4) == "+3"
+    assert (plural(1, "motion"), plural(2, "policy")) == ("1 motion", "2 policies")
+    assert (duration(0.9), duration(14), duration(300)) == ("0.9 s", "14 s", "5.0 min")
+
+
 def test_percent() -> None:
     assert percent(estimate(0.91, 0.05)) == "91 % [86, 96]"
     assert percent({"value": None, "ci95": [None, None]}) == "–"
 
 
 def test_titles_in_the_picture_are_escaped() -> None:
-    assert "<b>" not in loop_picture([Box("<b>", "&")], [], "")
+    assert "<i>" not in loop_picture([Box("<i>", "&")], [Box("<i>", "<i>")], "<i>")
 
 
 def test_a_stick_figure_stands_in_where_nothing_renders(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -135,8 +147,9 @@ def test_a_stick_figure_stands_in_where_nothing_renders(monkeypatch: pytest.Monk
         base_pos=np.tile([0, 0, 0.784], (rows, 1)),
     )  # fmt: skip
     shown_film = filmstrip.film(rollout, spec.to_xml(), panels=3)
-    assert shown_film.animation == "" and "no device" in shown_film.note
-    kind, data = shown_film.strip.split(",", 1)
+    assert shown_film.sheet is None and "no device" in shown_film.note
+    kind, data = shown_film.stills[0][1].split(",", 1)
+    assert len(shown_film.stills) == 3
     assert kind.startswith("data:image/svg+xml") and b"<path" in base64.b64decode(data)
 
 
