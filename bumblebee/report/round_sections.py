@@ -38,9 +38,9 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
 def _arrived(turn: RoundResults) -> str:
     seen, gate = turn.intake, turn.gate
     words = f"{seen['accepted']} rollouts accepted ({seen['seconds']:.0f} s), {seen['quarantined']} set aside. "
-    return (
-        words + f"The gate was {gate['status']} by {gate.get('by', 'nobody')} at {gate.get('at', 'an unknown time')}."
-    )
+    how = gate.get("known_by", {}).get("how", "automatic")  # the automatic answer's name says so itself
+    known = "" if how == "automatic" else f" ({how})"
+    return f"{words}The gate was {gate['status']} by {gate.get('by', 'nobody')}{known} at {gate.get('at', '?')}."
 
 
 def _effects(sealed: Json | None, diagnosis: Json) -> list[Block]:
