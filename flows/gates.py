@@ -1,24 +1,31 @@
 """A gate in the flow: show what came, wait for a person, write down the answer."""
 
+from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from prefect import runtime, suspend_flow_run
+from prefect import get_run_logger, runtime, suspend_flow_run
 from prefect.artifacts import create_markdown_artifact
-from prefect.input import RunInput
+from prefect.input import RunInput, read_flow_run_input
 from pydantic import Field
 
+from bumblebee.errors import BadInput
 from bumblebee.measured import gate
+from bumblebee.measured import gate_words as words
+from flows import gate_page
 from flows.stages import Stage
-from tasks.params import read
+from tasks.gate import automatic
+
+PAGE = {"how": "Prefect's page: whoever holds the login of this workspace"}  # more cannot be known of who clicked
 
 
 class GateAnswer(RunInput):
-    """What a person answers on Prefect's page."""
+    """What a person answers on Prefect's page; nothing is chosen beforehand."""
 
-    approve: bool = Field(default=True, description="On: the round goes on. Off: it stops here.")
-    by: str = Field(description="Who answers.")
-    note: str = Field(default="", description="Why, if there is something to say.")
+    answer: Literal["approve", "reject"] = Field(description="approve: the round goes on; reject: it stops here.")
+    by: str = Field(description="Your name.", min_length=1, max_length=gate.LONGEST)
+    seen: str = Field(description="Hash of what was shown to you: the answer holds for nothing else.")
+    note: str = Field(default="", description="Why, if there is something to say.", max_length=gate.LONGEST)
 
 
 def hold(folder: Path, stage: Stage) -> str | None:
@@ -27,41 +34,70 @@ def hold(folder: Path, stage: Stage) -> str | None:
     A run that Prefect started as a deployment is suspended: its process ends, the question stands on Prefect's page,
     and the answer starts it again, after any restart. Any other run gets the line that says how to answer, to end with.
     """
-    number = int(stage.option("round") or 0)
-    approval = folder / "data" / "approvals" / f"round-{number}.json"
-    summary = folder / "data" / "measured" / f"r{number}" / "summary.json"
-    if not summary.exists() or gate.verdict(approval, summary) != "pending" or automatic(folder):
+    place = gate.Gate(folder.resolve(), int(stage.option("round") or 0))
+    if not place.summary.exists() or automatic(folder):
         return None
-    request = gate.request(approval, number, summary)
-    text = question(request, folder)
-    create_markdown_artifact(text, key=f"gate-round-{number}", description=f"What came in round {number}")
-    if runtime.deployment.id is None:
-        return f"{gate.how_to_answer(number)}; then start again, it goes on from here"
-    model = GateAnswer.with_initial_data(description=text)
-    key = f"gate-{number}-{request['seen']['sha256'][:12]}"
-    given: Any = suspend_flow_run(wait_for_input=model, timeout=None, key=key)
-    gate.answer(approval, given.approve, given.by, given.note)
+    request = gate.request(place)
+    deployed = runtime.deployment.id is not None
+    if request["status"] != "pending":
+        if deployed:
+            say_if_late(request)
+        return None
+    if not deployed:
+        show(place, request)
+        return f"{words.how_to_answer(place.workspace, request)}; then start again, it goes on from here"
+    ask(place, request)
     return None
 
 
-def automatic(folder: Path) -> bool:
-    """Whether the gates answer themselves here."""
-    section = read(folder / "params.yaml").get("gate") or {}
-    return bool(section.get("mode") == "auto")
+def show(place: gate.Gate, request: dict[str, Any]) -> str:
+    """Put what came on a page of its own; its number."""
+    text = f"What came in round {place.round}; an answer to it names {words.short(request)}"
+    made = create_markdown_artifact(gate_page.page(request, place), key=f"gate-round-{place.round}", description=text)
+    return str(made)
 
 
-def question(request: dict[str, Any], folder: Path) -> str:
-    """Markdown: what came, what was found, where the plots are."""
-    seen, number = request["seen"], request["round"]
-    rows = [("files accepted", seen["accepted"]), ("files set aside", seen["quarantined"])]
-    rows.append(("seconds accepted", f"{seen['seconds']:.1f}"))
-    lines = [f"## Round {number}: measured rollouts have come in", "", "| what | how many |", "|---|---|"]
-    lines += [f"| {name} | {value} |" for name, value in rows]
-    if seen["findings"]:
-        lines += ["", "| finding | files | fatal | warning |", "|---|---|---|---|"]
-        lines += [f"| {rule} | {n['files']} | {n['fatal']} | {n['warning']} |" for rule, n in seen["findings"].items()]
-    else:
-        lines += ["", "No findings."]
-    plots = folder / "data" / "measured" / f"r{number}" / "overview.html"
-    lines += ["", f"Plots: `{plots}`", "", "Approve, and the diagnosis learns from these files."]
-    return "\n".join(lines)
+def ask(place: gate.Gate, request: dict[str, Any]) -> None:
+    """Suspend the run until a person answers what it shows; an answer that cannot be taken is asked for anew.
+
+    The pause is named after the hash of what is shown: data that change meanwhile are another pause with a question of
+    its own, and the answer to the first is never applied to them.
+    """
+    log = get_run_logger()
+    for attempt in count():
+        key = pause_key(request, attempt)
+        description = None
+        if answered(key) is None:  # the run comes here again after the answer
+            description = gate_page.question(request, show(place, request))
+            log.warning(gate_page.where_to_answer(place.round, runtime.flow_run.ui_url))
+        model = GateAnswer.with_initial_data(description=description, seen=words.short(request))
+        given: Any = suspend_flow_run(wait_for_input=model, timeout=None, key=key)
+        try:
+            author = gate.Author(given.by, PAGE)
+            table = gate.answer(place, given.answer == "approve", author, given.seen, given.note)
+            log.info(f"round {place.round}: {words.said(table)}")
+            return
+        except BadInput as error:
+            log.warning(f"the answer of {words.one_line(given.by)} on the page was not taken: {error}")
+        request = gate.request(place)
+        if request["status"] != "pending":
+            return
+
+
+def pause_key(request: dict[str, Any], attempt: int) -> str:
+    """The name of one question: round, what it shows, how often it was asked in vain."""
+    return f"gate-{request['round']}-{words.short(request)}-{attempt}"
+
+
+def answered(key: str) -> dict[str, Any] | None:
+    """What was answered on Prefect's page to the question of this name, if anything."""
+    found = read_flow_run_input(f"suspended-{key}-response")
+    return found if isinstance(found, dict) else None
+
+
+def say_if_late(request: dict[str, Any]) -> None:
+    """Log an answer from the page that came after another one: it was not taken."""
+    given = answered(pause_key(request, 0)) or {}
+    if given and (given.get("answer") == "approve") != (request["status"] == "approved"):
+        late = words.one_line(f"{given.get('answer')} by {given.get('by')}")
+        get_run_logger().warning(f"{late} on the page came too late: round {request['round']} is {words.said(request)}")

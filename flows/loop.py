@@ -14,7 +14,7 @@ from typing import Any
 from prefect import flow, get_run_logger, task
 from prefect.cache_policies import NO_CACHE
 from prefect.futures import PrefectFuture
-from prefect.states import Completed, Failed, State
+from prefect.states import Cancelled, Completed, Failed, State
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from flows import gates, progress
@@ -119,7 +119,7 @@ def outcome(running: dict[str, PrefectFuture[Any]], stages: list[Stage], waiting
         return Failed(message="\n".join([text, *(running[name].state.message or name for name in causes)]))
     if waiting is not None:
         text = f"{titles[waiting]} waits for an answer; what came before it is kept"
-        return Failed(name=WAITING, message=text)
+        return Cancelled(name=WAITING, message=text)
     return Completed(message=f"{len(running)} stage(s) brought up to date")
 
 

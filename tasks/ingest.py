@@ -10,7 +10,7 @@ from typing import Any
 import mujoco
 
 from bumblebee.errors import BadInput
-from bumblebee.measured import gate
+from bumblebee.measured import gate, gate_words
 from bumblebee.measured.intake import IntakeSummary, file_hash, incoming_files, intake, merge
 from bumblebee.measured.overview import write_overview
 from bumblebee.measured.rollout import read_rollout
@@ -128,13 +128,12 @@ def keep_rejected(out: Path, round: int) -> Path:
 
 def ask(round: int) -> None:
     """Leave the request at the gate; in the automatic mode answer it at once."""
-    path = Path(f"data/approvals/round-{round}.json")
-    request = gate.request(path, round, Path(f"data/measured/r{round}/summary.json"))
-    if request["status"] == "pending" and load("gate", gate.GateConfig).mode == "auto":
-        gate.answer(path, True, gate.AUTOMATIC)
-        print(f"round {round}: approved, {gate.AUTOMATIC}", flush=True)
-    elif request["status"] == "pending":
-        print(gate.how_to_answer(round), flush=True)
+    place = gate.Gate(Path.cwd(), round)
+    table = gate.settle(place, load("gate", gate.GateConfig).mode == "auto")
+    if table["status"] == "pending":
+        print(gate_words.how_to_answer(place.workspace, table), flush=True)
+    else:
+        print(f"round {round}: {gate_words.said(table)}", flush=True)
 
 
 def _accepted(batch: IntakeSummary, out: Path) -> Iterator[Any]:

@@ -1,22 +1,33 @@
 """The gate after an intake: a request that a person answers, and the answer as a file that the next stage depends on.
 
-{"round", "status": "pending" | "approved" | "rejected", "seen": {what the person saw}, "history": [answers]}
+{"round", "status": "pending" | "approved" | "rejected", "seen": {what the person saw}, "history": [earlier answers]},
+and with an answer "by" (the name that was given), "known_by" (how the program knew), "at" and "note". An answer holds
+for one summary.json, by its hash. Whoever answers first wins; another answer must say that it changes the first.
 """
 
+import fcntl
 import json
 import os
-import tempfile
-from dataclasses import dataclass
+import pwd
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
 from bumblebee.errors import BadInput
+from bumblebee.io.limits import LIMITS
+from bumblebee.io.read import read_json
+from bumblebee.io.write import unwritable, write_file
+from bumblebee.measured import gate_words as words
 from bumblebee.measured.intake import file_hash
 
 AUTOMATIC = "automatic (gate.mode: auto)"
-SHORT = 12  # digits of a hash that a person copies
 STATUSES = ("pending", "approved", "rejected")
+SUMMARY_LIMITS = replace(LIMITS, text_bytes=1 << 30, nodes=20_000_000)  # a line for each of many thousand rollouts
+LONGEST = 500  # characters of a name or a note
 
 
 @dataclass(frozen=True)
@@ -27,6 +38,49 @@ class GateConfig:
     """ask: a person answers, in the Prefect UI or by one command; auto: the gate answers itself and says so."""
 
 
+@dataclass(frozen=True)
+class Gate:
+    """The gate of one round, by its files."""
+
+    workspace: Path
+    """The folder with dvc.yaml and params.yaml."""
+    round: int
+    """The round's number."""
+
+    @property
+    def approval(self) -> Path:
+        """Where the request and its answer lie."""
+        return self.workspace / "data" / "approvals" / f"round-{self.round}.json"
+
+    @property
+    def summary(self) -> Path:
+        """What the ingest stage showed."""
+        return self.workspace / "data" / "measured" / f"r{self.round}" / "summary.json"
+
+
+@dataclass(frozen=True)
+class Author:
+    """Who answers, and how that is known."""
+
+    by: str
+    """The name that was given: a claim."""
+    known_by: dict[str, Any] = field(default_factory=dict)
+    """{"how": "unix user", "user", "uid", "host"}, {"how": "automatic"}, or {"how": what else vouches for it}."""
+
+
+ITSELF = Author(AUTOMATIC, {"how": "automatic"})
+
+
+def unix_user(by: str) -> Author:
+    """Whoever runs this process; the name that they give stands beside it."""
+    uid = os.getuid()
+    try:
+        user = pwd.getpwuid(uid).pw_name
+    except KeyError:  # a container may run under a number without a name
+        user = str(uid)
+    return Author(by, {"how": "unix user", "user": user, "uid": uid, "host": socket.gethostname()})
+
+
 def seen_of(summary: Path) -> dict[str, Any]:
     """What a person sees of an intake, with the hash that binds an answer to it."""
     table = _read(summary)
@@ -35,52 +89,65 @@ def seen_of(summary: Path) -> dict[str, Any]:
     return {"sha256": file_hash(summary), **counts, "findings": table.get("by_rule", {})}
 
 
-def request(path: Path, round: int, summary: Path) -> dict[str, Any]:
-    """Ask for an answer. An answer that was given to the same summary stands; given to another, it becomes history."""
-    seen = seen_of(summary)
-    old = read_approval(path) if Path(path).exists() else None
-    if old and old["seen"].get("sha256") == seen["sha256"]:
+def request(gate: Gate, automatic: bool = False) -> dict[str, Any]:
+    """The request of a round with its answer, if one stands; else a new request, and the old answer is history.
+
+    An answer to another summary does not stand, nor does one that the loop gave itself unless it is `automatic` now.
+    """
+    seen = seen_of(gate.summary)
+    old = read_approval(gate.approval) if gate.approval.exists() else None
+    if old and _stands(old, seen["sha256"], automatic):
         return old
-    history = [*old["history"], _without_history(old)] if old and old["status"] != "pending" else []
-    history = old["history"] if old and old["status"] == "pending" else history
-    table = {"round": round, "status": "pending", "seen": seen, "history": history}
-    write_json(path, table)
-    return table
+    with _locked(gate.approval):
+        return _asked(gate, automatic)
 
 
-def answer(path: Path, approve: bool, by: str, note: str = "") -> dict[str, Any]:
-    """Approve or reject what the request shows; who, when and what was seen are kept, earlier answers too."""
-    old = read_approval(path)
-    if not by.strip():
-        raise BadInput(path, "who answers", "no name", "Give --by NAME.")
-    history = old["history"] if old["status"] == "pending" else [*old["history"], _without_history(old)]
-    status = "approved" if approve else "rejected"
-    at = datetime.now(UTC).isoformat(timespec="seconds")
-    table = {"round": old["round"], "status": status, "by": by.strip(), "at": at, "note": note}
-    table |= {"seen": old["seen"], "history": history}
-    write_json(path, table)
-    return table
+def settle(gate: Gate, automatic: bool) -> dict[str, Any]:
+    """The request; where the gates answer themselves and nobody else did, with the automatic answer."""
+    with _locked(gate.approval):
+        table = _asked(gate, automatic)
+        if automatic and table["status"] == "pending":
+            table = _with_answer(table, True, ITSELF, "")
+            write_json(gate.approval, table)
+        return table
 
 
-def short(table: dict[str, Any]) -> str:
-    """The short hash of what a request shows; `--seen` takes it, or more digits of the whole."""
-    return str(table["seen"].get("sha256", ""))[:SHORT]
+def answer(
+    gate: Gate, approve: bool, author: Author, seen: str, note: str = "", change: bool = False
+) -> dict[str, Any]:
+    """Approve or reject what the request shows; who, when and what was seen are kept, earlier answers too.
+
+    Args:
+        gate: the round that is meant.
+        approve: whether it may go on.
+        author: who answers.
+        seen: the hash of what that person saw, at least its first 12 digits.
+        note: why.
+        change: whether to replace an answer that stands.
+
+    Raises:
+        BadInput: for no name, another hash than what lies there now, or an answer that stands already.
+    """
+    if words.one_line(author.by) in ("", "NAME"):
+        raise BadInput("--by", "the name of the person who answers", repr(author.by) if author.by else "no name")
+    with _locked(gate.approval):
+        old = read_approval(gate.approval)
+        if old["seen"].get("sha256") != file_hash(gate.summary):
+            raise words.other_data(gate.workspace, old, seen)
+        words.require_seen(gate.workspace, old, seen)
+        if old["status"] != "pending" and not change:
+            raise words.answered_already(gate.workspace, old, approve)
+        table = _with_answer(old, approve, author, note)
+        write_json(gate.approval, table)
+        return table
 
 
-def require_seen(table: dict[str, Any], seen: str) -> None:
-    """Refuse an answer that was meant for something else than what the request shows now; "" leaves it open."""
-    given = seen.strip().lower()
-    if not seen or (len(given) >= SHORT and str(table["seen"].get("sha256", "")).startswith(given)):
-        return
-    expected = f"{short(table)}, what round {table['round']} shows now"
-    do = f"Look again: python -m tasks.gate --round {table['round']} --show."
-    raise BadInput("--seen", expected, repr(seen), do)
-
-
-def what(table: dict[str, Any]) -> str:
-    """What an answer is about, in a few words."""
-    seen = table["seen"]
-    return f"{short(table)} ({seen.get('accepted')} files accepted, {seen.get('quarantined')} set aside)"
+def verdict(gate: Gate, automatic: bool = False) -> str:
+    """approved, rejected or pending; an answer that does not stand (see `request`) counts as pending."""
+    if not gate.approval.exists():
+        return "pending"
+    table = read_approval(gate.approval)
+    return str(table["status"]) if _stands(table, file_hash(gate.summary), automatic) else "pending"
 
 
 def read_approval(path: Path) -> dict[str, Any]:
@@ -89,53 +156,80 @@ def read_approval(path: Path) -> dict[str, Any]:
     if table.get("status") not in STATUSES:
         raise BadInput(f"{path}: status", f"one of {', '.join(STATUSES)}", repr(table.get("status")))
     if not isinstance(table.get("seen"), dict) or not isinstance(table.get("history"), list):
-        raise BadInput(path, "the keys seen and history", ", ".join(sorted(table)))
+        raise BadInput(path, "the keys seen and history", ", ".join(sorted(map(str, table))))
+    if type(table.get("round")) is not int:
+        raise BadInput(f"{path}: round", "the round's number", repr(table.get("round")))
+    if table["status"] != "pending" and not all(isinstance(table.get(key), str) for key in ("by", "at", "note")):
+        raise BadInput(path, "by, at and note of an answer", ", ".join(sorted(table)))
+    if not isinstance(table.get("known_by", {}), dict):
+        raise BadInput(f"{path}: known_by", "how the author was known", repr(table["known_by"]))
     return table
 
 
-def verdict(path: Path, summary: Path) -> str:
-    """approved, rejected or pending; an answer to another summary than this one counts as pending."""
-    if not Path(path).exists():
-        return "pending"
-    table = read_approval(path)
-    return table["status"] if table["seen"].get("sha256") == file_hash(summary) else "pending"
-
-
-def how_to_answer(round: int) -> str:
-    """The one line that tells a person what to do."""
-    command = f"python -m tasks.gate --round {round}"
-    return (
-        f"round {round} waits for an answer: look with `{command} --show`, "
-        f"then `{command} --approve --by NAME` or `{command} --reject --by NAME`"
-    )
+def is_automatic(table: dict[str, Any]) -> bool:
+    """Whether the loop gave this answer itself; answers of before `known_by` say so by their name."""
+    if "known_by" in table:
+        return bool(table["known_by"].get("how") == ITSELF.known_by["how"])
+    return bool(table.get("by") == AUTOMATIC)
 
 
 def write_json(path: Path, table: dict[str, Any]) -> None:
     """Write JSON whole or not at all."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=".part")
+    write_file(Path(path), json.dumps(table, indent=1, ensure_ascii=False) + "\n")
+
+
+def _stands(table: dict[str, Any], sha256: str, automatic: bool) -> bool:
+    """Whether a request or answer holds for what lies there now, as the gates are answered now."""
+    return table["seen"].get("sha256") == sha256 and (automatic or not is_automatic(table))
+
+
+def _asked(gate: Gate, automatic: bool) -> dict[str, Any]:
+    """The request that stands, or a new one, written; the lock is held."""
+    seen = seen_of(gate.summary)
+    old = read_approval(gate.approval) if gate.approval.exists() else None
+    if old and _stands(old, seen["sha256"], automatic):
+        return old
+    table = {"round": gate.round, "status": "pending", "seen": seen, "history": _history(old)}
+    write_json(gate.approval, table)
+    return table
+
+
+def _with_answer(old: dict[str, Any], approve: bool, author: Author, note: str) -> dict[str, Any]:
+    at = datetime.now(UTC).isoformat(timespec="seconds")
+    return {
+        **{"round": old["round"], "status": "approved" if approve else "rejected"},
+        **{"by": words.one_line(author.by)[:LONGEST], "known_by": author.known_by, "at": at},
+        **{"note": words.one_line(note)[:LONGEST], "seen": old["seen"], "history": _history(old)},
+    }
+
+
+def _history(old: dict[str, Any] | None) -> list[dict[str, Any]]:
+    """All earlier answers, the last one last; a request without an answer leaves none."""
+    if old is None or old["status"] == "pending":
+        return old["history"] if old else []
+    return [*old["history"], {key: value for key, value in old.items() if key != "history"}]
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """One process at a time between reading and writing; the lock is a file beside it, which no stage depends on."""
+    lock = path.with_name(f".{path.stem}.lock")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(json.dumps(table, indent=1, ensure_ascii=False) + "\n")
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
-
-
-def _without_history(table: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in table.items() if key != "history"}
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+    except OSError as error:
+        raise unwritable(lock, error) from None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
 
 
 def _read(path: Path) -> dict[str, Any]:
-    try:
-        table = json.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise BadInput(path, "a file that the ingest stage writes", "no such file", "Run the ingest stage.") from None
-    except (ValueError, UnicodeDecodeError) as error:
-        raise BadInput(path, "JSON", f"text that is not ({error})") from None
+    if not Path(path).exists():
+        raise BadInput(path, "a file that the ingest stage writes", "no such file", "Run the ingest stage.")
+    table = read_json(path, SUMMARY_LIMITS)
     if not isinstance(table, dict):
         raise BadInput(path, "a JSON object", type(table).__name__)
     return table

@@ -54,7 +54,9 @@ def _arrived(turn: RoundResults) -> str:
     by, said = str(gate.get("by", "nobody")), f" \u201c{gate['note']}\u201d" if gate.get("note") else ""
     if by.startswith("automatic"):
         return f"{words}The gate was {gate['status']} without asking a person (gate.mode: auto), {when}.{said}"
-    return f"{words}The gate was {gate['status']} by {by}, {when}.{said}"
+    how = gate.get("known_by", {}).get("how")
+    known = f" (known by: {how})" if how else ""
+    return f"{words}The gate was {gate['status']} by {by}{known}, {when}.{said}"
 
 
 def _effects(sealed: Json | None, diagnosis: Json) -> list[Block]:

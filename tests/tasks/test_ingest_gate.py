@@ -54,6 +54,12 @@ def approval() -> dict:
     return json.loads(Path("data/approvals/round-1.json").read_text())
 
 
+def answer(verb: str, by: str, *more: str, seen: str = "") -> int:
+    """The command, with the hash of what the request shows."""
+    words = ["--round", "1", f"--{verb}", "--by", by, "--seen", seen or approval()["seen"]["sha256"][:12], *more]
+    return gate_task.command(words)
+
+
 def test_a_round_waits_for_a_person_and_goes_on_after_the_answer(
     workspace: Setup, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -68,24 +74,26 @@ def test_a_round_waits_for_a_person_and_goes_on_after_the_answer(
 
     assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_PENDING
     line = capsys.readouterr().err
-    assert line.count("\n") == 1 and "python -m tasks.gate --round 1 --approve --by NAME" in line
+    seen = approval()["seen"]["sha256"][:12]
+    assert line.count("\n") == 1 and f"approve --workspace {Path.cwd()} --round 1 --seen {seen} --by NAME" in line
     assert not Path("data/gates/round-1.json").exists()
 
     assert gate_task.command(["--round", "1", "--show"]) == 0
     shown = capsys.readouterr().out
     assert "finite" in shown and "data/measured/r1/overview.html" in shown
-    assert gate_task.command(["--round", "1", "--approve", "--by", "Ann"]) == 0
+    assert answer("approve", "Ann") == 0
     gate_task.main(1)
     passed = json.loads(Path("data/gates/round-1.json").read_text())
     assert (passed["status"], passed["by"], passed["seen"]["accepted"]) == ("approved", "Ann", 1)
+    assert (passed["known_by"]["how"], passed["known_by"]["uid"]) == ("unix user", os.getuid())
 
 
 def test_a_rejected_round_stops_and_says_who_and_why(workspace: Setup, capsys: pytest.CaptureFixture[str]) -> None:
     workspace()
     ingest.main(1)
-    gate_task.command(["--round", "1", "--approve", "--by", "Ann"])
+    assert answer("approve", "Ann") == 0
     gate_task.main(1)
-    gate_task.command(["--round", "1", "--reject", "--by", "Bob", "--note", "wrong\nrobot"])
+    assert answer("reject", "Bob", "--note", "wrong\nrobot", "--change") == 0
     capsys.readouterr()
     assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_REJECTED
     line = capsys.readouterr().err
@@ -96,7 +104,7 @@ def test_a_rejected_round_stops_and_says_who_and_why(workspace: Setup, capsys: p
 def test_other_data_need_another_answer(workspace: Setup, capsys: pytest.CaptureFixture[str]) -> None:
     workspace()
     ingest.main(1)
-    gate_task.command(["--round", "1", "--approve", "--by", "Ann"])
+    assert answer("approve", "Ann") == 0
     workspace(seed=4)
     ingest.main(1)
     assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_PENDING
@@ -107,7 +115,7 @@ def test_the_same_data_give_the_same_bytes_and_keep_the_answer(workspace: Setup)
     workspace()
     ingest.main(1)
     first = {path: path.read_bytes() for path in Path("data/measured").rglob("*") if path.is_file()}
-    gate_task.command(["--round", "1", "--approve", "--by", "Ann"])
+    assert answer("approve", "Ann") == 0
     ingest.main(1)
     assert {path: path.read_bytes() for path in Path("data/measured").rglob("*") if path.is_file()} == first
     assert approval()["status"] == "approved"
@@ -125,7 +133,7 @@ def test_the_automatic_gate_answers_itself_and_says_so(workspace: Setup, capsys:
 def test_the_automatic_gate_does_not_overrule_a_person(workspace: Setup) -> None:
     workspace("auto")
     ingest.main(1)
-    gate_task.command(["--round", "1", "--reject", "--by", "Bob"])
+    assert answer("reject", "Bob", "--change") == 0
     ingest.main(1)
     assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_REJECTED
 
@@ -161,10 +169,12 @@ def test_an_answer_with_the_hash_of_other_data_is_refused(workspace: Setup, caps
     gate_task.command(["--round", "1", "--show"])
     assert seen[:12] in capsys.readouterr().out
     for wrong in ("0" * 12, seen[:3], "nonsense"):
-        assert gate_task.command(["--round", "1", "--approve", "--by", "Ann", "--seen", wrong]) == 2
-        line = capsys.readouterr().err
-        assert line.count("\n") == 1 and seen[:12] in line and approval()["status"] == "pending"
-    assert gate_task.command(["--round", "1", "--approve", "--by", "Ann", "--seen", seen[:12]]) == 0
+        with pytest.raises(BadInput, match=seen[:12]):
+            answer("approve", "Ann", seen=wrong)
+        assert approval()["status"] == "pending"
+    with pytest.raises(BadInput, match="--show"):
+        gate_task.command(["--round", "1", "--approve", "--by", "Ann"])
+    assert answer("approve", "Ann", seen=seen[:12]) == 0
     said = capsys.readouterr().out
     assert f"{seen[:12]} (1 files accepted, 1 set aside)" in said
     assert approval()["status"] == "approved"
@@ -174,7 +184,7 @@ def test_another_model_needs_another_answer(workspace: Setup) -> None:
     """The same rollouts beside a declared model that passes them too are not what was approved."""
     workspace()
     ingest.main(1)
-    gate_task.command(["--round", "1", "--approve", "--by", "Ann"])
+    assert answer("approve", "Ann") == 0
     text = Path("data/measured/r1/model.xml").read_text()
     Path("data/rollouts/r1/c0/model.xml").write_text(text + "<!-- another -->\n")
     ingest.main(1)
@@ -215,3 +225,49 @@ def test_as_a_process_the_gate_ends_with_its_status_and_one_line(workspace: Setu
         check=False,
     )
     assert run.returncode == 2 and run.stderr.count("\n") == 1 and "summary.json" in run.stderr
+
+
+def test_the_automatic_answer_does_not_count_once_a_person_is_asked(workspace: Setup) -> None:
+    folder = workspace("auto")
+    ingest.main(1)
+    gate_task.main(1)
+    (folder / "params.yaml").write_text("ingest: {}\ngate: {mode: ask}\n")
+    assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_PENDING
+    assert not Path("data/gates/round-1.json").exists()
+    assert [entry["known_by"] for entry in approval()["history"]] == [{"how": "automatic"}]
+    assert answer("approve", "Ann") == 0
+    assert status_of(lambda: gate_task.main(1)) == 0
+
+
+def test_the_automatic_answer_stands_when_the_same_files_come_in_again(workspace: Setup) -> None:
+    """Another time of day in the answer would make everything behind the gate stale."""
+    workspace("auto")
+    ingest.main(1)
+    first = Path("data/approvals/round-1.json").read_bytes()
+    ingest.main(1)
+    gate_task.main(1)
+    assert Path("data/approvals/round-1.json").read_bytes() == first
+
+
+def test_the_gate_does_not_pass_data_that_changed_after_the_answer(workspace: Setup) -> None:
+    workspace()
+    ingest.main(1)
+    assert answer("approve", "Ann") == 0
+    summary = Path("data/measured/r1/summary.json")
+    summary.write_text(summary.read_text().replace('"round": 1', '"round":  1'))
+    assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_PENDING
+    assert not Path("data/gates/round-1.json").exists()
+
+
+def test_a_look_from_another_folder_prints_commands_for_this_workspace(
+    workspace: Setup, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    folder = workspace()
+    ingest.main(1)
+    monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
+    capsys.readouterr()
+    assert gate_task.command(["--round", "1", "--show", "--workspace", str(folder)]) == 0
+    shown = capsys.readouterr().out
+    for verb in ("approve", "reject"):
+        assert f"-m flows.gate {verb} --workspace {folder} --round 1 --seen " in shown
+    assert sys.executable in shown and not list(Path.cwd().iterdir())

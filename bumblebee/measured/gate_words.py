@@ -1,0 +1,92 @@
+"""What the gate says to people: whole commands that work from any folder, and one line for each refusal."""
+
+import os
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+from bumblebee.errors import BadInput
+
+SHORT = 12  # digits of a hash that a person copies
+
+
+def short(table: dict[str, Any]) -> str:
+    """The short hash of what a request shows; `--seen` takes it, or more digits of the whole."""
+    return str(table["seen"].get("sha256", ""))[:SHORT]
+
+
+def show_command(workspace: Path, round: int) -> str:
+    """Prints what came and how to answer it."""
+    return f"{_python('tasks.gate', workspace)} --round {round} --show"
+
+
+def answer_command(workspace: Path, table: dict[str, Any], approve: bool) -> str:
+    """Answers what the request shows and nothing else; NAME is to be filled in."""
+    verb = "approve" if approve else "reject"
+    return f"{_python('flows.gate', workspace, verb)} --round {table['round']} --seen {short(table)} --by NAME"
+
+
+def _python(module: str, workspace: Path, *more: str) -> str:
+    """The command up to its options: this Python, and none of the packages that lie where it is typed (-P)."""
+    python = os.path.abspath(sys.executable) if sys.executable else "python3"  # links stay: they find the packages
+    parts = [python, "-P", "-m", module, *more, "--workspace", str(Path(workspace).resolve())]
+    return shlex.join(parts)
+
+
+def how_to_answer(workspace: Path, table: dict[str, Any]) -> str:
+    """The one line that tells a person what to do."""
+    return (
+        f"round {table['round']} waits for an answer about {what(table)}: "
+        f"look with `{show_command(workspace, table['round'])}`, "
+        f"then answer with `{answer_command(workspace, table, True)}`, or `reject` in place of `approve`"
+    )
+
+
+def what(table: dict[str, Any]) -> str:
+    """What an answer is about, in a few words."""
+    seen = table["seen"]
+    return f"{short(table)} ({seen.get('accepted')} files accepted, {seen.get('quarantined')} set aside)"
+
+
+def known(table: dict[str, Any]) -> str:
+    """How the author of an answer was known."""
+    facts = table.get("known_by") or {}
+    if facts.get("how") == "unix user":
+        return f"unix user {facts.get('user')}, uid {facts.get('uid')}, on {facts.get('host')}"
+    return str(facts.get("how") or "not recorded")
+
+
+def said(table: dict[str, Any]) -> str:
+    """An answer in one line: approved by Ada (unix user ada, uid 1000, on lab) at ..., with the note."""
+    note = f": {table['note']}" if table.get("note") else ""
+    return one_line(f"{table['status']} by {table['by']} ({known(table)}) at {table['at']}{note}")
+
+
+def one_line(text: str) -> str:
+    """Text from outside as one printable line."""
+    clean = text.encode("utf-8", "replace").decode()
+    return " ".join("".join(c if c.isprintable() else " " for c in clean).split())
+
+
+def require_seen(workspace: Path, table: dict[str, Any], seen: str) -> None:
+    """Refuse an answer without the hash of what the request shows now, or with another."""
+    given = seen.strip().lower()
+    if not given:
+        look = f"Look first with `{show_command(workspace, table['round'])}`; it prints the command with the hash."
+        raise BadInput("--seen", "the hash of what was looked at", "nothing", look)
+    if len(given) < SHORT or not str(table["seen"].get("sha256", "")).startswith(given):
+        raise other_data(workspace, table, seen)
+
+
+def other_data(workspace: Path, table: dict[str, Any], seen: str) -> BadInput:
+    """The line for an answer to something else than what lies there now."""
+    expected = f"{short(table)}, what round {table['round']} of {Path(workspace).resolve()} shows now"
+    look = f"Look again with `{show_command(workspace, table['round'])}`."
+    return BadInput("--seen", expected, repr(seen), look)
+
+
+def answered_already(workspace: Path, table: dict[str, Any], approve: bool) -> BadInput:
+    """The line for an answer where another stands."""
+    change = f"To change it: `{answer_command(workspace, table, approve)} --change`."
+    return BadInput(f"round {table['round']}", "no answer yet", f"one that was already {said(table)}", change)

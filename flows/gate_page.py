@@ -1,0 +1,126 @@
+"""What Prefect's page shows of a gate, as Markdown: everything needed to judge, and which button answers.
+
+Prefect renders tables, links and pictures that lie in the text itself (data URIs); nothing is loaded from elsewhere.
+"""
+
+import base64
+import csv
+import io
+import re
+from collections.abc import Iterable
+from html import escape
+from typing import Any
+
+from bumblebee.errors import BadInput
+from bumblebee.io.read import read_json, read_text
+from bumblebee.measured import gate, overview_plots
+from bumblebee.measured import gate_words as words
+from bumblebee.measured.rollout import read_rollout, rollout_files
+
+ROWS, PLOTS, BAR = 40, 12, 20  # rows of a table, pictures on the page, blocks of the longest bar
+SPECIAL = re.compile(r"([\\`*_{}\[\]()#+!|~>:.@-])")  # with `:`, `.` and `@`: no address becomes a link by itself
+
+
+def where_to_answer(round: int, url: str | None) -> str:
+    """The log line of a run that is about to be suspended."""
+    page = f"open {url} and " if url else ""
+    return f"round {round} waits for an answer: {page}choose Resume in the menu (⋮) at the top right of the run's page"
+
+
+def question(request: dict[str, Any], artifact: str) -> str:
+    """What the dialog says above its fields: short, with a link to the page."""
+    seen = request["seen"]
+    rules = ", ".join(f"{cell(rule)} ({counts['files']})" for rule, counts in list(seen["findings"].items())[:8])
+    return (
+        f"**Round {request['round']}: may the loop learn from these logs?** {seen['accepted']} files accepted "
+        f"({seen['seconds']:.1f} s), {seen['quarantined']} set aside. "
+        f"{f'Findings (files): {rules}' if rules else 'No findings'}. Hash `{words.short(request)}`: the answer holds "
+        f"for nothing else.\n\n[**Look at the tables and plots first**](/artifacts/artifact/{artifact})"
+    )
+
+
+def page(request: dict[str, Any], place: gate.Gate) -> str:
+    """Everything that a person needs to judge a round."""
+    seen, number = request["seen"], request["round"]
+    summary = read_json(place.summary, gate.SUMMARY_LIMITS)
+    counts = [("files accepted", seen["accepted"]), ("files set aside", seen["quarantined"])]
+    counts += [("seconds accepted", f"{seen['seconds']:.1f}"), ("joints", len(summary["joints"]))]
+    rules = [(rule, n["files"], n["fatal"], n["warning"]) for rule, n in seen["findings"].items()]
+    blocks = [
+        f"# Round {number}: may the loop learn from these logs?",
+        "Approve, and the diagnosis corrects the simulator with the accepted files; reject, and the round stops here.",
+        table(("what", "how many"), counts),
+        f"**To answer**: on the run's page choose *Resume* in the menu (⋮) at the top right. The answer holds for "
+        f"`{words.short(request)}`, the hash of what stands here, and for nothing else. Or in a terminal:",
+        f"```\n{words.answer_command(place.workspace, request, True)}\n"
+        f"{words.answer_command(place.workspace, request, False)}\n```",
+        "## Findings",
+        table(("rule", "files", "fatal", "warnings"), rules) if rules else "None.",
+        *findings(place),
+        "## By cluster",
+        table(("cluster", "accepted", "set aside"), verdicts(summary["by_cluster"])),
+        *pictures(place),
+        "## By motion",
+        table(("motion", "accepted", "set aside"), verdicts(summary["by_motion"])),
+        f"The same page as a file: `{place.summary.with_name('overview.html')}`",
+    ]
+    return "\n\n".join(blocks) + "\n"
+
+
+def findings(place: gate.Gate) -> list[str]:
+    """What was found, in words, the fatal ones first."""
+    rows = list(csv.DictReader(io.StringIO(read_text(place.summary.with_name("findings.csv"), 1 << 30))))
+    rows.sort(key=lambda row: row["fatal"] != "True")
+    if not rows:
+        return []
+    return [table(("", "finding"), [("fatal" if row["fatal"] == "True" else "", row["message"]) for row in rows])]
+
+
+def pictures(place: gate.Gate) -> list[str]:
+    """Tracking error by joint as tables with bars, and the worst joint of each motion as a picture."""
+    folder = place.summary.parent
+    try:
+        slides = overview_plots.slides(folder / "model.xml")
+        errors, traces = overview_plots.tracking(map(read_rollout, rollout_files(folder)))
+    except BadInput as error:
+        return [f"The plots cannot be drawn: {cell(str(error))}"]
+    blocks = ["## Tracking error by joint", "Root mean square of target minus position."]
+    for what, unit, values in overview_plots.by_unit(errors, slides):
+        largest = max(values.values()) or 1.0
+        rows = [(name, overview_plots.rounded(v), "█" * round(BAR * v / largest)) for name, v in values.items()]
+        blocks.append(table((f"{what.lower()}", unit, " "), rows))
+    if not errors:
+        return [*blocks, "No rollout holds position targets."]
+    blocks += [
+        "## Command (grey) and measurement (orange)",
+        "Of each motion's first file the joint that follows worst.",
+    ]
+    blocks += [picture(overview_plots.plot(trace, trace.joint in slides), trace.motion) for trace in traces[:PLOTS]]
+    more = len(traces) - PLOTS
+    return [*blocks, f"{more} more motions follow better: overview.html has them."] if more > 0 else blocks
+
+
+def picture(svg: str, name: str) -> str:
+    """An SVG that lies in the text."""
+    alone = svg.replace("<svg ", "<svg xmlns='http://www.w3.org/2000/svg' width='720' height='300' ", 1)
+    return f"![{cell(name)}](data:image/svg+xml;base64,{base64.b64encode(alone.encode()).decode()})"
+
+
+def verdicts(counts: dict[str, dict[str, int]]) -> list[tuple[str, int, int]]:
+    """Rows of accepted and set aside, those with files set aside first."""
+    rows = [(name, verdict["accepted"], verdict["quarantined"]) for name, verdict in counts.items()]
+    return sorted(rows, key=lambda row: -row[2])
+
+
+def table(head: Iterable[str], rows: list[tuple[Any, ...]]) -> str:
+    """A Markdown table of at most `ROWS` rows."""
+    names = list(head)
+    lines = [f"| {' | '.join(names)} |", f"|{'---|' * len(names)}"]
+    lines += [f"| {' | '.join(cell(str(value)) for value in row)} |" for row in rows[:ROWS]]
+    more = f"\n\n{len(rows) - ROWS} more." if len(rows) > ROWS else ""
+    return "\n".join(lines) + more
+
+
+def cell(text: str) -> str:
+    """Text from outside in a Markdown table: one line, no markup, no link."""
+    return SPECIAL.sub(r"\\\1", escape(words.one_line(text), quote=False))
