@@ -24,6 +24,7 @@ __all__ = [
     "Kind",
     "RuntimeHooks",
     "add_to_spec",
+    "effects_yaml",
     "read_effects",
     "runtime_hooks",
     "single",
@@ -34,10 +35,15 @@ __all__ = [
 def write_effects(path: Path, effects: Sequence[Effect]) -> None:
     """Write `effects.yaml`; it appears whole or not at all."""
     path = Path(path)
-    entries = [{"effect": e.effect, "where": list(e.where), "parameters": _written(e)} for e in effects]
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    temporary.write_text(yaml.safe_dump({"schema": 1, "effects": entries}, sort_keys=False))
+    temporary.write_text(effects_yaml(effects))
     os.replace(temporary, path)
+
+
+def effects_yaml(effects: Sequence[Effect]) -> str:
+    """The text of `effects.yaml`."""
+    entries = [{"effect": e.effect, "where": list(e.where), "parameters": _written(e)} for e in effects]
+    return yaml.safe_dump({"schema": 1, "effects": entries}, sort_keys=False)
 
 
 def read_effects(path: Path) -> list[Effect]:
