@@ -77,13 +77,3 @@ def shade(ratio: float) -> str:
     """Background for a cell whose error is `ratio` times the noise: the redder, the more."""
     strength = min(max((ratio - 1.0) / 20.0, 0.0), 1.0) ** 0.5
     return f"background:rgba(200,85,61,{0.55 * strength:.2f})"
-
-
-UNITS = {
-    "joint_pos_rmse": ("joint position", "mrad", 1e3),
-    "joint_vel_rmse": ("joint velocity", "rad/s", 1.0),
-    "base_pos_rmse": ("base position", "mm", 1e3),
-    "base_rot_rmse": ("base rotation", "mrad", 1e3),
-    "chi2": ("chi-square (1 = at the noise)", "", 1.0),
-}
-"""Measure of the error block -> its name, unit and the factor from SI."""

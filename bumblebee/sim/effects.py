@@ -17,6 +17,7 @@ from bumblebee.sim.effect_catalogue import CATALOGUE, Effect, Kind, Parameter, s
 from bumblebee.sim.effect_hooks import RuntimeHooks, runtime_hooks
 from bumblebee.sim.effect_spec import add_to_spec
 from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.units import both_units
 
 __all__ = [
     "CATALOGUE",
@@ -92,7 +93,8 @@ def _effect(where: str, entry: Any) -> Effect:
     _only_keys(f"{where}: parameters", entry.get("parameters"), set(kind.names))
     given = entry["parameters"]
     wanted = [p for p in kind.parameters if p.default is None or p.name in given]
-    return Effect(name, tuple(places), {p.name: _value(where, given.get(p.name), p) for p in wanted})
+    values = {p.name: _value(where, given.get(p.name), p, kind.on == "joint") for p in wanted}
+    return Effect(name, tuple(places), values)
 
 
 def _terms(where: str, table: Any) -> dict[str, float]:
@@ -111,10 +113,11 @@ def _terms(where: str, table: Any) -> dict[str, float]:
     return out
 
 
-def _value(where: str, value: Any, parameter: Parameter) -> float:
+def _value(where: str, value: Any, parameter: Parameter, on_joint: bool) -> float:
     """A finite number within the parameter's bounds."""
     number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     if not number or not parameter.lower <= value <= parameter.upper:
-        expected = f"a number from {parameter.lower:g} to {parameter.upper:g} {parameter.unit}".strip()
+        unit = both_units(parameter.unit) if on_joint else parameter.unit
+        expected = f"a number from {parameter.lower:g} to {parameter.upper:g} {unit}".strip()
         raise BadInput(f"{where}: parameters.{parameter.name}", expected, repr(value)[:80])
     return float(value)
