@@ -9,13 +9,17 @@ from bumblebee.diagnosis.diagnose import Diagnosis, diagnose
 from bumblebee.diagnosis.gap import gap
 from bumblebee.diagnosis.gap_page import gap_page
 from bumblebee.diagnosis.report import render_report
+from bumblebee.diagnosis.search_config import SearchConfig
 from bumblebee.diagnosis.session import Session, make_session
 from bumblebee.diagnosis.terminal import gap_summary, summary
 from bumblebee.sim.effects import CATALOGUE
 from bumblebee.sim.units import both_units, joint_unit
 from tests.diagnosis import cart
 
-TINY = DiagnosisConfig(max_windows=20, max_holdout_windows=10, report_windows=6, grow=False, beyond=False)
+SHORT = SearchConfig(most=1, trials=1, simulated=3, patience=1, shortlist=0, far=1e9, many=1e9)
+TINY = DiagnosisConfig(
+    max_windows=8, max_holdout_windows=6, report_windows=4, grow=False, beyond=False, search=SHORT
+)  # the units are asked about, not the diagnosis
 TURNING = ("rad", "N m", "kg m^2")
 
 
