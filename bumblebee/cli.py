@@ -1,4 +1,7 @@
-"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`. Status 0: done, 2: unusable input, one line."""
+"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`.
+
+Status 0: done, 2: unusable input or output, 1: an error that should not happen; one line on standard error each.
+"""
 
 import sys
 import time
@@ -8,16 +11,28 @@ from typing import Annotated
 
 import typer
 
-from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee import __version__
+from bumblebee.errors import EXIT_BAD_INPUT
+from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 
 app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
+_UNUSABLE = typer.BadParameter.__bases__[0]  # the library's UsageError, which it does not export
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
 Data = Annotated[Path, typer.Argument(metavar="DATASET", help="Folder that holds rollouts/*.parquet.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an earlier result of this command.")]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"bumblebee {__version__}")
+        raise typer.Exit
 
 
 @app.callback()
-def quiet() -> None:
+def quiet(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Say it, end.")] = False,
+) -> None:
     """Close the loop with measured data."""
     import mujoco
 
@@ -30,25 +45,26 @@ def diagnose(
     model: Model,
     dataset: Data,
     out: Annotated[Path, typer.Option("--out", help="Folder for the diagnosis.")],
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")] = False,
+    overwrite: Overwrite = False,
     max_windows: Annotated[int, typer.Option(min=8, help="Windows that take part in the fit.")] = 120,
-    seed: Annotated[int, typer.Option(help="Of the perturbed starts.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the perturbed starts.")] = 0,
 ) -> None:
     """Find which effect the model lacks, add it, and report the error before and after."""
     from bumblebee.diagnosis.config import DiagnosisConfig
     from bumblebee.diagnosis.diagnose import diagnose
     from bumblebee.diagnosis.example import examples
-    from bumblebee.diagnosis.output import refuse_existing, write_diagnosis
+    from bumblebee.diagnosis.output import write_diagnosis
+    from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
     from bumblebee.diagnosis.session import open_session
     from bumblebee.diagnosis.terminal import plot, summary
 
-    refuse_existing(out, overwrite)
+    claim_folder(out, DIAGNOSIS, overwrite, inputs_of(model, dataset))
     session = open_session(model, dataset)
     result = diagnose(session, DiagnosisConfig(max_windows=max_windows, seed=seed), _teller())
-    write_diagnosis(result, out, overwrite)
-    print(summary(result.document))
+    print(summary(result.document))  # said first: the disk may fail now
     shown = examples(result.session, result.effects, count=1)
-    print(plot(shown[0]) if shown else "")
+    print(plot(shown[0]) if shown else "", flush=True)
+    write_diagnosis(result, out, overwrite)
     print(f"written: {out / 'diagnosis.json'}, model.xml, effects.yaml, report.html")
 
 
@@ -58,14 +74,18 @@ def replay(
     dataset: Data,
     out: Annotated[Path, typer.Option("--out", help="JSON file for the errors.")],
     effects: Annotated[Path | None, typer.Option("--effects", help="effects.yaml to apply to the model.")] = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """The error of any model on any rollouts, by horizon."""
-    from bumblebee.diagnosis.replay import replay, write_json
+    from bumblebee.diagnosis.output import write_errors
+    from bumblebee.diagnosis.places import claim_file, inputs_of
+    from bumblebee.diagnosis.replay import replay
     from bumblebee.diagnosis.session import open_session
     from bumblebee.sim.effects import read_effects
 
+    claim_file(out, overwrite, inputs_of(model, dataset, effects))
     chosen = read_effects(effects) if effects else []
-    write_json(out, replay(open_session(model, dataset), chosen))
+    write_errors(replay(open_session(model, dataset), chosen), out, overwrite)
     print(f"written: {out}")
 
 
@@ -74,23 +94,21 @@ def gap(
     model: Model,
     dataset: Data,
     out: Annotated[Path | None, typer.Option("--out", help="Also write gap.json and gap.html here.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Where the model errs before anything is fitted."""
     from bumblebee.diagnosis.gap import gap as compare
-    from bumblebee.diagnosis.gap_page import gap_page
-    from bumblebee.diagnosis.output import refuse_existing
-    from bumblebee.diagnosis.replay import write_json, write_text
+    from bumblebee.diagnosis.output import write_gap
+    from bumblebee.diagnosis.places import GAP, claim_folder, inputs_of
     from bumblebee.diagnosis.session import open_session
     from bumblebee.diagnosis.terminal import gap_summary
 
     if out:
-        refuse_existing(out, overwrite)
+        claim_folder(out, GAP, overwrite, inputs_of(model, dataset))
     report = compare(open_session(model, dataset))
-    print(gap_summary(report.document, report.examples))
+    print(gap_summary(report.document, report.examples), flush=True)
     if out:
-        write_json(out / "gap.json", report.document)
-        write_text(out / "gap.html", gap_page(report))
+        write_gap(report, out, overwrite)
         print(f"written: {out / 'gap.html'}, gap.json")
 
 
@@ -103,8 +121,12 @@ def import_(
     columns: Annotated[Path | None, typer.Option("--columns", help="Column map of CSV logs, a YAML file.")] = None,
 ) -> None:
     """Turn logs of another layout into a dataset of the contract."""
+    from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output
     from bumblebee.measured.importers import import_dataset
 
+    refuse_overlap(dataset, [path for path in (source, model, columns) if path])
+    refuse_foreign(dataset, lambda path: False, "nothing")
+    try_output(dataset)
     ids = import_dataset(source, kind, dataset, model, columns)
     print(f"{len(ids)} rollouts: {', '.join(ids[:6])}{' ...' if len(ids) > 6 else ''}")
 
@@ -118,13 +140,27 @@ def _teller() -> Callable[[str], None]:
     return say
 
 
-def main() -> None:
-    """Entry point; bad input ends in one line and status 2."""
+def run(arguments: list[str]) -> int:
+    """Run one command; what is wrong in its options is said in one line."""
+    command = typer.main.get_command(app)
     try:
-        app()
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        raise SystemExit(EXIT_BAD_INPUT) from None
+        with command.make_context("bumblebee", list(arguments)) as context:
+            command.invoke(context)
+    except typer.Exit as end:
+        return end.exit_code
+    except typer.Abort:
+        return EXIT_INTERRUPTED
+    except _UNUSABLE as error:
+        context, text = getattr(error, "ctx", None), getattr(error, "format_message", error.__str__)()
+        path = context.command_path if context else "bumblebee"
+        print(" ".join(f"{path}: {text} Try '{path} --help'.".split()), file=sys.stderr)
+        return EXIT_BAD_INPUT
+    return 0
+
+
+def main() -> None:
+    """Entry point."""
+    raise SystemExit(guarded(lambda: run(sys.argv[1:])))
 
 
 if __name__ == "__main__":

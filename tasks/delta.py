@@ -3,6 +3,7 @@
 It is trained on the rollouts that the diagnosis fitted and judged on those that it held out: the delta never sees them.
 """
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 
@@ -116,8 +117,13 @@ def verdict(round: int, cluster: str, gain: Gain) -> str:
     if not gain.change:
         return outcome
     longest = list(gain.change.values())[-1]
-    change = f"{longest['relative']:+.1%} [{longest['low']:+.1%}, {longest['high']:+.1%}]"
-    return f"{outcome}; error after 1 s {change} on {gain.rollouts} held-out rollouts"
+    if not math.isfinite(longest["relative"]):
+        return f"{outcome}; no held-out rollout reaches 1 s, so no error after it"
+    rollouts = f"{gain.rollouts} held-out rollout{'' if gain.rollouts == 1 else 's'}"
+    if not math.isfinite(longest["low"]):
+        return f"{outcome}; error after 1 s {longest['relative']:+.1%}, no interval, on {rollouts}"
+    ends = f"[{longest['low']:+.1%}, {longest['high']:+.1%}]"
+    return f"{outcome}; error after 1 s {longest['relative']:+.1%} {ends} on {rollouts}"
 
 
 if __name__ == "__main__":

@@ -18,17 +18,16 @@ import hashlib
 import inspect
 import os
 import shutil
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.last_line import disk_line, guarded
 from tasks import recorder
 from tasks.params import load
 from tasks.parent import end_with_parent
 
-__all__ = ["load", "log_run", "output_file", "output_folder", "run_stage", "scratch"]
+__all__ = ["disk_line", "load", "log_run", "output_file", "output_folder", "run_stage", "scratch"]
 
 SCRATCH = Path(".scratch")
 _used_scratch: set[Path] = set()
@@ -38,44 +37,28 @@ def run_stage(main: Callable[..., object], argv: list[str] | None = None, *, log
     """Run a stage's `main` from the command line and leave the process with its status.
 
     The parameters of `main` become options (`cluster: str` is `--cluster`, `round: int` is `--round`). Bad input
-    and a full disk end in one line on standard error and status 2; any other exception keeps its traceback. When DVC
-    runs a stage that `logs` a run, MLflow is made ready beside it.
+    and a full disk end in one line on standard error and status 2, any other exception in one line that names a log
+    file with its traceback, and status 1. When DVC runs a stage that `logs` a run, MLflow is made ready beside it.
     """
     options = _parser(main).parse_args(argv)
     if "DVC_STAGE" in os.environ:
         end_with_parent()
         if logs and os.environ.get("RANK", "0") == "0":  # of processes that train together, one logs
             recorder.start()
-    try:
-        main(**vars(options))
-    except BadInput as error:
-        print(error, file=sys.stderr, flush=True)
-        raise SystemExit(EXIT_BAD_INPUT) from None
-    except OSError as error:
-        line = disk_line(error)
-        if line is None:
-            raise
-        print(line, file=sys.stderr, flush=True)
-        raise SystemExit(EXIT_BAD_INPUT) from None
-    except Exception as error:
-        if "database or disk is full" not in str(error):  # how SQLite says it, through whichever library
-            raise
-        print(disk_line(OSError(errno.ENOSPC, "", ".servers")), file=sys.stderr, flush=True)
-        raise SystemExit(EXIT_BAD_INPUT) from None
+    if status := guarded(lambda: _run(main, vars(options))):
+        raise SystemExit(status)
     for folder in _used_scratch:
         shutil.rmtree(folder, ignore_errors=True)
     _used_scratch.clear()
 
 
-def disk_line(error: OSError) -> str | None:
-    """The one line for a full disk or a folder without write access; None for any other error."""
-    place = error.filename or Path.cwd()
-    came = {errno.ENOSPC: "no space left", errno.EDQUOT: "quota used up", errno.EROFS: "a read-only disk"}
-    came[errno.EACCES] = "no permission to write"
-    if error.errno not in came:
-        return None
-    wanted = "a disk that takes the stage's output"
-    return str(BadInput(place, wanted, came[error.errno], "Free some space or choose another folder, then run again."))
+def _run(main: Callable[..., object], options: dict[str, object]) -> None:
+    try:
+        main(**options)
+    except Exception as error:
+        if "database or disk is full" in str(error):  # how SQLite says it, through whichever library
+            raise OSError(errno.ENOSPC, "", ".servers") from error
+        raise
 
 
 def _parser(main: Callable[..., object]) -> argparse.ArgumentParser:

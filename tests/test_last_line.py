@@ -1,5 +1,9 @@
 """Whatever happens, a command says one line and ends with a status that tells what it was."""
 
+import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -44,3 +48,60 @@ def test_the_traceback_of_the_unforeseen_is_kept_for_the_owner(capsys: pytest.Ca
 def test_success_is_zero_or_what_the_command_says():
     assert guarded(lambda: None) == 0
     assert guarded(lambda: 3) == 3
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)])
+def test_a_signal_lets_the_command_clean_up_and_is_one_line(
+    number: int, status: int, capsys: pytest.CaptureFixture[str]
+):
+    cleaned, before = [], signal.getsignal(number)
+
+    def command() -> None:
+        try:
+            os.kill(os.getpid(), number)
+        finally:
+            cleaned.append(True)
+
+    assert guarded(command) == status
+    assert cleaned and capsys.readouterr().err.count("\n") == 1
+    assert signal.getsignal(number) == before
+
+
+def test_handlers_of_the_command_itself_stay():
+    seen = []
+    before = signal.signal(signal.SIGTERM, lambda *_: seen.append(True))
+    try:
+        assert guarded(lambda: os.kill(os.getpid(), signal.SIGTERM)) == 0
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert seen
+
+
+def piped(target: str) -> subprocess.CompletedProcess:
+    """A command that prints much, its output going to `target` in a shell."""
+    code = "from bumblebee.last_line import guarded; raise SystemExit(guarded(lambda: print('x\\n' * 100_000)))"
+    command = f'{{ {sys.executable} -c "{code}"; echo $? >&2; }} {target}'
+    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
+    return subprocess.run(command, shell=True, capture_output=True, text=True, env=environment, executable="/bin/sh")
+
+
+def test_a_reader_that_had_enough_closes_it_quietly():
+    assert piped("| head -1").stderr.strip() == "1"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux alone has a full device")
+def test_an_output_that_takes_nothing_is_one_line():
+    said = piped("> /dev/full").stderr.strip().splitlines()
+    assert said[1:] == ["2"] and "no space left" in said[0]
+
+
+def test_a_working_folder_that_is_gone_hides_no_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    assert guarded(raising(RuntimeError("surprise"))) == 1
+    said = capsys.readouterr().err
+    assert "surprise" in said
+    Path(said.split("with ")[-1].strip()).unlink()

@@ -12,6 +12,7 @@ from bumblebee.diagnosis.discover import Discovery
 from bumblebee.diagnosis.formula import Formula, quantities_of
 from bumblebee.diagnosis.laws import Law
 from bumblebee.diagnosis.remains import JointRemains
+from bumblebee.diagnosis.units import joint_units
 
 NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
 _NAMED = 3  # joints that get a sentence
@@ -47,7 +48,7 @@ def unexplained(found: Discovery) -> dict[str, Any]:
     """The contract's `unexplained`: what is left with all effects in force."""
     left, whole = sorted((j for j in found.left.joints if j.significant), key=lambda j: -j.excess), found.left.whole
     p = min((j.p for j in found.left.joints), default=1.0)
-    said = _described(left, found.unconfirmed)
+    said = _described(left, found.unconfirmed, joint_units(found.problem.plant))
     if whole.significant and not left:
         said = _NOWHERE.format(whole.power)
     return {
@@ -64,7 +65,9 @@ def _depends_on(left: JointRemains, forms: Mapping[str, Mapping[str, float]]) ->
     return tuple(dict.fromkeys((*quantities_of(tuple(forms.get(left.joint, ()))), *left.depends_on)))
 
 
-def _described(left: Sequence[JointRemains], forms: Mapping[str, Mapping[str, float]]) -> str:
+def _described(
+    left: Sequence[JointRemains], forms: Mapping[str, Mapping[str, float]], units: Mapping[str, Mapping[str, str]]
+) -> str:
     """One sentence a joint: how much is left, on what it depends, and a form that was not kept."""
     lines = []
     for j in left[:_NAMED]:
@@ -72,7 +75,9 @@ def _described(left: Sequence[JointRemains], forms: Mapping[str, Mapping[str, fl
         line = f"{j.joint}: torques that depend on {on}"
         if j.laws:
             share = 100 * j.rms / max(j.typical, 1e-12)
-            line = f"{j.joint}: a torque of {j.rms:.2g} N m RMS ({share:.0f} % of its drive's) depends on {on}"
+            unit = units[j.joint]["torque"]
+            what = "force" if unit == "N" else "torque"
+            line = f"{j.joint}: a {what} of {j.rms:.2g} {unit} RMS ({share:.0f} % of its drive's) depends on {on}"
         if j.joint in forms:
             terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in forms[j.joint].items())
             terms = _TABLE.sub(r"\1(\2, ...)", terms)
@@ -109,8 +114,9 @@ def _curves(found: Discovery, joint: int) -> dict[str, list[list[float]]]:
     scene = found.left.scene
     data, path, lacks = scene.data, scene.data.path, scene.evidence.lacking(joint)
     block = np.repeat(np.arange(len(lacks)), lacks.shape[1])
-    over = {"velocity [rad/s]": data.v, "position [rad]": data.q, "torque [N m]": data.tau}
-    means = {name: path.mean(x[..., joint]).ravel() for name, x in over.items()} | {
+    over = {"velocity": data.v, "position": data.q, "torque": data.tau}
+    units = joint_units(found.problem.plant)[found.left.joints[joint].joint]
+    means = {f"{name} [{units[name]}]": path.mean(x[..., joint]).ravel() for name, x in over.items()} | {
         "time [s]": path.mean(data.t).ravel()
     }
     return {name: measured_curve(x, lacks.ravel(), block) for name, x in means.items() if np.ptp(x) > 0}

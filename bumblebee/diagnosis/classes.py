@@ -12,6 +12,7 @@ from bumblebee.diagnosis.holdout import Holdout
 from bumblebee.diagnosis.scores import Columns, score_tests
 from bumblebee.diagnosis.search import Search
 from bumblebee.diagnosis.trials import Trial, try_one
+from bumblebee.diagnosis.units import unit_on
 from bumblebee.sim.effects import CATALOGUE
 
 _SAME = 0.95
@@ -219,7 +220,7 @@ def detectable(found: Search) -> list[dict[str, Any]]:
                 | {
                     "parameter": parameter.name,
                     "change": float(size) if np.isfinite(size) else None,
-                    "unit": parameter.unit,
+                    "unit": unit_on(found.problem.plant, c.effect, c.where, parameter.unit),
                 }
             )
     return entries

@@ -15,7 +15,9 @@ from bumblebee.diagnosis.nuisance import NAMES
 from bumblebee.diagnosis.refine import Refined
 from bumblebee.diagnosis.search import Search
 from bumblebee.diagnosis.session import Session
+from bumblebee.diagnosis.units import joint_units, mixed_notes
 from bumblebee.diagnosis.variation import vary
+from bumblebee.diagnosis.verdict import LONE, unexplained_error
 from bumblebee.sim.effects import Effect
 
 _STILL = "the joint moves no more than its sensor's noise"
@@ -34,20 +36,29 @@ def document(
     """Which rollouts took which part, `entries` of the effects, the error with them, what is left and what to know."""
     session = material.session
     driven = _driven(session)
-    return (
+    told = (
         {"schema": 1, "train": session.ids(session.train)}
         | {"holdout": session.ids(session.holdout), "accept": session.ids(session.accept)}
         | {"effects": list(entries), "unexplained": NOT_TESTED if beyond is None else unexplained(beyond)}
         | ({} if beyond is None else {"structure": structure_table(beyond)})
         | {
+            "units": joint_units(session.plant),
             "error": _errors(session, effects, config),
             "unidentifiable": [{"where": [name], "why": _STILL} for name in material.still],
             "smallest_detectable": detectable(found),
             "set_aside": session.set_aside,
-            "notes": [*session.notes, *notes, *latency_notes(entries, driven), *factor_notes(entries, driven)],
+            "notes": [
+                *session.notes,
+                *mixed_notes(session.plant),
+                *notes,
+                *latency_notes(entries, driven),
+                *factor_notes(entries, driven),
+            ],
             "settings": _settings(material, config, found.bound, last),
         }
     )
+    lone = [] if session.holdout else [LONE]
+    return told | {"warnings": [*session.warnings, *lone, *unexplained_error(told)]}
 
 
 def _settings(material: Material, config: DiagnosisConfig, bound: float, last: Refined) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.problem import Problem, without
 from bumblebee.diagnosis.refine import Refined
 from bumblebee.diagnosis.search import Search
+from bumblebee.diagnosis.units import unit_on
 from bumblebee.diagnosis.variation import declared_values
 from bumblebee.sim.effect_catalogue import is_native
 from bumblebee.sim.effects import CATALOGUE
@@ -100,15 +101,16 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
         if p.default is not None and value == p.default:
             continue
         ends = [float(value - wide), float(value + wide)]
+        unit = unit_on(plant, c.effect, c.where, p.unit)
         if c.effect in INVERSE and not out:
             # The fit moves the inverse; an interval that reaches zero has no upper end.
             low, high = 1.0 / max(ends[1], 1e-12), None if ends[0] <= 0 else 1.0 / ends[0]
-            out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": p.unit}
+            out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": unit}
         else:
             inside = max(p.lower, ends[0]), min(p.upper, ends[1])
             ends = [end if np.isfinite(end) else None for end in inside]
             known = float(nominal) + 0.0 if np.isfinite(nominal) else None  # no -0
-            out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": p.unit}
+            out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": unit}
     return out
 
 

@@ -13,10 +13,12 @@ from scipy.stats import t as student
 from bumblebee.diagnosis.plant import Plant
 from bumblebee.diagnosis.signals import Layout
 from bumblebee.diagnosis.simulate import residuals
+from bumblebee.diagnosis.units import KINDS, members
 from bumblebee.diagnosis.variation import Variation
 from bumblebee.diagnosis.whiten import Whitener, fit_whitener
 from bumblebee.diagnosis.windows import Windows, choose_starts, cut, select
 from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.units import joint_unit
 
 HORIZONS = ("0.02", "0.2", "1.0")
 _RESAMPLES = 400
@@ -115,6 +117,7 @@ def _measures(
     for name in ("joint_pos", "joint_vel"):
         squares = error[:, layout.slices[name]] ** 2
         whole = _with_interval(squares.mean(axis=1), groups, rng)
+        whole |= _by_kind(plant, name, squares, groups)
         whole["per_joint"] = {joint: _with_interval(squares[:, j], groups, rng) for j, joint in enumerate(plant.joints)}
         out[f"{name}_rmse"] = whole
     for name in ("base_pos", "base_rot"):
@@ -122,6 +125,20 @@ def _measures(
             out[f"{name}_rmse"] = _with_interval((error[:, layout.slices[name]] ** 2).sum(axis=1), groups, rng)
     out["chi2"] = _with_interval(chi, chi_groups, rng, root=False)
     return out
+
+
+def _by_kind(plant: Plant, name: str, squares: np.ndarray, groups: np.ndarray) -> dict[str, Any]:
+    """Of squares (W, J): the unit of their root mean square; hinges and slides apart where the robot has both."""
+    hinge, kinds = {"joint_pos": "rad", "joint_vel": "rad/s"}[name], members(plant)
+    units = {kind: joint_unit(hinge, KINDS[kind]) for kind in kinds}
+    if len(kinds) == 1:
+        return {"unit": next(iter(units.values()))}
+    rng = np.random.default_rng(0)
+    apart = {
+        kind: _with_interval(squares[:, columns].mean(axis=1), groups, rng) | {"unit": units[kind]}
+        for kind, columns in kinds.items()
+    }
+    return {"unit": f"{units['hinge']}, 1 {units['slide']} as 1 {units['hinge']}", "by_kind": apart}
 
 
 def _with_interval(

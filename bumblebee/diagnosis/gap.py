@@ -11,11 +11,13 @@ from bumblebee.diagnosis.error_block import error_block, floor_block, horizon_wh
 from bumblebee.diagnosis.example import examples
 from bumblebee.diagnosis.form import examine
 from bumblebee.diagnosis.reported import reported_torque
-from bumblebee.diagnosis.session import Session
+from bumblebee.diagnosis.session import JUDGED_TWICE, Session
 from bumblebee.diagnosis.simulate import residuals
 from bumblebee.diagnosis.structure import JointStructure
 from bumblebee.diagnosis.torque_residual import TorqueResidual, missing_torques
+from bumblebee.diagnosis.units import joint_units, members, mixed_notes
 from bumblebee.diagnosis.variation import vary
+from bumblebee.diagnosis.verdict import ALONE
 from bumblebee.diagnosis.windows import Windows
 
 
@@ -39,20 +41,23 @@ def gap(session: Session, budget: int = 120, seed: int = 0) -> Gap:
     found = []
     if train is not None and held is not None:
         found = [examine(train, held, j)[0] for j, n in enumerate(train.joints) if n not in still]
+    units = joint_units(session.plant)
     document = {
         "schema": 1,
         "rollouts": session.ids(ids),
         "seconds": float(sum(r.time[-1] - r.time[0] for r in session.rollouts)),
         "commands": "torques" if session.plant.torque_input else "position targets",
+        "units": units,
         "error": error_block(*common, whiteners, model, session.steps[0], seed),
         "floor": floor_block(*common, whiteners, session.sigma, seed),
-        "missing_torque": _torques(found, train, held),
+        "missing_torque": _torques(found, train, held, units),
         "reported_torque": reported_torque(session.plant, session.rollouts),
         "motions": _by_motion(session, windows),
         "unidentifiable": [
             {"where": [name], "why": "the joint moves no more than its sensor's noise"} for name in still
         ],
-        "notes": [note for note in session.notes if "held-out" not in note and "held out" not in note],
+        "warnings": [*session.warnings, *([] if session.accept else [ALONE])],
+        "notes": [*(n for n in session.notes if n != JUDGED_TWICE), *mixed_notes(session.plant)],
         "set_aside": session.set_aside,
         "noise": dict(zip(session.layout.labels(session.plant.joints), session.sigma.tolist(), strict=True)),
     }
@@ -60,7 +65,10 @@ def gap(session: Session, budget: int = 120, seed: int = 0) -> Gap:
 
 
 def _torques(
-    found: Sequence[JointStructure], train: TorqueResidual | None, held: TorqueResidual | None
+    found: Sequence[JointStructure],
+    train: TorqueResidual | None,
+    held: TorqueResidual | None,
+    units: dict[str, dict[str, str]],
 ) -> dict[str, Any]:
     """Joint -> mean and structured part of the torque that it lacks, and what that goes with; largest share first."""
     if train is None or held is None:
@@ -70,6 +78,7 @@ def _torques(
         j = train.joints.index(s.joint)
         lacks = np.concatenate((train.missing[:, j], held.missing[:, j]))
         out[s.joint] = {
+            "unit": units[s.joint]["torque"],
             "mean": float(np.mean(lacks)),
             "structured_rms": s.rms,
             "drive_rms": s.typical,
@@ -87,22 +96,23 @@ def _by_motion(session: Session, windows: dict[str, Windows]) -> list[dict[str, 
         return []
     part = windows[name]
     left = residuals(session.plant, session.layout, part, [vary(session.plant, [])], session.steps[0])[0, :, -1]
-    square = (left[:, session.layout.slices["joint_pos"]] ** 2).mean(axis=1)
-    groups: dict[tuple[str, str], list[float]] = {}
-    for i, value in zip(part.rollout, square, strict=True):
+    squares = left[:, session.layout.slices["joint_pos"]] ** 2
+    kinds = members(session.plant)
+    groups: dict[tuple[str, str], list[np.ndarray]] = {}
+    for i, values in zip(part.rollout, squares, strict=True):
         meta = session.rollouts[i].meta
         key = str(meta.get("cluster") or ""), str(meta.get("motion") or session.rollouts[i].rollout_id)
-        groups.setdefault(key, []).append(float(value))
-    rows = [
-        {
-            "cluster": cluster,
-            "motion": motion,
-            "horizon": name,
-            "windows": len(values),
-            "joint_pos_rmse": float(np.sqrt(np.mean(good)))
-            if (good := [v for v in values if np.isfinite(v)])
-            else None,
-        }
-        for (cluster, motion), values in groups.items()
-    ]
-    return sorted(rows, key=lambda row: -(row["joint_pos_rmse"] or np.inf))
+        groups.setdefault(key, []).append(values)
+    found = []
+    for (cluster, motion), windows_of in groups.items():
+        entry = {"cluster": cluster, "motion": motion, "horizon": name, "windows": len(windows_of)}
+        entry |= {"joint_pos_rmse": _rms(windows_of, slice(None))}
+        entry |= {"by_kind": {kind: _rms(windows_of, columns) for kind, columns in kinds.items()}}
+        found.append(entry)
+    return sorted(found, key=lambda row: -(row["joint_pos_rmse"] or np.inf))
+
+
+def _rms(squares: Sequence[np.ndarray], columns: list[int] | slice) -> float | None:
+    """Root mean square over the windows that stayed finite; None where none did."""
+    good = [value for row in squares if np.isfinite(value := float(row[columns].mean()))]
+    return float(np.sqrt(np.mean(good))) if good else None

@@ -5,7 +5,10 @@ from typing import Any
 
 from bumblebee.diagnosis.drawing import cloud_picture, line_picture
 from bumblebee.diagnosis.gap import Gap
-from bumblebee.diagnosis.page import UNITS, figure, interval, items, number, page, probability, shade, table, warning
+from bumblebee.diagnosis.page import figure, interval, items, number, page, probability, shade, table, warning
+from bumblebee.diagnosis.units import motion_error, named, of_joint, pick, position_rows
+from bumblebee.diagnosis.units import rows as rows_of
+from bumblebee.diagnosis.verdict import nothing_seen
 
 _MOTIONS = 15
 
@@ -16,6 +19,7 @@ def gap_page(report: Gap) -> str:
     parts = [
         "<h1>Where the model errs</h1>",
         f"<p class='lead'>{_lead(document)}</p>",
+        *[warning(text) for text in document.get("warnings", [])],
         *[warning(f"{entry['rollout']} was set aside: {entry['reason']}") for entry in document["set_aside"]],
         *_pictures(report),
         "<h2>Error of windows restarted from measured states</h2>",
@@ -23,9 +27,9 @@ def gap_page(report: Gap) -> str:
         "<h2>Joint by joint</h2>",
         _joints(document),
         "<h2>The torque that the model lacks</h2>",
-        _torque(document["missing_torque"]),
+        _torque(document),
         *_clouds(report),
-        *_reported(document["reported_torque"]),
+        *_reported(document),
         "<h2>Motion by motion</h2>",
         _motions(document["motions"]),
         "<h2>Notes</h2>" if document["notes"] or document["unidentifiable"] else "",
@@ -40,15 +44,27 @@ def _lead(document: dict[str, Any]) -> str:
     text = f"{count} rollout{'s' if count != 1 else ''}, {seconds:.0f} s, {document['commands']}. Nothing was fitted."
     if horizon is None:
         return escape(text)
-    error = document["error"][horizon]["joint_pos_rmse"]
-    floor = document["floor"][horizon]["joint_pos_rmse"]
-    if error["value"] is None or not floor["value"]:
+    error, floor = document["error"][horizon], document["floor"][horizon]
+    said = []
+    for what, unit, scale, key in position_rows(error):
+        value, noise = pick(error, key).get("value"), pick(floor, key).get("value")
+        if value is not None and noise:
+            said.append(f"the {what} are {scale * value:.3g} {unit} off, {value / noise:.2g} times what noise leaves")
+    if not said:
         return escape(text)
-    worst = max(error["per_joint"].items(), key=lambda item: item[1]["value"] or 0.0)
-    return escape(
-        f"{text} After {horizon} s the joints are {1e3 * error['value']:.3g} mrad off, "
-        f"{error['value'] / floor['value']:.2g} times what sensor noise leaves; most on {worst[0]}."
-    )
+    return escape(f"{text} After {horizon} s {'; '.join(said)}; most on {_worst(error, floor)}.")
+
+
+def _worst(error: dict[str, Any], floor: dict[str, Any]) -> str:
+    """The joint furthest off; beside its noise where hinges and slides cannot be compared otherwise."""
+    mixed = "by_kind" in error["joint_pos_rmse"]
+    noise = floor["joint_pos_rmse"]["per_joint"]
+
+    def size(joint: str) -> float:
+        value = error["joint_pos_rmse"]["per_joint"][joint]["value"] or 0.0
+        return value / (noise[joint]["value"] or 1.0) if mixed else value
+
+    return max(error["joint_pos_rmse"]["per_joint"], key=size)
 
 
 def _pictures(report: Gap) -> list[str]:
@@ -73,11 +89,8 @@ def error_rows(columns: dict[str, dict[str, Any]]) -> str:
     rows = []
     first = next(iter(columns.values()))
     for horizon, measures in first.items():
-        for name in measures:
-            if name not in UNITS:
-                continue
-            label, unit, scale = UNITS[name]
-            cells = [interval(block.get(horizon, {}).get(name), scale) for block in columns.values()]
+        for label, unit, scale, key in rows_of(measures):
+            cells = [interval(pick(block.get(horizon, {}), key), scale) for block in columns.values()]
             rows.append([f"{escape(horizon)} s", label + (f" [{unit}]" if unit else ""), *cells])
         lost = measures.get("windows", {}).get("diverged", 0)
         if lost:
@@ -92,7 +105,7 @@ def _joints(document: dict[str, Any]) -> str:
     joints = list(next(iter(error.values()))["joint_pos_rmse"]["per_joint"])
     rows = []
     for joint in joints:
-        cells = [escape(joint)]
+        cells = [escape(named(document, joint))]
         for horizon, measures in error.items():
             mine = measures["joint_pos_rmse"]["per_joint"][joint]["value"]
             noise = floor.get(horizon, {}).get("joint_pos_rmse", {}).get("per_joint", {}).get(joint, {}).get("value")
@@ -100,11 +113,12 @@ def _joints(document: dict[str, Any]) -> str:
             text = number(None if mine is None else 1e3 * mine)
             cells.append(f"<span style='padding:0 .4rem;{shade(ratio)}'>{text}</span>")
         rows.append(cells)
-    text = "<p class='note'>RMS position error in mrad (mm for slides); the redder, the further above the noise.</p>"
+    text = "<p class='note'>RMS position error, unit beside the joint; the redder, the further above the noise.</p>"
     return text + table(["joint", *[f"{h} s" for h in error]], rows, range(1, 1 + len(error)))
 
 
-def _torque(lacking: dict[str, Any]) -> str:
+def _torque(document: dict[str, Any]) -> str:
+    lacking = document["missing_torque"]
     if not lacking:
         return "<p>Too few windows to say.</p>"
     rows = []
@@ -113,15 +127,15 @@ def _torque(lacking: dict[str, Any]) -> str:
         share = f"{100 * entry['structured_rms'] / entry['drive_rms']:.0f} %" if entry["drive_rms"] else "-"
         rows.append(
             [
-                escape(joint),
+                f"{escape(joint)} [{entry['unit']}]",
                 number(entry["mean"]),
                 number(entry["structured_rms"]) if entry["significant"] else "-",
                 share if entry["significant"] else "-",
-                on if entry["significant"] else "<span class='note'>nothing that these tests can see</span>",
+                on if entry["significant"] else f"<span class='note'>{escape(nothing_seen(document, joint))}</span>",
                 probability(entry["p"]),
             ]
         )
-    head = ["joint", "mean [N m]", "predictable RMS [N m]", "of the drive's", "goes with", "p"]
+    head = ["joint", "mean", "predictable RMS", "of the drive's", "goes with", "p"]
     text = (
         "<p class='note'>Torque that would make up for the missed velocities, over 0.04 s or a tick. The predictable "
         "part is what boosted trees, trained on some rollouts, foresee on others; p is corrected for the number of "
@@ -138,32 +152,38 @@ def _clouds(report: Gap) -> list[str]:
     worst = [j for j, e in report.document["missing_torque"].items() if e["significant"]][:3]
     parts = []
     for joint in worst:
-        j = data.joints.index(joint)
+        j, lacks = data.joints.index(joint), f"missing [{of_joint(report.document, joint, 'torque')}]"
         pair = [
             cloud_picture(
-                data.v[:, j], data.missing[:, j], "velocity [rad/s]", "missing [N m]", f"{joint} over velocity"
-            ),
-            cloud_picture(
-                data.q[:, j], data.missing[:, j], "position [rad]", "missing [N m]", f"{joint} over position"
-            ),
-        ]
+                values[:, j], data.missing[:, j], f"{name} [{of_joint(report.document, joint, name)}]", lacks,
+                f"{joint} over {name}",
+            )
+            for name, values in (("velocity", data.v), ("position", data.q))
+        ]  # fmt: skip
         shown = "".join(figure(p, escape(f"{joint}: mean in equally filled bins, 95 % interval")) for p in pair)
         parts.append(f"<div class='row'>{shown}</div>")
     return parts
 
 
-def _reported(table_: dict[str, dict[str, float]]) -> list[str]:
+def _reported(document: dict[str, Any]) -> list[str]:
+    table_ = document["reported_torque"]
     if not table_:
         return []
     rows = [
-        [escape(j), number(e["gain"]), number(e["bias"]), f"{1e3 * e['delay']:.1f}", number(e["correlation"])]
+        [
+            f"{escape(j)} [{of_joint(document, j, 'torque')}]",
+            number(e["gain"]),
+            number(e["bias"]),
+            f"{1e3 * e['delay']:.1f}",
+            number(e["correlation"]),
+        ]
         for j, e in table_.items()
     ]
     text = (
         "<p class='note'>The drive's reported torque against what the declared drive would give at the measured state. "
         "A gain or delay here is the drive's; what is wrong beyond it is friction, inertia or load.</p>"
     )
-    head = ["joint", "gain", "bias [N m]", "delay [ms]", "correlation"]
+    head = ["joint", "gain", "bias", "delay [ms]", "correlation"]
     return ["<h2>The drives' own torque</h2>", text, table(head, rows, (1, 2, 3, 4))]
 
 
@@ -173,10 +193,10 @@ def _motions(motions: list[dict[str, Any]]) -> str:
             escape(m["cluster"]) or "-",
             escape(m["motion"]),
             str(m["windows"]),
-            number(None if m["joint_pos_rmse"] is None else 1e3 * m["joint_pos_rmse"]),
+            motion_error(m),
         ]
         for m in motions[:_MOTIONS]
     ]
     more = f"<p class='note'>and {len(motions) - _MOTIONS} more</p>" if len(motions) > _MOTIONS else ""
     horizon = motions[0]["horizon"] if motions else "0.2"
-    return table(["cluster", "motion", "windows", f"joints after {horizon} s [mrad]"], rows, (2, 3)) + more
+    return table(["cluster", "motion", "windows", f"joints after {horizon} s"], rows, (2, 3)) + more

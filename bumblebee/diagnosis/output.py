@@ -1,55 +1,60 @@
-"""A diagnosis on disk: diagnosis.json, model.xml, effects.yaml, report.html, in a folder that appears whole."""
+"""Results on disk, whole or not at all; where their place fails in the end they are kept elsewhere.
+
+A diagnosis is diagnosis.json, model.xml, effects.yaml and report.html; a gap report gap.json and gap.html.
+"""
 
 import json
-import os
-import shutil
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from bumblebee.diagnosis.diagnose import Diagnosis
 from bumblebee.diagnosis.example import examples
+from bumblebee.diagnosis.gap import Gap
+from bumblebee.diagnosis.gap_page import gap_page
+from bumblebee.diagnosis.places import DIAGNOSIS, GAP, Result, refuse_file, refuse_folder
 from bumblebee.diagnosis.report import render_report
 from bumblebee.errors import BadInput
+from bumblebee.io.write import kept, write_file, write_folder
 from bumblebee.measured.model_file import name_assets_in_full
-from bumblebee.sim.effects import add_to_spec, write_effects
-
-
-def refuse_existing(out: Path, overwrite: bool) -> None:
-    """`BadInput` if `out` holds something and overwriting was not asked for."""
-    if out.exists() and not out.is_dir():
-        raise BadInput(out, "a folder to write", "a file")
-    if out.is_dir() and any(out.iterdir()) and not overwrite:
-        raise BadInput(
-            out, "a folder that does not exist yet", "one with files in it", "Add --overwrite to replace it."
-        )
+from bumblebee.sim.effects import add_to_spec, effects_yaml
 
 
 def write_diagnosis(diagnosis: Diagnosis, out: Path, overwrite: bool = False) -> None:
-    """Write all four files, or none."""
+    """Write all four files, or none; `overwrite` replaces an earlier diagnosis and nothing else."""
+    _write(Path(out), DIAGNOSIS, overwrite, contents(diagnosis))
+
+
+def write_gap(gap: Gap, out: Path, overwrite: bool = False) -> None:
+    """Write both files, or none; `overwrite` replaces an earlier gap report and nothing else."""
+    _write(Path(out), GAP, overwrite, {"gap.json": as_json(gap.document), "gap.html": gap_page(gap)})
+
+
+def write_errors(errors: dict[str, Any], out: Path, overwrite: bool = False) -> None:
+    """Write the errors that `replay` found; `overwrite` replaces an earlier file of them and nothing else."""
     out = Path(out)
-    refuse_existing(out, overwrite)
-    fresh = out.parent / f".{out.name}.{os.getpid()}.writing"
-    fresh.mkdir(parents=True)
     try:
-        fill(diagnosis, fresh)
-        if out.exists():
-            old = out.parent / f".{out.name}.{os.getpid()}.old"
-            os.rename(out, old)
-            os.rename(fresh, out)
-            shutil.rmtree(old)
-        else:
-            os.rename(fresh, out)
-    finally:
-        shutil.rmtree(fresh, ignore_errors=True)
+        refuse_file(out, overwrite)
+        write_file(out, as_json(errors))
+    except BadInput as error:
+        raise _elsewhere(error, out, {out.name: as_json(errors)}) from None
 
 
 def fill(diagnosis: Diagnosis, folder: Path) -> None:
     """The four files in an existing folder."""
-    text = json.dumps(diagnosis.document, indent=1, allow_nan=False)
-    (folder / "diagnosis.json").write_text(text)
-    write_effects(folder / "effects.yaml", diagnosis.effects)
-    (folder / "model.xml").write_text(corrected_xml(diagnosis))
+    for name, text in contents(diagnosis).items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def contents(diagnosis: Diagnosis) -> dict[str, str]:
+    """The four files by name."""
     shown = examples(diagnosis.session, diagnosis.effects)
-    (folder / "report.html").write_text(render_report(diagnosis.document, shown))
+    return {
+        "diagnosis.json": as_json(diagnosis.document),
+        "effects.yaml": effects_yaml(diagnosis.effects),
+        "model.xml": corrected_xml(diagnosis),
+        "report.html": render_report(diagnosis.document, shown),
+    }
 
 
 def corrected_xml(diagnosis: Diagnosis) -> str:
@@ -59,3 +64,20 @@ def corrected_xml(diagnosis: Diagnosis) -> str:
     add_to_spec(spec, diagnosis.effects)
     spec.compile()
     return spec.to_xml()
+
+
+def as_json(document: dict[str, Any]) -> str:
+    """Text of a document; numbers that are none are an error."""
+    return json.dumps(document, indent=1, allow_nan=False)
+
+
+def _write(out: Path, result: Result, overwrite: bool, files: Mapping[str, str]) -> None:
+    try:  # minutes have passed since the command looked: something else may lie there now
+        refuse_folder(out, result, overwrite)
+    except BadInput as error:
+        raise _elsewhere(error, out, files) from None
+    write_folder(out, files)
+
+
+def _elsewhere(error: BadInput, out: Path, files: Mapping[str, str]) -> BadInput:
+    return BadInput(error.where, error.expected, error.came, kept(out.name, files))

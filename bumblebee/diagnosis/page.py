@@ -13,8 +13,10 @@ th{color:#6b7385;font-weight:500}td.n,th.n{text-align:right;font-variant-numeric
 .note{color:#6b7385;font-size:.86rem}.warn{border-left:4px solid #c8553d;background:#fbeeea;padding:.5rem .9rem;
 margin:.8rem 0}
 .share{white-space:nowrap}.bar{display:inline-block;height:.6rem;background:#1b8a6b;border-radius:2px;vertical-align:middle;margin-right:.4rem}
-svg{max-width:100%;height:auto;font-size:11px}.row{display:flex;flex-wrap:wrap;gap:.6rem}.row figure{flex:1 1 18rem}
+figure{overflow-x:auto}svg{display:block;width:100%;min-width:34rem;max-width:48rem;height:auto;font-size:13px}
+.row svg{min-width:0}.row{display:flex;flex-wrap:wrap;gap:.6rem}.row figure{flex:1 1 18rem}
 figure{margin:.4rem 0}.row figure{max-width:20rem}figcaption{color:#6b7385;font-size:.86rem}
+@media(max-width:40rem){td:last-child:not(.n){min-width:11rem}}
 code{font-size:.86rem;white-space:normal;overflow-wrap:anywhere}
 details{margin:.6rem 0}summary{cursor:pointer;color:#6b7385}.good{color:#1b8a6b}.bad{color:#c8553d}
 .values{min-width:13rem;display:inline-block}"""
@@ -22,7 +24,8 @@ details{margin:.6rem 0}summary{cursor:pointer;color:#6b7385}.good{color:#1b8a6b}
 
 def page(title: str, parts: Sequence[str]) -> str:
     """A whole page; it loads nothing from anywhere."""
-    head = f"<meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>{escape(title)}</title>"
+    view = "<meta name='viewport' content='width=device-width,initial-scale=1'>"
+    head = f"<meta charset='utf-8'>{view}<title>{escape(title)}</title>"
     body = "\n".join(part for part in parts if part)
     return f"<!doctype html><html lang='en'><head>{head}<style>{_STYLE}</style></head><body>\n{body}\n</body></html>\n"
 
@@ -77,13 +80,3 @@ def shade(ratio: float) -> str:
     """Background for a cell whose error is `ratio` times the noise: the redder, the more."""
     strength = min(max((ratio - 1.0) / 20.0, 0.0), 1.0) ** 0.5
     return f"background:rgba(200,85,61,{0.55 * strength:.2f})"
-
-
-UNITS = {
-    "joint_pos_rmse": ("joint position", "mrad", 1e3),
-    "joint_vel_rmse": ("joint velocity", "rad/s", 1.0),
-    "base_pos_rmse": ("base position", "mm", 1e3),
-    "base_rot_rmse": ("base rotation", "mrad", 1e3),
-    "chi2": ("chi-square (1 = at the noise)", "", 1.0),
-}
-"""Measure of the error block -> its name, unit and the factor from SI."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from bumblebee.diagnosis.fit import Fit
 from bumblebee.diagnosis.problem import Problem
+from bumblebee.diagnosis.units import unit_on
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect, single
 
@@ -74,7 +75,7 @@ def entries(found: Sequence[Grid], problem: Problem, fit: Fit) -> tuple[list[dic
                     "value": g.step,
                     "ci95": [float(g.step - 1.96 * g.error), float(g.step + 1.96 * g.error)],
                     "nominal": 0.0,
-                    "unit": "rad",
+                    "unit": unit_on(problem.plant, "encoder_quantisation", g.joint, "rad"),
                 }
             },
             "equivalent": [],

@@ -1,9 +1,6 @@
 """The error block of any model on any rollouts, without a diagnosis."""
 
-import json
-import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from bumblebee.diagnosis.error_block import error_block, horizon_whiteners, horizon_windows
@@ -33,16 +30,3 @@ def _known(session: Session, effect: Effect) -> None:
     for place in effect.where:
         if place not in names:
             raise BadInput(f"effect {effect.effect}: where", f"a {kind} of the model", repr(place)[:80])
-
-
-def write_json(path: Path, document: dict[str, Any]) -> None:
-    """Write JSON; the file appears whole or not at all."""
-    write_text(path, json.dumps(document, indent=1, allow_nan=False))
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write text; the file appears whole or not at all."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    temporary.parent.mkdir(parents=True, exist_ok=True)
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, path)

@@ -7,7 +7,8 @@ from typing import Any
 from bumblebee.diagnosis.drawing import curve_picture, line_picture
 from bumblebee.diagnosis.gap_page import error_rows
 from bumblebee.diagnosis.page import figure, items, number, page, probability, table, warning
-from bumblebee.diagnosis.verdict import worse_horizons
+from bumblebee.diagnosis.units import named, of_joint, pick, position_rows
+from bumblebee.diagnosis.verdict import beside_noise, told_horizon, unexplained_error, what_is_left, worse_horizons
 
 _DETECTABLE = 60
 
@@ -18,7 +19,7 @@ def render_report(document: dict[str, Any], examples: Sequence[dict[str, Any]]) 
     parts = [
         "<h1>What the model lacks</h1>",
         f"<p class='lead'>{_lead(document)}</p>",
-        *[warning(text) for text in worse_horizons(document["error"])],
+        *[warning(text) for text in [*document.get("warnings", []), *worse_horizons(document["error"])]],
         *[warning(f"{a['rollout']} was set aside: {a['reason']}") for a in document.get("set_aside", [])],
         *_pictures(examples),
         "<h2>Effects</h2>",
@@ -26,9 +27,9 @@ def render_report(document: dict[str, Any], examples: Sequence[dict[str, Any]]) 
         "<h2>Error on rollouts that took no part in the fit</h2>" if held else "<h2>Error on the fitted rollout</h2>",
         error_rows({k: document["error"][k] for k in ("before", "after", "oracle", "floor") if k in document["error"]}),
         "<h2>Joint by joint</h2>",
-        _joints(document["error"]),
+        _joints(document),
         "<h2>What is left</h2>",
-        _left(document["unexplained"], document.get("structure", {})),
+        _left(document),
         _small(document.get("smallest_detectable", [])),
         "<h2>Notes</h2>",
         items(_notes(document)),
@@ -44,18 +45,25 @@ def _lead(document: dict[str, Any]) -> str:
         ]
         more = f" and {len(names) - 6} more" if len(names) > 6 else ""
         text = f"{len(effects)} effect{'s' if len(effects) > 1 else ''}: {'; '.join(names[:6])}{more}."
+    elif far := unexplained_error(document):
+        return escape(" ".join(far))
     else:
-        text = "No effect of the catalogue is missing, as far as these data can tell."
-    horizon = "0.2" if "0.2" in error["before"] else next(iter(error["before"]), None)
-    if horizon is None or not effects:
+        return "No effect of the catalogue is missing, as far as these data can tell."
+    horizon = told_horizon(error["before"])
+    if horizon is None:
         return text
-    before, after, floor = (error[k].get(horizon, {}).get("joint_pos_rmse", {}) for k in ("before", "after", "floor"))
-    if not before.get("value") or not after.get("value"):
-        return text
-    where = "held-out joint error" if document["holdout"] else "joint error of the fitted rollout"
-    said = f" After {horizon} s the {where} falls from {1e3 * before['value']:.3g} to {1e3 * after['value']:.3g} mrad"
-    noise = f" (noise alone {1e3 * floor['value']:.2g})" if floor.get("value") else ""
-    return f"{text}{said}{noise}."
+    where = "held-out error" if document["holdout"] else "error on the fitted rollout"
+    said = []
+    for what, unit, scale, key in position_rows(error["before"][horizon]):
+        before, after, floor = (pick(error[k].get(horizon, {}), key) for k in ("before", "after", "floor"))
+        if before.get("value") and after.get("value"):
+            noise = beside_noise(after, floor, unit, scale)
+            goes = "falls" if after["value"] < before["value"] else "goes"
+            said.append(
+                f" After {horizon} s the {where} of the {what} {goes} from {scale * before['value']:.3g} to "
+                f"{scale * after['value']:.3g} {unit}{f' ({noise})' if noise else ''}."
+            )
+    return text + "".join(said)
 
 
 def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
@@ -137,13 +145,14 @@ def _same(effect: dict[str, Any]) -> str:
     return text + (f"<br><span class='note'>to separate: {escape(advice)}</span>" if advice else "")
 
 
-def _joints(error: dict[str, Any]) -> str:
+def _joints(document: dict[str, Any]) -> str:
     """Before and after by joint and horizon, coloured where they differ."""
+    error = document["error"]
     if not error["before"]:
         return ""
     rows = []
     for joint in next(iter(error["before"].values()))["joint_pos_rmse"]["per_joint"]:
-        cells = [escape(joint)]
+        cells = [escape(named(document, joint))]
         for horizon in error["before"]:
             pair = [error[k][horizon]["joint_pos_rmse"]["per_joint"][joint]["value"] for k in ("before", "after")]
             if None in pair:
@@ -152,18 +161,19 @@ def _joints(error: dict[str, Any]) -> str:
             kind = "good" if pair[1] < 0.95 * pair[0] else "bad" if pair[1] > 1.05 * pair[0] else "note"
             cells.append(f"{number(1e3 * pair[0])} <span class='{kind}'>&rarr; {number(1e3 * pair[1])}</span>")
         rows.append(cells)
-    text = "<p class='note'>RMS position error before and after, in mrad (mm for slides).</p>"
+    text = "<p class='note'>RMS position error before and after, in mrad or mm, as beside the joint.</p>"
     return text + table(["joint", *[f"{h} s" for h in error["before"]]], rows, range(1, 1 + len(error["before"])))
 
 
-def _left(left: dict[str, Any], structure: dict[str, Any]) -> str:
+def _left(document: dict[str, Any]) -> str:
+    left, structure = document["unexplained"], document.get("structure", {})
     if not left["significant"]:
-        said = left["description"] or "No structure is left that these tests can see"
-        return f"<p>{escape(said)} (p = {left['p']:.2g}).</p>"
+        said = what_is_left(document)
+        return f"<p>{escape(said[:1].upper() + said[1:])} (p = {left['p']:.2g}).</p>"
     rows = [
         [
             escape(joint),
-            f"{e['torque_rms']:.3g}",
+            f"{e['torque_rms']:.3g} {of_joint(document, joint, 'torque')}",
             f"{100 * e['torque_rms'] / e['typical_torque']:.0f} %",
             escape(", ".join(e["depends_on"])) or "-",
             probability(e["p"]),
@@ -174,19 +184,20 @@ def _left(left: dict[str, Any], structure: dict[str, Any]) -> str:
     text = (
         "<p>Structure remains that no effect above explains. It is described, not forced into a catalogue's name.</p>"
     )
-    head = ["joint", "RMS [N m]", "of the drive's", "goes with", "p"]
+    head = ["joint", "RMS", "of the drive's", "goes with", "p"]
     said = f"<p>{escape(left['description'])}.</p>"
     listed = table(head, rows, (1, 2, 4)) if rows else ""
-    return text + listed + said + "".join(_curves(structure, left["where"][:3]))
+    return text + listed + said + "".join(_curves(document, left["where"][:3]))
 
 
-def _curves(structure: dict[str, Any], joints: Sequence[str]) -> list[str]:
+def _curves(document: dict[str, Any], joints: Sequence[str]) -> list[str]:
     """What is left over velocity, position and so on, a row of pictures a joint."""
     parts = []
     for joint in joints:
-        known = structure.get(joint, {}).get("curves", {})
+        known = document.get("structure", {}).get(joint, {}).get("curves", {})
+        lacks = f"missing [{of_joint(document, joint, 'torque')}]"
         drawn = [
-            figure(curve_picture(rows, quantity, "missing [N m]", f"{joint} over {quantity}"), escape(joint))
+            figure(curve_picture(rows, quantity, lacks, f"{joint} over {quantity}"), escape(joint))
             for quantity, rows in known.items()
         ]
         parts.append(f"<div class='row'>{''.join(drawn)}</div>")

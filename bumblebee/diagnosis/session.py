@@ -15,6 +15,7 @@ from bumblebee.diagnosis.repeats import motion_names
 from bumblebee.diagnosis.signals import Layout, layout_of
 from bumblebee.diagnosis.simulate import longest_step, step_for
 from bumblebee.diagnosis.smooth import HALF_SPAN, smooth_rollouts
+from bumblebee.diagnosis.undriven import undriven_warnings
 from bumblebee.diagnosis.unlogged import refuse_unlogged
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
@@ -29,6 +30,7 @@ _SHORTEST = 0.35
 # From so many rollouts to fit on, some are put aside to decide which effects are accepted.
 _ENOUGH_TO_SPLIT = 4
 _MOST_WARNINGS = 12
+JUDGED_TWICE = "the held-out rollouts decided which effects were accepted, never how large they are"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +55,8 @@ class Session:
     notes: list[str]
     set_aside: list[dict[str, str]]
     """Rollouts that could not be used, with the reason."""
+    warnings: tuple[str, ...] = ()
+    """What must not be overlooked in any report of this model and these rollouts."""
 
     def ids(self, which: Sequence[int]) -> list[str]:
         """Rollout ids of indices."""
@@ -117,6 +121,7 @@ def make_session(
         notes.append(f"position and velocity actuators taken as one servo of one limit: {', '.join(folded[:6])}")
     plant = make_plant(spec, long[0], model)
     refuse_unlogged(plant, model)
+    undriven = undriven_warnings(plant, long, model)
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)
     if plant.floating and not has_pos:
@@ -124,9 +129,7 @@ def make_session(
     train, holdout = split(long)
     accept = _accepting(long, train, holdout)
     if set(accept) & set(holdout):
-        notes.append("the held-out rollouts decided which effects were accepted, never how large they are")
-    elif not holdout:
-        notes.append("a single rollout: nothing could be held out; errors are those of the fitted data")
+        notes.append(JUDGED_TWICE)
     period = float(np.median(np.diff(long[0].time)))
     declared = float(spec.option.timestep)
     steps = (step_for(period, min(_FINE, declared)), longest_step(period, _COARSE))
@@ -141,7 +144,9 @@ def make_session(
         if fast:
             notes.append(f"{fast} fast rollouts: joint readings smoothed over +-{1000 * HALF_SPAN:g} ms")
     aside = [{"rollout": name, "reason": str(error)} for name, error in failed]
-    return Session(spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside)
+    return Session(
+        spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, tuple(undriven)
+    )
 
 
 def _accepting(rollouts: Sequence[Rollout], train: Sequence[int], holdout: Sequence[int]) -> list[int]:

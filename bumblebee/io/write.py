@@ -3,11 +3,12 @@
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from bumblebee.errors import BadInput
+from bumblebee.io import left_overs
 
 TRIED_BYTES = 1 << 20  # written and removed again to see whether a disk takes a result
 
@@ -30,17 +31,20 @@ def refuse_foreign(out: Path, is_ours: Callable[[Path], bool], what: str) -> Non
 def try_output(out: Path) -> None:
     """See whether the disk takes an output at `out`, before minutes of work; nothing is left behind.
 
+    What runs that were killed left beside `out` is cleared; a result that one had put aside comes back.
+
     Raises:
         BadInput: no permission, a read-only or full disk, a file where a folder must be.
     """
-    parent = Path(os.path.abspath(out)).parent
+    out = Path(os.path.abspath(out))
     made: list[Path] = []
     try:
-        for folder in reversed([parent, *parent.parents]):
+        for folder in reversed([out.parent, *out.parent.parents]):
             if not folder.exists():
                 folder.mkdir()
                 made.append(folder)
-        with tempfile.NamedTemporaryFile(dir=parent, prefix=f".{out.name[:40]}.") as probe:
+        left_overs.clear(out)
+        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=left_overs.prefix(out), suffix=".part") as probe:
             probe.write(bytes(TRIED_BYTES))
             probe.flush()
             os.fsync(probe.fileno())
@@ -51,29 +55,55 @@ def try_output(out: Path) -> None:
             folder.rmdir()
 
 
-def unwritable(out: Path, error: OSError) -> BadInput:
+def unwritable(out: Path, error: OSError, do: str = "Choose another place.") -> BadInput:
     """The line for an output that the system refuses."""
-    return BadInput(out, "a place that can be written", error.strerror or str(error), "Choose another place.")
+    return BadInput(out, "a place that can be written", error.strerror or str(error), do)
 
 
 def write_file(path: Path, content: bytes | str) -> None:
     """Write a file, whole or not at all; one that is there is replaced: ask `refuse_foreign` first."""
-    path = Path(path)
-    data = content.encode() if isinstance(content, str) else content
+    path = Path(os.path.abspath(path))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:40]}.", suffix=".part")
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=left_overs.prefix(path), suffix=".part")
     except OSError as error:
         raise unwritable(path, error) from None
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
+            stream.write(_bytes(content))
         os.chmod(name, 0o644)
         os.replace(name, path)
     except OSError as error:
         raise unwritable(path, error) from None
     finally:
         Path(name).unlink(missing_ok=True)
+
+
+def write_folder(out: Path, files: Mapping[str, bytes | str]) -> None:
+    """Write a folder of files, whole or not at all; where its place takes nothing it is kept elsewhere.
+
+    Args:
+        out: the folder; one that is there is replaced.
+        files: name -> content.
+    """
+    try:
+        with new_folder(out) as folder:
+            _fill(folder, files)
+    except OSError as error:
+        raise unwritable(out, error, kept(out.name, files)) from None
+
+
+def kept(name: str, files: Mapping[str, bytes | str]) -> str:
+    """Keep a finished result in the temporary folder; the sentence that says where, or that it could not be."""
+    place = None
+    try:
+        place = Path(tempfile.mkdtemp(prefix=f"{name[:40].lstrip('.')}."))
+        _fill(place, files)
+    except OSError as error:
+        if place is not None:
+            shutil.rmtree(place, ignore_errors=True)
+        return f"The result is lost: the temporary folder takes nothing either ({error.strerror})."
+    return f"The result is complete and kept in {place}."
 
 
 @contextmanager
@@ -86,7 +116,8 @@ def new_folder(out: Path) -> Iterator[Path]:
     out = Path(os.path.abspath(out))
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        fresh = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name[:40]}."))
+        left_overs.clear(out)
+        fresh = Path(tempfile.mkdtemp(dir=out.parent, prefix=left_overs.prefix(out), suffix=".part"))
     except OSError:
         fresh = Path(tempfile.mkdtemp(prefix=f"{out.name[:40]}."))
     finished = False
@@ -98,8 +129,10 @@ def new_folder(out: Path) -> Iterator[Path]:
     except OSError as error:
         if not finished:
             raise
-        do = f"The result is complete and kept in {fresh}."
-        raise BadInput(out, "a place that can be written", error.strerror or str(error), do) from None
+        raise unwritable(out, error, f"The result is complete and kept in {left_overs.spare(fresh)}.") from None
+    except BaseException:  # stopped while it was put in its place
+        finished = False
+        raise
     finally:
         if not finished:
             shutil.rmtree(fresh, ignore_errors=True)
@@ -107,21 +140,42 @@ def new_folder(out: Path) -> Iterator[Path]:
 
 def swap(fresh: Path, out: Path) -> None:
     """Put `fresh` where `out` is, by renames; what was there is removed only when the new one is in place."""
-    old = out.with_name(f".{out.name[:40]}.{os.getpid()}.old")
+    near = fresh if os.stat(fresh).st_dev == os.stat(out.parent).st_dev else _copied(fresh, out)
+    old = out.with_name(f"{left_overs.prefix(out)}old")
     replaced = os.path.lexists(out)
-    if replaced:
-        os.rename(out, old)
     try:
-        if os.stat(fresh).st_dev == os.stat(out.parent).st_dev:
-            os.rename(fresh, out)
-        else:
-            shutil.move(fresh, out)
-    except OSError:
         if replaced:
+            shutil.rmtree(old, ignore_errors=True)
+            os.rename(out, old)
+        os.rename(near, out)
+    except BaseException:
+        if replaced and not os.path.lexists(out):
             os.rename(old, out)
+        if near != fresh:
+            shutil.rmtree(near, ignore_errors=True)
         raise
-    if replaced:
-        shutil.rmtree(old, ignore_errors=True)
+    for folder in (old, *([fresh] if near != fresh else [])):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _copied(fresh: Path, out: Path) -> Path:
+    """The same folder on the disk of `out`, from which a rename is enough."""
+    near = Path(tempfile.mkdtemp(dir=out.parent, prefix=left_overs.prefix(out), suffix=".part"))
+    try:
+        shutil.copytree(fresh, near, dirs_exist_ok=True)
+    except BaseException:
+        shutil.rmtree(near, ignore_errors=True)
+        raise
+    return near
+
+
+def _fill(folder: Path, files: Mapping[str, bytes | str]) -> None:
+    for name, content in files.items():
+        (folder / name).write_bytes(_bytes(content))
+
+
+def _bytes(content: bytes | str) -> bytes:
+    return content.encode() if isinstance(content, str) else content
 
 
 def _same(one: Path, other: Path) -> bool:

@@ -18,6 +18,7 @@ from bumblebee.sim.effect_catalogue import CATALOGUE, Effect, Kind, Parameter, s
 from bumblebee.sim.effect_hooks import RuntimeHooks, runtime_hooks
 from bumblebee.sim.effect_spec import add_to_spec
 from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.units import both_units
 
 __all__ = [
     "CATALOGUE",
@@ -25,6 +26,7 @@ __all__ = [
     "Kind",
     "RuntimeHooks",
     "add_to_spec",
+    "effects_yaml",
     "read_effects",
     "runtime_hooks",
     "single",
@@ -41,10 +43,15 @@ _LARGEST = 1e9  # of a parameter or a coefficient, in SI units
 def write_effects(path: Path, effects: Sequence[Effect]) -> None:
     """Write `effects.yaml`; it appears whole or not at all."""
     path = Path(path)
-    entries = [{"effect": e.effect, "where": list(e.where), "parameters": _written(e)} for e in effects]
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    temporary.write_text(yaml.safe_dump({"schema": 1, "effects": entries}, sort_keys=False))
+    temporary.write_text(effects_yaml(effects))
     os.replace(temporary, path)
+
+
+def effects_yaml(effects: Sequence[Effect]) -> str:
+    """The text of `effects.yaml`."""
+    entries = [{"effect": e.effect, "where": list(e.where), "parameters": _written(e)} for e in effects]
+    return yaml.safe_dump({"schema": 1, "effects": entries}, sort_keys=False)
 
 
 def read_effects(path: Path) -> list[Effect]:
@@ -139,7 +146,8 @@ def _effect(where: str, entry: Any) -> Effect:
     _only_keys(f"{where}: parameters", entry.get("parameters"), set(kind.names))
     given = entry["parameters"]
     wanted = [p for p in kind.parameters if p.default is None or p.name in given]
-    return Effect(name, tuple(places), {p.name: _value(where, given.get(p.name), p) for p in wanted})
+    values = {p.name: _value(where, given.get(p.name), p, kind.on == "joint") for p in wanted}
+    return Effect(name, tuple(places), values)
 
 
 def _terms(where: str, table: Any) -> dict[str, float]:
@@ -166,11 +174,12 @@ def _terms(where: str, table: Any) -> dict[str, float]:
     return out
 
 
-def _value(where: str, value: Any, parameter: Parameter) -> float:
+def _value(where: str, value: Any, parameter: Parameter, on_joint: bool) -> float:
     """A finite number within the parameter's bounds."""
     if not _is_number(value) or not parameter.lower <= value <= parameter.upper:
+        unit = both_units(parameter.unit) if on_joint else parameter.unit
         lower, upper = max(parameter.lower, -_LARGEST), min(parameter.upper, _LARGEST)
-        expected = f"a number from {lower:g} to {upper:g} {parameter.unit}".strip()
+        expected = f"a number from {lower:g} to {upper:g} {unit}".strip()
         raise BadInput(f"{where}: parameters.{parameter.name}", expected, _shown(value))
     return float(value)
 

@@ -1,6 +1,7 @@
 """Outputs appear whole, replace no input and nothing that is not ours, and a disk is tried before the work."""
 
 import os
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -70,3 +71,74 @@ def test_a_finished_result_is_kept_where_its_place_is_gone(tmp_path: Path, monke
         (folder / "whole").write_text("x")
     kept = Path(str(caught.value).split("kept in ")[1].rstrip("."))
     assert (kept / "whole").read_text() == "x"
+
+
+GONE = 2**22 + 7  # no process has this number: Linux ends at 2^22
+
+
+def test_what_a_killed_run_left_is_cleared_and_what_a_living_one_works_on_stays(tmp_path: Path):
+    for process in (GONE, os.getppid()):
+        (tmp_path / f".out.{process}.abc_1.part").mkdir()
+        (tmp_path / f".out.{process}.abc_2.part").write_text("half")
+    (tmp_path / f".other.{GONE}.abc_1.part").mkdir()
+    (tmp_path / f".out.{GONE}.mine").mkdir()
+    write.try_output(tmp_path / "out")
+    kept = {path.name for path in tmp_path.iterdir()}
+    living = {f".out.{os.getppid()}.abc_{n}.part" for n in (1, 2)}
+    assert kept == {*living, f".other.{GONE}.abc_1.part", f".out.{GONE}.mine"}
+
+
+def test_a_result_that_a_killed_run_had_moved_away_comes_back(tmp_path: Path):
+    (tmp_path / f".out.{GONE}.old").mkdir()
+    (tmp_path / f".out.{GONE}.old" / "result").write_text("mine")
+    write.try_output(tmp_path / "out")
+    assert (tmp_path / "out" / "result").read_text() == "mine"
+    (tmp_path / f".out.{GONE}.old").mkdir()
+    write.try_output(tmp_path / "out")
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_an_interrupted_exchange_leaves_the_old_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    write.write_folder(tmp_path / "out", {"a": "old"})
+    real = os.rename
+
+    def rename(source: Path, target: Path) -> None:
+        if str(source).endswith(".part"):
+            raise KeyboardInterrupt
+        real(source, target)
+
+    monkeypatch.setattr(os, "rename", rename)
+    with pytest.raises(KeyboardInterrupt):
+        write.write_folder(tmp_path / "out", {"a": "new"})
+    assert (tmp_path / "out" / "a").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_files_that_their_disk_does_not_take_are_kept_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "elsewhere"))
+    real = Path.write_bytes
+
+    def full(path: Path, data: bytes) -> int:
+        if "elsewhere" in path.parts:
+            return real(path, data)
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(BadInput, match="No space left") as caught:
+        write.write_folder(tmp_path / "out", {"a": "x"})
+    kept = Path(str(caught.value).split("kept in ")[1].rstrip("."))
+    assert (kept / "a").read_text() == "x"
+    assert [path.name for path in tmp_path.iterdir()] == ["elsewhere"]
+
+
+def test_a_result_that_no_disk_takes_is_said_to_be_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    assert "lost" in write.kept("out", {"a": "x"})
+
+
+def test_long_names_have_temporary_names_that_a_disk_takes(tmp_path: Path):
+    out = tmp_path / ("ü" * 120)
+    write.write_folder(out, {"a": "x"})
+    write.write_file(tmp_path / ("n" * 250), "x")
+    assert (out / "a").read_text() == "x"

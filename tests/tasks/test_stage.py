@@ -94,12 +94,30 @@ def test_a_full_disk_is_one_line_and_status_2_and_nothing_is_half_written(capsys
     assert list(Path("data").iterdir()) == []
 
 
-def test_other_errors_keep_their_traceback():
+@pytest.mark.parametrize("error", [OSError(errno.ENOENT, "no such file", "x"), RuntimeError("two\nlines")])
+def test_other_errors_are_one_line_and_status_1_and_their_traceback_is_in_a_log(
+    error: Exception, capsys: pytest.CaptureFixture[str]
+):
     def main() -> None:
-        raise OSError(errno.ENOENT, "no such file", "x")
+        raise error
 
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(SystemExit) as ended:
         run_stage(main, [])
+    assert ended.value.code == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "Traceback" not in said
+    log = Path(said.split("with ")[-1].strip())
+    assert "Traceback" in log.read_text() and type(error).__name__ in log.read_text()
+    log.unlink()
+
+
+def test_a_full_database_is_a_full_disk(capsys: pytest.CaptureFixture[str]):
+    def main() -> None:
+        raise RuntimeError("(sqlite3.OperationalError) database or disk is full")
+
+    with pytest.raises(SystemExit) as ended:
+        run_stage(main, [])
+    assert ended.value.code == 2 and "no space left" in capsys.readouterr().err
 
 
 def test_scratch_survives_a_run_that_did_not_complete_and_goes_with_one_that_did(workspace: Path):
