@@ -8,23 +8,28 @@ import os
 import subprocess
 import sys
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from prefect import flow, get_run_logger, task
+from prefect import flow, get_run_logger, runtime, task
 from prefect.cache_policies import NO_CACHE
 from prefect.futures import PrefectFuture
 from prefect.states import Completed, Failed, State
 from prefect.task_runners import ThreadPoolTaskRunner
 
+from bumblebee.errors import BadInput
 from flows import gates
-from flows.environment import environment
+from flows.environment import SERVERS, environment, without_login
+from flows.owned import require_own
+from flows.runs import recorded
 from flows.stages import Stage, changed_stages, downstream, read_stages, to_run
 
 KEPT = 5  # last lines of a failed stage that its error repeats
 
 
 WAITING = "WaitingForAnswer"  # name of the state of a run that ended at a gate
+at_end: Callable[[State[Any]], None] = lambda state: None  # noqa: E731  (flows.walk puts its own here)
 
 
 @task(task_run_name="{title}", cache_policy=NO_CACHE, persist_result=False, retries=0)
@@ -39,7 +44,7 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
     with subprocess.Popen(
         command,
         cwd=workspace,
-        env=environment(Path(workspace)),
+        env=without_login(environment(Path(workspace))),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -64,13 +69,28 @@ def is_chatter(line: str) -> bool:
 
 
 @flow(name="loop", log_prints=False, persist_result=False, validate_parameters=False)
-def loop(workspace: str = "") -> State[Any]:
+def loop() -> State[Any]:
     """Walk the stages; ends completed, failed, or named WaitingForAnswer where a gate has no answer yet.
 
-    Args:
-        workspace: the folder with dvc.yaml and params.yaml; by default what BUMBLEBEE_WORKSPACE says, or this one.
+    In the folder that BUMBLEBEE_WORKSPACE names, or in this one. No parameter: dvc.yaml holds commands, so that who
+    starts a run must not choose whose they are.
     """
-    folder = Path(workspace or os.environ.get("BUMBLEBEE_WORKSPACE", "."))
+    folder = Path(os.environ.get("BUMBLEBEE_WORKSPACE", "."))
+    try:
+        require_own(folder)
+        with recorded(folder / SERVERS, runtime.flow_run.id):
+            state = walk(folder)
+    except BadInput as error:
+        state = Failed(message=str(error))
+    except Exception as error:
+        at_end(Failed(message=f"{type(error).__name__}: {error}"))
+        raise
+    at_end(state)
+    return state
+
+
+def walk(folder: Path) -> State[Any]:
+    """Start every stage that has work to do when those before it are done; how it ended."""
     log = get_run_logger()
     stages = read_stages(folder)
     busy = to_run(stages, changed_stages(folder))
