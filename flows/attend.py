@@ -15,6 +15,7 @@ from flows.processes import end_tree
 from flows.servers import HOME, Addresses
 
 LOOK_EVERY = 0.2  # [s]
+WALK = [sys.executable, "-m", "flows.walk"]
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SEEN = {"mlflow": "MLflow's server went away: its page is closed, the stages go on and write its history all the same"}
 
@@ -67,9 +68,10 @@ def attend(folder: Path, addresses: Addresses, *options: str, until_lost: bool =
     settings = environment(folder)
     settings["PREFECT_API_URL"] = f"{addresses.prefect}/api"
     settings["BUMBLEBEE_WORKSPACE"] = str(folder.resolve())
-    command = [sys.executable, "-m", "flows.walk", *options]
     # A session of its own: what ends this process ends that one in order, and not both at once.
-    process = subprocess.Popen(command, cwd=HOME, env=settings, stdin=subprocess.DEVNULL, start_new_session=True)
+    process = subprocess.Popen(
+        [*WALK, *options], cwd=HOME, env=settings, stdin=subprocess.DEVNULL, start_new_session=True
+    )
     gone: set[str] = set()
     try:
         while process.poll() is None:

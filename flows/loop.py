@@ -69,14 +69,19 @@ def is_chatter(line: str) -> bool:
 
 
 @flow(name="loop", log_prints=False, persist_result=False, validate_parameters=False)
-def loop() -> State[Any]:
+def loop(workspace: str = "") -> State[Any]:
     """Walk the stages; ends completed, failed, or named WaitingForAnswer where a gate has no answer yet.
 
-    In the folder that BUMBLEBEE_WORKSPACE names, or in this one. No parameter: dvc.yaml holds commands, so that who
-    starts a run must not choose whose they are.
+    In the folder that BUMBLEBEE_WORKSPACE names, or in this one: dvc.yaml holds commands, so that who starts a run
+    must not choose whose they are.
+
+    Args:
+        workspace: leave it empty; any other folder than the served one is refused.
     """
-    folder = Path(os.environ.get("BUMBLEBEE_WORKSPACE", "."))
+    folder = Path(os.environ.get("BUMBLEBEE_WORKSPACE", ".")).resolve()
     try:
+        if workspace and Path(workspace).resolve() != folder:
+            raise BadInput("the run's workspace", f"{folder} or none (runs work there only)", workspace)
         require_own(folder)
         with recorded(folder / SERVERS, runtime.flow_run.id):
             state = walk(folder)

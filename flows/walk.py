@@ -9,6 +9,7 @@ import logging
 import os
 import signal
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,8 @@ def serve(name: str) -> None:
     os.chdir(workspaces.HOME)
     from flows.loop import loop
 
+    logging.getLogger("prefect.runner").setLevel(logging.ERROR)
+    warnings.simplefilter("ignore", RuntimeWarning)  # its end leaves a coroutine unawaited, and says so
     settings: dict[str, Any] = {"print_starting_message": False, "pause_on_shutdown": False}
     loop.serve(name=name, **settings)
 
