@@ -32,6 +32,7 @@ HOST = "127.0.0.1"
 HOME = Path(__file__).resolve().parent.parent
 START_LIMIT = 120.0  # [s] until a server must answer; a cold first start with two busy cores takes about 30
 NAMES = ("prefect", "mlflow")
+FRONT = [sys.executable, "-m", "flows.front"]
 
 
 @dataclass(frozen=True)
@@ -217,7 +218,7 @@ def _end_left_over(workspace: Path) -> None:
 
 
 def _start(name: str, bound: socket.socket, workspace: Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "flows.front", name, "--workspace", str(workspace)]
+    command = [*FRONT, name, "--workspace", str(workspace)]
     command += ["--socket", str(bound.fileno()), "--keeper", str(os.getpid())]
     settings = {key: value for key, value in environment(workspace).items() if key not in ADDRESSES}
     path = workspace / SERVERS / f"{name}.log"
