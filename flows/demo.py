@@ -2,35 +2,43 @@
 
 import argparse
 import json
-import logging
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
-from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.errors import EXIT_BAD_INPUT
+from bumblebee.last_line import EXIT_INTERRUPTED, guarded
+from flows import login
 from flows import workspace as workspaces
-from flows.environment import environment
-from flows.servers import Addresses, servers
+from flows.attend import attend, ended_in_order
+from flows.environment import SERVERS, environment
+from flows.owned import require_own
+from flows.servers import Addresses, require_port, servers
 from flows.stages import changed_stages, read_stages, to_run
 from tasks import params, sections
 
-EXIT_FAILED, EXIT_WAITING = 1, 3
+EXIT_WAITING = 3
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run; 0 done, 1 a stage failed, 2 bad input, 3 a gate waits for an answer."""
+    """Run; 0 done, 1 a stage failed, 2 bad input, 3 a gate waits for an answer, 130 ended by Ctrl-C or a signal."""
     options = parser().parse_args(argv)
-    try:
-        folder = options.workspace or choose(options.name, options.profile, options.motions)
-        return run(folder, options.prefect_port, options.mlflow_port)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        print("stopped; the same command continues after the last finished stage", file=sys.stderr)
-        return 130
+    return guarded(lambda: started(options))
+
+
+def started(options: argparse.Namespace) -> int:
+    """What the options ask for, until it is done or a signal ends it."""
+    with ended_in_order():
+        try:
+            require_port("--prefect-port", options.prefect_port)
+            require_port("--mlflow-port", options.mlflow_port)
+            folder = options.workspace or choose(options.name, options.profile, options.motions)
+            return run(folder, options.prefect_port, options.mlflow_port)
+        except KeyboardInterrupt:
+            print("stopped; the same command continues after the last finished stage", file=sys.stderr)
+            return EXIT_INTERRUPTED
 
 
 def parser() -> argparse.ArgumentParser:
@@ -62,6 +70,7 @@ def choose(name: str, profile: str, motions: Path | None) -> Path:
 
 def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
     """Bring the workspace up to date through the flow."""
+    require_own(folder)
     os.environ.update(environment(folder))
     sections.check_names(params.read(folder / "params.yaml"), folder / "params.yaml")
     sections.loop(folder / "params.yaml")
@@ -73,29 +82,10 @@ def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
     with servers(folder, prefect_port, mlflow_port) as addresses:
         finish_check(check)
         announce(folder, addresses)
-        status = walk(folder, addresses)
-        if status == 0:
-            summarise(folder)
+        status = attend(folder, addresses)
+    if status == 0:
+        summarise(folder)
     return status
-
-
-def walk(folder: Path, addresses: Addresses) -> int:
-    """Run the flow in this process; only now is Prefect imported, since it reads its settings once."""
-    os.environ["PREFECT_API_URL"] = f"{addresses.prefect}/api"
-    from flows.loop import WAITING, loop, runner
-
-    os.chdir(folder)
-    state = loop.with_options(task_runner=runner(os.cpu_count() or 1))(str(folder), return_state=True)
-    for logger in ("prefect", "prefect.flow_runs", "prefect.task_runs"):
-        for handler in logging.getLogger(logger).handlers:
-            handler.flush()  # what is on its way to the server must arrive before that ends
-    if state.is_completed():
-        return 0
-    print(state.message, file=sys.stderr)
-    if state.name == WAITING:
-        return EXIT_WAITING
-    print("what completed is kept: the same command goes on from there", file=sys.stderr)
-    return EXIT_FAILED
 
 
 def start_check(folder: Path) -> "subprocess.Popen[str]":
@@ -123,6 +113,8 @@ def announce(folder: Path, addresses: Addresses) -> None:
     print(f"workspace  {shown(folder)}")
     print(f"Prefect    {addresses.prefect}   the stages as they run, and the gates")
     print(f"MLflow     {addresses.mlflow}   every run's numbers, and the registered policies")
+    print(f"login      user {login.USER}, password in {shown(folder / SERVERS / login.NAME)} (only you can read it);")
+    print("           Prefect's page wants the whole line of that file")
     print(f"open them again with: {serve_command(folder)}", flush=True)
 
 

@@ -4,6 +4,8 @@ import os
 import sys
 from pathlib import Path
 
+from flows import login
+
 SERVERS = ".servers"  # folder of the workspace with both servers' databases, logs and addresses
 
 QUIET = {
@@ -15,16 +17,27 @@ QUIET = {
     "HF_HUB_OFFLINE": "1",
     "HF_HUB_DISABLE_TELEMETRY": "1",
 }
+SECRETS = ("PREFECT_API_AUTH_STRING", "PREFECT_SERVER_API_AUTH_STRING")
+HERE = ("127.0.0.1", "localhost")  # never through a proxy, which would see the login
 # One BLAS thread a process: several would fight torch and the simulator for the same cores.
 THREADS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 def environment(workspace: Path) -> dict[str, str]:
-    """The variables of a process that works in `workspace`, built on those of this process."""
+    """The variables of a process that works in `workspace`, built on those of this process.
+
+    With the login to the workspace's servers, where there is one; see `without_login`.
+    """
     workspace = workspace.resolve()
     servers = workspace / SERVERS
-    found = dict(os.environ)
+    found = without_login(dict(os.environ))
+    password = login.read(servers)
+    if password is not None:
+        found["PREFECT_API_AUTH_STRING"] = login.pair(password)
     found |= QUIET
+    for name in ("NO_PROXY", "no_proxy"):
+        known = [host for host in found.get(name, "").split(",") if host and host not in HERE]
+        found[name] = ",".join([*known, *HERE])
     for name, value in THREADS.items():
         found.setdefault(name, value)
     found["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), found.get("PATH", os.defpath)])
@@ -44,3 +57,8 @@ def environment(workspace: Path) -> dict[str, str]:
     found.pop("DVC_STAGE", None)
     found.pop("DVC_ROOT", None)
     return found
+
+
+def without_login(variables: dict[str, str]) -> dict[str, str]:
+    """The variables for a process that has nothing to do with the servers, such as a stage."""
+    return {name: value for name, value in variables.items() if name not in SECRETS}

@@ -8,23 +8,28 @@ import os
 import subprocess
 import sys
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from prefect import flow, get_run_logger, task
+from prefect import flow, get_run_logger, runtime, task
 from prefect.cache_policies import NO_CACHE
 from prefect.futures import PrefectFuture
 from prefect.states import Cancelled, Completed, Failed, State
 from prefect.task_runners import ThreadPoolTaskRunner
 
+from bumblebee.errors import BadInput
 from flows import gates, progress
-from flows.environment import environment
+from flows.environment import SERVERS, environment, without_login
+from flows.owned import require_own
+from flows.runs import recorded
 from flows.stages import Stage, changed_stages, downstream, read_stages, to_run
 
 KEPT = 5  # last lines of a failed stage that its error repeats
 
 
 WAITING = "WaitingForAnswer"  # name of the state of a run that ended at a gate
+at_end: Callable[[State[Any]], None] = lambda state: None  # noqa: E731  (flows.walk puts its own here)
 
 
 @task(task_run_name="{title}", cache_policy=NO_CACHE, persist_result=False, retries=0)
@@ -41,7 +46,7 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
         subprocess.Popen(
             command,
             cwd=workspace,
-            env=environment(Path(workspace)),
+            env=without_login(environment(Path(workspace))),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -72,10 +77,30 @@ def is_chatter(line: str) -> bool:
 def loop(workspace: str = "") -> State[Any]:
     """Walk the stages; ends completed, failed, or named WaitingForAnswer where a gate has no answer yet.
 
+    In the folder that BUMBLEBEE_WORKSPACE names, or in this one: dvc.yaml holds commands, so that who starts a run
+    must not choose whose they are.
+
     Args:
-        workspace: the folder with dvc.yaml and params.yaml; by default what BUMBLEBEE_WORKSPACE says, or this one.
+        workspace: leave it empty; any other folder than the served one is refused.
     """
-    folder = Path(workspace or os.environ.get("BUMBLEBEE_WORKSPACE", "."))
+    folder = Path(os.environ.get("BUMBLEBEE_WORKSPACE", ".")).resolve()
+    try:
+        if workspace and Path(workspace).resolve() != folder:
+            raise BadInput("the run's workspace", f"{folder} or none (runs work there only)", workspace)
+        require_own(folder)
+        with recorded(folder / SERVERS, runtime.flow_run.id):
+            state = walk(folder)
+    except BadInput as error:
+        state = Failed(message=str(error))
+    except Exception as error:
+        at_end(Failed(message=f"{type(error).__name__}: {error}"))
+        raise
+    at_end(state)
+    return state
+
+
+def walk(folder: Path) -> State[Any]:
+    """Start every stage that has work to do when those before it are done; how it ended."""
     log = get_run_logger()
     stages = read_stages(folder)
     busy = to_run(stages, changed_stages(folder))

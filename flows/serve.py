@@ -2,37 +2,41 @@
 
 import argparse
 import os
-import signal
 import sys
 from pathlib import Path
-from typing import Any
 
-from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.last_line import guarded
 from flows import workspace as workspaces
+from flows.attend import attend, ended_in_order
 from flows.demo import add_ports, announce
 from flows.environment import environment
-from flows.servers import Addresses, servers
+from flows.owned import require_own
+from flows.servers import Addresses, require_port, servers
 
 DEPLOYMENT = "demo"
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Serve until Ctrl-C or SIGTERM."""
+    """Serve until Ctrl-C, SIGTERM or SIGHUP; 0 then, 1 when Prefect's server went away, 2 bad input."""
     options = parser().parse_args(argv)
-    signal.signal(signal.SIGTERM, _as_interrupt)
-    try:
-        folder = workspaces.named(options.name)
-        os.environ.update(environment(folder))
-        with servers(folder, options.prefect_port, options.mlflow_port) as addresses:
-            announce(folder, addresses)
-            serve(folder, addresses)
-    except BadInput as error:
-        print(error, file=sys.stderr)
-        return EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        pass
-    print("servers stopped", file=sys.stderr)
-    return 0
+    return guarded(lambda: started(options))
+
+
+def started(options: argparse.Namespace) -> int:
+    """Open both servers, with the loop as a deployment, until a signal comes."""
+    with ended_in_order():
+        try:
+            require_port("--prefect-port", options.prefect_port)
+            require_port("--mlflow-port", options.mlflow_port)
+            folder = workspaces.named(options.name)
+            require_own(folder)
+            os.environ.update(environment(folder))
+            with servers(folder, options.prefect_port, options.mlflow_port) as addresses:
+                announce(folder, addresses)
+                return serve(folder, addresses)
+        except KeyboardInterrupt:
+            print("servers stopped", file=sys.stderr)
+            return 0
 
 
 def parser() -> argparse.ArgumentParser:
@@ -43,20 +47,12 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def serve(folder: Path, addresses: Addresses) -> None:
+def serve(folder: Path, addresses: Addresses) -> int:
     """Wait for runs to start or resume, each in a process of its own; ends with Ctrl-C."""
-    os.environ["PREFECT_API_URL"] = f"{addresses.prefect}/api"
-    os.environ["BUMBLEBEE_WORKSPACE"] = str(folder)
-    os.chdir(workspaces.HOME)
-    from flows.loop import loop
-
-    print("start a run on Prefect's page Deployments; Ctrl-C ends the servers", flush=True)
-    settings: dict[str, Any] = {"print_starting_message": False, "pause_on_shutdown": False}
-    loop.serve(name=DEPLOYMENT, parameters={"workspace": str(folder)}, **settings)
-
-
-def _as_interrupt(number: int, frame: object) -> None:
-    raise KeyboardInterrupt
+    if addresses.keeper != os.getpid():
+        print(f"the servers run already, kept by process {addresses.keeper}, and end with it", flush=True)
+    print("start a run on Prefect's page Deployments; Ctrl-C ends this", flush=True)
+    return attend(folder, addresses, "--deployment", DEPLOYMENT, until_lost=True)
 
 
 if __name__ == "__main__":

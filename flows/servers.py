@@ -1,8 +1,13 @@
-"""The servers of Prefect and MLflow on this machine alone: SQLite files under .servers/, free ports, a clean end."""
+"""The servers of Prefect and MLflow on this machine alone: SQLite files under .servers/, any port, a login.
 
+One process keeps them: it holds a lock on .servers, and they end with it, also when it is killed. A second one uses
+them and leaves them alone.
+"""
+
+import fcntl
 import json
 import os
-import signal
+import secrets
 import socket
 import subprocess
 import sys
@@ -11,15 +16,23 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import IO
 
 from bumblebee.errors import BadInput
+from flows import login, runs
 from flows.environment import SERVERS, environment
+from flows.guard import ALIVE, proof
+from flows.processes import alive, born, same, stop
+
+__all__ = ["Addresses", "alive", "running", "servers", "stop"]
 
 HOST = "127.0.0.1"
+HOME = Path(__file__).resolve().parent.parent
 START_LIMIT = 120.0  # [s] until a server must answer; a cold first start with two busy cores takes about 30
-STOP_LIMIT = 10.0  # [s] until a server that was asked to end is killed
+NAMES = ("prefect", "mlflow")
+FRONT = [sys.executable, "-m", "flows.front"]
 
 
 @dataclass(frozen=True)
@@ -33,41 +46,71 @@ class Addresses:
     keeper: int
     """The process that started them and ends them."""
     pids: tuple[int, ...]
-    """The servers' own processes."""
+    """The servers' own processes, Prefect's first."""
+    born: tuple[float, ...] = ()
+    """When these started, and at the end the keeper: seconds since 1970."""
+
+    def lost(self) -> list[str]:
+        """The servers whose process is gone."""
+        return [name for name, pid, when in zip(NAMES, self.pids, self.born, strict=False) if not same(pid, when)]
 
 
-def free_port(wanted: int = 0) -> int:
-    """A port that nobody listens on; `wanted` itself when given.
+def require_port(name: str, port: int) -> None:
+    """Refuse what is no port that a user may listen on; 0 asks for a free one.
+
+    Raises:
+        BadInput: for anything but 0 and 1024 to 65535.
+    """
+    if port != 0 and not 1024 <= port <= 65535:
+        raise BadInput(name, "0 (any free port) or a port from 1024 to 65535", str(port))
+
+
+def listener(wanted: int = 0) -> socket.socket:
+    """A socket that is bound to the port, or to a free one; nobody else can take it any more.
 
     Raises:
         BadInput: when the wanted port is taken.
     """
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HOST, wanted))
-        except OSError as error:
-            remedy = "Give another port, or none for a free one."
-            raise BadInput(f"port {wanted} of {HOST}", "a free port", str(error.strerror), remedy) from None
-        return int(probe.getsockname()[1])
+    bound = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        bound.bind((HOST, wanted))
+        if wanted:  # with SO_REUSEADDR a port that somebody listens on can be refused only here
+            bound.listen()
+    except OSError as error:
+        bound.close()
+        remedy = "Give another port, or none for a free one."
+        raise BadInput(f"port {wanted} of {HOST}", "a free port", str(error.strerror), remedy) from None
+    return bound
 
 
 def running(workspace: Path) -> Addresses | None:
-    """The servers that another process keeps for this workspace, if they answer."""
-    try:
-        found = Addresses(**json.loads((workspace / SERVERS / "addresses.json").read_text()))
-    except (OSError, ValueError, TypeError):
+    """The servers that another process keeps for this workspace, if they answer, and are what they say they are."""
+    found = written(workspace)
+    password = login.read(workspace / SERVERS)
+    if found is None or password is None:
         return None
-    return found if answers(f"{found.prefect}/api/health") and answers(f"{found.mlflow}/health") else None
+    return found if answers(found.prefect, password) and answers(found.mlflow, password) else None
 
 
-def answers(url: str) -> bool:
-    """Whether the address answers with success."""
+def written(workspace: Path) -> Addresses | None:
+    """What the last keeper wrote down."""
+    try:
+        table = json.loads((workspace / SERVERS / "addresses.json").read_text())
+        return Addresses(**{**table, "pids": tuple(table["pids"]), "born": tuple(table["born"])})
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+
+
+def answers(url: str, password: str) -> bool:
+    """Whether a server of ours answers there: one that knows the password, and not who took the port after it."""
+    nonce = secrets.token_hex(16)
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
-        with opener.open(url, timeout=5) as reply:
-            return bool(reply.status == 200)
-    except (urllib.error.URLError, OSError):
+        with opener.open(f"{url}{ALIVE}?nonce={nonce}", timeout=5) as reply:
+            said = reply.read(200).decode("ascii", "replace").strip()
+            return secrets.compare_digest(said, proof(password, nonce))
+    except (urllib.error.URLError, OSError, ValueError):
         return False
 
 
@@ -75,97 +118,132 @@ def answers(url: str) -> bool:
 def servers(workspace: Path, prefect_port: int = 0, mlflow_port: int = 0) -> Iterator[Addresses]:
     """Both servers for the length of a block.
 
-    Those that another process keeps for this workspace are used and left to it; those whose keeper was killed are
-    taken over and ended with the block.
+    Those that another process keeps for this workspace are used and left to it.
 
     Raises:
-        BadInput: when a wanted port is taken or a server ends at once.
+        BadInput: when a wanted port is taken or none, others are in use, or a server ends at once.
     """
+    require_port("--prefect-port", prefect_port)
+    require_port("--mlflow-port", mlflow_port)
     workspace = workspace.resolve()
-    found = running(workspace)
-    if found is not None:
-        try:
+    folder = login.private(workspace / SERVERS)
+    with (folder / "lock").open("a+") as lock:
+        found = _lock_or_running(workspace, lock)
+        if found is not None:
+            _require_ports(found, prefect_port, mlflow_port)
             yield found
-        finally:
-            if not alive(found.keeper):
-                (workspace / SERVERS / "addresses.json").unlink(missing_ok=True)
-                stop(list(found.pids))
-        return
-    ports = {"prefect": free_port(prefect_port), "mlflow": free_port(mlflow_port)}
+            return
+        with _kept(workspace, {"prefect": prefect_port, "mlflow": mlflow_port}) as made:
+            yield made
+
+
+def _lock_or_running(workspace: Path, lock: IO[str]) -> Addresses | None:
+    """Become the keeper (None), or wait for the servers of the one that is."""
+    end = time.monotonic() + START_LIMIT
+    while True:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if (found := running(workspace)) is not None:
+                return found
+            if time.monotonic() > end:
+                lock.seek(0)
+                came = f"process {lock.read(20).strip() or '?'}, which holds them and does not answer"
+                raise BadInput(workspace / SERVERS, "servers that answer", came, "End it, then start again.") from None
+            time.sleep(0.2)
+            continue
+        lock.seek(0)
+        lock.truncate()
+        lock.write(f"{os.getpid()}\n")
+        lock.flush()
+        return None
+
+
+def _require_ports(found: Addresses, prefect_port: int, mlflow_port: int) -> None:
+    for name, wanted, address in (("prefect", prefect_port, found.prefect), ("mlflow", mlflow_port, found.mlflow)):
+        if wanted and not address.endswith(f":{wanted}"):
+            came = f"{wanted}, while this workspace's servers already run (Prefect {found.prefect}, MLflow "
+            came += f"{found.mlflow}, kept by process {found.keeper})"
+            remedy = f"Open those, or end process {found.keeper} first."
+            raise BadInput(f"--{name}-port", f"no port, or {address.rpartition(':')[2]}", came, remedy)
+
+
+@contextmanager
+def _kept(workspace: Path, ports: dict[str, int]) -> Iterator[Addresses]:
+    """Start both servers, and end them with the block. The lock is held."""
     folder = workspace / SERVERS
-    (folder / "artifacts").mkdir(parents=True, exist_ok=True)
+    file = folder / "addresses.json"
+    _end_left_over(workspace)
+    file.unlink(missing_ok=True)
+    password = login.ensure(folder)
+    login.private(folder / "artifacts")
     started: dict[str, subprocess.Popen[bytes]] = {}
+    listeners: dict[str, socket.socket] = {}
     try:
-        for name, command in commands(workspace, ports).items():
-            started[name] = _start(name, command, workspace)
-        urls = {name: f"http://{HOST}:{port}" for name, port in ports.items()}
-        addresses = Addresses(**urls, keeper=os.getpid(), pids=tuple(each.pid for each in started.values()))
-        _wait(started["prefect"], f"{addresses.prefect}/api/health", folder / "prefect.log")
-        _wait(started["mlflow"], f"{addresses.mlflow}/health", folder / "mlflow.log")
-        (folder / "addresses.json").write_text(json.dumps(vars(addresses)))
+        for name in NAMES:
+            listeners[name] = listener(ports[name])
+        urls = {name: f"http://{HOST}:{each.getsockname()[1]}" for name, each in listeners.items()}
+        for name in NAMES:
+            started[name] = _start(name, listeners[name], workspace)
+            listeners[name].close()
+        pids = tuple(each.pid for each in started.values())
+        times = tuple(born(pid) for pid in (*pids, os.getpid()))
+        addresses = Addresses(**urls, keeper=os.getpid(), pids=pids, born=times)
+        for name in NAMES:
+            _wait(started[name], urls[name], password, folder / f"{name}.log")
+        runs.clear_lost(folder, addresses.prefect, password)
+        write_private(file, json.dumps(asdict(addresses)))
         yield addresses
     finally:
-        (folder / "addresses.json").unlink(missing_ok=True)
+        for each in listeners.values():
+            each.close()
+        file.unlink(missing_ok=True)  # ours: the lock is held from before it was written until after this
         stop([each.pid for each in started.values()])
 
 
-def commands(workspace: Path, ports: dict[str, int]) -> dict[str, list[str]]:
-    """The command line of each server."""
-    folder = workspace / SERVERS
-    prefect = [sys.executable, "-m", "prefect", "server", "start", "--host", HOST, "--port", str(ports["prefect"])]
-    mlflow = [sys.executable, "-m", "mlflow", "server", "--host", HOST, "--port", str(ports["mlflow"])]
-    mlflow += ["--backend-store-uri", f"sqlite:///{folder / 'mlflow.db'}", "--workers", "1"]
-    mlflow += ["--serve-artifacts", "--artifacts-destination", str(folder / "artifacts")]
-    return {"prefect": prefect, "mlflow": mlflow}
+def write_private(path: Path, text: str) -> None:
+    """Write a file whole, for its owner only."""
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    part.unlink(missing_ok=True)
+    with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as stream:
+        stream.write(text)
+    part.replace(path)
 
 
-def _start(name: str, command: list[str], workspace: Path) -> subprocess.Popen[bytes]:
-    with (workspace / SERVERS / f"{name}.log").open("ab") as log:
-        # A session of its own: Ctrl-C reaches the flow first, which then ends the servers in order.
+def _end_left_over(workspace: Path) -> None:
+    """End the servers of a keeper that was killed; they end by themselves, but not at once."""
+    old = written(workspace)
+    if old is not None:
+        stop([pid for pid, when in zip(old.pids, old.born, strict=False) if same(pid, when)])
+
+
+def _start(name: str, bound: socket.socket, workspace: Path) -> subprocess.Popen[bytes]:
+    command = [*FRONT, name, "--workspace", str(workspace)]
+    command += ["--socket", str(bound.fileno()), "--keeper", str(os.getpid())]
+    settings = {key: value for key, value in environment(workspace).items() if key not in ADDRESSES}
+    path = workspace / SERVERS / f"{name}.log"
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW, 0o600), "ab") as log:
+        # A session of its own: Ctrl-C reaches the keeper first, which then ends the servers in order.
         return subprocess.Popen(
-            command, cwd=workspace, env=environment(workspace), stdout=log, stderr=log, start_new_session=True
+            command,
+            cwd=HOME,
+            env=settings,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+            pass_fds=(bound.fileno(),),
         )
 
 
-def _wait(process: subprocess.Popen[bytes], url: str, log: Path) -> None:
+ADDRESSES = {"PREFECT_API_URL", "MLFLOW_TRACKING_URI", "MLFLOW_REGISTRY_URI"}  # of clients; a server asks nobody
+
+
+def _wait(process: subprocess.Popen[bytes], url: str, password: str, log: Path) -> None:
     end = time.monotonic() + START_LIMIT
-    while not answers(url):
+    while not answers(url, password):
         if process.poll() is not None or time.monotonic() > end:
             lines = [line for line in log.read_text(errors="replace").splitlines() if line.strip()] or ["no message"]
             raise BadInput(url, "a server that answers", lines[-1], f"See {log}.")
-        time.sleep(0.2)
-
-
-def alive(pid: int) -> bool:
-    """Whether a process of this number runs."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
-
-
-def stop(pids: list[int]) -> None:
-    """End the processes, each the head of a group, and everything that they started; first politely."""
-    for pid in pids:
-        _signal(pid, signal.SIGTERM)
-    end = time.monotonic() + STOP_LIMIT
-    while any(_running(pid) for pid in pids) and time.monotonic() < end:
-        time.sleep(0.05)
-    for pid in pids:
-        _signal(pid, signal.SIGKILL)  # what is left of its group
-        _running(pid)
-
-
-def _running(pid: int) -> bool:
-    try:
-        return os.waitpid(pid, os.WNOHANG) == (0, 0)
-    except ChildProcessError:  # another process's child, or already waited for
-        return alive(pid)
-
-
-def _signal(pid: int, number: int) -> None:
-    with suppress(ProcessLookupError):
-        os.killpg(pid, number)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(0.1)

@@ -5,27 +5,41 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import psutil
 import pytest
 
 from bumblebee.errors import BadInput
-from flows import demo, servers
+from flows import demo, serve, servers
 from flows.environment import environment
 
 
 def test_a_taken_port_is_one_line():
-    with socket.socket() as taken:
-        taken.bind((servers.HOST, 0))
+    with servers.listener() as taken:
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(BadInput, match=f"port {port} of 127.0.0.1: expected a free port, came"):
-            servers.free_port(port)
+            servers.listener(port)
 
 
-def test_a_free_port_is_given_as_asked_or_found():
-    port = servers.free_port()
-    assert servers.free_port(port) == port
+def test_a_port_is_held_from_the_moment_that_it_is_chosen():
+    with servers.listener() as held, pytest.raises(BadInput):
+        held.listen()
+        servers.listener(held.getsockname()[1])
+
+
+@pytest.mark.parametrize("option", ["--prefect-port", "--mlflow-port"])
+@pytest.mark.parametrize("port", ["99999", "-1", "80", "1023", "65536"])
+@pytest.mark.parametrize("program", [demo, serve])
+def test_a_number_that_is_no_port_is_one_line_before_anything_starts(
+    program: ModuleType, option: str, port: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    for place in (demo, serve):
+        monkeypatch.setattr(place, "servers", None)
+    assert program.main([option, port]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and error.startswith(f"{option}: expected 0 (any free port) or a port from 1024")
 
 
 def test_the_demo_ends_with_status_2_on_a_taken_port(

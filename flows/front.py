@@ -1,0 +1,93 @@
+"""One server behind its guard: `python -m flows.front prefect|mlflow --workspace FOLDER --socket N --keeper PID`.
+
+The keeper has bound the socket, so that nobody can take the port between its choice and its use. The password is read
+from its file; nothing secret stands on the command line or in the log.
+"""
+
+import argparse
+import os
+import socket
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from flows import login
+from flows.environment import SERVERS
+from flows.guard import Guard
+from tasks.parent import end_with_parent
+
+GRACE = 2  # [s] that open connections get at the end
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Serve until SIGTERM, or until the keeper is gone."""
+    parser = argparse.ArgumentParser(prog="python -m flows.front", description=__doc__)
+    parser.add_argument("server", choices=["prefect", "mlflow"])
+    parser.add_argument("--workspace", type=Path, required=True)
+    parser.add_argument("--socket", type=int, required=True, help="number of the bound socket")
+    parser.add_argument("--keeper", type=int, required=True, help="the process that ends this one")
+    options = parser.parse_args(argv)
+    end_with_parent()
+    if os.getppid() != options.keeper:
+        return 1  # it ended before this one could watch it
+    os.umask(0o077)
+    folder = options.workspace / SERVERS
+    password = login.read(folder)
+    if password is None:
+        print(f"{folder / login.NAME}: no password that only its owner can read", file=sys.stderr)
+        return 1
+    listener = socket.socket(fileno=options.socket)
+    port = int(listener.getsockname()[1])
+    app = prefect_app(port, password) if options.server == "prefect" else mlflow_app(folder)
+    # Prefect's page has a login of its own, which its interface and its WebSockets demand; MLflow has none.
+    serve(Guard(app, password, ask=options.server == "mlflow"), listener)
+    return 0
+
+
+def prefect_app(port: int, password: str) -> Any:
+    """Prefect's server with its pages, whatever the port; these ask the address that they came from."""
+    os.environ["PREFECT_SERVER_API_HOST"] = "127.0.0.1"
+    os.environ["PREFECT_SERVER_API_PORT"] = str(port)
+    os.environ["PREFECT_SERVER_UI_API_URL"] = "/api"
+    os.environ["PREFECT_SERVER_UI_SHOW_PROMOTIONAL_CONTENT"] = "false"
+    os.environ["PREFECT_SERVER_API_CORS_ALLOWED_ORIGINS"] = f"http://127.0.0.1:{port}"
+    os.environ["PREFECT_SERVER_API_AUTH_STRING"] = login.pair(password)
+    os.environ["PREFECT_API_AUTH_STRING"] = login.pair(password)  # its services are clients of itself
+    from prefect.server.api.server import create_app
+
+    return create_app(final=True)
+
+
+# What `mlflow server` hands to its application; tests/flows/test_servers.py compares the names with MLflow's.
+MLFLOW = {
+    "_MLFLOW_SERVER_FILE_STORE": "sqlite:///{folder}/mlflow.db",
+    "_MLFLOW_SERVER_REGISTRY_STORE": "sqlite:///{folder}/mlflow.db",
+    "_MLFLOW_SERVER_ARTIFACT_ROOT": "mlflow-artifacts:/",
+    "_MLFLOW_SERVER_SERVE_ARTIFACTS": "true",
+    "_MLFLOW_SERVER_ARTIFACT_DESTINATION": "{folder}/artifacts",
+    "_MLFLOW_SGI_NAME": "uvicorn",
+}
+
+
+def mlflow_app(folder: Path) -> Any:
+    """MLflow's server on the workspace's database; loaded by name, since flows import nothing of MLflow."""
+    os.environ |= {name: value.format(folder=folder) for name, value in MLFLOW.items()}
+    import_module("mlflow.server.handlers").initialize_backend_stores(
+        os.environ["_MLFLOW_SERVER_FILE_STORE"],
+        os.environ["_MLFLOW_SERVER_REGISTRY_STORE"],
+        os.environ["_MLFLOW_SERVER_ARTIFACT_ROOT"],
+    )
+    return import_module("mlflow.server.fastapi_app").app
+
+
+def serve(app: Any, listener: socket.socket) -> None:
+    """Answer on a bound socket until SIGTERM or SIGINT."""
+    import uvicorn
+
+    config = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=GRACE, timeout_keep_alive=5)
+    uvicorn.Server(config).run(sockets=[listener])
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
