@@ -11,6 +11,7 @@ import pandas as pd
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.summary import compare
+from bumblebee.ranges import Ranged
 from tasks import registry
 from tasks.lineage import path_hash
 from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both
@@ -22,7 +23,7 @@ EVALUATION, OUT = Path("data/evaluation"), Path("data/published.json")
 
 
 @dataclass(frozen=True)
-class PublishConfig:
+class PublishConfig(Ranged):
     """By which numbers policies are promoted."""
 
     engine: Literal["auto", "stand_in", "nominal"] = "auto"

@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pandas as pd
 import torch
@@ -21,6 +21,7 @@ from bumblebee.learning.ranks import Ranks, check_gpus, join, launch, leave, thi
 from bumblebee.learning.trial import Trials, World, success_by_family, try_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
+from bumblebee.ranges import Range, Ranged, Seed
 from bumblebee.sim.engines import make_engine
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
@@ -33,10 +34,10 @@ BEFORE = "before.parquet"
 
 
 @dataclass(frozen=True)
-class TrainingConfig:
+class TrainingConfig(Ranged):
     """One training of a tracking policy."""
 
-    seed: int = 0
+    seed: Seed = 0
     """Of the network, the draws of clips and frames, and the differences between the worlds."""
     env: EnvConfig = field(default_factory=EnvConfig)
     """The task."""
@@ -44,8 +45,17 @@ class TrainingConfig:
     """The algorithm."""
     trials: Trials = field(default_factory=Trials)
     """How the policy is tried before and after."""
-    gpus: int = 1
+    gpus: Annotated[int, Range(least=1, most=64)] = 1
     """GPUs of this machine that train together, each with `env.num_worlds` worlds; for the engine `mujoco_warp`."""
+
+    def __post_init__(self) -> None:
+        """Refuse batches that are smaller than their parts, and several GPUs for an engine that has no use for them."""
+        super().__post_init__()
+        batch, least = self.env.num_worlds * self.ppo.steps, max(self.ppo.mini_batches, 2)
+        parts = f"at least {least} control steps an update (env.num_worlds times ppo.steps, here {batch})"
+        self.require(batch >= least, "ppo", parts)
+        engine = self.env.engine
+        self.require(self.gpus == 1 or engine == "mujoco_warp", "gpus", f"1 with the engine {engine}")
 
 
 @dataclass(frozen=True)

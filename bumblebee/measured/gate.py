@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from bumblebee.errors import BadInput
 from bumblebee.measured.intake import file_hash
+from bumblebee.ranges import Ranged
 
 AUTOMATIC = "automatic (gate.mode: auto)"
 SHORT = 12  # digits of a hash that a person copies
@@ -20,7 +21,7 @@ STATUSES = ("pending", "approved", "rejected")
 
 
 @dataclass(frozen=True)
-class GateConfig:
+class GateConfig(Ranged):
     """How the gate after each intake is answered."""
 
     mode: Literal["ask", "auto"] = "ask"

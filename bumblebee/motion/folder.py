@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated
 
 import pandas as pd
 
@@ -24,6 +25,7 @@ from bumblebee.motion.pieces import motion_of, split_long
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
 from bumblebee.motion.store import read_library
+from bumblebee.ranges import Line, Name, Range, Ranged
 
 # Formats that come in such folders and are not read; what is no motion at all (notes, licences) is passed over.
 _NOT_YET = {
@@ -41,22 +43,30 @@ _UNKNOWN = "a format that is not known"
 _NO_MOTION = {"", ".txt", ".md", ".pdf", ".png", ".jpg", ".gif", ".mp4", ".html", ".json", ".yaml", ".yml", ".py"}
 
 
+Hertz = Annotated[float, Range(least=1, most=10_000)]
+
+
 @dataclass(frozen=True)
-class ReadConfig:
+class ReadConfig(Ranged):
     """How motion files become clips."""
 
-    csv_fps: float = 60.0
+    csv_fps: Hertz = 60.0
     """Frame rate of CSV files, which do not say it: g1_moves 60, LAFAN1's retargets 30 [Hz]."""
-    csv_fps_by_folder: dict[str, float] = field(default_factory=dict)
+    csv_fps_by_folder: dict[Name, Hertz] = field(default_factory=dict)
     """Another rate for the CSV files under a folder of that name, such as `{lafan1: 30}` [Hz]."""
-    fps: float = 50.0
+    fps: Hertz = 50.0
     """Frame rate of the clips: that of the policy [Hz]."""
-    max_seconds: float = 10.0
+    max_seconds: Annotated[float, Range(least=0, most=3600)] = 10.0
     """Longer motions are cut into equal pieces `<name>_p0`, `_p1` ... no longer than this; 0 never cuts [s]."""
-    captions_folder: str = ""
+    captions_folder: Line = ""
     """Where `<stem>.txt` caption files lie, if not beside the motions."""
     grounding: GroundingConfig = field(default_factory=GroundingConfig)
     """Correction of motions that float or sink."""
+
+    def __post_init__(self) -> None:
+        """Refuse pieces that are shorter than any motion."""
+        super().__post_init__()
+        self.require(self.max_seconds == 0 or self.max_seconds >= 0.2, "max_seconds", "0, or at least 0.2")
 
 
 @dataclass(frozen=True)
