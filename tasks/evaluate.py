@@ -4,6 +4,7 @@ Writes data/evaluation/contract.json, episodes.parquet (one row an episode) and 
 """
 
 import json
+import re
 import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
@@ -75,6 +76,8 @@ class EvaluateConfig(Ranged):
         super().__post_init__()
         self.require_names("engines", ENGINES)
         self.require(len(set(self.seeds)) == len(self.seeds), "seeds", "distinct numbers")
+        digest = not self.contract or bool(re.fullmatch("[0-9a-f]{64}", self.contract))
+        self.require(digest, "contract", "nothing, or a sha256 of 64 digits")
 
 
 @dataclass(frozen=True)

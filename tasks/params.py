@@ -43,6 +43,11 @@ def load(section: str, kind: type[Config], path: Path = FILE) -> Config:
 
     content = read(path)
     check_names(content, path)
+    return section_of(content, section, kind, path)
+
+
+def section_of(content: dict[str, Any], section: str, kind: type[Config], path: Path) -> Config:
+    """The same from the content of the file."""
     if section not in content:
         raise BadInput(f"{path}: {section}", "this section", "none", nearest(section, content))
     return build(kind, content[section], path, section)

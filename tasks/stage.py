@@ -27,6 +27,7 @@ from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from tasks import recorder
 from tasks.params import load
 from tasks.parent import end_with_parent
+from tasks.sections import check_once
 
 __all__ = ["load", "log_run", "output_file", "output_folder", "run_stage", "scratch"]
 
@@ -47,6 +48,8 @@ def run_stage(main: Callable[..., object], argv: list[str] | None = None, *, log
         if logs and os.environ.get("RANK", "0") == "0":  # of processes that train together, one logs
             recorder.start()
     try:
+        if "DVC_STAGE" in os.environ:
+            check_once()
         main(**vars(options))
     except BadInput as error:
         print(error, file=sys.stderr, flush=True)

@@ -30,11 +30,12 @@ def read_bytes(path: Path, most: int = LIMITS.file_bytes) -> bytes:
     except (OSError, ValueError) as error:
         raise BadInput(path, "a file that can be read", getattr(error, "strerror", None) or str(error)) from None
     try:
+        facts = os.fstat(handle)
+        if not stat.S_ISREG(facts.st_mode):  # asked first: no stream can be made of a folder
+            os.close(handle)
+            came = "a folder" if stat.S_ISDIR(facts.st_mode) else "a pipe, device or socket"
+            raise BadInput(path, "a file", came)
         with os.fdopen(handle, "rb") as stream:
-            facts = os.fstat(stream.fileno())
-            if not stat.S_ISREG(facts.st_mode):
-                came = "a folder" if stat.S_ISDIR(facts.st_mode) else "a pipe, device or socket"
-                raise BadInput(path, "a file", came)
             if facts.st_size > most:
                 raise BadInput(path, f"at most {most:,} bytes", f"{facts.st_size:,}")
             return stream.read(most + 1)
