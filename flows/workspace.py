@@ -52,8 +52,7 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
     for name in CODE:
         _link(folder / name, HOME / name)
     _write(folder / ".dvcignore", (HOME / ".dvcignore").read_text())
-    read_from = (content.get("motions") or {}).get("source", "embedded")
-    _write(folder / "dvc.yaml", stages_with(None if read_from == "embedded" else Path(read_from)))
+    _write(folder / "dvc.yaml", stages_with(motions_of(content)))
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     if edited is None or content != edited:
         _write(folder / "params.yaml", text)
@@ -72,12 +71,25 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
 def settings_of(folder: Path, profile: str | None) -> tuple[dict[str, Any], dict[str, Any] | None]:
     """What params.yaml starts from: (settings, the edited ones in `folder` if somebody edited them there)."""
     here, generated = folder / "params.yaml", folder / GENERATED
-    if here.exists() and (not generated.exists() or here.read_text() != generated.read_text()):
+    made = here.is_file() and generated.is_file() and here.read_bytes() == generated.read_bytes()
+    if here.exists() and not made:
         edited = params.read(here)
         print(f"{here} was edited: it is kept (remove it to start from the checkout's again)", file=sys.stderr)
         return edited, edited
     content = params.read(HOME / "params.yaml")
     return (merge(content, params.read(profile_path(profile))) if profile else content), None
+
+
+def motions_of(content: dict[str, Any]) -> Path | None:
+    """The user's motions; None for the embedded ones, and for what `tasks.sections` refuses before the first stage."""
+    section = content.get("motions")
+    source = section.get("source") if isinstance(section, dict) else None
+    if not isinstance(source, str) or not source.isprintable() or source in ("", "embedded"):
+        return None
+    try:
+        return Path(source).expanduser()
+    except RuntimeError:  # the home of nobody
+        return None
 
 
 def stages_with(motions: Path | None) -> str:

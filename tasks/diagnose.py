@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import mujoco
 
@@ -10,20 +11,23 @@ from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import fill
 from bumblebee.diagnosis.session import open_session
 from bumblebee.diagnosis.terminal import summary
+from bumblebee.ranges import Range, Ranged, Seed
 from tasks.stage import load, log_run, output_folder, run_stage
+
+Windows = Annotated[int, Range(least=8, most=100_000)]
 
 
 @dataclass(frozen=True)
-class DiagnoseConfig:
+class DiagnoseConfig(Ranged):
     """Section `diagnose` of params.yaml."""
 
-    max_windows: int = 120
+    max_windows: Windows = 120
     """Windows of 0.2 s that take part in the fit."""
-    max_holdout_windows: int = 60
+    max_holdout_windows: Windows = 60
     """Held-out windows that acceptance is decided on."""
-    report_windows: int = 80
+    report_windows: Windows = 80
     """Windows for each horizon of the error block."""
-    seed: int = 0
+    seed: Seed = 0
     """Of the perturbed starts."""
 
 

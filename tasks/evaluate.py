@@ -4,13 +4,14 @@ Writes data/evaluation/contract.json, episodes.parquet (one row an episode) and 
 """
 
 import json
+import re
 import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pandas as pd
 
@@ -38,6 +39,7 @@ from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
 from bumblebee.progress import progress
+from bumblebee.ranges import Count, Few, Line, Name, Range, Ranged, Seed, Size
 from tasks.params import FILE, read
 from tasks.rollouts import FILTERED, SEALED, cut, start_stand_in
 from tasks.stage import load, log_run, output_folder, run_stage
@@ -47,27 +49,35 @@ ENGINES = ("nominal", "stand_in")
 
 
 @dataclass(frozen=True)
-class EvaluateConfig:
+class EvaluateConfig(Ranged):
     """What is evaluated."""
 
-    seeds: tuple[int, ...] = (0,)
+    seeds: Annotated[tuple[Seed, ...], Size()] = (0,)
     """One episode for each seed, motion and policy."""
-    engines: tuple[str, ...] = ("nominal", "stand_in")
+    engines: Annotated[tuple[Name, ...], Size()] = ("nominal", "stand_in")
     """Which robots: the declared model, the stand-in."""
-    max_seconds: float = 10.0
+    max_seconds: Annotated[float, Range(least=0.1, most=3600)] = 10.0
     """Longer motions are cut to their beginning [s]."""
-    max_motions: int = 40
+    max_motions: Count = 40
     """A larger library is thinned: held-out motions first, at least one of each cluster, the rest evenly."""
     untrained: bool = True
     """Also a policy with fresh weights: what there is before training."""
-    contract: str = ""
+    contract: Line = ""
     """sha256 of the contract that must be met, or nothing; a different one is refused."""
-    threads: int = 2
+    threads: Few = 2
     """CPU threads of the simulation."""
     thresholds: Thresholds = field(default_factory=Thresholds)
     """Keypoint thresholds of success."""
     start_noise: StartNoise = field(default_factory=StartNoise)
     """Noise of the start states."""
+
+    def __post_init__(self) -> None:
+        """Refuse robots that there are not, and episodes that would be run twice."""
+        super().__post_init__()
+        self.require_names("engines", ENGINES)
+        self.require(len(set(self.seeds)) == len(self.seeds), "seeds", "distinct numbers")
+        digest = not self.contract or bool(re.fullmatch("[0-9a-f]{64}", self.contract))
+        self.require(digest, "contract", "nothing, or a sha256 of 64 digits")
 
 
 @dataclass(frozen=True)

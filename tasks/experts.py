@@ -5,6 +5,7 @@ from pathlib import Path
 
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.trial import World
+from bumblebee.ranges import PartOf
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
 from tasks.stage import load, run_stage
@@ -19,7 +20,7 @@ class ExpertsConfig(TrainingConfig):
     """The task; one thread, since experts train side by side and threads that wait for each other lose then."""
     ppo: PpoConfig = field(default_factory=lambda: PpoConfig(iterations=80))
     """The algorithm."""
-    others: float = 0.1
+    others: PartOf = 0.1
     """Share of the draws that goes to other clusters' clips, so that an expert forgets nothing that it will need."""
 
 

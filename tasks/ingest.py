@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import mujoco
 
@@ -17,25 +17,30 @@ from bumblebee.measured.rollout import read_rollout
 from bumblebee.measured.summary import summary_table
 from bumblebee.measured.thresholds import Thresholds
 from bumblebee.progress import progress
+from bumblebee.ranges import Line, Name, Range, Ranged
 from bumblebee.robot.model import write_xml
 from tasks.stage import load, log_run, output_folder, run_stage
 
 
 @dataclass(frozen=True)
-class IngestConfig:
+class IngestConfig(Ranged):
     """Where measured rollouts come from."""
 
-    incoming: str = "data/rollouts/r{round}"
+    incoming: Name = "data/rollouts/r{round}"
     """Folder of a round: datasets in folders of their own, one a cluster, or one dataset. `{round}` is its number."""
-    model: str = ""
+    model: Line = ""
     """The declared MJCF; empty: the model.xml beside the rollouts, or else this project's G1."""
-    gains_tolerance: float = Thresholds.gains_relative
+    gains_tolerance: Annotated[float, Range(least=0, most=1000)] = Thresholds.gains_relative
     """Largest relative difference between a file's kp or kd and the declared model's (and the deployed policy's);
     a file beyond it is set aside. A lab that varies its gains on purpose allows more."""
 
     def __post_init__(self) -> None:
-        if not self.gains_tolerance >= 0:
-            raise ValueError(f"gains_tolerance is {self.gains_tolerance:g}, and it is at least 0")
+        """Refuse a folder's name that is none for every round."""
+        super().__post_init__()
+        try:
+            self.incoming.format(round=1)
+        except (KeyError, IndexError, ValueError, AttributeError):
+            self.require(False, "incoming", "a path with no braces but those of {round}")
 
 
 def main(round: int) -> None:

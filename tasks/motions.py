@@ -10,19 +10,21 @@ from bumblebee.motion.folder import ReadConfig, Reading, motion_files, read_fold
 from bumblebee.motion.pieces import hold_out
 from bumblebee.motion.store import write_library
 from bumblebee.progress import progress
+from bumblebee.ranges import Name, PartOf, Ranged, Unfit
 from tasks.stage import load, log_run, run_stage
 
 MOTIONS = Path("data/motions")
 EMBEDDED = "embedded"
+CONTROL_HZ = 50.0
 
 
 @dataclass(frozen=True)
-class MotionsConfig:
+class MotionsConfig(Ranged):
     """Where the motions come from."""
 
-    source: str = EMBEDDED
+    source: Name = EMBEDDED
     """"embedded" for the library that comes with BumbleBee, or a folder (or one file) of motions."""
-    holdout_share: float = 0.15
+    holdout_share: PartOf = 0.15
     """Share of the motions that no policy trains on, by a hash of their names, in each family of 4 or more."""
     embedded: EmbeddedConfig = field(default_factory=EmbeddedConfig)
     """Which clips the embedded library has."""
@@ -30,9 +32,10 @@ class MotionsConfig:
     """How the files of a folder are read."""
 
     def __post_init__(self) -> None:
-        """Refuse a share that leaves nothing to train on."""
-        if not 0 <= self.holdout_share < 1:
-            raise ValueError(f"holdout_share is a share from 0 to below 1, came {self.holdout_share}")
+        """Refuse clips at another rate than the robot's control."""
+        super().__post_init__()
+        if self.read.fps != CONTROL_HZ:
+            raise Unfit(type(self), "read.fps", f"{CONTROL_HZ:g}, the rate of the policies", self.read.fps)
 
 
 def main() -> None:

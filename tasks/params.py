@@ -1,16 +1,17 @@
 """One section of params.yaml as the frozen dataclass of its stage: every key known, present and of its type."""
 
 import difflib
+import math
 import re
 import types
 import typing
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
-
-import yaml
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from bumblebee.errors import BadInput
+from bumblebee.io.read import read_yaml
+from bumblebee.ranges import Unfit, annotations, describe, element_kinds, fault, shown
 
 FILE = Path("params.yaml")
 EXPONENT = re.compile(r"[-+]?[0-9]+e[-+]?[0-9]+", re.IGNORECASE)
@@ -21,16 +22,11 @@ def read(path: Path = FILE) -> dict[str, Any]:
     """The whole of params.yaml as plain data.
 
     Raises:
-        BadInput: when the file is missing or is not a YAML mapping.
+        BadInput: when the file is missing, damaged, or is not a YAML mapping of distinct keys.
     """
-    try:
-        content = yaml.safe_load(path.read_text())
-    except FileNotFoundError:
-        raise BadInput(path, "a file with the parameters", "no file", "Run in the folder that holds it.") from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"{path}, line {mark.line + 1}" if mark else path
-        raise BadInput(where, "YAML", str(getattr(error, "problem", error))) from None
+    if not path.exists():
+        raise BadInput(path, "a file with the parameters", "no file", "Run in the folder that holds it.")
+    content = read_yaml(path)
     if not isinstance(content, dict):
         raise BadInput(path, "sections of parameters", type(content).__name__)
     return content
@@ -47,6 +43,11 @@ def load(section: str, kind: type[Config], path: Path = FILE) -> Config:
 
     content = read(path)
     check_names(content, path)
+    return section_of(content, section, kind, path)
+
+
+def section_of(content: dict[str, Any], section: str, kind: type[Config], path: Path) -> Config:
+    """The same from the content of the file."""
     if section not in content:
         raise BadInput(f"{path}: {section}", "this section", "none", nearest(section, content))
     return build(kind, content[section], path, section)
@@ -56,21 +57,24 @@ def build(kind: type[Config], values: Any, path: Path | str, place: str) -> Conf
     """An instance of the dataclass `kind` from plain data; `place` is the key's path in the file."""
     if not isinstance(values, dict):
         raise BadInput(f"{path}: {place}", "keys and values", _said(values))
-    hints = typing.get_type_hints(kind)
+    hints = annotations(kind)
     known = {field.name: field for field in fields(kind) if field.init}  # type: ignore[arg-type]
     inside = f"{place}." if place else ""
     for key in values:
         if key not in known:
             expected = f"one of {', '.join(known)}" if len(known) <= 6 else "a known key"
-            raise BadInput(f"{path}: {inside}{key}", expected, "an unknown key", nearest(str(key), known))
+            said = shown(key, bare=True)
+            raise BadInput(f"{path}: {inside}{said}", expected, "an unknown key", nearest(said, known))
     made = {}
     for name, field in known.items():
         if name in values:
             made[name] = convert(hints[name], values[name], path, f"{inside}{name}")
         elif field.default is MISSING and field.default_factory is MISSING:
-            raise BadInput(f"{path}: {inside}{name}", _type_name(hints[name]), "nothing", "Add the key.")
+            raise BadInput(f"{path}: {inside}{name}", describe(hints[name]), "nothing", "Add the key.")
     try:
         return kind(**made)
+    except Unfit as error:
+        raise BadInput(f"{path}: {inside}{error.field}", error.expected, error.came) from None
     except (ValueError, TypeError) as error:
         raise BadInput(f"{path}: {place}", "values that fit together", str(error)) from None
 
@@ -78,31 +82,50 @@ def build(kind: type[Config], values: Any, path: Path | str, place: str) -> Conf
 def convert(kind: Any, value: Any, path: Path | str, place: str) -> Any:
     """`value` as the type `kind`: scalars, literals, optionals, tuples, lists, dicts, paths and dataclasses."""
     origin, args = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _ranged(kind, args, value, path, place)
     if kind is Any:
         return value
     if origin in (typing.Union, types.UnionType):
         return _one_of(args, value, path, place, kind)
-    if origin is typing.Literal:
-        if value in args:
-            return value
-    elif is_dataclass(kind):
+    if is_dataclass(kind):
         return build(kind, value, path, place)  # type: ignore[arg-type]
-    elif origin in (tuple, list) and isinstance(value, list):
-        inner = _element_types(origin, args, len(value))
+    if origin in (tuple, list) and isinstance(value, list):
+        inner = element_kinds(origin, args, len(value))
         if inner is not None:
             made = [convert(t, v, path, f"{place}[{i}]") for i, (t, v) in enumerate(zip(inner, value, strict=True))]
             return tuple(made) if origin is tuple else made
     elif origin is dict and isinstance(value, dict):
-        return {convert(args[0], k, path, place): convert(args[1], v, path, f"{place}.{k}") for k, v in value.items()}
-    elif kind is float and isinstance(value, (int, float)) and not isinstance(value, bool):
-        return float(value)
+        keys = {key: f"{place}.{shown(key, bare=True)}" for key in value}
+        return {convert(args[0], k, path, keys[k]): convert(args[1], v, path, keys[k]) for k, v in value.items()}
     elif kind is float and isinstance(value, str) and EXPONENT.fullmatch(value):
         return float(value)  # YAML 1.1 reads 1e-4 as text, YAML 1.2 (and DVC) as a number
-    elif kind is Path and isinstance(value, str):
-        return Path(value)
-    elif isinstance(kind, type) and isinstance(value, kind) and isinstance(value, bool) == (kind is bool):
-        return value
-    raise BadInput(f"{path}: {place}", _type_name(kind), _said(value))
+    elif fault(kind, value, place) is None:
+        return _made(kind, value)
+    raise BadInput(f"{path}: {place}", describe(kind), _said(value))
+
+
+def _ranged(kind: Any, args: tuple[Any, ...], value: Any, path: Path | str, place: str) -> Any:
+    """A value with a range; what was expected names it."""
+    try:
+        made = convert(args[0], value, path, place)
+    except BadInput as error:
+        if error.where != f"{path}: {place}":
+            raise
+        raise BadInput(error.where, describe(kind), _said(value)) from None
+    if fault(kind, str(value) if args[0] is Path else made, place) is not None:
+        raise BadInput(f"{path}: {place}", describe(kind), _said(value))
+    return made
+
+
+def _made(kind: Any, value: Any) -> Any:
+    """A value of the right type in it; a whole number too large for a float is as bad as infinite."""
+    if kind is float:
+        try:
+            return float(value)
+        except OverflowError:
+            return math.inf
+    return Path(value) if kind is Path else value
 
 
 def _one_of(args: tuple[Any, ...], value: Any, path: Path | str, place: str, kind: Any) -> Any:
@@ -116,16 +139,7 @@ def _one_of(args: tuple[Any, ...], value: Any, path: Path | str, place: str, kin
         except BadInput:
             if is_dataclass(option) and isinstance(value, dict):
                 raise
-    raise BadInput(f"{path}: {place}", _type_name(kind), _said(value))
-
-
-def _element_types(origin: Any, args: tuple[Any, ...], length: int) -> list[Any] | None:
-    """The type of each element; None where the number of elements does not fit."""
-    if not args:
-        return [Any] * length
-    if origin is list or (len(args) == 2 and args[1] is Ellipsis):
-        return [args[0]] * length
-    return list(args) if len(args) == length else None
+    raise BadInput(f"{path}: {place}", describe(kind), _said(value))
 
 
 def nearest(key: str, known: typing.Iterable[str]) -> str:
@@ -135,20 +149,4 @@ def nearest(key: str, known: typing.Iterable[str]) -> str:
 
 
 def _said(value: Any) -> str:
-    return f"{value!r} ({type(value).__name__})"
-
-
-def _type_name(kind: Any) -> str:
-    origin, args = get_origin(kind), get_args(kind)
-    if origin is typing.Literal:
-        return "one of " + ", ".join(map(str, args))
-    if origin in (typing.Union, types.UnionType):
-        return " or ".join("nothing" if a is type(None) else _type_name(a) for a in args)
-    if origin is tuple and args and args[-1] is not Ellipsis:
-        return f"a list of {len(args)} values"
-    if origin in (tuple, list):
-        return f"a list of {_type_name(args[0])} values" if args else "a list"
-    if is_dataclass(kind):
-        return "keys and values"
-    names = {int: "a whole number", float: "a number", str: "text", bool: "true or false", Path: "a path"}
-    return names.get(kind, getattr(kind, "__name__", str(kind)))
+    return f"{shown(value)} ({type(value).__name__})"

@@ -11,6 +11,7 @@ import pandas as pd
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.summary import compare
+from bumblebee.ranges import Ranged
 from tasks import registry
 from tasks.lineage import path_hash
 from tasks.model_card import Evaluated, licences_of, model_card
@@ -24,7 +25,7 @@ MOTIONS = Path("data/filtered")
 
 
 @dataclass(frozen=True)
-class PublishConfig:
+class PublishConfig(Ranged):
     """By which numbers policies are promoted."""
 
     engine: Literal["auto", "stand_in", "nominal"] = "auto"

@@ -12,6 +12,7 @@ import pandas as pd
 
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.store import read_index
+from bumblebee.ranges import Line, Name, Ranged, Seed
 from bumblebee.report.data_sections import clusters_section, motions_section
 from bumblebee.report.filmstrip import film
 from bumblebee.report.loop_picture import Box, loop_picture
@@ -32,16 +33,16 @@ OUT = Path("reports/report.html")
 
 
 @dataclass(frozen=True)
-class ReportConfig:
+class ReportConfig(Ranged):
     """What the page shows beside the numbers."""
 
-    title: str = "BumbleBee: from motions to a registered generalist"
+    title: Name = "BumbleBee: from motions to a registered generalist"
     """The page's heading."""
     film: bool = True
     """Run the generalist once more on the stand-in robot and show it."""
-    film_motion: str = ""
+    film_motion: Line = ""
     """Motion of the film; empty: the liveliest one that it follows."""
-    seed: int = 3
+    seed: Seed = 3
     """Of the film's start state and sensor noise."""
 
 

@@ -12,7 +12,7 @@ import sys
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
@@ -27,6 +27,7 @@ from bumblebee.evaluation.episodes import rollout_metrics
 from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
+from bumblebee.ranges import Count, Few, Place, Range, Ranged, Seed
 from bumblebee.robot.model import write_xml
 from tasks.params import FILE, read
 from tasks.stage import load, log_run, output_folder, run_stage
@@ -35,21 +36,21 @@ FILTERED, SEALED = Path("data/filtered"), Path("data/sealed/robot.json")
 
 
 @dataclass(frozen=True)
-class RolloutsConfig:
+class RolloutsConfig(Ranged):
     """What is run on the robot in a round."""
 
-    motions: int = 6
+    motions: Count = 6
     """Motions of the cluster (paper: 20)."""
-    repeats: int = 2
+    repeats: Few = 2
     """Rollouts of each motion (paper: 8)."""
-    seed: int = 11
+    seed: Seed = 11
     """Of the choice of motions, the start states and the sensor noise."""
-    source: Path | None = None
+    source: Place | None = None
     """Folder of the user's own measured rollouts; nothing: the stand-in robot runs. New files in data/incoming are seen
     by themselves; with another folder, run `dvc repro -f` for this stage."""
-    threads: int = 2
+    threads: Few = 2
     """CPU threads of the stand-in."""
-    max_seconds: float = 10.0
+    max_seconds: Annotated[float, Range(least=0.1, most=3600)] = 10.0
     """Longer clips are cut to their beginning [s]."""
 
 

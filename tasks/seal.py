@@ -6,12 +6,12 @@ Only the stand-in's process reads that file, and the report at the very end. Wit
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from bumblebee.deploy.stand_in_effects import PARAMETERS, seal
-from bumblebee.errors import BadInput
+from bumblebee.ranges import Name, Range, Ranged, Seed
 from bumblebee.robot.facts import g1_bodies, joint_names, joints
 from bumblebee.robot.model import gains
 from tasks.stage import load, output_file, run_stage
@@ -29,23 +29,33 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class SealConfig:
+class SealConfig(Ranged):
     """What may be sealed."""
 
-    seed: int = 7
+    seed: Seed = 7
     """Of the draw."""
-    n_effects: int = 2
+    n_effects: Annotated[int, Range(least=0, most=1000)] = 2
     """Number of effects, each of another kind on another joint or body; 0: the diagnosis' null test."""
-    kinds: tuple[str, ...] = tuple(PARAMETERS)
+    kinds: tuple[Name, ...] = tuple(PARAMETERS)
     """Kinds to draw from."""
-    joints: tuple[str, ...] = tuple(
+    joints: tuple[Name, ...] = tuple(
         f"{side}_{name}_joint"
         for side in ("left", "right")
         for name in ("hip_pitch", "knee", "ankle_pitch", "shoulder_pitch", "elbow")
     )
     """Joints to draw from: those that most motions move."""
-    bodies: tuple[str, ...] = ("torso_link", "pelvis", "left_knee_link", "right_knee_link")
+    bodies: tuple[Name, ...] = ("torso_link", "pelvis", "left_knee_link", "right_knee_link")
     """Bodies to draw from for `link_mass`."""
+
+    def __post_init__(self) -> None:
+        """Refuse names that do not exist, and more effects than kinds or joints."""
+        super().__post_init__()
+        self.require_names("kinds", PARAMETERS)
+        self.require_names("joints", joint_names())
+        self.require_names("bodies", g1_bodies())
+        self.require(bool(self.bodies) or "link_mass" not in self.kinds, "bodies", "at least one for link_mass")
+        most = min(len(self.kinds), len(self.joints))
+        self.require(self.n_effects <= most, "n_effects", f"at most {most}, as many as there are kinds and joints")
 
 
 def main() -> None:
@@ -66,7 +76,6 @@ def main() -> None:
 
 def draw(config: SealConfig) -> list[dict[str, Any]]:
     """The effects as they stand in the file; the same configuration gives the same effects."""
-    _check(config)
     rng = np.random.default_rng(config.seed)
     kinds = rng.permutation(config.kinds)[: config.n_effects]
     places = iter(rng.permutation(config.joints))
@@ -96,22 +105,6 @@ def size(kind: str, place: str, rng: np.random.Generator) -> float:
         "encoder_offset": (0.03 + 0.03 * share) * float(rng.choice([-1, 1])),
     }
     return round(sizes[kind], 5)
-
-
-def _check(config: SealConfig) -> None:
-    """Names that do not exist, or more effects than kinds or joints, are refused before anything is drawn."""
-    choices = (
-        ("kinds", config.kinds, PARAMETERS),
-        ("joints", config.joints, joint_names()),
-        ("bodies", config.bodies, g1_bodies()),
-    )
-    for field, values, known in choices:
-        for value in values:
-            if value not in known:
-                raise BadInput(f"params.yaml: seal.{field}", f"names among {', '.join(list(known)[:8])} ...", value)
-    most = min(len(config.kinds), len(config.joints))
-    if not 0 <= config.n_effects <= most:
-        raise BadInput("params.yaml: seal.n_effects", f"0 to {most}", str(config.n_effects))
 
 
 if __name__ == "__main__":

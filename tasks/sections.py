@@ -1,12 +1,15 @@
 """Which dataclass each section of params.yaml is: `python -m tasks.sections` checks the whole file at once."""
 
+import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from bumblebee.errors import BadInput
+from bumblebee.io.read import read_bytes
+from bumblebee.ranges import Few, Name, Range, Ranged, Size, shown
 from tasks import params
 
 SECTIONS = {
@@ -28,27 +31,29 @@ SECTIONS = {
     "report": "tasks.report:ReportConfig",
 }
 LOOP = ("clusters", "rounds", "final_round")
+CHECKED = Path(".scratch/params.checked")
+LONGEST = 64  # signs of a cluster's name, which names folders and models
 
 
 @dataclass(frozen=True)
-class Round:
+class Round(Ranged):
     """One turn of the loop."""
 
-    n: int
+    n: Few
     """Its number, from 1."""
-    parent: int
+    parent: Annotated[int, Range(least=0, most=1000)]
     """The round whose experts act on the robot in it; 0 are the experts fine-tuned from base."""
 
 
 @dataclass(frozen=True)
-class Loop:
+class Loop(Ranged):
     """The loop's shape: the keys of params.yaml that belong to no stage."""
 
-    clusters: tuple[str, ...]
+    clusters: Annotated[tuple[Name, ...], Size(0)]
     """Names of the clusters, slowest motions first; their number is K."""
-    rounds: tuple[Round, ...]
+    rounds: Annotated[tuple[Round, ...], Size(0)]
     """The rounds, each after its parent; may be empty."""
-    final_round: int
+    final_round: Annotated[int, Range(least=0, most=1000)]
     """The round whose experts are distilled, evaluated and published."""
 
 
@@ -58,13 +63,17 @@ def loop(path: Path = params.FILE) -> Loop:
     Raises:
         BadInput: naming the key that does not fit.
     """
-    content = params.read(path)
+    return shape_of(params.read(path), path)
+
+
+def shape_of(content: dict[str, Any], path: Path) -> Loop:
+    """The same from the content of the file."""
     shape = params.build(Loop, {key: content[key] for key in LOOP if key in content}, path, "")
-    if not shape.clusters or len(set(shape.clusters)) < len(shape.clusters):
-        raise BadInput(f"{path}: clusters", "distinct names, at least one", str(list(shape.clusters)))
+    if not shape.clusters or len({name.casefold() for name in shape.clusters}) < len(shape.clusters):
+        raise BadInput(f"{path}: clusters", "distinct names, at least one", shown(list(shape.clusters)))
     for name in shape.clusters:
-        if not name.replace("_", "").isalnum():
-            raise BadInput(f"{path}: clusters", "names of letters, digits and _", repr(name))
+        if not name.replace("_", "").isalnum() or len(name) > LONGEST:
+            raise BadInput(f"{path}: clusters", f"names of at most {LONGEST} letters, digits and _", shown(name))
     for index, item in enumerate(shape.rounds):
         if item.n != index + 1 or item.parent != index:
             expected = f"n: {index + 1}, parent: {index} (each round follows the one before)"
@@ -84,25 +93,49 @@ def check_names(content: Iterable[str], path: Path) -> None:
     known = [*LOOP, *SECTIONS]
     for section in content:
         if section not in known:
-            nearest = params.nearest(str(section), known)
-            raise BadInput(f"{path}: {section}", "a known section", "an unknown one", nearest)
+            said = shown(section, bare=True)
+            raise BadInput(f"{path}: {said}", "a known section", "an unknown one", params.nearest(said, known))
 
 
 def check(path: Path = params.FILE) -> dict[str, Any]:
-    """Every section as its dataclass, and the loop's shape under "".
+    """Every section as its dataclass, and the loop's shape under ""; what they name is there.
 
     Raises:
         BadInput: for the first thing in the file that is wrong.
     """
-    check_names(params.read(path), path)
-    found: dict[str, Any] = {"": loop(path)}
+    return check_content(params.read(path), path)
+
+
+def check_content(content: dict[str, Any], path: Path) -> dict[str, Any]:
+    """The same from the content of the file."""
+    check_names(content, path)
+    found: dict[str, Any] = {"": shape_of(content, path)}
     for section, place in SECTIONS.items():
         module, _, name = place.partition(":")
-        found[section] = params.load(section, getattr(import_module(module), name), path)
+        found[section] = params.section_of(content, section, getattr(import_module(module), name), path)
+    import_module("tasks.sources").check_sources(found, path)
     return found
+
+
+def check_once(path: Path = params.FILE) -> None:
+    """`check`, by the stage that comes first after the file was changed: a slip in the last section stops it.
+
+    Checking imports what all stages import, which takes seconds; a stage reads and checks its own section in any case.
+
+    Raises:
+        BadInput: see `check`.
+    """
+    if not path.exists():
+        return  # a stage that reads it says so
+    digest = hashlib.sha256(read_bytes(path)).hexdigest()
+    if CHECKED.is_file() and CHECKED.read_text(errors="replace") == digest:
+        return
+    check(path)
+    CHECKED.parent.mkdir(exist_ok=True)
+    CHECKED.write_text(digest)
 
 
 if __name__ == "__main__":
     from tasks.stage import run_stage
 
-    run_stage(lambda: check())
+    run_stage(lambda: check(), logs=False)

@@ -26,6 +26,7 @@ from bumblebee.last_line import disk_line, guarded
 from tasks import recorder
 from tasks.params import load
 from tasks.parent import end_with_parent
+from tasks.sections import check_once
 
 __all__ = ["disk_line", "load", "log_run", "output_file", "output_folder", "run_stage", "scratch"]
 
@@ -54,6 +55,8 @@ def run_stage(main: Callable[..., object], argv: list[str] | None = None, *, log
 
 def _run(main: Callable[..., object], options: dict[str, object]) -> None:
     try:
+        if "DVC_STAGE" in os.environ:
+            check_once()
         main(**options)
     except Exception as error:
         if "database or disk is full" in str(error):  # how SQLite says it, through whichever library

@@ -21,6 +21,7 @@ from bumblebee.learning.ranks import Ranks, check_gpus, join, launch, leave, thi
 from bumblebee.learning.trial import Trials, World, success_by_family, try_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
+from bumblebee.ranges import Few, Ranged, Seed
 from bumblebee.sim.engines import make_engine
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
@@ -33,10 +34,10 @@ BEFORE = "before.parquet"
 
 
 @dataclass(frozen=True)
-class TrainingConfig:
+class TrainingConfig(Ranged):
     """One training of a tracking policy."""
 
-    seed: int = 0
+    seed: Seed = 0
     """Of the network, the draws of clips and frames, and the differences between the worlds."""
     env: EnvConfig = field(default_factory=EnvConfig)
     """The task."""
@@ -44,8 +45,17 @@ class TrainingConfig:
     """The algorithm."""
     trials: Trials = field(default_factory=Trials)
     """How the policy is tried before and after."""
-    gpus: int = 1
+    gpus: Few = 1
     """GPUs of this machine that train together, each with `env.num_worlds` worlds; for the engine `mujoco_warp`."""
+
+    def __post_init__(self) -> None:
+        """Refuse batches that are smaller than their parts, and several GPUs for an engine that has no use for them."""
+        super().__post_init__()
+        batch, least = self.env.num_worlds * self.ppo.steps, max(self.ppo.mini_batches, 2)
+        parts = f"at least {least} control steps an update (env.num_worlds times ppo.steps, here {batch})"
+        self.require(batch >= least, "ppo", parts)
+        engine = self.env.engine
+        self.require(self.gpus == 1 or engine == "mujoco_warp", "gpus", "1, or the engine `mujoco_warp`")
 
 
 @dataclass(frozen=True)
@@ -165,9 +175,6 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
 
 def _train_together(job: Job, config: TrainingConfig) -> dict[str, Any]:
     """Run this stage as `config.gpus` processes; the card that the first of them wrote."""
-    if config.env.engine != "mujoco_warp":
-        came, do = f"{config.gpus} with the engine {config.env.engine!r}", "Set `env.engine: mujoco_warp`."
-        raise BadInput(f"params.yaml: {job.stage}.gpus", "1, or the engine `mujoco_warp`", came, do)
     check_gpus(config.gpus)
     if status := launch(config.gpus, this_command()):
         raise SystemExit(status)

@@ -8,13 +8,14 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.metrics import WALKING_FAMILIES, success_threshold
 from bumblebee.motion.clip import Clip
+from bumblebee.ranges import Name, Range, Ranged
 
 SCHEMA = 1
 ALIGNMENT = (
@@ -28,24 +29,24 @@ ERRORS = (
 
 
 @dataclass(frozen=True)
-class Thresholds:
+class Thresholds(Ranged):
     """How far a key body may be from its reference."""
 
-    walking: float = 0.8
+    walking: Annotated[float, Range(above=0, most=100)] = 0.8
     """Families whose root travels [m]."""
-    other: float = 0.4
+    other: Annotated[float, Range(above=0, most=100)] = 0.4
     """All other families [m]."""
-    walking_families: tuple[str, ...] = WALKING_FAMILIES
+    walking_families: tuple[Name, ...] = WALKING_FAMILIES
     """The families that count as walking."""
 
 
 @dataclass(frozen=True)
-class StartNoise:
+class StartNoise(Ranged):
     """Standard deviation of the start state around the clip's first frame; drawn anew for every seed and motion."""
 
-    joint_pos: float = 0.01
+    joint_pos: Annotated[float, Range(least=0, most=10)] = 0.01
     """Joint angles [rad]."""
-    joint_vel: float = 0.05
+    joint_vel: Annotated[float, Range(least=0, most=100)] = 0.05
     """Joint speeds [rad/s]."""
 
 

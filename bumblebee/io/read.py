@@ -30,11 +30,12 @@ def read_bytes(path: Path, most: int = LIMITS.file_bytes) -> bytes:
     except (OSError, ValueError) as error:
         raise BadInput(path, "a file that can be read", getattr(error, "strerror", None) or str(error)) from None
     try:
+        facts = os.fstat(handle)
+        if not stat.S_ISREG(facts.st_mode):  # asked first: no stream can be made of a folder
+            os.close(handle)
+            came = "a folder" if stat.S_ISDIR(facts.st_mode) else "a pipe, device or socket"
+            raise BadInput(path, "a file", came)
         with os.fdopen(handle, "rb") as stream:
-            facts = os.fstat(stream.fileno())
-            if not stat.S_ISREG(facts.st_mode):
-                came = "a folder" if stat.S_ISDIR(facts.st_mode) else "a pipe, device or socket"
-                raise BadInput(path, "a file", came)
             if facts.st_size > most:
                 raise BadInput(path, f"at most {most:,} bytes", f"{facts.st_size:,}")
             return stream.read(most + 1)
@@ -65,7 +66,7 @@ def parse_yaml(where: object, text: str, limits: Limits = LIMITS) -> Any:
     """The same from text; `where` names its place in a message."""
     try:
         _measure_yaml(where, text, limits)
-        content = yaml.safe_load(text)
+        content = yaml.load(text, Loader=_DistinctKeys)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f"{where}, line {mark.line + 1}" if mark else where
@@ -76,6 +77,21 @@ def parse_yaml(where: object, text: str, limits: Limits = LIMITS) -> Any:
         raise BadInput(where, "YAML of plain values", f"{type(error).__name__}: {error}"[:200]) from None
     count(where, content, limits)
     return content
+
+
+class _DistinctKeys(yaml.SafeLoader):
+    """YAML's safe loader, which takes the last of two like keys in silence, refusing them."""
+
+    def compose_mapping_node(self, anchor: str | None) -> yaml.MappingNode:
+        """The mapping as it stands in the text, before `<<` merges others into it."""
+        node = super().compose_mapping_node(anchor)
+        seen: set[tuple[str, str]] = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if (key.tag, key.value) in seen:
+                    raise yaml.MarkedYAMLError(problem=f"the key {key.value!r} twice", problem_mark=key.start_mark)
+                seen.add((key.tag, key.value))
+        return node
 
 
 def _measure_yaml(where: object, text: str, limits: Limits) -> None:

@@ -1,51 +1,61 @@
 """Settings of PPO, a section of params.yaml."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
+
+from bumblebee.ranges import Count, Factor, Few, Positive, Range, Ranged, Rate, Share, Widths
 
 
 @dataclass(frozen=True)
-class PpoConfig:
+class PpoConfig(Ranged):
     """Proximal policy optimisation; the defaults are for minutes on a CPU, `PAPER` is the paper's (appendix B)."""
 
-    iterations: int = 600
+    iterations: Count = 600
     """Updates in all; each sees `num_worlds` times `steps` control steps."""
-    steps: int = 16
+    steps: Annotated[int, Range(least=1, most=10000)] = 16
     """Control steps of each world before an update."""
-    epochs: int = 3
+    epochs: Few = 3
     """Passes over those steps."""
-    mini_batches: int = 4
+    mini_batches: Annotated[int, Range(least=1, most=10000)] = 4
     """Gradient steps a pass."""
-    gamma: float = 0.97
+    gamma: Share = 0.97
     """Discount a control step."""
-    lam: float = 0.95
+    lam: Share = 0.95
     """Decay of the advantage estimate."""
-    clip: float = 0.2
+    clip: Annotated[float, Range(above=0, most=10)] = 0.2
     """Largest change of the action's probability ratio that is rewarded."""
-    entropy: float = 0.001
+    entropy: Factor = 0.001
     """Weight of the entropy."""
-    value: float = 1.0
+    value: Factor = 1.0
     """Weight of the critic's loss."""
-    grad_norm: float = 1.0
+    grad_norm: Positive = 1.0
     """Gradients are scaled down to this norm."""
     schedule: Literal["adaptive", "fixed"] = "adaptive"
     """Adapt the learning rate to the KL divergence of an update, or leave it."""
-    learning_rate: float = 1e-3
+    learning_rate: Rate = 1e-3
     """First, or only, learning rate."""
-    learning_rate_range: tuple[float, float] = (1e-4, 2e-3)
+    learning_rate_range: tuple[Rate, Rate] = (1e-4, 2e-3)
     """Bounds of the adaptive rate: with 23 actions a small KL target would pin it to nothing."""
-    desired_kl: float = 0.05
+    desired_kl: Positive = 0.05
     """KL divergence of an update that the rate is adapted to, at first."""
-    desired_kl_end: float = 0.05
+    desired_kl_end: Positive = 0.05
     """The same at the end."""
-    hidden: tuple[int, ...] = (256, 256, 128)
+    hidden: Widths = (256, 256, 128)
     """Widths of the actor's and the critic's layers, ELU."""
-    initial_std: float = 0.8
+    initial_std: Positive = 0.8
     """First standard deviation of the action; 0.3 was a dead end."""
     symmetry: bool = False
     """Learn from every sample's reflection too, left and right exchanged; doubles the batch."""
-    checkpoint_every: int = 25
+    checkpoint_every: Count = 25
     """Iterations between checkpoints, from which a killed training goes on."""
+
+    def __post_init__(self) -> None:
+        """Refuse bounds that run backwards, and a first rate outside of them: it would become another."""
+        super().__post_init__()
+        self.require_order("learning_rate_range")
+        low, high = self.learning_rate_range
+        within = self.schedule == "fixed" or low <= self.learning_rate <= high
+        self.require(within, "learning_rate", f"a rate within learning_rate_range, {low:g} to {high:g}")
 
 
 PAPER = PpoConfig(

@@ -10,6 +10,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import torch
@@ -18,6 +19,7 @@ from torch import Tensor
 from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
 from bumblebee.learning.delta_rewards import DeltaRewardConfig
+from bumblebee.ranges import Count, Factor, Few, Name, Positive, Range, Ranged, Seed, Size, Widths
 from bumblebee.robot.facts import ANKLE_JOINTS, joint_names
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, matrix
@@ -26,39 +28,45 @@ WEIGHTS, CARD = "delta.pt", "card.json"
 
 
 @dataclass(frozen=True)
-class DeltaConfig:
+class DeltaConfig(Ranged):
     """Training of one cluster's delta action."""
 
-    iterations: int = 60
+    iterations: Count = 60
     """PPO iterations."""
-    num_envs: int = 256
+    num_envs: Annotated[int, Range(least=1, most=1000000)] = 256
     """Robots that replay recordings at once."""
-    steps_per_iteration: int = 16
+    steps_per_iteration: Annotated[int, Range(least=1, most=10000)] = 16
     """Control steps of each robot between two updates."""
-    threads: int = 1
+    threads: Few = 1
     """CPU threads of the simulator."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of starts, exploration and network."""
-    joints: tuple[str, ...] = ANKLE_JOINTS
+    joints: Annotated[tuple[Name, ...], Size()] = ANKLE_JOINTS
     """Joints that the correction acts on (paper: the four ankle joints)."""
-    limit: float = 0.2
+    limit: Annotated[float, Range(above=0, most=3.2)] = 0.2
     """Largest correction of a target [rad]."""
-    hidden: tuple[int, ...] = (128, 64)
+    hidden: Widths = (128, 64)
     """Units of the hidden layers."""
-    episode_seconds: float = 1.0
+    episode_seconds: Annotated[float, Range(least=0.02, most=3600)] = 1.0
     """Length of an episode, restarted from a recorded state."""
-    learning_rate: float = 1e-3
+    learning_rate: Annotated[float, Range(least=1e-4, most=2e-3)] = 1e-3
     """Adam's rate at the start; it adapts to `desired_kl`."""
-    desired_kl: float = 0.02
+    desired_kl: Positive = 0.02
     """Change of the policy that the adaptive rate aims at."""
-    init_std: float = 0.25
+    init_std: Positive = 0.25
     """Standard deviation of the first exploration, as a share of `limit`."""
-    action_penalty: float = 0.05
+    action_penalty: Factor = 0.05
     """Factor on the table's two action rows: 1 is the paper's, which with corrections this small allows none."""
-    divergence: float = 0.5
+    divergence: Positive = 0.5
     """An episode ends where the root is this far from the recording [m]."""
     rewards: DeltaRewardConfig = field(default_factory=DeltaRewardConfig)
     """The table's weights."""
+
+    def __post_init__(self) -> None:
+        """Refuse joints that the robot has not, and batches smaller than the parts that they are learnt in."""
+        super().__post_init__()
+        self.require_names("joints", joint_names())
+        self.require(self.num_envs * self.steps_per_iteration >= 4, "num_envs", "times steps_per_iteration, at least 4")
 
 
 def layout(joints: int = 23) -> list[tuple[str, int]]:

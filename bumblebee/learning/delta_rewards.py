@@ -9,40 +9,41 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from bumblebee.ranges import Ranged, Weight
 from bumblebee.sim.rotations import angle_between
 
 
 @dataclass(frozen=True)
-class DeltaRewardConfig:
+class DeltaRewardConfig(Ranged):
     """Weights of the table's rows."""
 
-    torque_limits: float = -10.0
+    torque_limits: Weight = -10.0
     """Row "Torque limits": share of motors at their limit."""
-    dof_pos_limits: float = -10.0
+    dof_pos_limits: Weight = -10.0
     """Row "DoF position limits": share of joints beyond their range."""
-    dof_vel_limits: float = -10.0
+    dof_vel_limits: Weight = -10.0
     """Row "DoF velocity limits": share of joints beyond their speed."""
-    termination: float = -200.0
+    termination: Weight = -200.0
     """Row "Termination"; multiplied by the control period like every row."""
-    dof_acc: float = -3e-8
+    dof_acc: Weight = -3e-8
     """Row "DoF acceleration"."""
-    action_rate: float = -2.0
+    action_rate: Weight = -2.0
     """Row "Action rate"."""
-    action_norm: float = -2.0
+    action_norm: Weight = -2.0
     """Row "Action norm"."""
-    torque: float = -1e-4
+    torque: Weight = -1e-4
     """Row "Torque"."""
-    root_pos: float = 1.0
+    root_pos: Weight = 1.0
     """Row "Root position"."""
-    root_rot: float = 0.5
+    root_rot: Weight = 0.5
     """Row "Root rotation"."""
-    root_ang_vel: float = 0.5
+    root_ang_vel: Weight = 0.5
     """Row "Root angular velocity"."""
-    root_vel: float = 0.5
+    root_vel: Weight = 0.5
     """Row "Root velocity"."""
-    dof_pos: float = 0.5
+    dof_pos: Weight = 0.5
     """Row "DoF position"."""
-    dof_vel: float = 0.5
+    dof_vel: Weight = 0.5
     """Row "DoF velocity"."""
 
 

@@ -9,7 +9,7 @@ the experts answer what they see in "policy", and who learns sees "student".
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import pandas as pd
 import torch
@@ -17,38 +17,46 @@ from rsl_rl.models import MLPModel
 from torch import Tensor
 
 from bumblebee.learning.policy import Policy, Shape, new_actor, shape_of
+from bumblebee.ranges import Count, Few, Positive, Range, Ranged, Rate, Seed, Share, Widths
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 
 
 @dataclass(frozen=True)
-class DistillConfig:
+class DistillConfig(Ranged):
     """Distillation of the experts into the generalist."""
 
-    iterations: int = 300
+    iterations: Count = 300
     """Rounds of collecting and learning."""
-    steps: int = 8
+    steps: Annotated[int, Range(least=1, most=10000)] = 8
     """Control steps of each world a round; with 512 worlds that is the paper's batch of 4096."""
-    epochs: int = 2
+    epochs: Few = 2
     """Passes over a round's number of samples, drawn from all that was gathered."""
-    mini_batches: int = 4
+    mini_batches: Annotated[int, Range(least=1, most=10000)] = 4
     """Gradient steps a pass."""
-    learning_rate: float = 5e-4
+    learning_rate: Rate = 5e-4
     """Adam's rate; the paper's is 1e-4 with many more samples."""
-    grad_norm: float = 1.0
+    grad_norm: Positive = 1.0
     """Gradients are scaled down to this norm."""
-    capacity: int = 400_000
+    capacity: Annotated[int, Range(least=1, most=100000000)] = 400_000
     """Samples that are kept; the oldest go first."""
-    expert_share: float = 0.5
+    expert_share: Share = 0.5
     """Share of the worlds in which the expert acts at first; falls to 0 over the first half."""
     init: Literal["base", "scratch"] = "base"
     """Start from the base policy or from nothing; a student with an observation of its own starts from nothing."""
-    hidden: tuple[int, ...] = (256, 256, 128)
+    hidden: Widths = (256, 256, 128)
     """Layers of a generalist from scratch; from base they are base's."""
-    seed: int = 0
+    seed: Seed = 0
     """Seed of the draws and of the network."""
     env: EnvConfig = field(default_factory=EnvConfig)
     """The environment it learns in."""
+
+    def __post_init__(self) -> None:
+        """Refuse a store that does not hold one step of all worlds, and batches smaller than their parts."""
+        super().__post_init__()
+        worlds = self.env.num_worlds
+        self.require(self.capacity >= worlds, "capacity", f"at least env.num_worlds, {worlds}")
+        self.require(worlds * self.steps >= self.mini_batches, "mini_batches", f"at most {worlds * self.steps} samples")
 
 
 PAPER_DAGGER = DistillConfig(steps=1, learning_rate=1e-4, init="scratch", hidden=(1024, 1024, 512))

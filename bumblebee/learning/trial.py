@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from bumblebee.motion.clip import Clip
+from bumblebee.ranges import Factor, Few, Ranged, Seed
 from bumblebee.sim.effect_hooks import RuntimeHooks
 from bumblebee.sim.engines import make_engine
 from bumblebee.tracking.config import ObservationConfig
@@ -24,14 +25,14 @@ _WORLDS = 128  # at once
 
 
 @dataclass(frozen=True)
-class Trials:
+class Trials(Ranged):
     """How often and how roughly a policy is tried; the same settings give the same starts and the same noise."""
 
-    repeats: int = 1
+    repeats: Few = 1
     """Rollouts of each clip."""
-    noise: float = 0.0
+    noise: Factor = 0.0
     """Factor on the noise of the start and of the sensors."""
-    seed: int = 0
+    seed: Seed = 0
     """Of that noise."""
 
 

@@ -23,6 +23,7 @@ from bumblebee.io.read import read_json
 from bumblebee.io.write import unwritable, write_file
 from bumblebee.measured import gate_words as words
 from bumblebee.measured.intake import file_hash
+from bumblebee.ranges import Ranged
 
 AUTOMATIC = "automatic (gate.mode: auto)"
 STATUSES = ("pending", "approved", "rejected")
@@ -31,7 +32,7 @@ LONGEST = 500  # characters of a name or a note
 
 
 @dataclass(frozen=True)
-class GateConfig:
+class GateConfig(Ranged):
     """How the gate after each intake is answered."""
 
     mode: Literal["ask", "auto"] = "ask"

@@ -7,36 +7,42 @@ drop is written down with the value, the frame and a sentence.
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
 
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import lowest_heights
+from bumblebee.ranges import Range, Ranged
 from bumblebee.robot.facts import KEY_BODIES, joint_names, joints
 
 DROP_COLUMNS = ("motion", "rule", "value", "limit", "unit", "frame", "time", "explanation")
 
 
+Limit = Annotated[float, Range(least=0, most=1e6)]
+Speed = Annotated[float, Range(above=0, most=1e6)]
+
+
 @dataclass(frozen=True)
-class FilterConfig:
+class FilterConfig(Ranged):
     """Limits of the kinematic rules; a motion beyond one of them is dropped."""
 
-    penetration: float = 0.05
+    penetration: Limit = 0.05
     """How deep the robot's lowest point may lie under the floor [m]."""
-    floating: float = 0.10
+    floating: Limit = 0.10
     """How high above the floor the robot's lowest point may stay throughout [m]."""
-    airborne_height: float = 0.20
+    airborne_height: Limit = 0.20
     """A frame whose lowest point is higher than this counts as airborne [m]."""
-    airborne_seconds: float = 1.0
+    airborne_seconds: Limit = 1.0
     """How long the robot may be airborne without a break [s]."""
-    joint_excess: float = 0.05
+    joint_excess: Limit = 0.05
     """How far a joint may go beyond its limit [rad]."""
-    body_speed: float = 15.0
+    body_speed: Speed = 15.0
     """How fast a keypoint may move [m/s]."""
-    joint_speed: float = 40.0
+    joint_speed: Speed = 40.0
     """How fast a joint may turn [rad/s]; the G1's motors reach 20 to 37."""
-    root_speed: float = 5.0
+    root_speed: Speed = 5.0
     """How fast the pelvis may move from one frame to the next [m/s]; beyond it the motion jumps."""
 
 

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import pandas as pd
 
@@ -29,6 +29,7 @@ from bumblebee.motion.resample import resample
 from bumblebee.motion.store import read_index, read_indexed, read_library
 from bumblebee.motion.texts import shown
 from bumblebee.motion.walk import INDEX, motion_files
+from bumblebee.ranges import Line, Name, Range, Ranged
 
 Result = TypeVar("Result")
 
@@ -50,22 +51,30 @@ _MAX_DIRECTORY = 16 << 20  # bytes of a zip's list of files
 _UNKNOWN = "a format that is not known"
 
 
+Hertz = Annotated[float, Range(least=1, most=10_000)]
+
+
 @dataclass(frozen=True)
-class ReadConfig:
+class ReadConfig(Ranged):
     """How motion files become clips."""
 
-    csv_fps: float = 60.0
+    csv_fps: Hertz = 60.0
     """Frame rate of CSV files, which do not say it: g1_moves 60, LAFAN1's retargets 30 [Hz]."""
-    csv_fps_by_folder: dict[str, float] = field(default_factory=dict)
+    csv_fps_by_folder: dict[Name, Hertz] = field(default_factory=dict)
     """Another rate for the CSV files under a folder of that name, such as `{lafan1: 30}` [Hz]."""
-    fps: float = 50.0
+    fps: Hertz = 50.0
     """Frame rate of the clips: that of the policy [Hz]."""
-    max_seconds: float = 10.0
+    max_seconds: Annotated[float, Range(least=0, most=3600)] = 10.0
     """Longer motions are cut into equal pieces `<name>_p0`, `_p1` ... no longer than this; 0 never cuts [s]."""
-    captions_folder: str = ""
+    captions_folder: Line = ""
     """Where `<stem>.txt` caption files lie, if not beside the motions."""
     grounding: GroundingConfig = field(default_factory=GroundingConfig)
     """Correction of motions that float or sink."""
+
+    def __post_init__(self) -> None:
+        """Refuse pieces that are shorter than any motion."""
+        super().__post_init__()
+        self.require(self.max_seconds == 0 or self.max_seconds >= 0.2, "max_seconds", "0, or at least 0.2")
 
 
 @dataclass(frozen=True)

@@ -6,30 +6,32 @@ envelope of the robot's lowest point over about a second, which follows the drif
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy import ndimage
 
 from bumblebee.motion import quaternions
 from bumblebee.motion.kinematics import forward_bodies, lowest, sole_points
+from bumblebee.ranges import Range, Ranged
 from bumblebee.robot.facts import FEET, joint_names, joints
 
 
 @dataclass(frozen=True)
-class GroundingConfig:
+class GroundingConfig(Ranged):
     """How a motion's height is corrected."""
 
     enabled: bool = True
     """Correct at all. Motions that were made on the floor (the embedded ones) never are."""
-    tolerance: float = 0.025
+    tolerance: Annotated[float, Range(least=0, most=10)] = 0.025
     """A motion whose estimated floor stays within this distance of 0 is left as it is [m]."""
-    jump_seconds: float = 1.0
+    jump_seconds: Annotated[float, Range(least=0, most=60)] = 1.0
     """A rise shorter than this is a jump and stays; a longer one is an error of the estimate [s]."""
-    smooth_seconds: float = 0.15
+    smooth_seconds: Annotated[float, Range(least=0, most=60)] = 0.15
     """Standard deviation of the Gaussian that smooths the correction over time [s]."""
     level_ankles: bool = True
     """Turn the ankles so that a foot which is near the floor and slow stands flat."""
-    level_below: float = 0.08
+    level_below: Annotated[float, Range(above=0, most=1)] = 0.08
     """A sole at this height above the estimated floor, or higher, keeps its ankle angles [m]."""
 
 

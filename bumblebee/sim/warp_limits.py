@@ -10,18 +10,19 @@ import numpy as np
 import torch
 
 from bumblebee.errors import BadInput
+from bumblebee.ranges import Count, Ranged
 
 _SHARE = 0.9  # of the free memory that the worlds may fill
 _SAMPLE = 64  # worlds from which the memory a world is measured
 
 
 @dataclass(frozen=True)
-class Buffers:
+class Buffers(Ranged):
     """Room for contacts; Warp drops what does not fit, and `MujocoWarp.check` says so."""
 
-    contacts: int = 32
+    contacts: Count = 32
     """Contacts a world, on average over all worlds."""
-    constraints: int = 192
+    constraints: Count = 192
     """Rows of constraints in any one world: 4 a contact, 1 a joint at its limit or with dry friction."""
 
 

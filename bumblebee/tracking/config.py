@@ -1,123 +1,145 @@
 """Settings of the tracking task, a section of params.yaml each."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
-from bumblebee.sim.engines import Name
+from bumblebee.ranges import Factor, Few, Name, PartOf, Range, Ranged, Seconds, Seed, Share, Size, Unfit, Weight
+from bumblebee.sim.engines import Name as EngineName
 from bumblebee.sim.warp_limits import Buffers
 from bumblebee.tracking.library import AHEAD
+from bumblebee.tracking.terms import SETS, TERMS
 
 
 @dataclass(frozen=True)
-class RewardConfig:
+class RewardConfig(Ranged):
     """Which weights and kernels the reward has; docs/decisions/rewards.md says why there are two sets."""
 
     preset: Literal["demo", "paper"] = "demo"
     """`paper`: the table's weights and sharpness; `demo`: the same terms, tuned for minutes on a CPU."""
-    weights: dict[str, float] = field(default_factory=dict)
+    weights: dict[Name, Weight] = field(default_factory=dict)
     """Weights that replace the preset's, by term."""
-    sharpness: dict[str, float] = field(default_factory=dict)
+    sharpness: dict[Name, Factor] = field(default_factory=dict)
     """Factors in exp(-factor * error) that replace the preset's, by term."""
-    soft_limit: float = 0.95
+    soft_limit: Annotated[float, Range(above=0, most=1)] = 0.95
     """Share of a torque, position or velocity limit beyond which it counts as exceeded."""
+
+    def __post_init__(self) -> None:
+        """Refuse terms that there are not."""
+        super().__post_init__()
+        from bumblebee.tracking.rewards import ERRORS, PENALTIES  # late: it reads this class
+
+        self.require_names("weights", [*PENALTIES, *ERRORS])
+        self.require_names("sharpness", ERRORS)
 
 
 @dataclass(frozen=True)
-class Randomisation:
+class Randomisation(Ranged):
     """How much the worlds differ from the declared model (paper, table of domain randomisation); zeros: not at all."""
 
-    friction: tuple[float, float] = (0.6, 1.25)
+    friction: tuple[Annotated[float, Range(above=0, most=10)], Annotated[float, Range(above=0, most=10)]] = (0.6, 1.25)
     """Range of the factor on ground friction."""
-    gains: float = 0.1
+    gains: PartOf = 0.1
     """Largest relative change of each servo's P and D gain."""
-    strength: float = 0.0
+    strength: PartOf = 0.0
     """Largest relative loss of torque limit and gain of a motor."""
-    mass: float = 0.05
+    mass: PartOf = 0.05
     """Largest relative change of each link's mass."""
-    frictionloss: float = 0.0
+    frictionloss: Annotated[float, Range(least=0, most=1000)] = 0.0
     """Largest dry friction added to a joint [N m]; not zero costs about 15 % of the speed."""
-    push: float = 0.3
+    push: Annotated[float, Range(least=0, most=100)] = 0.3
     """Largest change of the root's horizontal velocity by a push [m/s]."""
-    push_interval: float = 5.0
+    push_interval: Seconds = 5.0
     """Mean time between pushes [s]."""
     push_regular: bool = False
     """Push each world exactly every `push_interval` with exactly `push`, its heading drawn, instead of by chance."""
-    base_com: float = 0.0
+    base_com: Annotated[float, Range(least=0, most=1)] = 0.0
     """Largest shift of the torso's centre of mass along each of its axes [m]."""
-    delay: tuple[float, float] = (0.0, 0.0)
+    delay: tuple[Annotated[float, Range(least=0, most=1)], Annotated[float, Range(least=0, most=1)]] = (0.0, 0.0)
     """Range of the delay [s] of all of a world's commands, on top of the model's own; the model needs room for it
     (`tracking.model.task_model`)."""
 
+    def __post_init__(self) -> None:
+        """Refuse ranges that run backwards."""
+        super().__post_init__()
+        self.require_order("friction")
+        self.require_order("delay")
+
 
 @dataclass(frozen=True)
-class Terrain:
+class Terrain(Ranged):
     """The ground that policies learn on (paper, table of domain randomisation: flat, rough)."""
 
-    rough: float = 0.0
+    rough: Share = 0.0
     """Share of the episodes on rough ground; with 0 the floor is a plane."""
-    amplitude: float = 0.025
+    amplitude: Annotated[float, Range(above=0, most=1)] = 0.025
     """Largest height of rough ground above or below the flat one [m]."""
-    cell: float = 0.2
+    cell: Annotated[float, Range(least=0.01, most=10)] = 0.2
     """Distance of the knots, between which the ground is straight [m]."""
-    size: float = 20.0
+    size: Annotated[float, Range(least=2, most=1000)] = 20.0
     """Half the side of the terrain [m]; an episode that comes within 1 m of the edge ends, which is no failure."""
-    seed: int = 0
+    seed: Seed = 0
     """Of the heights."""
+
+    def __post_init__(self) -> None:
+        """Refuse ground of too few knots to stand on, or too many to hold."""
+        super().__post_init__()
+        knots = self.size / self.cell
+        self.require(4 <= knots <= 2000, "cell", "4 to 2,000 cells in half the side, `size`")
 
 
 @dataclass(frozen=True)
-class ObservationConfig:
+class ObservationConfig(Ranged):
     """What a network sees: terms of `tracking.terms.TERMS`, or names of sets of them, over some control steps."""
 
-    terms: tuple[str, ...] = ("demo",)
+    terms: tuple[Name, ...] = ("demo",)
     """Names of terms in order; `teacher` and `student` stand for sets of them. Without any: no such group."""
-    history: int = 1
+    history: Annotated[int, Range(least=1, most=1000)] = 1
     """Control steps that are seen, the oldest first; what was before an episode's start is its first step."""
-    now: tuple[str, ...] = ()
+    now: tuple[Name, ...] = ()
     """Terms of which the newest step alone is seen, after all others."""
-    noise: float = 1.0
+    noise: Factor = 1.0
     """Factor on the sensor noise, beside `env.observation_noise`."""
 
 
 @dataclass(frozen=True)
-class EnvConfig:
+class EnvConfig(Ranged):
     """The environment that policies learn in."""
 
-    engine: Name = "mujoco"
+    engine: EngineName = "mujoco"
     """`mujoco` on CPU threads, or `mujoco_warp` on an NVIDIA GPU (the extra `gpu`), which wants thousands of worlds."""
     buffers: Buffers = field(default_factory=Buffers)
     """Room for contacts on a GPU."""
     compile: bool = False
     """Whether torch compiles observations and rewards, 10 s once: a GPU then steps about 7 % faster; it needs a C
     compiler on the machine."""
-    num_worlds: int = 512
+    num_worlds: Annotated[int, Range(least=1, most=1000000)] = 512
     """Copies of the robot."""
-    threads: int = 2
+    threads: Few = 2
     """CPU threads of the physics."""
-    physics_hz: float = 100.0
+    physics_hz: Annotated[float, Range(least=50, most=10000)] = 100.0
     """Rate of the physics; the policy acts at 50 Hz. At 100 Hz a training is a quarter faster than at 200 Hz, and its
     policies hold at 200 Hz and at 1 kHz."""
-    episode_seconds: float = 10.0
+    episode_seconds: Annotated[float, Range(least=0.02, most=3600)] = 10.0
     """Longest episode [s]; its end is no failure."""
-    start_share: float = 0.2
+    start_share: Share = 0.2
     """Share of the episodes that start at the clip's first frame; the others start anywhere."""
-    ahead: tuple[float, ...] = AHEAD
+    ahead: Annotated[tuple[Annotated[float, Range(above=0, most=10)], ...], Size(0, 100)] = AHEAD
     """Look-ahead times of the observation [s]."""
-    reset_noise: float = 1.0
+    reset_noise: Factor = 1.0
     """Factor on the noise of the initial state: 0.03 rad, 0.3 rad/s, 0.1 m/s, 0.02 m in the plane."""
-    observation_noise: float = 1.0
+    observation_noise: Factor = 1.0
     """Factor on the sensor noise of the policy's observation."""
-    threshold_start: float = 0.8
+    threshold_start: Annotated[float, Range(above=0, most=100)] = 0.8
     """Distance of a key body from the reference that ends an episode, at first [m]."""
-    threshold_end: float = 0.3
+    threshold_end: Annotated[float, Range(above=0, most=100)] = 0.3
     """The same at the end of the curriculum [m]."""
-    threshold_share: float = 0.5
+    threshold_share: Share = 0.5
     """Share of the training over which the threshold shrinks."""
-    sampler_floor: float = 0.3
+    sampler_floor: Annotated[float, Range(above=0, most=1000)] = 0.3
     """A clip is drawn by its length times (this + its failure rate): no clip is ever forgotten."""
-    sampler_memory: float = 0.9
+    sampler_memory: Share = 0.9
     """How much of a clip's failure rate one more episode leaves."""
-    sampler_stretch: float = 0.0
+    sampler_stretch: Annotated[float, Range(least=0, most=3600)] = 0.0
     """Length of the stretches of a clip whose own failure rates are followed [s]; 0: whole clips' rates."""
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     """What the policy sees; the critic sees the same without noise, forces, torques and the time left."""
@@ -132,3 +154,15 @@ class EnvConfig:
     """Differences between the worlds."""
     terrain: Terrain = field(default_factory=Terrain)
     """The ground."""
+
+    def __post_init__(self) -> None:
+        """Refuse rates, curricula and terms that cannot be."""
+        super().__post_init__()
+        self.require(self.physics_hz % 50 == 0, "physics_hz", "a multiple of the policy's 50 Hz")
+        expected = f"at most threshold_start, {self.threshold_start:g}"
+        self.require(self.threshold_end <= self.threshold_start, "threshold_end", expected)
+        for name in ("observation", "student"):
+            seen = getattr(self, name)
+            for term in {*seen.terms, *seen.now} - {*SETS, *TERMS}:
+                raise Unfit(type(self), f"{name}.terms", f"terms among {', '.join([*SETS, *TERMS][:8])} ...", term)
+        self.require(bool(self.observation.terms or self.observation.now), "observation", "at least one term")

@@ -109,7 +109,7 @@ def test_weights_load_without_pickled_code(model: TextMotionAutoencoder, tmp_pat
 
 @pytest.mark.parametrize("bad", [{"fps": 0.0}, {"hidden": 30, "heads": 4}, {"dropout": 1.0}, {"min_clips": 0}])
 def test_unusable_settings_are_named(bad: dict[str, float]) -> None:
-    with pytest.raises(BadInput, match="cluster." + next(iter(bad))):
+    with pytest.raises(BadInput, match="ClusterConfig." + next(iter(bad))):
         ClusterConfig(**bad)
 
 

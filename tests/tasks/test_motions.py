@@ -71,7 +71,10 @@ def test_the_embedded_library_is_written_the_same_twice():
     [
         ("motions: {source: nowhere}", "motions.source: expected a folder of motions or 'embedded', came nowhere"),
         ("motions: {sauce: mine}", "motions.sauce: expected"),
-        ("motions: {source: mine, holdout_share: 1.5}", "holdout_share is a share from 0 to below 1, came 1.5"),
+        (
+            "motions: {source: mine, holdout_share: 1.5}",
+            "motions.holdout_share: expected a number of at least 0, below 1, came 1.5",
+        ),
         ("motions: {source: mine/other.npz}", "SMPL motions cannot be read yet"),
     ],
 )

@@ -55,5 +55,5 @@ def test_every_kind_is_noticeable_in_its_own_unit(kind: str) -> None:
     "change", [{"kinds": ("gremlin",)}, {"joints": ("left_tail",)}, {"bodies": ("tail",)}, {"n_effects": 9}]
 )
 def test_what_does_not_exist_is_named(change: dict) -> None:
-    with pytest.raises(BadInput, match=f"seal.{next(iter(change))}"):
+    with pytest.raises(BadInput, match=f"SealConfig.{next(iter(change))}"):
         draw(replace(SealConfig(), **change))

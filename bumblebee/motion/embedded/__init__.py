@@ -6,6 +6,7 @@ runs, tests and the demonstration; a real library is read by the other modules o
 
 import hashlib
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from bumblebee.motion.embedded.plan import FPS
 from bumblebee.motion.embedded.solver import solve
 from bumblebee.motion.embedded.vary import Vary
 from bumblebee.motion.kinematics import make_clip
+from bumblebee.ranges import Count, Name, Range, Ranged, Seed, Size
 
 __all__ = ["FAMILIES", "EmbeddedConfig", "make_library"]
 
@@ -24,19 +26,25 @@ SOURCE, LICENCE = "made by bumblebee.motion.embedded", "Apache-2.0"
 
 
 @dataclass(frozen=True)
-class EmbeddedConfig:
+class EmbeddedConfig(Ranged):
     """Which clips are made; the same configuration makes the same bytes."""
 
-    seed: int = 0
+    seed: Seed = 0
     """Sizes and tempi of every clip."""
-    families: tuple[str, ...] = FAMILIES
+    families: Annotated[tuple[Name, ...], Size()] = FAMILIES
     """Families to make."""
-    limit: int | None = None
+    limit: Count | None = None
     """At most so many clips, taken in turn from each family; None for all."""
-    variants: tuple[int, ...] = (0,)
+    variants: Annotated[tuple[Annotated[int, Range(least=0, most=999)], ...], Size()] = (0,)
     """Versions of every kind, other sizes and tempi each; 0 has the plain name, 3 ends in "_v3"."""
-    variation: float = 0.06
+    variation: Annotated[float, Range(least=0, most=0.5)] = 0.06
     """Share by which sizes and tempi vary."""
+
+    def __post_init__(self) -> None:
+        """Refuse families that there are not, and what would make a clip twice."""
+        super().__post_init__()
+        self.require_names("families", FAMILIES)
+        self.require(len(set(self.variants)) == len(self.variants), "variants", "distinct numbers")
 
 
 def make_library(config: EmbeddedConfig | None = None) -> list[Clip]:

@@ -1,0 +1,60 @@
+"""The files and folders that params.yaml names: each is looked for before the first stage, not when its stage comes."""
+
+from pathlib import Path
+from typing import Any
+
+from bumblebee.clustering.text import encoder_folder
+from bumblebee.errors import BadInput
+
+MADE_HERE = "data"  # what the loop itself fills
+
+
+def check_sources(found: dict[str, Any], path: Path) -> None:
+    """Refuse a source that is not there.
+
+    Args:
+        found: the sections by name, as their dataclasses.
+        path: the file that they come from.
+
+    Raises:
+        BadInput: naming the key.
+    """
+    motions, rollouts, ingest = found["motions"], found["rollouts"], found["ingest"]
+    if motions.source != "embedded":
+        place, wanted = f"{path}: motions.source", "a folder of motions or 'embedded'"
+        _require(_at_home(motions.source, place, wanted), place, wanted, either=True)
+    if motions.read.captions_folder:
+        _require(Path(motions.read.captions_folder), f"{path}: motions.read.captions_folder", "a folder of captions")
+    try:
+        encoder_folder(found["cluster"].text_encoder)
+    except BadInput as error:
+        raise BadInput(f"{path}: cluster.text_encoder", error.expected, error.came, error.do) from None
+    if rollouts.source is not None:
+        _require(rollouts.source, f"{path}: rollouts.source", "a folder of measured rollouts")
+    before = _before_round(ingest.incoming)
+    if before.parts[:1] != (MADE_HERE,):
+        _require(before, f"{path}: ingest.incoming", "a folder of measured rollouts")
+    if ingest.model and not Path(ingest.model).is_file():
+        raise BadInput(f"{path}: ingest.model", "an MJCF file", f"{ingest.model}: no such file")
+
+
+def _require(place: Path, key: str, wanted: str, either: bool = False) -> None:
+    """Refuse what is no folder (`either`: nor a file)."""
+    if place.is_dir() or (either and place.is_file()):
+        return
+    raise BadInput(key, wanted, f"{place}: {'no folder' if place.exists() else 'nothing there'}")
+
+
+def _at_home(name: str, key: str, wanted: str) -> Path:
+    """The path, `~` replaced."""
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        raise BadInput(key, wanted, f"{name}: no such user") from None
+
+
+def _before_round(incoming: str) -> Path:
+    """What stands before the part of the path that is another in each round."""
+    parts = Path(incoming).parts
+    changing = [index for index, part in enumerate(parts) if "{" in part]
+    return Path(*parts[: changing[0]]) if changing else Path(incoming)
