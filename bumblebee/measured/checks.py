@@ -8,7 +8,8 @@ import numpy as np
 from bumblebee.measured.checks_base import check_base
 from bumblebee.measured.checks_magnitude import check_magnitude
 from bumblebee.measured.checks_order import check_names, check_order
-from bumblebee.measured.checks_sign import check_response, check_velocity
+from bumblebee.measured.checks_response import check_response
+from bumblebee.measured.checks_sign import check_velocity
 from bumblebee.measured.checks_time import check_time
 from bumblebee.measured.checks_units import check_degrees, check_gains
 from bumblebee.measured.checks_values import check_finite, check_frozen, check_range, check_steps

@@ -99,7 +99,7 @@ def incoming_files(folder: Path) -> list[Path]:
         raise BadInput(folder, "a folder of measured rollouts", "no such folder")
     inner = folder / "rollouts"
     files = (inner if inner.is_dir() else folder).glob("*.parquet")
-    return sorted(file for file in files if not file.name.startswith(".") and (file.is_file() or file.is_symlink()))
+    return sorted(file for file in files if not file.name.startswith("."))
 
 
 def findings_table(findings: Iterable[Finding]) -> pd.DataFrame:
@@ -118,6 +118,8 @@ def merge(summaries: Iterable[IntakeSummary]) -> IntakeSummary:
 
 def file_hash(path: Path) -> str:
     """sha256 of a file's bytes."""
+    if not Path(path).is_file():  # a pipe would be waited for
+        raise BadInput(path, "a file", "a folder" if Path(path).is_dir() else "none")
     try:
         with Path(path).open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
@@ -131,9 +133,14 @@ def _take(
     quarantine: Path,
     check: Callable[[Path], tuple[Rollout | None, list[Finding]]],
 ) -> tuple[Item, list[Finding]]:
-    digest = file_hash(source)
-    rollout, findings = check(source)
     shown = _shown(source.name)
+    try:
+        digest = file_hash(source)
+    except BadInput as error:  # there is nothing that could be copied, only something to tell
+        found = Finding(shown, "", None, "readable", error.expected, error.came, fatal=True)
+        _note(quarantine / source.name, shown, "", [found])
+        return Item(shown, "", False, "", "", 0.0, ()), [found]
+    rollout, findings = check(source)
     fatal = any(finding.fatal for finding in findings)
     place = accepted / source.name
     if place.exists():
@@ -189,8 +196,13 @@ def _set_aside(source: Path, digest: str, quarantine: Path, findings: list[Findi
         place = quarantine / f"{source.stem}.{digest[:12]}{source.suffix}"
     if not place.exists():
         copy_new(source, place)
+    _note(place, _shown(source.name), digest, findings)
+
+
+def _note(place: Path, file: str, digest: str, findings: list[Finding]) -> None:
+    """What was found, as JSON beside the file that was set aside."""
     notes = place.with_name(f"{place.name}.findings.json")
-    table = {"file": _shown(source.name), "sha256": digest, "findings": [finding.as_dict() for finding in findings]}
+    table = {"file": file, "sha256": digest, "findings": [finding.as_dict() for finding in findings]}
     if not notes.exists():
         write_new(notes, json.dumps(table, indent=1, ensure_ascii=False, default=str).encode())
 
