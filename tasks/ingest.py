@@ -10,8 +10,10 @@ from typing import Annotated, Any
 import mujoco
 
 from bumblebee.errors import BadInput
+from bumblebee.io.read import read_json
 from bumblebee.measured import gate, gate_words
 from bumblebee.measured.intake import IntakeSummary, file_hash, incoming_files, intake, merge
+from bumblebee.measured.model_file import copy_model, load_model
 from bumblebee.measured.overview import write_overview
 from bumblebee.measured.rollout import read_rollout
 from bumblebee.measured.summary import summary_table
@@ -46,7 +48,7 @@ class IngestConfig(Ranged):
 def main(round: int) -> None:
     """Sort the rollouts of one round."""
     config = load("ingest", IngestConfig)
-    folders = dataset_folders(Path(config.incoming.format(round=round)))
+    folders = dataset_folders(Path(incoming_of(config.incoming, round)))
     with output_folder(f"data/measured/r{round}") as out:
         write_model(folders, config.model, out / "model.xml")
         limits = Thresholds(gains_relative=config.gains_tolerance)
@@ -59,6 +61,15 @@ def main(round: int) -> None:
     ask(round)
     counts = {key: float(table[key]) for key in ("accepted", "quarantined", "seconds")}
     log_run("ingest", round=round, params=config, metrics=counts)
+
+
+def incoming_of(pattern: str, round: int) -> str:
+    """The folder of a round; the pattern's only field is its number."""
+    try:
+        return pattern.format(round=round)
+    except (ValueError, LookupError, AttributeError, TypeError):
+        where = "params.yaml: ingest.incoming"
+        raise BadInput(where, "a folder with no braces but {round}", repr(pattern)[:80]) from None
 
 
 def dataset_folders(incoming: Path) -> list[Path]:
@@ -81,11 +92,8 @@ def write_model(folders: list[Path], given: str, out: Path) -> None:
     if source is None:
         write_xml(out)
         return
-    try:
-        mujoco.MjModel.from_xml_path(str(source))
-    except ValueError as error:
-        raise BadInput(source, "an MJCF model that loads", str(error)) from None
-    shutil.copyfile(source, out)
+    load_model(source)
+    copy_model(source, out)
 
 
 def policy_contracts(folders: list[Path], round: int) -> dict[str, dict[str, Any]]:
@@ -94,8 +102,24 @@ def policy_contracts(folders: list[Path], round: int) -> dict[str, dict[str, Any
     for folder in folders:
         for path in (folder / "contract.json", Path(f"models/experts/r{round - 1}/{folder.name}/contract.json")):
             if folder.name not in contracts and path.is_file():
-                contracts[folder.name] = json.loads(path.read_text(encoding="utf-8"))
+                contracts[folder.name] = read_contract(path)
     return contracts
+
+
+def read_contract(path: Path) -> dict[str, Any]:
+    """What the checks ask of a policy's contract: joints, and gains for each."""
+    table = read_json(path)
+    if not isinstance(table, dict):
+        raise BadInput(path, "a JSON object", type(table).__name__)
+    joints = table.get("joints", [])
+    if not isinstance(joints, list) or not all(isinstance(joint, str) for joint in joints):
+        raise BadInput(f"{path}: joints", "a list of names", repr(joints)[:80])
+    for key in ("kp", "kd"):
+        gains = table.get(key, [])
+        numbers = isinstance(gains, list) and all(type(gain) in (int, float) and abs(gain) < 1e9 for gain in gains)
+        if not numbers or len(gains) not in (0, len(joints)):
+            raise BadInput(f"{path}: {key}", f"{len(joints)} numbers, one a joint", repr(gains)[:80])
+    return {"joints": joints} | {key: table[key] for key in ("kp", "kd") if table.get(key)}
 
 
 def sort_rollouts(

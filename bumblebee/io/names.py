@@ -23,11 +23,13 @@ def safe_stem(text: object, fallback: str = "unnamed") -> str:
     return plain or fallback
 
 
-def require_stem(where: object, text: object) -> str:
+def require_stem(where: object, text: object, longest: int = LONGEST) -> str:
     """`text` itself where it can name a file as it stands."""
-    if not isinstance(text, str) or not text or text.startswith(".") or len(text.encode()) > LONGEST:
-        raise BadInput(where, f"a name of 1 to {LONGEST} bytes that does not begin with a dot", repr(text)[:80])
-    if any(sign in "/\\" or ord(sign) < 32 or ord(sign) == 127 for sign in text):
+    if not isinstance(text, str) or not text or text.startswith("."):
+        raise BadInput(where, "a name that does not begin with a dot", repr(text)[:80])
+    if len(text.encode("utf-8", "replace")) > longest:
+        raise BadInput(where, f"a name of 1 to {longest} bytes", repr(text)[:80])
+    if any(sign in "/\\" or ord(sign) < 32 or ord(sign) == 127 or 0xD800 <= ord(sign) < 0xE000 for sign in text):
         raise BadInput(where, "a name without slashes and control characters", repr(text)[:80])
     return text
 
@@ -35,13 +37,15 @@ def require_stem(where: object, text: object) -> str:
 def distinct_stems(texts: Sequence[object], fallback: str = "unnamed") -> list[str]:
     """A safe name for each text, no two alike, also where the file system does not tell cases apart."""
     taken: set[str] = set()
+    last: dict[str, int] = {}  # so that a hundred thousand texts of one stem need no search each
     out = []
     for text in texts:
-        stem, number = safe_stem(text, fallback), 1
-        name = stem
+        name = stem = safe_stem(text, fallback)
+        number = last.get(stem.casefold(), 1)
         while name.casefold() in taken:
             number += 1
             name = f"{stem}-{number}"
+        last[stem.casefold()] = number
         taken.add(name.casefold())
         out.append(name)
     return out

@@ -3,10 +3,13 @@
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from bumblebee.measured.checks_base import check_base
+from bumblebee.measured.checks_magnitude import check_magnitude
 from bumblebee.measured.checks_order import check_names, check_order
-from bumblebee.measured.checks_sign import check_response, check_velocity
+from bumblebee.measured.checks_response import check_response
+from bumblebee.measured.checks_sign import check_velocity
 from bumblebee.measured.checks_time import check_time
 from bumblebee.measured.checks_units import check_degrees, check_gains
 from bumblebee.measured.checks_values import check_finite, check_frozen, check_range, check_steps
@@ -35,16 +38,24 @@ def check_rollout(
         limits: what still passes.
     """
     view = View(file or f"{rollout.rollout_id}.parquet", rollout, model, contract, limits or Thresholds())
+    with np.errstate(all="ignore"):  # every quotient is guarded where it matters
+        _check_all(view)
+    return view.findings
+
+
+def _check_all(view: View) -> None:
+    rollout = view.rollout
     check_names(view)
     check_finite(view)
+    check_magnitude(view)
     check_gains(view)
-    if view.found("finite", "time"):
-        return view.findings
+    if view.found("finite", "time") or view.found("magnitude"):
+        return  # a square of such a number is no number any more
     check_time(view)
     other_unit = any(finding.rule == "rate" and "these are" in finding.came for finding in view.findings)
     no_clock = view.found("time-order") or view.found("time-duplicate") or other_unit
     if no_clock or view.found("finite") or rollout.frames < 4:
-        return view.findings  # what follows needs numbers and a clock
+        return  # what follows needs numbers and a clock
     check_degrees(view)
     check_frozen(view)
     check_range(view)
@@ -53,4 +64,3 @@ def check_rollout(
     check_order(view)
     check_response(view)
     check_base(view)
-    return view.findings

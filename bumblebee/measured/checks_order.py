@@ -5,6 +5,7 @@ import difflib
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from bumblebee.measured.checks_units import driven_joints
 from bumblebee.measured.view import View
 
 ORDER_WINDOW = 0.2  # s over which changes are compared: long against a servo's lag, short against a motion
@@ -20,8 +21,7 @@ def check_names(view: View) -> None:
             near = difflib.get_close_matches(name, known, 1)
             expected = f"a joint of the model (nearest: {near[0]})" if near else "a joint of the model"
             view.add("joints", None, "joint-names", expected, name, fatal=True)
-    moved = {view.model.joint(int(i)).name for i in view.model.actuator_trnid[:, 0] if 0 <= i < view.model.njnt}
-    absent = sorted(moved - set(view.rollout.joints))
+    absent = sorted(set(driven_joints(view.model)) - set(view.rollout.joints))
     if absent:
         came = f"no column for {', '.join(absent[:3])}{' ...' if len(absent) > 3 else ''} ({len(absent)} in all)"
         view.add("joints", None, "joint-missing", "every actuated joint of the model", came, fatal=True)

@@ -56,13 +56,24 @@ def _fits_only_as_degrees(values: np.ndarray, ranges: np.ndarray) -> bool:
     return bool(outside and (_excess(values * DEGREE, ranges) < 0.1).all())
 
 
+def driven_joints(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Names of the joints that actuators turn directly, in the actuators' order; tendons and sites are left out."""
+    return tuple(model.joint(int(model.actuator_trnid[i, 0])).name for i in range(model.nu) if at_joint(model, i))
+
+
+def at_joint(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether an actuator acts on a joint."""
+    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    return int(model.actuator_trntype[actuator]) in kinds
+
+
 def servo_gains(model: mujoco.MjModel) -> dict[str, tuple[float, float]]:
     """Joint name -> (kp, kd) of the position servos of a model; other actuators are left out."""
     gains = {}
     for actuator in range(model.nu):
         affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
         kp = float(model.actuator_gainprm[actuator, 0])
-        if affine and kp > 0 and np.isclose(-model.actuator_biasprm[actuator, 1], kp):
+        if at_joint(model, actuator) and affine and kp > 0 and np.isclose(-model.actuator_biasprm[actuator, 1], kp):
             name = model.joint(int(model.actuator_trnid[actuator, 0])).name
             gains[name] = (kp, float(-model.actuator_biasprm[actuator, 2]))
     return gains

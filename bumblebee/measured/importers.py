@@ -1,16 +1,18 @@
 """`import_dataset`: any known layout of logs as a dataset of the contract, with the declared model beside it."""
 
 import os
-import shutil
-import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 
 from bumblebee.errors import BadInput
+from bumblebee.io.names import distinct_stems
+from bumblebee.io.write import new_folder, try_output
 from bumblebee.measured.asap_npz import import_asap
-from bumblebee.measured.csv_map import DOUBLE_PENDULUM, import_csv, read_map
+from bumblebee.measured.column_map import DOUBLE_PENDULUM, read_map
+from bumblebee.measured.csv_map import import_csv
 from bumblebee.measured.model_file import copy_model, load_model
 from bumblebee.measured.rollout import Rollout, write_rollout
 from bumblebee.measured.so101 import import_so101
@@ -43,7 +45,7 @@ def read_rollouts(
     }
     if kind not in readers:
         raise BadInput(kind, f"one of {', '.join(KINDS)}", repr(kind))
-    return readers[kind]()
+    return _distinct(readers[kind]())
 
 
 def import_dataset(
@@ -51,19 +53,27 @@ def import_dataset(
 ) -> list[str]:
     """Write `out`/rollouts/*.parquet and `out`/model.xml; `out` appears whole and must not exist. Returns the ids."""
     out = Path(out)
-    if out.exists():
+    if os.path.lexists(out):
         raise BadInput(out, "a new folder", "one that exists", "Choose another name.")
+    try_output(out)
     model = load_model(model_path) if model_path else None
     rollouts = read_rollouts(Path(source), kind, model, column_map)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
-    try:
+    with new_folder(out) as folder:
         for rollout in rollouts:
-            write_rollout(temporary / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)
+            write_rollout(folder / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)
         if model_path:
-            copy_model(model_path, temporary / "model.xml")
-        temporary.chmod(0o755)
-        os.rename(temporary, out)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+            copy_model(model_path, folder / "model.xml")
     return [rollout.rollout_id for rollout in rollouts]
+
+
+def _distinct(rollouts: list[Rollout]) -> list[Rollout]:
+    """The rollouts under names that can be files' and of which no two are alike; none is lost."""
+    names = distinct_stems([rollout.rollout_id for rollout in rollouts], "rollout")
+    return [_renamed(rollout, name) for rollout, name in zip(rollouts, names, strict=True)]
+
+
+def _renamed(rollout: Rollout, name: str) -> Rollout:
+    if name == rollout.rollout_id:
+        return rollout
+    motion = {"motion": name} if rollout.meta.get("motion") == rollout.rollout_id else {}
+    return replace(rollout, rollout_id=name, meta=rollout.meta | motion)

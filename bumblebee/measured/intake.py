@@ -20,11 +20,14 @@ import numpy as np
 import pandas as pd
 
 from bumblebee.errors import BadInput
+from bumblebee.io.names import safe_stem
 from bumblebee.measured.checks import check_rollout
 from bumblebee.measured.finding import Finding
 from bumblebee.measured.rollout import BadRollout, Rollout, read_rollout
 from bumblebee.measured.thresholds import Thresholds
 
+UNFORESEEN = "check-failed"  # the rule of a file over which a check itself broke
+LONGEST_NAME = 220  # bytes: `<name>.findings.json` lies beside it, and file systems take 255
 FINDING_COLUMNS = ("file", "column", "row", "rule", "expected", "came", "fatal", "message")
 
 
@@ -115,8 +118,13 @@ def merge(summaries: Iterable[IntakeSummary]) -> IntakeSummary:
 
 def file_hash(path: Path) -> str:
     """sha256 of a file's bytes."""
-    with Path(path).open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+    if not Path(path).is_file():  # a pipe would be waited for
+        raise BadInput(path, "a file", "a folder" if Path(path).is_dir() else "none")
+    try:
+        with Path(path).open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise BadInput(path, "a file that can be read", error.strerror or str(error)) from None
 
 
 def _take(
@@ -125,7 +133,13 @@ def _take(
     quarantine: Path,
     check: Callable[[Path], tuple[Rollout | None, list[Finding]]],
 ) -> tuple[Item, list[Finding]]:
-    digest = file_hash(source)
+    shown = _shown(source.name)
+    try:
+        digest = file_hash(source)
+    except BadInput as error:  # there is nothing that could be copied, only something to tell
+        found = Finding(shown, "", None, "readable", error.expected, error.came, fatal=True)
+        _note(quarantine / source.name, shown, "", [found])
+        return Item(shown, "", False, "", "", 0.0, ()), [found]
     rollout, findings = check(source)
     fatal = any(finding.fatal for finding in findings)
     place = accepted / source.name
@@ -133,7 +147,7 @@ def _take(
         same = file_hash(place) == digest
         if not same or fatal:
             came = "a file of that name that was accepted before" + ("" if same else ", with other content")
-            findings.append(Finding(source.name, "", None, "name-taken", "a name that is free", came, fatal=True))
+            findings.append(Finding(shown, "", None, "name-taken", "a name that is free", came, fatal=True))
             fatal = True
     elif not fatal:
         copy_new(source, place)
@@ -141,7 +155,7 @@ def _take(
         _set_aside(source, digest, quarantine, findings)
     meta = rollout.meta if rollout else {}
     return Item(
-        source.name,
+        shown,
         digest,
         not fatal,
         str(meta.get("motion", "")),
@@ -154,22 +168,41 @@ def _take(
 def _check(
     source: Path, model: mujoco.MjModel, contracts: Mapping[str, dict[str, Any]], limits: Thresholds | None
 ) -> tuple[Rollout | None, list[Finding]]:
+    name = _shown(source.name)
     try:
         rollout = read_rollout(source)
     except BadRollout as bad:
-        return None, [Finding(source.name, bad.column, None, bad.rule, bad.expected, bad.came, fatal=True)]
+        return None, [Finding(name, bad.column, None, bad.rule, bad.expected, bad.came, fatal=True)]
     contract = contracts.get(str(rollout.meta.get("cluster", "")), contracts.get(""))
-    return rollout, check_rollout(rollout, model, contract, source.name, limits)
+    try:
+        return rollout, check_rollout(rollout, model, contract, name, limits)
+    except BadInput:
+        raise
+    except Exception as error:  # one file that a check stumbles over must not keep a batch of good ones from its end
+        came = f"{type(error).__name__}: {error}"[:200]
+        return rollout, [Finding(name, "", None, UNFORESEEN, "a file that the checks can judge", came, fatal=True)]
+
+
+def _shown(name: str) -> str:
+    """A file's name as text that every file and page can hold; bytes that are no UTF-8 become question marks."""
+    return name.encode("utf-8", "replace").decode()
 
 
 def _set_aside(source: Path, digest: str, quarantine: Path, findings: list[Finding]) -> None:
     place = quarantine / source.name
+    if len(os.fsencode(source.name)) > LONGEST_NAME:
+        place = quarantine / f"{safe_stem(source.stem)}.{digest[:12]}{source.suffix}"
     if place.exists() and file_hash(place) != digest:
         place = quarantine / f"{source.stem}.{digest[:12]}{source.suffix}"
     if not place.exists():
         copy_new(source, place)
+    _note(place, _shown(source.name), digest, findings)
+
+
+def _note(place: Path, file: str, digest: str, findings: list[Finding]) -> None:
+    """What was found, as JSON beside the file that was set aside."""
     notes = place.with_name(f"{place.name}.findings.json")
-    table = {"file": source.name, "sha256": digest, "findings": [finding.as_dict() for finding in findings]}
+    table = {"file": file, "sha256": digest, "findings": [finding.as_dict() for finding in findings]}
     if not notes.exists():
         write_new(notes, json.dumps(table, indent=1, ensure_ascii=False, default=str).encode())
 

@@ -1,13 +1,20 @@
 """The metadata of a rollout file: one JSON object under the Parquet key `bumblebee.rollout`, schema 1."""
 
 import json
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bumblebee.errors import BadInput
+from bumblebee.io.names import require_stem
+from bumblebee.io.read import decode, parse_json
+
 METADATA_KEY = b"bumblebee.rollout"
 SCHEMA = 1
+LONGEST_ID = 200  # bytes: a motion's name with round and cluster before it; file systems take 255 with the ending
+LARGEST = 1e9  # of a rate or gain
 REQUIRED_KEYS = ("schema", "rollout_id", "joints", "control_hz")
 OPTIONAL_KEYS = ("robot", "kp", "kd", "motion", "cluster", "policy", "recorded_at", "operator", "notes")
 
@@ -36,16 +43,19 @@ def decode_metadata(path: Path, raw: bytes | None, bad: Callable[..., Exception]
     if raw is None:
         raise bad(path, column, "metadata", f"JSON under the Parquet metadata key {column}", "no such key")
     try:
-        table = json.loads(raw)
-    except ValueError as error:
-        raise bad(path, column, "metadata", "a JSON object", f"text that is not JSON ({error})") from None
+        table = parse_json(column, decode(column, raw))
+        json.dumps(table, ensure_ascii=False).encode()
+    except BadInput as error:
+        raise bad(path, column, "metadata", error.expected, error.came) from None
+    except UnicodeEncodeError:
+        raise bad(path, column, "metadata", "text that UTF-8 can hold", "half of a surrogate pair") from None
     if not isinstance(table, dict):
         raise bad(path, column, "metadata", "a JSON object", type(table).__name__)
     for key in REQUIRED_KEYS:
         if key not in table:
-            raise bad(path, column, "metadata", f"the key {key}", f"only {', '.join(sorted(table))}")
+            raise bad(path, column, "metadata", f"the key {key}", f"only {', '.join(sorted(table))}"[:200])
     if table["schema"] != SCHEMA:
-        raise bad(path, column, "schema", f"schema {SCHEMA}", repr(table["schema"]))
+        raise bad(path, column, "schema", f"schema {SCHEMA}", repr(table["schema"])[:80])
     _check_fields(path, table, lambda rule, expected, came: bad(path, column, rule, expected, came))
     rest = {key: value for key, value in table.items() if key not in REQUIRED_KEYS and value is not None}
     return Metadata(table["rollout_id"], tuple(table["joints"]), float(table["control_hz"]), rest)
@@ -53,16 +63,18 @@ def decode_metadata(path: Path, raw: bytes | None, bad: Callable[..., Exception]
 
 def _check_fields(path: Path, table: dict[str, Any], bad: Callable[[str, str, str], Exception]) -> None:
     joints, rate, name = table["joints"], table["control_hz"], table["rollout_id"]
-    if not isinstance(name, str) or not name or name.startswith(".") or any(c in name for c in "/\\\0"):
-        raise bad("rollout-id", "a name without slashes", repr(name))
+    try:
+        require_stem(path, name, LONGEST_ID)
+    except BadInput as error:
+        raise bad("rollout-id", error.expected, error.came) from None
     if name != path.stem:
         raise bad("rollout-id", f"the name of the file, {path.stem}", repr(name))
-    if not isinstance(joints, list) or not joints or not all(isinstance(joint, str) for joint in joints):
+    if not isinstance(joints, list) or not joints or not all(map(_is_name, joints)):
         raise bad("metadata", "joints: a list of names", repr(joints)[:80])
     if len(set(joints)) != len(joints):
-        raise bad("joint-names", "every joint once", f"{sorted({j for j in joints if joints.count(j) > 1})[0]} twice")
+        raise bad("joint-names", "every joint once", f"{Counter(joints).most_common(1)[0][0]} twice")
     if not _is_number(rate) or not 0 < rate < 1e5:
-        raise bad("metadata", "control_hz: a positive number", repr(rate))
+        raise bad("metadata", "control_hz: a positive number", repr(rate)[:80])
     for key in ("kp", "kd"):
         values = table.get(key)
         if values is not None and not (
@@ -71,8 +83,13 @@ def _check_fields(path: Path, table: dict[str, Any], bad: Callable[[str, str, st
             raise bad("metadata", f"{key}: {len(joints)} numbers", repr(values)[:80])
 
 
+def _is_name(value: object) -> bool:
+    # A NUL would end the name for MuJoCo and not for us.
+    return isinstance(value, str) and value.strip() != "" and all(ord(sign) >= 32 for sign in value)
+
+
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST
 
 
 def _plain(value: Any) -> Any:

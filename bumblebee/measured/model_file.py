@@ -1,19 +1,51 @@
 """A declared model in another folder: its includes and assets lie where it came from."""
 
+import math
+import re
 import shutil
 from pathlib import Path
 
 import mujoco
 
 from bumblebee.errors import BadInput
+from bumblebee.io.read import read_text
+
+LARGEST = 64 << 20  # bytes of the XML itself; the largest public robot models have 1 MB
+MEMORY = 8 << 30  # bytes that a model may ask for its arena
+_MULTIPLIERS = (
+    ("replicate", ("count",), 1e5),
+    ("composite", ("count",), 1e6),
+    ("flexcomp", ("count",), 1e6),
+    ("texture", ("width", "height"), 1e8),
+    ("hfield", ("nrow", "ncol"), 1e8),
+)
 
 
 def load_model(path: Path) -> mujoco.MjModel:
     """The compiled model of an MJCF file; `BadInput` with MuJoCo's own words where it does not load."""
+    path = Path(path)
+    text = read_text(path, LARGEST)
+    if "\0" in text or "<" not in text:
+        raise BadInput(path, "an MJCF model that loads", "a file that is no XML")
+    _refuse_multiplied(path, text)
     try:
         return mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise BadInput(path, "an MJCF model that loads", str(error)) from None
+    except Exception as error:  # ValueError mostly; FatalError and MemoryError from its allocations
+        raise BadInput(path, "an MJCF model that loads", str(error)[:300]) from None
+
+
+def _refuse_multiplied(path: Path, text: str) -> None:
+    """Refuse numbers in a model that make a few bytes into gigabytes before MuJoCo looks at them."""
+    for tag, keys, most in _MULTIPLIERS:
+        for element in re.findall(rf"<{tag}\b[^>]*>", text):
+            found = [re.findall(rf"\b{key}\s*=\s*[\"']([^\"']*)", element) for key in keys]
+            numbers = [float(n) for words in found for n in re.findall(r"\d+(?:\.\d+)?", " ".join(words))]
+            size = math.prod(numbers) if numbers else 0.0
+            if not size <= most:
+                raise BadInput(path, f"a {tag} of at most {most:g} ({' x '.join(keys)})", f"{size:.3g}")
+    for size, unit in re.findall(r"\bmemory\s*=\s*[\"']\s*(\d+)\s*([KMGTPE]?)", text):
+        if float(size) * 1024 ** " KMGTPE".index(unit or " ") > MEMORY:
+            raise BadInput(path, f"memory of at most {MEMORY:,} bytes", f"{size[:40]}{unit}")
 
 
 def name_assets_in_full(spec: mujoco.MjSpec) -> None:

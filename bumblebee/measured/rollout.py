@@ -16,7 +16,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from bumblebee.errors import BadInput
+from bumblebee.io.limits import LIMITS, Limits
 from bumblebee.measured.metadata import METADATA_KEY, Metadata, decode_metadata, encode_metadata
+from bumblebee.measured.tables import arrow_table
 
 # Column -> values a row; "J" is the number of joints. `foot_force` is (F, 3) and handled apart.
 WIDTHS: dict[str, int | str] = {
@@ -120,11 +122,14 @@ def write_rollout(path: Path, rollout: Rollout) -> None:
     path = Path(path)
     if path.exists():
         raise BadRollout(path, "", "never-overwritten", "a new file name", "a file that exists", "Write elsewhere.")
+    content = _to_table(rollout)
+    # What could not be read back, a name that leads elsewhere first of all, is not written.
+    decode_metadata(path, content.schema.metadata[METADATA_KEY], BadRollout)
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=".part")
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem[:40]}.", suffix=".part")
     os.close(handle)
     try:
-        pq.write_table(_to_table(rollout), temporary, compression="zstd")
+        pq.write_table(content, temporary, compression="zstd")
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
     finally:
@@ -132,10 +137,10 @@ def write_rollout(path: Path, rollout: Rollout) -> None:
             os.unlink(temporary)
 
 
-def read_rollout(path: Path) -> Rollout:
+def read_rollout(path: Path, limits: Limits = LIMITS) -> Rollout:
     """Read one rollout of the contract; `BadRollout` names file, column and rule where it does not keep to it."""
     path = Path(path)
-    table = _read_table(path)
+    table = _read_table(path, limits)
     meta = decode_metadata(path, (table.schema.metadata or {}).get(METADATA_KEY), BadRollout)
     _require_columns(path, table)
     joints = len(meta.joints)
@@ -181,25 +186,32 @@ def _to_table(rollout: Rollout) -> pa.Table:
     return pa.table(columns).replace_schema_metadata({METADATA_KEY: encode_metadata(meta)})
 
 
-def _read_table(path: Path) -> pa.Table:
+def _read_table(path: Path, limits: Limits) -> pa.Table:
+    """The contract's columns of a file; others are left alone."""
     if not path.is_file():
         raise BadRollout(path, "", "readable", "a Parquet file", "no such file")
     try:
+        if path.stat().st_size > limits.file_bytes:
+            raise BadInput(path, f"at most {limits.file_bytes:,} bytes", f"{path.stat().st_size:,}")
         with pa.OSFile(str(path)) as source:
-            table = pq.read_table(source)
-    except (pa.ArrowException, OSError, ValueError) as error:
-        came = f"{path.stat().st_size} bytes that cannot be read as one ({error})"
-        raise BadRollout(path, "", "readable", "a Parquet file", came) from None
-    repeated = sorted({name for name in table.column_names if table.column_names.count(name) > 1})
-    if repeated:
-        raise BadRollout(path, repeated[0], "unique-columns", "every column once", "the same name twice")
-    return table
+            return arrow_table(path, source, ("time", *VECTORS), limits)
+    except BadInput as bad:
+        column = bad.where.removeprefix(str(path)).removeprefix(": column ")
+        raise BadRollout(path, column, "unique-columns" if column else "readable", bad.expected, bad.came) from None
+    except (OSError, ValueError) as error:
+        raise BadRollout(path, "", "readable", "a file that can be read", str(error)) from None
 
 
 def _require_columns(path: Path, table: pa.Table) -> None:
     for column in REQUIRED:
         if column not in table.column_names:
-            raise BadRollout(path, column, "required-column", "this column", f"only {', '.join(table.column_names)}")
+            raise BadRollout(
+                path,
+                column,
+                "required-column",
+                "this column",
+                f"only {', '.join(table.column_names) or 'columns of others'}",
+            )
     if not any(column in table.column_names for column in COMMANDS):
         raise BadRollout(path, "joint_target", "command-column", "joint_target or joint_torque_cmd", "neither of them")
     if table.num_rows < 2:

@@ -5,7 +5,6 @@ current estimates and are left out.
 """
 
 import contextlib
-import io
 import json
 import re
 from pathlib import Path, PurePosixPath
@@ -16,6 +15,7 @@ import pandas as pd
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from bumblebee.measured.source import NO_VELOCITY, Source, differences, measured_rate, open_source
+from bumblebee.measured.tables import read_csv
 
 JAW_ZERO, JAW_TRAVEL = -0.174533, 2.336  # rad at share 0, rad from share 0 to 1
 NOTES = (
@@ -38,8 +38,11 @@ def _read_motion(source: Source, folder: PurePosixPath) -> Rollout:
     for name in ("state_motor.csv", "joint_list.txt"):
         if str(folder / name) not in source.names:
             raise BadInput(f"{source.place}/{folder}", f"{name} beside control.csv", "no such file")
-    listed = source.read(str(folder / "joint_list.txt")).decode("utf-8", "replace")
+    listed = source.read_text(str(folder / "joint_list.txt"))
     joints = tuple(re.findall(r"[^\s,\[\]\"']+", listed))
+    if not joints or len(set(joints)) < len(joints):
+        came = ", ".join(joints)[:80] or "none"
+        raise BadInput(f"{source.place}/{folder}/joint_list.txt", "names of joints, each once", came)
     stamps, commands = _read_table(source, str(folder / "control.csv"), ("positions",), len(joints))
     state = str(folder / "state_motor.csv")
     fast = "velocities" in source.read(state).split(b"\n", 1)[0].decode("utf-8", "replace")
@@ -70,32 +73,32 @@ def _read_table(
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Time stamps [us] and vector columns of one CSV whose vectors are JSON lists in quotes."""
     where = source.where(name)
-    try:
-        table = pd.read_csv(io.BytesIO(source.read(name)))
-    except (ValueError, UnicodeDecodeError) as error:
-        raise BadInput(where, "a CSV file", str(error)) from None
+    table = read_csv(where, source.read(name), source.limits)
     for column in ("timestamp", *columns):
         if column not in table.columns:
-            raise BadInput(f"{where}: column {column}", "this column", f"only {', '.join(map(str, table.columns))}")
+            raise BadInput(
+                f"{where}: column {column}", "this column", f"only {', '.join(map(str, table.columns[:40]))}"
+            )
     vectors = {}
     for column in columns:
         vectors[column] = _vectors(f"{where}: column {column}", table[column].astype(str).tolist(), width)
-    try:
-        return table["timestamp"].to_numpy(dtype=np.float64), vectors
-    except ValueError as error:
-        raise BadInput(f"{where}: column timestamp", "microseconds", str(error)) from None
+    stamps = table["timestamp"]
+    if stamps.dtype.kind not in "iuf":
+        row = int(np.argmax(pd.to_numeric(stamps.astype(str), errors="coerce").isna()))
+        raise BadInput(f"{where}: column timestamp, row {row}", "microseconds", repr(stamps.iloc[row])[:60])
+    return stamps.to_numpy(dtype=np.float64, na_value=np.nan), vectors
 
 
 def _vectors(where: str, texts: list[str], width: int) -> np.ndarray:
     """(rows, width) from JSON lists, parsed at once; only where that fails row by row, to name the row."""
-    with contextlib.suppress(ValueError, TypeError):
+    with contextlib.suppress(ValueError, TypeError, RecursionError, OverflowError):
         values = np.array(json.loads(f"[{','.join(texts)}]"), dtype=np.float64)
         if values.shape == (len(texts), width):
             return values
     for row, text in enumerate(texts):
         try:
             row_values = [float(value) for value in json.loads(text)]
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, RecursionError, OverflowError):
             raise BadInput(f"{where}, row {row}", f"a JSON list of {width} numbers", repr(text)[:60]) from None
         if len(row_values) != width:
             raise BadInput(f"{where}, row {row}", f"{width} values", str(len(row_values)))

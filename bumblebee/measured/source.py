@@ -8,8 +8,12 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.io.limits import Limits
+from bumblebee.io.names import distinct_stems
+from bumblebee.io.read import decode, member_bytes, members, npz_arrays, read_bytes
 
-LARGEST = 1 << 30  # bytes of one file in an archive, unpacked; a log is a thousand times smaller
+LOGS = Limits(ratio=200.0)
+"""Of logs: numbers that were measured have noise and pack ten times, not two hundred times."""
 
 
 @dataclass(frozen=True)
@@ -18,22 +22,25 @@ class Source:
 
     place: Path
     names: tuple[str, ...]
+    limits: Limits = LOGS
 
     def read(self, name: str) -> bytes:
         """The bytes of one file."""
-        if self.place.is_dir():
-            return (self.place / name).read_bytes()
         if not _is_archive(self.place):
-            return self.place.read_bytes()
-        with zipfile.ZipFile(self.place) as archive:
-            info = archive.getinfo(name)
-            if info.file_size > LARGEST:
-                raise BadInput(f"{self.place}: {name}", f"at most {LARGEST} bytes", str(info.file_size))
-            try:
-                with archive.open(info) as stream:
-                    return stream.read(info.file_size + 1)
-            except (zipfile.BadZipFile, OSError, RuntimeError, NotImplementedError) as error:
-                raise BadInput(f"{self.place}: {name}", "a file that unpacks", str(error)) from None
+            return read_bytes(self.place / name if self.place.is_dir() else self.place, self.limits.file_bytes)
+        where = self.where(name)
+        try:
+            with zipfile.ZipFile(self.place) as archive:
+                return member_bytes(where, archive, archive.getinfo(name), self.limits)
+        except (zipfile.BadZipFile, OSError, KeyError, ValueError) as error:
+            raise BadInput(where, "a file that unpacks", str(error)) from None
+
+    def read_text(self, name: str) -> str:
+        """The text of one small file."""
+        data = self.read(name)
+        if len(data) > self.limits.text_bytes:
+            raise BadInput(self.where(name), f"at most {self.limits.text_bytes:,} bytes", f"{len(data):,}")
+        return decode(self.where(name), data)
 
     def where(self, name: str) -> str:
         """How a message names the file."""
@@ -44,45 +51,51 @@ class Source:
         return sorted(name for name in self.names if name.lower().endswith(suffix))
 
 
-def open_source(place: Path) -> Source:
+def open_source(place: Path, limits: Limits = LOGS) -> Source:
     """A folder, a zip archive or a single file.
 
     Raises:
-        BadInput: where there is nothing, or an archive is damaged or holds names that lead out of it.
+        BadInput: where there is nothing, or an archive is damaged, too large, or holds names that lead out of it.
     """
     place = Path(place)
-    if place.is_dir():
-        inside = (path for path in place.rglob("*") if path.is_file())
-        return Source(place, tuple(sorted(path.relative_to(place).as_posix() for path in inside)))
-    if not place.is_file():
-        raise BadInput(place, "a folder or a file", "neither")
+    try:
+        if place.is_dir():
+            inside = (path for path in place.rglob("*") if path.is_file())
+            names = sorted(path.relative_to(place).as_posix() for path in inside)
+            if len(names) > limits.members:
+                raise BadInput(place, f"at most {limits.members:,} files", f"{len(names):,}")
+            return Source(place, tuple(names), limits)
+        if not place.is_file():
+            raise BadInput(place, "a folder or a file", "neither")
+    except (OSError, ValueError) as error:  # no permission, a name too long, a NUL in it
+        raise BadInput(place, "a folder or a file", str(error)) from None
     if not _is_archive(place):
-        return Source(place, (place.name,))
+        return Source(place, (place.name,), limits)
     try:
         with zipfile.ZipFile(place) as archive:
-            names = [info.filename for info in archive.infolist() if not info.is_dir()]
-    except (zipfile.BadZipFile, OSError) as error:
-        raise BadInput(place, "a zip archive", f"{place.stat().st_size} bytes that are not one ({error})") from None
+            names = [info.filename for info in members(place, archive, limits)]
+    except BadInput:
+        raise
+    except Exception as error:  # a damaged directory raises anything from BadZipFile to struct.error
+        raise BadInput(place, "a zip archive", f"bytes that are not one ({error})") from None
     for name in names:
         parts = PurePosixPath(name.replace("\\", "/"))
-        if parts.is_absolute() or ".." in parts.parts or ":" in parts.parts[0]:
+        if not parts.parts or parts.is_absolute() or ".." in parts.parts or ":" in parts.parts[0]:
             raise BadInput(f"{place}: {name}", "names inside the archive", "a name that leads out of it")
-    return Source(place, tuple(sorted(names)))
+    return Source(place, tuple(sorted(set(names))), limits)
 
 
 def _is_archive(place: Path) -> bool:
     """By its name: an .npz file is a zip archive inside, too, but one log."""
-    return place.suffix.lower() == ".zip"
+    return place.suffix.lower() == ".zip" and place.is_file()
 
 
 def read_arrays(source: Source, name: str) -> dict[str, np.ndarray]:
     """The arrays of an .npz file; pickled objects in it are refused, never run."""
-    where = source.where(name)
-    try:
-        with np.load(io.BytesIO(source.read(name)), allow_pickle=False) as archive:
-            return {key: archive[key] for key in archive.files}
-    except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, AttributeError, TypeError) as error:
-        raise BadInput(where, "an .npz file of plain arrays", str(error)) from None
+    where, data = source.where(name), source.read(name)
+    if not zipfile.is_zipfile(io.BytesIO(data)):
+        raise BadInput(where, "an .npz file of plain arrays", f"{len(data):,} bytes that are none")
+    return npz_arrays(where, data, source.limits)
 
 
 NO_VELOCITY = "joint_vel was not logged: differences of the positions"
@@ -91,9 +104,9 @@ NO_VELOCITY = "joint_vel was not logged: differences of the positions"
 def rollout_names(names: list[str], suffix: str) -> dict[str, str]:
     """File name -> rollout id: the stem where the stems differ, the whole path with underscores where not."""
     stems = [PurePosixPath(name).name[: -len(suffix)] for name in names]
-    if len(set(stems)) == len(stems):
-        return dict(zip(names, (stem.lstrip(".") or "rollout" for stem in stems), strict=True))
-    return {name: name[: -len(suffix)].replace("/", "_").lstrip(".") for name in names}
+    if len({stem.casefold() for stem in stems}) < len(stems):
+        stems = [name[: -len(suffix)] for name in names]
+    return dict(zip(names, distinct_stems(stems, "rollout"), strict=True))
 
 
 def differences(time: np.ndarray, place: np.ndarray) -> np.ndarray:
@@ -106,5 +119,6 @@ def differences(time: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 def measured_rate(time: np.ndarray) -> float:
     """Rate [Hz] from the median period, to four digits; 1 where the stamps do not increase."""
-    period = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    with np.errstate(all="ignore"):
+        period = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     return float(f"{1 / period:.4g}") if np.isfinite(period) and 1e-5 < period < 1e5 else 1.0

@@ -4,7 +4,6 @@ Signals are found by the JSON mapping name -> [type, columns] that mujoco.sysid 
 5 control). States come from qpos and qvel signals, or from jointpos and jointvel sensors of the model.
 """
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,8 @@ import mujoco
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.checks_units import servo_gains
+from bumblebee.io.read import parse_json, require_real
+from bumblebee.measured.checks_units import at_joint, servo_gains
 from bumblebee.measured.rollout import Rollout
 from bumblebee.measured.source import (
     NO_VELOCITY,
@@ -24,6 +24,7 @@ from bumblebee.measured.source import (
     read_arrays,
     rollout_names,
 )
+from bumblebee.measured.tables import require_finite
 
 SENSOR, QPOS, QVEL, CTRL = 0, 2, 3, 5
 PART = re.compile(r"[_.-](control|controls|ctrl|sensordata|sensor|sensors|state|states|measured)$")
@@ -58,12 +59,12 @@ def _read(source: Source, files: list[str], rollout_id: str, model: mujoco.MjMod
         signals |= _signals(source.where(name), table, model)
     controls = {key[1]: signal for key, signal in signals.items() if key[0] == "ctrl"}
     if not controls:
-        raise BadInput(where, "control signals with their mapping", f"only {', '.join(table)}")
+        raise BadInput(where, "control signals with their mapping", f"only {', '.join(table)[:200] or 'nothing'}")
     joints, commands, actuators = [], [], []
     for actuator, signal in controls.items():
         number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
-        if number < 0:
-            raise BadInput(f"{where}: {actuator}_ctrl", "an actuator of the model", actuator)
+        if number < 0 or not at_joint(model, number) or model.actuator_gear[number, 0] == 0:
+            raise BadInput(f"{where}: {actuator}_ctrl", "an actuator of the model that turns a joint", actuator[:80])
         joints.append(model.joint(int(model.actuator_trnid[number, 0])).name)
         commands.append(signal)
         actuators.append(number)
@@ -79,7 +80,7 @@ def _read(source: Source, files: list[str], rollout_id: str, model: mujoco.MjMod
         missing = [joint for joint in joints if (kind, joint) not in signals]
         if missing:
             raise BadInput(
-                f"{where}: {column}", f"a signal for joint {missing[0]}", f"only {', '.join(_said(signals))}"
+                f"{where}: {column}", f"a signal for joint {missing[0]}", f"only {', '.join(_said(signals))}"[:200]
             )
         state[column] = np.stack([_at(signals[kind, joint], time) for joint in joints], axis=1)
     state.setdefault("joint_vel", differences(time, state["joint_pos"]))
@@ -118,9 +119,12 @@ def _signals(where: str, table: dict[str, np.ndarray], model: mujoco.MjModel) ->
     for prefix in ("", "control_", "sensordata_", "state_"):  # states replace sensors of the same joint
         if f"{prefix}times" not in table or f"{prefix}data" not in table:
             continue
-        time, data = table[f"{prefix}times"].astype(np.float64), table[f"{prefix}data"]
+        time, data = (_finite(f"{where}: {prefix}{key}", table[f"{prefix}{key}"]) for key in ("times", "data"))
         data = data[:, None] if data.ndim == 1 else data
         mapping = _mapping(where, table, prefix, model)
+        if (np.diff(time.ravel()) <= 0).any():
+            row = int(np.argmax(np.diff(time.ravel()) <= 0)) + 1
+            raise BadInput(f"{where}: {prefix}times, row {row}", "increasing times", "a step back or a repeat")
         if time.ndim != 1 or data.ndim != 2 or len(time) != len(data):
             raise BadInput(f"{where}: {prefix}data", f"{time.size} rows like {prefix}times", str(data.shape))
         for name, (kind, columns) in mapping.items():
@@ -128,8 +132,8 @@ def _signals(where: str, table: dict[str, np.ndarray], model: mujoco.MjModel) ->
             if place is None or not columns:
                 continue
             if not 0 <= min(columns) <= max(columns) < data.shape[1]:
-                raise BadInput(f"{where}: {name}", f"columns from 0 to {data.shape[1] - 1}", str(columns))
-            found[place] = _Signal(time, data[:, columns[0]].astype(np.float64))
+                raise BadInput(f"{where}: {name}", f"columns from 0 to {data.shape[1] - 1}", str(columns)[:80])
+            found[place] = _Signal(time, data[:, columns[0]])
     return found
 
 
@@ -140,11 +144,23 @@ def _mapping(
         if prefix == "control_":  # without a mapping the columns are the model's controls
             return {f"{model.actuator(i).name}_ctrl": (CTRL, [i]) for i in range(model.nu)}
         return {}
+    place = f"{where}: {prefix}signal_mapping"
     try:
-        raw = json.loads(str(table[f"{prefix}signal_mapping"]))
-        return {str(name): (int(kind), [int(column) for column in columns]) for name, (kind, columns) in raw.items()}
-    except (ValueError, TypeError, AttributeError) as error:
-        raise BadInput(f"{where}: {prefix}signal_mapping", "JSON: name -> [type, columns]", str(error)) from None
+        raw = parse_json(place, str(table[f"{prefix}signal_mapping"]))
+        return {_name(name): (int(kind), [int(column) for column in columns]) for name, (kind, columns) in raw.items()}
+    except (ValueError, TypeError, AttributeError, OverflowError) as error:
+        raise BadInput(place, "JSON: name -> [type, columns]", str(error)[:160]) from None
+
+
+def _finite(where: str, values: np.ndarray) -> np.ndarray:
+    return require_finite(where, require_real(where, values))
+
+
+def _name(text: str) -> str:
+    """A name that MuJoCo can be asked for: it ends names at a NUL and knows no halves of surrogate pairs."""
+    if "\0" in text:
+        raise ValueError("a name with NUL in it")
+    return text.encode().decode()
 
 
 def _place(name: str, kind: int, model: mujoco.MjModel) -> tuple[str, str] | None:

@@ -60,13 +60,14 @@ class Thresholds:
     """Factor between displacement and integrated velocity, either way: filters and coarse steps stay within."""
     velocity_scale_fatal: float = 2.5
     """Factor from which the unit is wrong."""
-    response_z: float = 6.0
-    """Standard errors by which a joint's response must oppose its command to be called reversed."""
+    response_z: float = 4.0
+    """Standard errors by which a joint's response must oppose its command to be called reversed; with the whole state
+    beside the command honest joints in contact reach 3."""
     response_effect: float = 0.02
     """Share of the declared servo's effect on the free joint that the opposing effect must have: damping, a sampled
     servo and weak motors leave more, a slow reference that is tracked without error a twentieth of it."""
-    response_correlation: float = -0.3
-    """Correlation of command and position changes below which a response may be called reversed."""
+    response_correlation: float = 0.3
+    """Correlation of command and position changes over 0.1 s from which a joint is seen to follow its command."""
     follow_gain: float = 0.45
     """Share of the tracking error that may remain under the negative target, to call a joint reversed by it."""
     follow_error: float = 0.08
