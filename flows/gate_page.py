@@ -17,6 +17,7 @@ from bumblebee.measured import gate, overview_plots
 from bumblebee.measured import gate_words as words
 from bumblebee.measured.rollout import read_rollout, rollout_files
 
+BUTTON = "Resume at the top right (in the menu ⋮ where it is no button)"
 ROWS, PLOTS, BAR = 40, 12, 20  # rows of a table, pictures on the page, blocks of the longest bar
 SPECIAL = re.compile(r"([\\`*_{}\[\]()#+!|~>:.@-])")  # with `:`, `.` and `@`: no address becomes a link by itself
 
@@ -24,7 +25,7 @@ SPECIAL = re.compile(r"([\\`*_{}\[\]()#+!|~>:.@-])")  # with `:`, `.` and `@`: n
 def where_to_answer(round: int, url: str | None) -> str:
     """The log line of a run that is about to be suspended."""
     page = f"open {url} and " if url else ""
-    return f"round {round} waits for an answer: {page}choose Resume in the menu (⋮) at the top right of the run's page"
+    return f"round {round} waits for an answer: {page}choose {BUTTON} of the run's page"
 
 
 def question(request: dict[str, Any], artifact: str) -> str:
@@ -35,12 +36,15 @@ def question(request: dict[str, Any], artifact: str) -> str:
         f"**Round {request['round']}: may the loop learn from these logs?** {seen['accepted']} files accepted "
         f"({seen['seconds']:.1f} s), {seen['quarantined']} set aside. "
         f"{f'Findings (files): {rules}' if rules else 'No findings'}. Hash `{words.short(request)}`: the answer holds "
-        f"for nothing else.\n\n[**Look at the tables and plots first**](/artifacts/artifact/{artifact})"
+        f"for nothing else.\n\n[Look at the tables and plots first](../../artifacts/artifact/{artifact})"
     )
 
 
-def page(request: dict[str, Any], place: gate.Gate) -> str:
-    """Everything that a person needs to judge a round."""
+def page(request: dict[str, Any], place: gate.Gate, run: str = "") -> str:
+    """Everything that a person needs to judge a round; `run` is the number of the run that asks, if it can be answered.
+
+    Links lead from one page of Prefect's to another by relative paths, which hold in both of its designs.
+    """
     seen, number = request["seen"], request["round"]
     summary = read_json(place.summary, gate.SUMMARY_LIMITS)
     counts = [("files accepted", seen["accepted"]), ("files set aside", seen["quarantined"])]
@@ -50,8 +54,9 @@ def page(request: dict[str, Any], place: gate.Gate) -> str:
         f"# Round {number}: may the loop learn from these logs?",
         "Approve, and the diagnosis corrects the simulator with the accepted files; reject, and the round stops here.",
         table(("what", "how many"), counts),
-        f"**To answer**: on the run's page choose *Resume* in the menu (⋮) at the top right. The answer holds for "
-        f"`{words.short(request)}`, the hash of what stands here, and for nothing else. Or in a terminal:",
+        f"An answer holds for `{words.short(request)}`, the hash of what stands here, and for nothing else.",
+        *([f"**[To answer, open the run](../../runs/flow-run/{run})** and choose {BUTTON}."] if run else []),
+        "In a terminal:",
         f"```\n{words.answer_command(place.workspace, request, True)}\n"
         f"{words.answer_command(place.workspace, request, False)}\n```",
         "## Findings",
@@ -101,8 +106,9 @@ def pictures(place: gate.Gate) -> list[str]:
 
 
 def picture(svg: str, name: str) -> str:
-    """An SVG that lies in the text."""
-    alone = svg.replace("<svg ", "<svg xmlns='http://www.w3.org/2000/svg' width='720' height='300' ", 1)
+    """An SVG that lies in the text, on white also where the page is dark."""
+    size = "xmlns='http://www.w3.org/2000/svg' width='720' height='300' style='background:#fff'"
+    alone = svg.replace("<svg ", f"<svg {size} ", 1)
     return f"![{cell(name)}](data:image/svg+xml;base64,{base64.b64encode(alone.encode()).decode()})"
 
 

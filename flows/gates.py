@@ -7,7 +7,7 @@ from typing import Any, Literal
 from prefect import get_run_logger, runtime, suspend_flow_run
 from prefect.artifacts import create_markdown_artifact
 from prefect.input import RunInput, read_flow_run_input
-from pydantic import Field
+from pydantic import Field, create_model
 
 from bumblebee.errors import BadInput
 from bumblebee.measured import gate
@@ -16,6 +16,7 @@ from flows import gate_page
 from flows.stages import Stage
 from tasks.gate import automatic
 
+SEEN = "Hash of what was shown to you: the answer holds for nothing else."
 PAGE = {"how": "Prefect's page: whoever holds the login of this workspace"}  # more cannot be known of who clicked
 
 
@@ -24,7 +25,7 @@ class GateAnswer(RunInput):
 
     answer: Literal["approve", "reject"] = Field(description="approve: the round goes on; reject: it stops here.")
     by: str = Field(description="Your name.", min_length=1, max_length=gate.LONGEST)
-    seen: str = Field(description="Hash of what was shown to you: the answer holds for nothing else.")
+    seen: str = Field(description=SEEN)
     note: str = Field(default="", description="Why, if there is something to say.", max_length=gate.LONGEST)
 
 
@@ -50,10 +51,12 @@ def hold(folder: Path, stage: Stage) -> str | None:
     return None
 
 
-def show(place: gate.Gate, request: dict[str, Any]) -> str:
+def show(place: gate.Gate, request: dict[str, Any], run: str | None = None) -> str:
     """Put what came on a page of its own; its number."""
     text = f"What came in round {place.round}; an answer to it names {words.short(request)}"
-    made = create_markdown_artifact(gate_page.page(request, place), key=f"gate-round-{place.round}", description=text)
+    made = create_markdown_artifact(
+        gate_page.page(request, place, run or ""), key=f"gate-round-{place.round}", description=text
+    )
     return str(made)
 
 
@@ -68,9 +71,9 @@ def ask(place: gate.Gate, request: dict[str, Any]) -> None:
         key = pause_key(request, attempt)
         description = None
         if answered(key) is None:  # the run comes here again after the answer
-            description = gate_page.question(request, show(place, request))
+            description = gate_page.question(request, show(place, request, runtime.flow_run.id))
             log.warning(gate_page.where_to_answer(place.round, runtime.flow_run.ui_url))
-        model = GateAnswer.with_initial_data(description=description, seen=words.short(request))
+        model = form(words.short(request), description)
         given: Any = suspend_flow_run(wait_for_input=model, timeout=None, key=key)
         try:
             author = gate.Author(given.by, PAGE)
@@ -82,6 +85,14 @@ def ask(place: gate.Gate, request: dict[str, Any]) -> None:
         request = gate.request(place)
         if request["status"] != "pending":
             return
+
+
+def form(seen: str, description: str | None) -> type[GateAnswer]:
+    """The form of one question, with the hash of what it shows filled in."""
+    filled: Any = (str, Field(default=seen, description=SEEN))
+    made: type[GateAnswer] = create_model("GateAnswer", __base__=GateAnswer, seen=filled)
+    made._description = description
+    return made
 
 
 def pause_key(request: dict[str, Any], attempt: int) -> str:

@@ -83,7 +83,8 @@ def _asked(summary: dict[str, Any], sha256: str) -> str:
     command = f"--round {int(summary['round'])} --seen {sha256[:SHORT]} --by NAME"
     return (
         f"<div class=ask>{text}<p>The answer holds for what this page shows, and for nothing else: "
-        f"<code>{sha256[:SHORT]}</code>. On Prefect's page of the run, choose Resume in the menu at the top right; "
+        f"<code>{sha256[:SHORT]}</code>. On Prefect's page of the run, choose Resume at the top right "
+        "(in the menu ⋮ where it is no button); "
         "or in the workspace's folder:</p>"
         f"<pre>python -m flows.gate approve {command}</pre><pre>python -m flows.gate reject {command}</pre>"
         f"<p class=note>Whole commands, for any folder: <code>python -m tasks.gate --round {int(summary['round'])} "

@@ -15,7 +15,7 @@ from bumblebee.measured.model_file import load_model
 from bumblebee.measured.rollout import Rollout
 
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 360, 150, 40, 8, 22, 18  # of a picture; it is as wide as a telephone
-NAMES, ROW = 150, 18  # of the bars: width of the names, height of a row
+NAMES, ROW = 160, 18  # of the bars: width of the names, height of a row
 POINTS = 240  # drawn of one curve: more than a telephone's pixels add nothing
 FONT = "font-family='system-ui,sans-serif' font-size='11' fill='#4a5568'"
 
@@ -85,7 +85,7 @@ def bars(errors: dict[str, float], unit: str) -> str:
     room = WIDTH - NAMES - 75
     for row, (name, value) in enumerate(errors.items()):
         y, length = ROW * row, room * value / largest
-        shown = name if len(name) <= 24 else f"{name[:23]}…"
+        shown = name if len(name) <= 27 else f"{name[:26]}…"
         rows.append(f"<text x='0' y='{y + 13}' {FONT}>{escape(shown)}</text>")
         rows.append(f"<rect x='{NAMES}' y='{y + 3}' width='{length:.1f}' height='12' fill='#d99a00'/>")
         rows.append(f"<text x='{NAMES + 5 + length:.1f}' y='{y + 13}' {FONT}>{rounded(value)} {unit}</text>")

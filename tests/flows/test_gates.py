@@ -86,11 +86,11 @@ def ask(place: gate.Gate) -> None:
 def test_the_dialog_has_no_answer_beforehand_and_shows_the_hash(place: gate.Gate, page: Page) -> None:
     ask(place)
     seen = gate.request(place)["seen"]["sha256"]
-    schema = gates.GateAnswer.with_initial_data(seen=seen[:12]).model_json_schema()
+    schema = gates.form(seen[:12], "").model_json_schema()
     assert "default" not in schema["properties"]["answer"] and "default" not in schema["properties"]["by"]
     assert {"answer", "by"} <= set(schema["required"]) and schema["properties"]["seen"]["default"] == seen[:12]
     (question,) = page.shown.values()
-    assert seen[:12] in question and "(/artifacts/artifact/the-artifact)" in question
+    assert seen[:12] in question and "(../../artifacts/artifact/the-artifact)" in question
 
 
 def test_an_answer_on_the_page_is_written_with_how_its_author_was_known(place: gate.Gate, page: Page) -> None:
