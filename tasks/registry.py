@@ -40,6 +40,7 @@ def prepare() -> "MlflowClient":
 @cache
 def _prepared(workspace: Path) -> "MlflowClient":
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     os.environ.setdefault("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT", "1")
     logging.getLogger("mlflow").setLevel(logging.WARNING)
     import mlflow
@@ -264,6 +265,8 @@ def _policy_files(whole: Path) -> Path:
     folder.mkdir()
     (whole / "model.onnx").rename(folder / "policy.onnx")
     contract = yaml.safe_load((whole / "MLmodel").read_text())["metadata"]["contract"]
+    sha256 = hashlib.sha256((folder / "policy.onnx").read_bytes()).hexdigest()  # MLflow wrote the graph anew
+    contract |= {"onnx_sha256": sha256, "exported_onnx_sha256": contract["onnx_sha256"]}
     (folder / "contract.json").write_text(_text(contract))
     return folder
 

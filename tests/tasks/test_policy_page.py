@@ -5,7 +5,9 @@ import re
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
+import yaml
 
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import EXIT_BAD_INPUT
@@ -112,10 +114,12 @@ def test_what_cannot_be_fetched_is_refused_in_one_line_and_nothing_is_written(
 
 def test_a_version_from_before_cards_is_fetched_too(workspace: Path, tmp_path: Path) -> None:
     """Its files are MLflow's model alone, with the contract among its metadata."""
-    import yaml
-
-    (tmp_path / "model.onnx").write_bytes(b"onnx")
-    (tmp_path / "MLmodel").write_text(yaml.safe_dump({"metadata": {"contract": {"schema": 1}}}))
-    folder = registry._policy_files(tmp_path)
-    assert (folder / "policy.onnx").read_bytes() == b"onnx"
-    assert json.loads((folder / "contract.json").read_text()) == {"schema": 1}
+    stored = onnx.load(workspace / "p0.01" / "policy.onnx")
+    stored.producer_name = "written anew"
+    (tmp_path / "model.onnx").write_bytes(stored.SerializeToString())
+    exported = ExportedPolicy.load(workspace / "p0.01")
+    (tmp_path / "MLmodel").write_text(yaml.safe_dump({"metadata": {"contract": exported.contract}}))
+    policy = ExportedPolicy.load(registry._policy_files(tmp_path))
+    obs = np.ones((2, 283), np.float32)
+    assert np.array_equal(policy.act(obs), exported.act(obs))
+    assert policy.contract["exported_onnx_sha256"] == exported.sha256 != policy.sha256
