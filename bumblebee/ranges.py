@@ -159,7 +159,7 @@ class Ranged:
 
 
 @cache
-def annotations(kind: type) -> dict[str, Any]:
+def annotations(kind: Any) -> dict[str, Any]:
     """The annotation of each field of a dataclass, ranges included."""
     hints = typing.get_type_hints(kind, include_extras=True)
     return {name: hints[name] for name in getattr(kind, "__dataclass_fields__", {})}
@@ -228,11 +228,16 @@ def describe(kind: Any) -> str:
         return f"a list of {len(args)} {each if get_origin(args[0]) is Annotated else 'values'}"
     if origin in (tuple, list):
         base = get_args(args[0])[0] if args and get_origin(args[0]) is Annotated else args[0] if args else None
-        return f"a list of {describe(base)} values" if args else "a list"
+        return "a list of " + _plural(base) if args else "a list"
     if is_dataclass(kind) or origin is dict:
         return "keys and values"
     names = {int: "a whole number", float: "a number", str: "text", bool: "true or false", Path: "a path"}
     return names.get(kind, getattr(kind, "__name__", str(kind)))
+
+
+def _plural(kind: Any) -> str:
+    """Elements of a list in words."""
+    return {int: "whole numbers", float: "numbers", str: "texts"}.get(kind, f"{describe(kind)} values")
 
 
 def shown(value: Any, bare: bool = False) -> str:

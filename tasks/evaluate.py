@@ -145,11 +145,6 @@ def motions(config: EvaluateConfig) -> tuple[list[Clip], dict[str, str]]:
 
 def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
     """The contract; one that is not the wanted one is refused, with what differs if the old one is still there."""
-    unknown = [name for name in config.engines if name not in ENGINES]
-    if unknown or not config.engines or not config.seeds:
-        raise BadInput(
-            f"{FILE}: evaluate", f"seeds, and engines among {', '.join(ENGINES)}", ", ".join(unknown) or "none"
-        )
     engines = {name: settings(name) for name in config.engines}
     contract = freeze(clips, config.seeds, config.thresholds, config.start_noise, engines, FALL_RULE)
     if config.contract and config.contract != contract.sha256:

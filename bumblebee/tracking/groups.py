@@ -6,7 +6,6 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from bumblebee.errors import BadInput
 from bumblebee.sim.engine import RobotState
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.history import History
@@ -38,8 +37,6 @@ class Group:
         compiled: bool = False,
     ) -> None:
         worlds, joints, ahead = sizes
-        if config.history < 1:
-            raise BadInput("observation.history", "at least 1 step", str(config.history))
         self.parts: list[Part] = parts(config.terms, joints, ahead)
         """Parts of one control step, those that are seen over the history."""
         self.parts_now: list[Part] = parts(config.now, joints, ahead)

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
-from bumblebee.errors import BadInput
 from bumblebee.robot.facts import joints
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import angle_between, length3, rotate
@@ -233,9 +232,6 @@ class Reward:
         paper = config.preset == "paper"
         self.weights = (PAPER_WEIGHTS if paper else DEMO_WEIGHTS) | config.weights
         self.sharpness = (PAPER_SHARPNESS if paper else DEMO_SHARPNESS) | config.sharpness
-        unknown = (set(self.weights) - set(PENALTIES) - set(ERRORS)) | (set(self.sharpness) - set(ERRORS))
-        if unknown:
-            raise BadInput("reward.weights, reward.sharpness", ", ".join([*PENALTIES, *ERRORS]), min(unknown))
         self.dt = dt
         self._penalties = [name for name, weight in self.weights.items() if weight and name in PENALTIES]
         self._errors = [name for name, weight in self.weights.items() if weight and name in ERRORS]

@@ -68,7 +68,7 @@ def test_a_missing_key_without_default_is_named():
         ({"iterations": 1, "rate": "fast"}, "a number", "'fast' (str)"),
         ({"iterations": 1, "mode": "later"}, "one of ask, auto", "'later' (str)"),
         ({"iterations": 1, "fast": 1}, "true or false", "1 (int)"),
-        ({"iterations": 1, "names": "a"}, "a list of text values", "'a' (str)"),
+        ({"iterations": 1, "names": "a"}, "a list of texts", "'a' (str)"),
         ({"iterations": 1, "inner": {"limits": [1]}}, "a list of 2 values", "[1] (list)"),
         ({"iterations": 1, "inner": {"weights": {"a": "b"}}}, "a number", "'b' (str)"),
         ({"iterations": 1, "source": 5}, "a path or nothing", "5 (int)"),

@@ -102,5 +102,5 @@ def test_a_world_that_blows_up_leaves_no_trace_in_its_history(model: mujoco.MjMo
 
 def test_a_history_of_no_step_is_refused(model: mujoco.MjModel) -> None:
     """It names the field."""
-    with pytest.raises(BadInput, match=r"observation\.history"):
+    with pytest.raises(BadInput, match=r"ObservationConfig\.history"):
         make(model, replace(CONFIG, observation=replace(SEEN, history=0)))

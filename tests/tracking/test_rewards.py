@@ -128,7 +128,7 @@ def test_the_papers_weights() -> None:
 
 def test_an_unknown_term_is_refused() -> None:
     """A misspelt weight, or a sharpness of a term that has none, is one line, not a silent nothing."""
-    with pytest.raises(BadInput, match=r"action_rate.*came action_rat$"):
+    with pytest.raises(BadInput, match=r"action_rate.*came 'action_rat'$"):
         Reward(RewardConfig(weights={"action_rat": -1.0}), 0.02)
-    with pytest.raises(BadInput, match=r"came torque$"):
+    with pytest.raises(BadInput, match=r"came 'torque'$"):
         Reward(RewardConfig(sharpness={"torque": 1.0}), 0.02)
