@@ -18,6 +18,7 @@ from bumblebee.diagnosis.smooth import HALF_SPAN, smooth_rollouts
 from bumblebee.diagnosis.undriven import undriven_warnings
 from bumblebee.diagnosis.unlogged import refuse_unlogged
 from bumblebee.errors import BadInput
+from bumblebee.measured.checks_magnitude import beyond
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.measured.usable import review
 
@@ -186,7 +187,7 @@ def split(rollouts: Sequence[Rollout]) -> tuple[list[int], list[int]]:
 
 
 def _usable(dataset: object, rollout: Rollout, first: Rollout | None) -> None:
-    """`BadInput` for a rollout that no window may start in: not-a-number anywhere, too short, other joints."""
+    """`BadInput` for a rollout that no window may start in: not a number, too large, too short, other joints."""
     name = f"{dataset}: {rollout.rollout_id}"
     for column in ("time", *rollout.columns):
         values = np.asarray(getattr(rollout, column))
@@ -194,6 +195,9 @@ def _usable(dataset: object, rollout: Rollout, first: Rollout | None) -> None:
         if bad.any():
             where = f"{name}: column {column}: row {int(np.flatnonzero(bad)[0])}: rule finite"
             raise BadInput(where, "finite numbers", "NaN or infinity", "Set the file aside or repair the logger.")
+    for large in beyond(rollout)[:1]:
+        where = f"{name}: column {large.column}: row {large.row}: rule magnitude"
+        raise BadInput(where, large.expected, large.came, "Set the file aside or repair the logger.")
     if rollout.frames > 1 and (np.diff(rollout.time) <= 0).any():
         row = int(np.flatnonzero(np.diff(rollout.time) <= 0)[0]) + 1
         raise BadInput(

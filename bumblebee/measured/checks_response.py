@@ -5,8 +5,8 @@ What else moves the joint moves the target too, though: gravity as a squat deepe
 it, the floor, and a policy answers all of them. A waist that sags under a load which its target leans against shows
 target and acceleration in opposite phase for a whole rollout, and no sign is wrong. So the change of velocity is
 regressed on the command with the whole state beside it: every joint's command, position and velocity, the base's
-direction of gravity and velocities. What is left of the command then is what nothing else explains. A drive may answer
-late, so the joint's own command stands there as its mean over the last 60 ms.
+direction of gravity and velocities. What is left of the command then is what nothing else explains. A drive that
+answers late shows an echo of the present command at most, so the mean of the last 60 ms must oppose the motion, too.
 
 The rows are a series: residuals of one tick are like those of the next where contact lasts, so the standard error
 counts their products over 0.1 s (Newey and West 1987), and is never taken smaller than that of independent rows.
@@ -48,9 +48,10 @@ def check_response(view: View) -> None:
         place, given = rollout.joint_pos[:, joint], command[:, joint]
         window = view.window(0.1)
         together = correlation(place[window:] - place[:-window], given[window:] - given[:-window])
-        z, effect, whole = rows.response(joint)
+        z, late, effect, whole = rows.response(joint)
         strong = effect < -limits.response_effect * effects[joint]
-        against = strong and z < -limits.response_z and (not by_target or together < limits.response_correlation)
+        opposed = z < -limits.response_z and late < -limits.response_late
+        against = strong and opposed and (not by_target or together < limits.response_correlation)
         mirrored = by_target and z < NOT_ALONG and together < MIRRORED and _follows_negative(view, place, given)
         if against or mirrored:
             came = f"motion against it ({-z:.0f} standard errors, correlation of the changes {together:.2f})"
@@ -89,27 +90,32 @@ class _Rows:
         self.base = _base(view)[:-window][::window]
         self.seconds = window * view.period
 
-    def response(self, joint: int) -> tuple[float, float, bool]:
-        """The command's effect on the next change of velocity, in standard errors and as acceleration per unit.
+    def response(self, joint: int) -> tuple[float, float, float, bool]:
+        """The command's effect on the next change of velocity.
 
-        Last: whether the whole state stood beside it. Both are 0 where there are too few rows even for the joint alone.
+        In standard errors, the same for the mean of the last commands, as acceleration per unit, and whether the whole
+        state stood beside it; 0 where there are too few rows even for the joint alone.
         """
         now = slice(LATE, None)
         place, speed = self.place[now], self.speed[now]
-        given = np.mean([self.given[LATE - late : len(self.given) - late, joint] for late in range(LATE + 1)], axis=0)
-        own = [given, place[:, joint], speed[:, joint], np.sin(place[:, joint]), np.ones(len(place))]
+        own = [place[:, joint], speed[:, joint], np.sin(place[:, joint]), np.ones(len(place))]
         others = [i for i in range(place.shape[1]) if i != joint]
         table = np.column_stack(
             [*own, *(values[:, others] for values in (self.given[now], place, speed)), self.base[now]]
         )
-        whole = len(table) >= ROWS_EACH * table.shape[1]
+        whole = len(table) >= ROWS_EACH * (table.shape[1] + 1)
         if not whole:
             table = np.column_stack(own)
-        if len(table) < 3 * len(own):
-            return 0.0, 0.0, False
+        if len(table) < 3 * (len(own) + 1):
+            return 0.0, 0.0, 0.0, False
         lags = max(1, round(LASTING / self.seconds))
-        weight, error = _first_weight(table, self.change[now, joint], lags)
-        return weight / error, weight / self.seconds, whole
+        given = [self.given[LATE - late : len(self.given) - late, joint] for late in range(LATE + 1)]
+        fits = [
+            _first_weight(np.column_stack([command, table]), self.change[now, joint], lags)
+            for command in (given[0], np.mean(given, axis=0))
+        ]
+        (weight, error), (late, doubt) = fits
+        return weight / error, late / doubt, weight / self.seconds, whole
 
 
 def _base(view: View) -> np.ndarray:

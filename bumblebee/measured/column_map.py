@@ -80,14 +80,16 @@ def read_map(path: Path) -> ColumnMap:
     columns = _columns(f"{path}: columns", table["columns"])
     for column, names in columns.items():
         _same_order(f"{path}: columns: {column}", joints, names)
-    (episode,) = _names(f"{path}: episode", table["episode"]) if table.get("episode") else ("",)
+    episode = _names(f"{path}: episode", table["episode"]) if table.get("episode") else ("",)
+    if len(episode) > 1:
+        raise BadInput(f"{path}: episode", "the name of one column", ", ".join(episode)[:60])
     meta = table.get("meta", {})
     if not isinstance(meta, dict) or not all(isinstance(key, str) for key in meta):
         raise BadInput(f"{path}: meta", "keys and values", repr(meta)[:60])
     linear = {key: _linear(f"{path}: {key}", table.get(key), len(joints)) for key in ("scale", "offset")}
     if any(factor == 0 for factors in linear["scale"].values() for factor in factors):
         raise BadInput(f"{path}: scale", "factors other than 0", "0")
-    given = {"joints": joints, "columns": columns, "time": time, "episode": episode, "meta": meta}
+    given = {"joints": joints, "columns": columns, "time": time, "episode": episode[0], "meta": meta}
     return ColumnMap(**(table | given | linear))
 
 

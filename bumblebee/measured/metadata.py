@@ -34,7 +34,7 @@ def encode_metadata(meta: Metadata) -> bytes:
     table = {"schema": SCHEMA, "rollout_id": meta.rollout_id}
     table |= {"joints": list(meta.joints), "control_hz": meta.control_hz}
     rest = {key: value for key, value in meta.rest.items() if value is not None and key not in table}
-    return json.dumps(table | rest, default=_plain, ensure_ascii=False).encode()
+    return json.dumps(table | rest, default=_plain, ensure_ascii=False).encode("utf-8", "replace")
 
 
 def decode_metadata(path: Path, raw: bytes | None, bad: Callable[..., Exception]) -> Metadata:
