@@ -52,7 +52,8 @@ def unexplained_error(document: Mapping[str, Any]) -> list[str]:
         value, noise = (pick(block.get(horizon, {}), key).get("value") for block in (after, floor))
         if value is None or not noise or value <= FAR * noise:
             continue
-        size = f"{number(scale * value)} {unit} in its {what} after {horizon} s, {number(value / noise, 2)} times what noise leaves"
+        times = number(value / noise, 2)
+        size = f"{number(scale * value)} {unit} in its {what} after {horizon} s, {times} times what noise leaves"
         if document["effects"]:
             lines.append(f"The corrected model still errs by {size}: what was found does not explain that.")
         else:
