@@ -49,7 +49,9 @@ def _lead(document: dict[str, Any]) -> str:
     for what, unit, scale, key in position_rows(error):
         value, noise = pick(error, key).get("value"), pick(floor, key).get("value")
         if value is not None and noise:
-            said.append(f"the {what} are {scale * value:.3g} {unit} off, {value / noise:.2g} times what noise leaves")
+            said.append(
+                f"the {what} are {number(scale * value)} {unit} off, {number(value / noise, 2)} times what noise leaves"
+            )
     if not said:
         return escape(text)
     return escape(f"{text} After {horizon} s {'; '.join(said)}; most on {_worst(error, floor)}.")

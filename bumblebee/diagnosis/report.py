@@ -60,8 +60,8 @@ def _lead(document: dict[str, Any]) -> str:
             noise = beside_noise(after, floor, unit, scale)
             goes = "falls" if after["value"] < before["value"] else "goes"
             said.append(
-                f" After {horizon} s the {where} of the {what} {goes} from {scale * before['value']:.3g} to "
-                f"{scale * after['value']:.3g} {unit}{f' ({noise})' if noise else ''}."
+                f" After {horizon} s the {where} of the {what} {goes} from {number(scale * before['value'])} to "
+                f"{number(scale * after['value'])} {unit}{f' ({noise})' if noise else ''}."
             )
     return text + "".join(said)
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from bumblebee.diagnosis.page import number
 from bumblebee.diagnosis.units import pick, position_rows, rows
 
 _MORE = 1.02  # by so much the error has to be larger to be called worse
@@ -51,9 +52,8 @@ def unexplained_error(document: Mapping[str, Any]) -> list[str]:
         value, noise = (pick(block.get(horizon, {}), key).get("value") for block in (after, floor))
         if value is None or not noise or value <= FAR * noise:
             continue
-        size = (
-            f"{scale * value:.3g} {unit} in its {what} after {horizon} s, {value / noise:.2g} times what noise leaves"
-        )
+        times = number(value / noise, 2)
+        size = f"{number(scale * value)} {unit} in its {what} after {horizon} s, {times} times what noise leaves"
         if document["effects"]:
             lines.append(f"The corrected model still errs by {size}: what was found does not explain that.")
         else:
@@ -106,4 +106,6 @@ def nothing_seen(document: Mapping[str, Any], joint: str) -> str:
     )
     if value is None or not noise or value <= FAR * noise:
         return "nothing that these tests can see"
-    return f"no structure that these tests can see, yet {value / noise:.2g} times the noise off after {horizon} s"
+    return (
+        f"no structure that these tests can see, yet {number(value / noise, 2)} times the noise off after {horizon} s"
+    )

@@ -2,6 +2,7 @@
 
 import copy
 import json
+import tempfile
 from pathlib import Path
 
 import mujoco
@@ -50,14 +51,22 @@ def test_the_files_keep_the_contract(diagnosed, tmp_path: Path) -> None:
     assert (effect.effect, effect.where) == ("motor_strength", ("j3",))
 
 
-def test_an_existing_folder_is_left_alone_unless_told(diagnosed, tmp_path: Path) -> None:
-    """Refused in one line; with overwrite it is replaced whole."""
-    (tmp_path / "old.txt").write_text("mine")
-    with pytest.raises(BadInput, match="overwrite"):
-        write_diagnosis(diagnosed(CASE, seed=3), tmp_path)
-    assert [p.name for p in tmp_path.iterdir()] == ["old.txt"]
-    write_diagnosis(diagnosed(CASE, seed=3), tmp_path, overwrite=True)
-    assert not (tmp_path / "old.txt").exists()
+def test_an_earlier_diagnosis_is_replaced_only_when_told_and_nothing_else_ever(
+    diagnosed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Refused in one line; what cannot be written there is kept in the temporary folder."""
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "elsewhere"))
+    write_diagnosis(diagnosed(CASE, seed=3), tmp_path / "out")
+    with pytest.raises(BadInput, match="a diagnosis from before") as caught:
+        write_diagnosis(diagnosed(CASE, seed=3), tmp_path / "out")
+    kept = Path(str(caught.value).split("kept in ")[1].rstrip("."))
+    assert (kept / "diagnosis.json").read_text() == (tmp_path / "out" / "diagnosis.json").read_text()
+    write_diagnosis(diagnosed(CASE, seed=3), tmp_path / "out", overwrite=True)
+    (tmp_path / "out" / "old.txt").write_text("mine")
+    with pytest.raises(BadInput, match=r"old\.txt"):
+        write_diagnosis(diagnosed(CASE, seed=3), tmp_path / "out", overwrite=True)
+    assert (tmp_path / "out" / "old.txt").read_text() == "mine"
 
 
 def test_text_from_files_cannot_become_markup(diagnosed) -> None:
