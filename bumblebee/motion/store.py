@@ -95,7 +95,8 @@ def read_index(folder: Path) -> pd.DataFrame:
     path = Path(folder) / "index.parquet"
     if not os.path.lexists(path):
         raise BadInput(path, "the index of a motion library", "no such file", "Run the stage that writes it.")
-    index = read_table(path, _INDEX, _MAX_CLIPS).to_pandas()
+    # Without the file's own notes for pandas, which would be believed and may be damaged.
+    index = read_table(path, _INDEX, _MAX_CLIPS).replace_schema_metadata(None).to_pandas()
     taken: dict[str, int] = {}
     for row, name in enumerate(index["name"]):
         require_stem(f"{path}, row {row}: name", name)

@@ -101,14 +101,14 @@ def test_a_thousand_folders_in_one_another_are_walked(motions, tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     import os
 
-    for _ in range(1100):  # deeper than Python may call itself
+    for _ in range(1010):  # deeper than Python may call itself
         os.mkdir("d")
         os.chdir("d")
     os.chdir(tmp_path)
     assert motion_files(Path(".")) == [Path("a.csv")] and path.exists()
-    for _ in range(1100):
+    for _ in range(1010):
         os.chdir("d")
-    for _ in range(1100):
+    for _ in range(1010):
         os.chdir("..")
         os.rmdir("d")
 

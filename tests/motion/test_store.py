@@ -4,6 +4,7 @@ import errno
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from bumblebee.errors import BadInput
@@ -82,3 +83,14 @@ def test_a_clip_that_is_no_parquet_is_named(motions, tmp_path, content):
 def test_a_folder_without_index_is_named(tmp_path):
     with pytest.raises(BadInput, match="index of a motion library, came no such file"):
         read_library(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "notes", [b"\xb1", b"{", b"[]", b'{"index_columns": ["x"], "columns": [], "column_indexes": 3}']
+)
+def test_damaged_notes_for_pandas_in_an_index_change_nothing(motions, tmp_path, notes):
+    write_library(tmp_path / "lib", [motions.clip("a", 12)])
+    path = tmp_path / "lib/index.parquet"
+    wanted = read_index(tmp_path / "lib")
+    pq.write_table(pq.read_table(path).replace_schema_metadata({b"pandas": notes}), path)
+    pd.testing.assert_frame_equal(read_index(tmp_path / "lib"), wanted)
