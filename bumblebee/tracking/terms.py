@@ -5,6 +5,7 @@ targets "in the global coordinates" are taken in the latter: nothing may depend 
 `docs/decisions/paper-task.md` says what else the paper leaves open.
 """
 
+import difflib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -237,7 +238,9 @@ def expanded(terms: Sequence[str]) -> tuple[str, ...]:
     """
     names = [name for given in terms for name in SETS.get(given, (given,))]
     if unknown := [name for name in names if name not in TERMS]:
-        raise BadInput("observation.terms", ", ".join([*SETS, *TERMS]), repr(unknown[0]))
+        near = difflib.get_close_matches(unknown[0], [*SETS, *TERMS], n=1)
+        hint = f"Did you mean {near[0]}?" if near else f"The sets of terms are {', '.join(SETS)}."
+        raise BadInput("observation.terms", "names of sets or terms", repr(unknown[0])[:80], hint)
     return tuple(names)
 
 

@@ -64,7 +64,7 @@ def test_one_rollout_says_that_nothing_was_held_out(diagnosed) -> None:
     """The effect is still found; the document says that its errors are not held out."""
     document = diagnosed({("motor_strength", "j3"): 0.85}, 5, count=1).document
     assert document["holdout"] == []
-    assert any("held out" in note for note in document["notes"])
+    assert any("held out" in note for note in document["warnings"])
 
 
 def test_a_joint_that_never_moves_is_unidentifiable(diagnosed) -> None:

@@ -121,7 +121,7 @@ def test_friction_is_found_in_uneven_fast_torque_driven_logs(friction: tuple[flo
 
 def test_a_lone_rollout_is_diagnosed_and_said_to_be_one() -> None:
     found = diagnose(session(cart.record(count=1, friction=(3.0, 0.0), seconds=5.0)), SMALL).document
-    assert found["holdout"] == [] and any("single rollout" in note for note in found["notes"])
+    assert found["holdout"] == [] and any("single rollout" in note for note in found["warnings"])
     assert [e["where"] for e in found["effects"]] == [["cart"]]
 
 
