@@ -4,9 +4,10 @@ By the servo's law, torque = kp (target - position) - kd velocity, a step of the
 What else moves the joint moves the target too, though: gravity as a squat deepens, other joints, the base and, through
 it, the floor, and a policy answers all of them. A waist that sags under a load which its target leans against shows
 target and acceleration in opposite phase for a whole rollout, and no sign is wrong. So the change of velocity is
-regressed on the command with the whole state beside it: every joint's command, position and velocity, the base's
-direction of gravity and velocities. What is left of the command then is what nothing else explains. A drive that
-answers late shows an echo of the present command at most, so the mean of the last 60 ms must oppose the motion, too.
+regressed on the command that was held meanwhile with the whole state beside it: every joint's command, position and
+velocity, the base's direction of gravity and velocities. What is left of the command is what nothing else explains. A
+drive that answers late shows an echo of the present command at most, so the mean of the last 60 ms must oppose the
+motion, too.
 
 The rows are a series: residuals of one tick are like those of the next where contact lasts, so the standard error
 counts their products over 0.1 s (Newey and West 1987), and is never taken smaller than that of independent rows.
@@ -17,14 +18,14 @@ import numpy as np
 from bumblebee.measured.checks_sign import correlation
 from bumblebee.measured.checks_units import servo_gains
 from bumblebee.measured.quaternion import conjugate, rotate
-from bumblebee.measured.view import View, integral
+from bumblebee.measured.view import View
 
 MIRRORED = -0.9  # correlation of the changes of a position that follows its target's negative
 NOT_ALONG = 2.0  # standard errors: from here on a joint's acceleration is seen to go along with its command
 ROWS_EACH = 1.5  # rows for every column of the regression: with fewer it explains anything
 TICK, LASTING = 0.02, 0.1  # s between rows, s over which residuals are taken to hang together
 LATE = 3  # rows by which a drive may answer late
-RIDGE = 1e-8  # of columns of length 1: keeps collinear ones apart, as a resting joint's position and the constant
+RIDGE = 1e-7  # of columns of length 1: keeps collinear ones apart, as a resting joint's position and the constant
 
 
 def check_response(view: View) -> None:
@@ -82,9 +83,10 @@ class _Rows:
     def __init__(self, view: View, command: np.ndarray) -> None:
         rollout = view.rollout
         window = view.window(TICK)
-        span = (rollout.time[window:] - rollout.time[:-window])[:, None]
         self.change = (rollout.joint_vel[window:] - rollout.joint_vel[:-window])[::window]
-        self.given = (integral(rollout.time, command, window) / span)[::window]
+        # Held from row to row: the command of the row at the end was chosen after the motion, and answers it.
+        total = np.concatenate([np.zeros_like(command[:1]), np.cumsum(command, axis=0)])
+        self.given = ((total[window:] - total[:-window]) / window)[:-1][::window]
         self.place = rollout.joint_pos[:-window][::window]
         self.speed = rollout.joint_vel[:-window][::window]
         self.base = _base(view)[:-window][::window]

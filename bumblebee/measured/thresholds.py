@@ -63,12 +63,12 @@ class Thresholds:
     response_z: float = 4.0
     """Standard errors by which a joint's response must oppose its command to be called reversed; with the whole state
     beside the command honest joints in contact reach 3."""
-    response_late: float = 2.0
-    """The same for the mean command of the last 60 ms; a drive that answers 30 ms late reaches 1.5."""
+    response_late: float = 1.0
+    """The same for the mean command of the last 60 ms; a drive that answers 30 ms late reaches 0.6."""
     response_effect: float = 0.02
     """Share of the declared servo's effect on the free joint that the opposing effect must have: damping, a sampled
     servo and weak motors leave more, a slow reference that is tracked without error a twentieth of it."""
-    response_correlation: float = 0.0
+    response_correlation: float = 0.3
     """Correlation of command and position changes over 0.1 s from which a joint is seen to follow its command."""
     follow_gain: float = 0.45
     """Share of the tracking error that may remain under the negative target, to call a joint reversed by it."""

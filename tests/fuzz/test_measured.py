@@ -59,6 +59,8 @@ def good_files() -> dict[str, bytes]:
     """One good file of every layout."""
     rollout = replace(arm_rollout(0, seconds=1.2), rollout_id="log")
     q, v, u, t = rollout.joint_pos, rollout.joint_vel, rollout.joint_target, rollout.time
+    rest = {"kp": np.full(3, 40.0), "IMU_quaternion": np.ones((60, 4)) / 2, "IMU_gyro": q}
+    states = {"state_times": t, "state_data": np.hstack([q, v]), "state_signal_mapping": np.array(MAPPING)}
     rows = "".join(
         ",".join(map(str, [a, *b, *c, k % 3])) + "\n" for k, (a, b, c) in enumerate(zip(t, q, u, strict=True))
     )
@@ -70,8 +72,8 @@ def good_files() -> dict[str, bytes]:
         b"columns: {joint_pos: [q1, q2, q3], joint_target: [u1, u2, u3]}\n",
         "state_motor.csv": f"type,timestamp,positions,velocities\n{state}".encode(),
         "joint_list.txt": b"shoulder\nelbow\nwrist\n",
-        "asap.npz": npz(time=t, joint_pos=q, joint_vel=v, joint_pos_cmd=u, kp=np.full(3, 40.0), IMU_quaternion=np.ones((60, 4)) / 2, IMU_gyro=q),
-        "sysid.npz": npz(control_times=t, control_data=u, state_times=t, state_data=np.hstack([q, v]), state_signal_mapping=np.array(MAPPING)),
+        "asap.npz": npz(time=t, joint_pos=q, joint_vel=v, joint_pos_cmd=u, **rest),
+        "sysid.npz": npz(control_times=t, control_data=u, **states),
     }  # fmt: skip
 
 
