@@ -47,7 +47,6 @@ def _prepared(workspace: Path) -> "MlflowClient":
 
     SERVERS.mkdir(exist_ok=True)
     uri = f"sqlite:///{(SERVERS / 'mlflow.db').resolve()}"
-    logging.getLogger("mlflow").setLevel(logging.WARNING)
     logging.getLogger("alembic").setLevel(logging.WARNING)
     with _locked():
         mlflow.set_tracking_uri(uri)
@@ -256,17 +255,17 @@ def fetch(name: str, wanted: str, out: Path) -> Path:
 
 
 def _policy_files(whole: Path) -> Path:
-    """The policy's own folder in a version's files; versions from before had only the model and its metadata."""
+    """The policy's own folder in a version's files; from before there is MLflow's model alone, of other bytes."""
     if (whole / EXTRA).is_dir():
         return whole / EXTRA
+    import onnx
     import yaml
 
-    folder = whole / "policy"
-    folder.mkdir()
-    (whole / "model.onnx").rename(folder / "policy.onnx")
+    (folder := whole / "policy").mkdir()
+    model = onnx.load(str(whole / "model.onnx")).SerializeToString()  # with the weights beside it
+    (folder / "policy.onnx").write_bytes(model)
     contract = yaml.safe_load((whole / "MLmodel").read_text())["metadata"]["contract"]
-    sha256 = hashlib.sha256((folder / "policy.onnx").read_bytes()).hexdigest()  # MLflow wrote the graph anew
-    contract |= {"onnx_sha256": sha256, "exported_onnx_sha256": contract["onnx_sha256"]}
+    contract |= {"onnx_sha256": hashlib.sha256(model).hexdigest(), "exported_onnx_sha256": contract["onnx_sha256"]}
     (folder / "contract.json").write_text(_text(contract))
     return folder
 

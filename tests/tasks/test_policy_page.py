@@ -116,7 +116,8 @@ def test_a_version_from_before_cards_is_fetched_too(workspace: Path, tmp_path: P
     """Its files are MLflow's model alone, with the contract among its metadata."""
     stored = onnx.load(workspace / "p0.01" / "policy.onnx")
     stored.producer_name = "written anew"
-    (tmp_path / "model.onnx").write_bytes(stored.SerializeToString())
+    path = str(tmp_path / "model.onnx")
+    onnx.save_model(stored, path, save_as_external_data=True, location="weights.data", size_threshold=0)
     exported = ExportedPolicy.load(workspace / "p0.01")
     (tmp_path / "MLmodel").write_text(yaml.safe_dump({"metadata": {"contract": exported.contract}}))
     policy = ExportedPolicy.load(registry._policy_files(tmp_path))
