@@ -119,7 +119,7 @@ WRONG: list[tuple[str, Any, str]] = [
     *_same("base.ppo.entropy", -1),
     *_same("base.ppo.value", -1),
     *_same("base.ppo.grad_norm", 0),
-    *_same("base.ppo.learning_rate", 0, -1e-4, 1.5, 0.5),
+    *_same("base.ppo.learning_rate", 0, -1e-4, 1.5),
     ("base.ppo.learning_rate_range", [-1e-5, 1e-3], "base.ppo.learning_rate_range[0]"),
     *_same("base.ppo.learning_rate_range", [1e-3, 1e-5]),
     *_same("base.ppo.desired_kl", 0, NAN),
