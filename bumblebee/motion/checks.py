@@ -57,7 +57,8 @@ def finite(raw: RawMotion) -> None:
 
 def unit_quaternions(raw: RawMotion) -> None:
     """The root's four numbers are a rotation."""
-    norm = np.linalg.norm(raw.root_quat, axis=1)
+    with np.errstate(over="ignore"):
+        norm = np.linalg.norm(raw.root_quat, axis=1)
     bad = np.flatnonzero(np.abs(norm - 1) > _NORM_TOLERANCE)
     if len(bad):
         where = f"{raw.where}, {raw.row(bad[0])}, root quaternion"

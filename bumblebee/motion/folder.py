@@ -4,10 +4,11 @@ import hashlib
 import os
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import pandas as pd
 
@@ -143,12 +144,16 @@ def _parts(file: Path, config: ReadConfig) -> Iterator[tuple[Path, list[Clip] | 
     whole: list[list[Clip]] = []
     for row in rows:
         part = file.parent / "clips" / f"{row['name']}.parquet"
-        clip = _tried(lambda row=row: split_long(read_indexed(file.parent, row), config.max_seconds), part)
+        clip = _tried(partial(_indexed, file.parent, row, config), part)
         if isinstance(clip, str):
             yield part, clip
         else:
             whole.append(clip)
     yield from ((file, group) for group in _apart(whole))
+
+
+def _indexed(library: Path, row: Mapping[str, Any], config: ReadConfig) -> list[Clip]:
+    return split_long(read_indexed(library, row), config.max_seconds)
 
 
 def _tried(read: Callable[[], Result], file: Path) -> Result | str:

@@ -47,14 +47,14 @@ def load(path: Path, data: bytes | None = None) -> Any:
             path, "a pickle of plain values and numeric arrays", str(refusal), "Nothing of it was executed."
         ) from None
     except (EOFError, struct.error, zlib.error, lzma.LZMAError, OSError) as error:
-        raise BadInput(path, "a whole pickle", f"one that ends early ({error})", "Copy the file again.") from None
+        raise BadInput(path, "a whole pickle", f"one that ends early ({error})"[:200], "Copy the file again.") from None
     except pickle.UnpicklingError as error:
         ended = "truncated" in str(error) or "exhausted" in str(error)
         came = f"one that ends early ({error})" if ended else f"a broken one ({error})"
-        raise BadInput(path, "a whole pickle", came, "Copy the file again.") from None
+        raise BadInput(path, "a whole pickle", came[:200], "Copy the file again.") from None
     except _BROKEN as error:
         came = f"a broken one ({type(error).__name__}: {error})"
-        raise BadInput(path, "a whole pickle", came, "Copy the file again.") from None
+        raise BadInput(path, "a whole pickle", came[:200], "Copy the file again.") from None
 
 
 def _unpacked(path: Path, raw: bytes) -> bytes:

@@ -106,7 +106,7 @@ def read_term(text: str) -> Term:
     inside = {id(part) for n in nodes if isinstance(n, ast.Subscript) for part in (n.value, n.slice)}
     used = {n.id for n in nodes if isinstance(n, ast.Name) and n.id in OWN and id(n) not in inside}
     calls = [n for n in nodes if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)]
-    states = {_state(n): tuple(_number(a) for a in n.args) for n in calls if n.func.id in STATES}
+    states = {_state(n): tuple(_number(a) for a in n.args) for n in calls if _name(n) in STATES}
     return Term(text, rubs, tuple(dict.fromkeys(others)), frozenset(used), tuple(states.items()), tree)
 
 
@@ -154,6 +154,10 @@ def _check_call(name: str, arguments: list[ast.expr], others: list[str], depth: 
         raise ValueError(f"the function {name} of {len(arguments)}")
     for argument in arguments:
         _check(argument, others, depth)
+
+
+def _name(node: ast.Call) -> str:
+    return node.func.id if isinstance(node.func, ast.Name) else ""
 
 
 def _state(node: ast.Call) -> str:

@@ -178,3 +178,10 @@ def test_a_decompression_bomb_is_refused(tmp_path, monkeypatch):
     (tmp_path / "a.pkl").write_bytes(zlib.compress(bytes(1_000_000)))
     with pytest.raises(BadInput, match="unpacks to more"):
         safe_pickle.load(tmp_path / "a.pkl")
+
+
+def test_a_number_that_is_none_is_not_quoted_at_length(tmp_path):
+    (tmp_path / "a.pkl").write_bytes(b"F" + b"x" * 100_000 + b"\n.")
+    with pytest.raises(BadInput, match="a broken one") as caught:
+        safe_pickle.load(tmp_path / "a.pkl")
+    assert len(str(caught.value)) < 600
