@@ -215,3 +215,20 @@ def test_as_a_process_the_gate_ends_with_its_status_and_one_line(workspace: Setu
         check=False,
     )
     assert run.returncode == 2 and run.stderr.count("\n") == 1 and "summary.json" in run.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [("[1]", "JSON object"), ('{"joints": 5}', "joints"), ('{"joints": ["a"], "kp": ["b"]}', "kp"), ("{", "JSON")],
+)
+def test_a_broken_policy_contract_beside_the_rollouts_is_one_line(workspace: Setup, text: str, named: str) -> None:
+    workspace()
+    Path("data/rollouts/r1/c0/contract.json").write_text(text)
+    with pytest.raises(BadInput, match=rf"contract\.json.*{named}"):
+        ingest.main(1)
+
+
+@pytest.mark.parametrize("pattern", ["data/{", "{0}", "{cluster}", "{round.x}"])
+def test_a_pattern_with_other_fields_is_one_line(pattern: str) -> None:
+    with pytest.raises(BadInput, match=r"ingest\.incoming"):
+        ingest.incoming_of(pattern, 1)
