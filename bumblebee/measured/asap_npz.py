@@ -109,7 +109,7 @@ def _measured(where: str, values: np.ndarray) -> np.ndarray:
 
 def _require_shapes(where: str, table: dict[str, np.ndarray], rows: int) -> None:
     """Every array with a row for every time stamp, and as many joints or components as it must have."""
-    wanted = {key: (rows, size) for key, size in _BASE.items()}
+    wanted: dict[str, tuple[object, ...]] = {key: (rows, size) for key, size in _BASE.items()}
     place = table["joint_pos"]
     width = place.shape[1] if place.ndim == 2 else 0
     wanted |= dict.fromkeys(_JOINTS, (rows, width or "joints"))

@@ -271,3 +271,20 @@ def test_a_look_from_another_folder_prints_commands_for_this_workspace(
     for verb in ("approve", "reject"):
         assert f"-m flows.gate {verb} --workspace {folder} --round 1 --seen " in shown
     assert sys.executable in shown and not list(Path.cwd().iterdir())
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [("[1]", "JSON object"), ('{"joints": 5}', "joints"), ('{"joints": ["a"], "kp": ["b"]}', "kp"), ("{", "JSON")],
+)
+def test_a_broken_policy_contract_beside_the_rollouts_is_one_line(workspace: Setup, text: str, named: str) -> None:
+    workspace()
+    Path("data/rollouts/r1/c0/contract.json").write_text(text)
+    with pytest.raises(BadInput, match=rf"contract\.json.*{named}"):
+        ingest.main(1)
+
+
+@pytest.mark.parametrize("pattern", ["data/{", "{0}", "{cluster}", "{round.x}"])
+def test_a_pattern_with_other_fields_is_one_line(pattern: str) -> None:
+    with pytest.raises(BadInput, match=r"ingest\.incoming"):
+        ingest.incoming_of(pattern, 1)
