@@ -22,7 +22,7 @@ import pytest
 import yaml
 
 from bumblebee.learning.ppo import CHECKPOINT
-from flows import demo, servers
+from flows import demo, login, servers
 from flows import workspace as workspaces
 from flows.environment import environment
 from flows.stages import changed_stages, read_stages
@@ -158,7 +158,7 @@ def test_the_registry_resolves_its_aliases_through_the_server(loop: Loop, monkey
     with servers.servers(loop.folder) as addresses:
         for name, facts in published.items():
             query = f"registered-models/alias?name={name}&alias=champion"
-            version = fetch(f"{addresses.mlflow}/api/2.0/mlflow/{query}")["model_version"]
+            version = fetch(loop.folder, f"{addresses.mlflow}/api/2.0/mlflow/{query}")["model_version"]
             assert version["version"] == facts["champion"]
             tags = {tag["key"]: tag["value"] for tag in version["tags"]}
             assert {"git_sha", "onnx_sha256", "evaluation_contract", "lineage"} <= set(tags)
@@ -167,9 +167,10 @@ def test_the_registry_resolves_its_aliases_through_the_server(loop: Loop, monkey
     assert servers.running(loop.folder) is None
 
 
-def fetch(url: str) -> dict:
+def fetch(folder: Path, url: str) -> dict:
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-    with opener.open(url, timeout=30) as reply:
+    header = {"Authorization": login.header(login.read(folder / ".servers"))}
+    with opener.open(urllib.request.Request(url, headers=header), timeout=30) as reply:
         return json.loads(reply.read())
 
 
