@@ -151,8 +151,8 @@ def run(arguments: list[str]) -> int:
     except typer.Abort:
         return EXIT_INTERRUPTED
     except _UNUSABLE as error:
-        context, text = getattr(error, "ctx", None), getattr(error, "format_message", error.__str__)()
-        path = context.command_path if context else "bumblebee"
+        place, text = getattr(error, "ctx", None), getattr(error, "format_message", error.__str__)()
+        path = place.command_path if place else "bumblebee"
         print(" ".join(f"{path}: {text} Try '{path} --help'.".split()), file=sys.stderr)
         return EXIT_BAD_INPUT
     return 0
