@@ -27,7 +27,7 @@ else
 PIP_TORCH = --require-hashes -r requirements-torch.lock
 endif
 
-.PHONY: help setup demo smoke serve test unit e2e format check type lock clean
+.PHONY: help setup demo smoke serve test unit e2e fuzz kills format check type lock clean
 
 help:  ## these lines
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -67,6 +67,12 @@ unit: setup  ## the tests without the end-to-end run
 
 e2e: setup  ## the end-to-end run alone
 	$(BIN)/python -m pytest -q -m e2e
+
+fuzz: setup  ## an hour of fuzzing for each group of readers; SECONDS_EACH=<n> for another time
+	BUMBLEBEE_FUZZ_SECONDS=$(or $(SECONDS_EACH),3600) $(BIN)/python -m pytest -q tests/fuzz
+
+kills: setup  ## kill every process at every stage once (docs/trust.md); needs `make smoke` before, root for full disks
+	$(BIN)/python -m benchmarks.kills --workspace runs/smoke --out kills.jsonl
 
 format: setup  ## lay out the code
 	$(BIN)/ruff check --fix --select I .
