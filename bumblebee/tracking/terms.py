@@ -238,8 +238,8 @@ def expanded(terms: Sequence[str]) -> tuple[str, ...]:
     """
     names = [name for given in terms for name in SETS.get(given, (given,))]
     if unknown := [name for name in names if name not in TERMS]:
-        near = difflib.get_close_matches(unknown[0], [*SETS, *TERMS], n=1)
-        hint = f"Did you mean {near[0]}?" if near else f"The sets of terms are {', '.join(SETS)}."
+        near = difflib.get_close_matches(unknown[0], [*SETS, *TERMS], n=3)
+        hint = f"Did you mean {' or '.join(near)}?" if near else f"The sets of terms are {', '.join(SETS)}."
         raise BadInput("observation.terms", "names of sets or terms", repr(unknown[0])[:80], hint)
     return tuple(names)
 
