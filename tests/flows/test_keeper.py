@@ -63,7 +63,8 @@ told = []
 signal.signal(signal.SIGUSR1, lambda *_: told.append(1))
 signal.signal(signal.SIGTERM, signal.SIG_IGN)  # as stubborn as Prefect can be
 stage = subprocess.Popen([sys.executable, "-c", "import sys; sys.path.insert(0, {home!r}); from tasks.parent import "
-    "end_with_parent; end_with_parent(); print('stage', flush=True); import time; time.sleep(60)"])
+    "end_with_parent; end_with_parent(); import time; time.sleep(60)"],
+    stderr=subprocess.DEVNULL)
 Path({folder!r}, "walk.pid").write_text(f"{{os.getpid()}} {{stage.pid}}")
 while not told:
     time.sleep(0.02)
