@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
+from bumblebee.measured.intake import FINDING_COLUMNS
 from flows import front, login, runs, servers
 from flows.servers import Addresses
 
@@ -56,6 +57,8 @@ class Served:
             state = self.ask("flow_runs/filter", flow_runs={"id": {"any_": [run]}})[0]["state"]
             if state["name"] in states:
                 return state
+            if state["type"] in ("FAILED", "CRASHED"):
+                break
             time.sleep(0.3)
         raise TimeoutError(state)
 
@@ -78,9 +81,11 @@ def make(folder: Path) -> Path:
     }  # fmt: skip
     (folder / "data" / "measured" / "r1").mkdir(parents=True)
     (folder / "dvc.yaml").write_text(yaml.safe_dump({"stages": stages}))
-    (folder / "params.yaml").write_text("clusters: [c0]\n")
-    summary = {"accepted": 3, "quarantined": 1, "seconds": 4.0, "by_rule": {}}
+    (folder / "params.yaml").write_text("clusters: [c0]\ngate: {mode: ask}\n")
+    summary = {"round": 1, "accepted": 3, "quarantined": 1, "seconds": 4.0, "joints": ["knee"], "by_rule": {}}
+    summary |= {"by_cluster": {}, "by_motion": {}, "files": []}
     (folder / "data" / "measured" / "r1" / "summary.json").write_text(json.dumps(summary))
+    (folder / "data" / "measured" / "r1" / "findings.csv").write_text(",".join(FINDING_COLUMNS) + "\n")
     for name in ("bumblebee", "tasks", "flows"):
         (folder / name).symlink_to(servers.HOME / name)
     from dvc.repo import Repo
@@ -246,13 +251,16 @@ def test_a_person_logs_in_watches_a_run_and_answers_its_gate_on_prefects_page(se
     page.get_by_role("button", name="Open menu").click()
     page.get_by_role("menuitem", name="Resume").click()
     dialog = page.get_by_role("dialog")
-    dialog.get_by_text("files accepted").wait_for()
+    dialog.get_by_text("3 files accepted").wait_for()
     look(page, "prefect-gate")
+    dialog.get_by_text("Select", exact=True).click()
+    page.get_by_role("option", name="approve").click()
     dialog.locator("textarea").first.fill("Ada")
     dialog.get_by_role("button", name="Resume").click()
     assert served.until(run["id"], "Completed", "Failed", "Crashed")["name"] == "Completed"
     answer = json.loads((served.folder / "data" / "approvals" / "round-1.json").read_text())
     assert (answer["status"], answer["by"]) == ("approved", "Ada")
+    assert answer["known_by"]["how"].startswith("Prefect's page")
     assert (served.folder / "g.txt").exists()
 
 
