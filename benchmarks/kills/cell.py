@@ -11,7 +11,7 @@ class Cell:
     """What is done."""
 
     target: str
-    """A process of the loop (loop, dvc, stage, recorder, prefect, mlflow), or a command of the library."""
+    """A process of the loop (keeper, flow, dvc, stage, recorder, prefect, mlflow), or a command of the library."""
     stage: str
     """The stage, as DVC calls it, that is at work when it happens; for a command what it works on."""
     how: str

@@ -16,25 +16,27 @@ from flows.workspace import CODE, HOME
 
 # How a target is known by its command line; {stage} is the stage's module, {name} DVC's name of the instance.
 WORDS = {
-    "loop": ("flows.demo",),
+    "keeper": ("flows.demo",),
+    "flow": ("flows.walk",),
     "dvc": ("flows.reproduce", "{name}"),
     "stage": ("tasks.{stage}",),
     "recorder": ("tasks.recorder",),
-    "prefect": ("{prefect}",),
-    "mlflow": ("mlflow", "server"),
+    "prefect": ("flows.front", "prefect"),
+    "mlflow": ("flows.front", "mlflow"),
 }
+TARGETS = ("keeper", "flow", "dvc", "stage", "prefect", "mlflow")
 DELAY = 0.7  # [s] that a stage works before the blow
 
 
 def cells() -> list[Cell]:
     """Every process with every signal while base trains; every stage with -9; disks and two at once."""
-    base = [Cell(target, "base", how) for target in ("loop", "dvc", "stage", "prefect", "mlflow") for how in SIGNALS]
+    base = [Cell(target, "base", how) for target in TARGETS for how in SIGNALS]
     names = ["seal", "motions", "filter", "cluster", "experts@cluster0", "rollouts@after0-cluster0", "ingest@after0"]
     names += ["diagnose@after0", "delta@after0-cluster1", "refine@after0-cluster0", "distill", "evaluate"]
     stages = [Cell("stage", name, "-9") for name in [*names, "publish", "report"]]
-    loops = [Cell("loop", name, "-9") for name in ("rollouts@after0-cluster0", "publish")]
+    loops = [Cell("keeper", name, "-9") for name in ("rollouts@after0-cluster0", "publish")]
     full = [Cell("stage", name, "disk full") for name in ("motions", "base", "rollouts@after0-cluster0", "publish")]
-    return [*base, *stages, *loops, Cell("recorder", "publish", "-9"), *full, Cell("loop", "filter", "two at once")]
+    return [*base, *stages, *loops, Cell("recorder", "publish", "-9"), *full, Cell("keeper", "filter", "two at once")]
 
 
 def run(cell: Cell, finished: Path, scratch: Path) -> Outcome:
@@ -67,7 +69,7 @@ def blow(cell: Cell, name: str, folder: Path, log: Path, fill: "Fill") -> tuple[
     """Start the loop, wait until the stage works, hit; (status, seconds until the end, last line, orphans)."""
     words = ["-m", "flows.demo", "--workspace", str(folder)]
     running = start(words, folder, environment(folder), cell.name, log)
-    facts = {"stage": name.partition("@")[0], "name": name, "prefect": prefect_word()}
+    facts = {"stage": name.partition("@")[0], "name": name}
     stage = [word.format(**facts) for word in WORDS["stage"]]
     second: subprocess.Popen[bytes] | None = None
     if cell.how == "two at once":
@@ -85,14 +87,6 @@ def blow(cell: Cell, name: str, folder: Path, log: Path, fill: "Fill") -> tuple[
         other, more = wait_end(second)
         status, seconds = (status if other == 0 else other), seconds + more
     return status, seconds, last_line(log), orphans(cell.name)
-
-
-def prefect_word() -> str:
-    """The end of the argument by which Prefect's server is known."""
-    from flows import servers
-
-    line = servers.commands(Path("."), {"prefect": 1, "mlflow": 2})["prefect"]
-    return line[2] if line[1] == "-m" else line[-1]
 
 
 def copy(finished: Path, folder: Path) -> None:
