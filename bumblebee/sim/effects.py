@@ -4,7 +4,6 @@ Values are absolute (N m, kg, s, rad ...), so that the effects applied to the de
 model; `motor_strength`, `kp` and `kd` alone are factors on the declared gains.
 """
 
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,8 @@ import yaml
 
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
-from bumblebee.io.read import parse_yaml, read_text
+from bumblebee.io.read import read_yaml
+from bumblebee.io.write import write_file
 from bumblebee.sim.effect_catalogue import CATALOGUE, Effect, Kind, Parameter, single
 from bumblebee.sim.effect_hooks import RuntimeHooks, runtime_hooks
 from bumblebee.sim.effect_spec import add_to_spec
@@ -42,10 +42,7 @@ _LARGEST = 1e9  # of a parameter or a coefficient, in SI units
 
 def write_effects(path: Path, effects: Sequence[Effect]) -> None:
     """Write `effects.yaml`; it appears whole or not at all."""
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    temporary.write_text(effects_yaml(effects))
-    os.replace(temporary, path)
+    write_file(path, effects_yaml(effects))
 
 
 def effects_yaml(effects: Sequence[Effect]) -> str:
@@ -56,9 +53,7 @@ def effects_yaml(effects: Sequence[Effect]) -> str:
 
 def read_effects(path: Path) -> list[Effect]:
     """Read `effects.yaml`; a key, an id or a value that is not the catalogue's is named in a `BadInput`."""
-    text = read_text(Path(path), _LIMITS.text_bytes)
-    _refuse_repeated_keys(path, text)
-    document = parse_yaml(path, text, _LIMITS)
+    document = read_yaml(Path(path), _LIMITS)
     _only_keys(path, document, {"schema", "effects"})
     if type(document.get("schema")) is not int or document["schema"] != 1:
         raise BadInput(f"{path}: schema", "1", repr(document.get("schema"))[:80])
@@ -86,35 +81,6 @@ def _only_keys(where: object, table: Any, keys: set[str]) -> None:
         raise BadInput(where, f"a mapping with keys {sorted(keys)}", type(table).__name__)
     if unknown := sorted(str(key) for key in table if key not in keys):
         raise BadInput(where, f"only the keys {sorted(keys)}", f"unknown key {unknown[0][:80]!r}")
-
-
-def _refuse_repeated_keys(path: Path, text: str) -> None:
-    """YAML's reader lets the last of two equal keys win in silence; the file's author meant one of them."""
-    # Each entry is a mapping's keys so far, or None for a list; `expects` says whether a key comes next.
-    keys: list[set[str] | None] = []
-    expects: list[bool] = []
-    for number, event in enumerate(_events(path, text)):
-        if number > _LIMITS.nodes:
-            raise BadInput(path, f"at most {_LIMITS.nodes:,} values", "more")
-        if isinstance(event, yaml.CollectionEndEvent):
-            keys.pop()
-            expects.pop()
-            continue
-        if not isinstance(event, yaml.NodeEvent):
-            continue
-        if keys and (known := keys[-1]) is not None:
-            if expects[-1] and isinstance(event, yaml.ScalarEvent):
-                if event.value in known:
-                    where = f"{path}, line {event.start_mark.line + 1}"
-                    raise BadInput(where, "each key once", f"a second {event.value[:80]!r}")
-                known.add(event.value)
-            expects[-1] = not expects[-1]
-        if isinstance(event, yaml.CollectionStartEvent):
-            if len(keys) >= _LIMITS.depth:
-                where = f"{path}, line {event.start_mark.line + 1}"
-                raise BadInput(where, f"at most {_LIMITS.depth} levels of nesting", "more")
-            keys.append(set() if isinstance(event, yaml.MappingStartEvent) else None)
-            expects.append(True)
 
 
 def _events(path: Path, text: str) -> Iterator[yaml.Event]:
