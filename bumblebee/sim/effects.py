@@ -4,7 +4,7 @@ Values are absolute (N m, kg, s, rad ...), so that the effects applied to the de
 model; `motor_strength`, `kp` and `kd` alone are factors on the declared gains.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -81,15 +81,6 @@ def _only_keys(where: object, table: Any, keys: set[str]) -> None:
         raise BadInput(where, f"a mapping with keys {sorted(keys)}", type(table).__name__)
     if unknown := sorted(str(key) for key in table if key not in keys):
         raise BadInput(where, f"only the keys {sorted(keys)}", f"unknown key {unknown[0][:80]!r}")
-
-
-def _events(path: Path, text: str) -> Iterator[yaml.Event]:
-    try:
-        yield from yaml.parse(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = f"{path}, line {mark.line + 1}" if mark else path
-        raise BadInput(place, "YAML of plain values", str(getattr(error, "problem", None) or error)[:200]) from None
 
 
 def _effect(where: str, entry: Any) -> Effect:
