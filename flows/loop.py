@@ -4,6 +4,7 @@ DVC decides what is stale; Prefect decides what runs beside what and shows it. E
 of its own, brought up to date by DVC; Prefect's own cache is off, so that there is one.
 """
 
+import logging
 import os
 import subprocess
 import sys
@@ -28,6 +29,12 @@ from flows.stages import Stage, changed_stages, downstream, read_stages, to_run
 KEPT = 5  # last lines of a failed stage that its error repeats
 
 
+def is_news(record: logging.LogRecord) -> bool:
+    """Whether a line of Prefect's own says what the stage has not said: its failure stands in its last line already."""
+    return not record.getMessage().startswith("Task run failed with state")
+
+
+logging.getLogger("prefect.task_runs").addFilter(is_news)
 WAITING = "WaitingForAnswer"  # name of the state of a run that ended at a gate
 at_end: Callable[[State[Any]], None] = lambda state: None  # noqa: E731  (flows.walk puts its own here)
 

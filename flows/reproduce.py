@@ -1,6 +1,10 @@
 """`dvc --wait-for-lock repro -s STAGE` in a process that ends with the flow: `python -m flows.reproduce STAGE`."""
 
+import signal
 import sys
+
+if __name__ == "__main__" and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # while DVC is imported, Ctrl-C ends it without a word
 
 from tasks.parent import end_with_parent
 
@@ -10,6 +14,8 @@ def main(argv: list[str] | None = None) -> int:
     end_with_parent()
     from dvc.cli import main as dvc
 
+    if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     names = sys.argv[1:] if argv is None else argv
     # Waiting for the lock matters: of stages that run side by side one would otherwise lose its finished work.
     return int(dvc(["--wait-for-lock", "repro", "--single-item", *names]))

@@ -35,10 +35,10 @@ def main(argv: list[str] | None = None) -> int:
 def walk() -> int:
     """Run the flow in this process; only now is Prefect imported, since it reads its settings once."""
     folder = Path(os.environ["BUMBLEBEE_WORKSPACE"])
+    lost = Lost()
+    signal.signal(signal.SIGUSR1, lost.say)  # before the slow import: unhandled it would end this process
     from flows import loop as loops
 
-    lost = Lost()
-    signal.signal(signal.SIGUSR1, lost.say)
     loops.at_end = lambda state: lost.leave(verdict(state, loops.WAITING)) if lost else None
     os.chdir(folder)
     state = loops.loop.with_options(task_runner=loops.runner(os.cpu_count() or 1))(return_state=True)

@@ -18,6 +18,7 @@ import hashlib
 import inspect
 import os
 import shutil
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -43,6 +44,8 @@ def run_stage(main: Callable[..., object], argv: list[str] | None = None, *, log
     """
     options = _parser(main).parse_args(argv)
     if "DVC_STAGE" in os.environ:
+        if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         end_with_parent()
         if logs and os.environ.get("RANK", "0") == "0":  # of processes that train together, one logs
             recorder.start()
