@@ -88,5 +88,5 @@ lock:  ## write requirements.lock and requirements-torch.lock from what is insta
 	$(BIN)/python -m tests.lock
 
 clean:  ## remove caches, workspaces and servers' data; keeps .venv, data/ and models/
-	rm -rf runs .servers .scratch .pytest_cache .ruff_cache .mypy_cache build *.egg-info
+	rm -rf runs .servers .scratch .hypothesis kills.jsonl .pytest_cache .ruff_cache .mypy_cache build *.egg-info
 	find bumblebee tasks flows tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
