@@ -3,6 +3,11 @@
 import os
 import signal
 
-if "DVC_STAGE" in os.environ and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-    # While a stage still imports, Ctrl-C ends it without a word; `tasks.stage.run_stage` answers it in one line.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+if "DVC_STAGE" in os.environ:
+    # Before the stage's imports, which take seconds: a loop that is killed meanwhile must not leave it behind.
+    from tasks.parent import end_with_parent
+
+    end_with_parent()
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        # While it imports, Ctrl-C ends it without a word; `tasks.stage.run_stage` answers it in one line.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -6,6 +6,7 @@ import threading
 import time
 
 LOOK_EVERY = 0.5  # [s]
+_watching = threading.Event()
 SHELLS = {"sh", "dash", "bash", "zsh", "fish", "ksh"}
 
 
@@ -13,7 +14,10 @@ def end_with_parent() -> None:
     """Watch who started this process from a thread, and end it, whatever it does, when that one is gone.
 
     Where a shell stands between (DVC runs commands in one, and some shells stay), the one before it counts too.
+    Called again it does nothing.
     """
+    if _watching.is_set():
+        return
     import psutil
 
     parent = psutil.Process().parent()
@@ -27,7 +31,10 @@ def end_with_parent() -> None:
     def watch() -> None:
         while os.getppid() == parent.pid and all(process.is_running() for process in watched):
             time.sleep(LOOK_EVERY)
-        print("the process that started this one is gone: ending", file=sys.stderr, flush=True)
-        os._exit(1)
+        try:
+            print("the process that started this one is gone: ending", file=sys.stderr, flush=True)
+        finally:
+            os._exit(1)  # also where nobody reads any more: the pipe went with the process
 
+    _watching.set()
     threading.Thread(target=watch, daemon=True, name="parent").start()
