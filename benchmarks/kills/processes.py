@@ -1,6 +1,7 @@
 """Finding, hitting and waiting for processes of one cell: all of them carry the cell's mark in their environment."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -21,10 +22,16 @@ def start(words: Sequence[str], folder: Path, env: Mapping[str, str], mark: str,
             [sys.executable, *words],
             cwd=folder,
             env={**env, MARK: mark},
+            stdin=subprocess.DEVNULL,
             stdout=out,
             stderr=out,
-            stdin=subprocess.DEVNULL,
+            preexec_fn=_listen,
         )
+
+
+def _listen() -> None:
+    """Ctrl-C reaches the command also where a shell that runs this in the background has switched it off."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def marked(mark: str) -> list[psutil.Process]:
