@@ -8,6 +8,7 @@ from contextlib import suppress
 
 import psutil
 
+YOUNG = 5.0  # [s] in which an interpreter may still be starting, where Ctrl-C shows a traceback that is nobody's
 STOP_LIMIT = 5.0  # [s] until a process that was asked to end is killed
 
 
@@ -61,11 +62,15 @@ def stop(pids: Iterable[int], limit: float = STOP_LIMIT) -> None:
 
 
 def end_tree(pid: int, limit: float = STOP_LIMIT) -> None:
-    """End a process and everything below it: SIGINT to what it started, SIGTERM to itself, SIGKILL to what is left."""
+    """End a process and everything below it: SIGINT to what it started, SIGTERM to itself, SIGKILL to what is left.
+
+    What was started just now gets SIGTERM as well: it has nothing to clear up yet.
+    """
     tree = below(pid)
     for process in tree:
         with suppress(psutil.Error):
-            process.send_signal(signal.SIGINT)
+            young = time.time() - process.create_time() < YOUNG
+            process.send_signal(signal.SIGTERM if young else signal.SIGINT)
     with suppress(ProcessLookupError):
         os.kill(pid, signal.SIGTERM)
     end = time.monotonic() + limit

@@ -9,6 +9,7 @@ something does not hold. Started again with the same file it goes on. Linux; ful
 import argparse
 import json
 import os
+import shutil
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
@@ -35,6 +36,10 @@ def main() -> int:
                 continue
             known[cell.name] = outcome
             print(f"  {'; '.join(outcome.broken) or 'holds'} ({outcome.seconds} s: {outcome.said})", flush=True)
+            if outcome.broken:
+                kept = options.out.with_name(f"{options.out.stem}-{number}.log")
+                shutil.copyfile(Path(scratch) / "log.txt", kept)
+                print(f"  what was said: {kept}", flush=True)
             with options.out.open("a") as file:
                 file.write(json.dumps(asdict(outcome)) + "\n")
     found = [known[cell.name] for cell, _ in todo if cell.name in known]
