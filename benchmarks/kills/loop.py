@@ -26,7 +26,7 @@ WORDS = {
     "mlflow": ("flows.front", "mlflow"),
 }
 TARGETS = ("keeper", "flow", "dvc", "stage", "prefect", "mlflow")
-DELAY = 0.7  # [s] that a stage works before the blow
+DELAY = 0.3  # [s] that a stage works before the blow
 
 
 def cells() -> list[Cell]:
@@ -75,8 +75,8 @@ def blow(cell: Cell, name: str, folder: Path, log: Path, fill: "Fill") -> tuple[
         fill(True)
     else:
         wait_for(stage, running)
-        time.sleep(DELAY)
         target = wait_for([word.format(**facts) for word in WORDS[cell.target]], running)
+        time.sleep(DELAY)
         target.send_signal(SIGNALS[cell.how])
     status, seconds = wait_end(running)
     if second is not None:

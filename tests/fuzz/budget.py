@@ -4,7 +4,7 @@ import os
 import time
 from collections.abc import Iterator
 
-SECONDS = float(os.environ.get("BUMBLEBEE_FUZZ_SECONDS", "6"))
+SECONDS = float(os.environ.get("BUMBLEBEE_FUZZ_SECONDS", "12"))
 
 
 def rounds(share: float = 1.0) -> Iterator[int]:
