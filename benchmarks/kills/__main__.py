@@ -14,6 +14,8 @@ import tempfile
 from dataclasses import asdict
 from pathlib import Path
 
+import psutil
+
 from benchmarks.kills import command, loop
 from benchmarks.kills.cell import Cell, Outcome
 
@@ -31,7 +33,7 @@ def main() -> int:
             print(f"{number}/{len(todo)} {cell.name}", flush=True)
             try:
                 outcome = one(cell, room is loop, options.workspace.resolve(), Path(scratch))
-            except RuntimeError as error:
+            except (RuntimeError, psutil.NoSuchProcess) as error:
                 print(f"  not tried: {error}", flush=True)
                 continue
             known[cell.name] = outcome
