@@ -25,13 +25,9 @@ DELAY = {"diagnose": 6.0, "gap": 2.5, "replay": 2.5, "import": 2.0}  # [s] from 
 
 
 def cells() -> list[Cell]:
-    """Every signal on the long one, -9 and full disks on all, two at once, a folder without write access."""
-    found = [Cell("diagnose", "arm", how) for how in SIGNALS]
-    for command in ("gap", "replay", "import"):
-        found += [Cell(command, "arm", how) for how in ("-9", "TERM")]
-    found += [Cell(command, "arm", "disk full") for command in DELAY]
-    found += [Cell(command, "arm", "two at once") for command in DELAY]
-    return [*found, *(Cell(command, "arm", "read-only") for command in ("diagnose", "replay"))]
+    """Every command with every signal, a full disk, one without write access, and two at once."""
+    ways = (*SIGNALS, "disk full", "read-only", "two at once")
+    return [Cell(command, "arm", how) for command in DELAY for how in ways]
 
 
 def run(cell: Cell, scratch: Path) -> Outcome:
