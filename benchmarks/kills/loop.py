@@ -25,13 +25,15 @@ WORDS = {
     "prefect": ("flows.front", "prefect"),
     "mlflow": ("flows.front", "mlflow"),
 }
-TARGETS = ("keeper", "flow", "dvc", "stage", "prefect", "mlflow")
+ENDED = ("keeper", "flow", "dvc", "stage")  # with which the run ends
+SERVERS = ("prefect", "mlflow")  # without which it goes on: hit during its last stage
 DELAY = 0.3  # [s] that a stage works before the blow
 
 
 def cells() -> list[Cell]:
-    """Every process with every signal while base trains; every stage with -9; disks and two at once."""
-    base = [Cell(target, "base", how) for target in TARGETS for how in SIGNALS]
+    """Every process with every signal, while base trains or the report is made; every stage with -9; disks and two at once."""
+    base = [Cell(target, "base", how) for target in ENDED for how in SIGNALS]
+    base += [Cell(target, "report", how) for target in SERVERS for how in SIGNALS]
     names = ["seal", "motions", "filter", "cluster", "experts@cluster0", "rollouts@after0-cluster0", "ingest@after0"]
     names += ["diagnose@after0", "delta@after0-cluster1", "refine@after0-cluster0", "distill", "evaluate"]
     stages = [Cell("stage", name, "-9") for name in [*names, "publish", "report"]]
