@@ -31,7 +31,7 @@ DELAY = 0.3  # [s] that a stage works before the blow
 
 
 def cells() -> list[Cell]:
-    """Every process with every signal, while base trains or the report is made; every stage with -9; disks and two at once."""
+    """Every process with every signal, every stage with -9, full disks, and two at once."""
     base = [Cell(target, "base", how) for target in ENDED for how in SIGNALS]
     base += [Cell(target, "report", how) for target in SERVERS for how in SIGNALS]
     names = ["seal", "motions", "filter", "cluster", "experts@cluster0", "rollouts@after0-cluster0", "ingest@after0"]
