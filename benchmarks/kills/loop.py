@@ -10,7 +10,8 @@ from pathlib import Path
 import yaml
 
 from benchmarks.kills.cell import SIGNALS, Cell, Outcome
-from benchmarks.kills.processes import PATIENCE, last_line, orphans, start, wait_end, wait_for
+from benchmarks.kills.processes import GRACE, PATIENCE, last_line, orphans, start, wait_end, wait_for
+from bumblebee.errors import BadInput
 from flows.environment import environment
 from flows.stages import changed_stages, read_stages
 from flows.workspace import CODE, HOME
@@ -54,7 +55,7 @@ def run(cell: Cell, finished: Path, scratch: Path) -> Outcome:
         log = scratch / "log.txt"
         log.write_bytes(b"")
         status, seconds, said, left_alive = blow(cell, name, folder, log, fill)
-        lost = sorted(changed_stages(folder) - before - after(folder, name))
+        lost = sorted(changed_now(folder) - before - after(folder, name))
         half = half_written(folder)
         fill(False)
         again = goes_on(cell, name, folder, log)
@@ -100,6 +101,18 @@ def goes_on(cell: Cell, name: str, folder: Path, log: Path) -> int | None:
         running.send_signal(signal.SIGTERM)
     status, _ = wait_end(running)
     return 0 if done(folder, name) else status
+
+
+def changed_now(folder: Path) -> set[str]:
+    """The stages that differ from dvc.lock, once DVC's lock is free: a killed holder counts until the system reaps it."""
+    end = time.monotonic() + GRACE
+    while True:
+        try:
+            return changed_stages(folder)
+        except BadInput:
+            if time.monotonic() > end:
+                raise
+            time.sleep(0.5)
 
 
 def done(folder: Path, name: str) -> bool:

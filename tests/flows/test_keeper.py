@@ -126,6 +126,17 @@ def test_nothing_outlives_a_keeper_that_was_killed_and_the_next_one_starts(folde
     assert keeper.left() == []
 
 
+def test_when_the_flow_is_killed_its_stage_goes_with_it_and_the_keeper_ends_the_servers(folder: Path):
+    keeper = Keeper(folder)
+    walk, stage = keeper.all[-2:]
+    stage.suspend()  # it cannot notice by itself that its parent is gone
+    walk.kill()
+    _, error = keeper.process.communicate(timeout=60)
+    assert keeper.process.returncode == 1 and "Traceback" not in error
+    assert keeper.left() == []
+    assert not (folder / ".servers" / "addresses.json").exists()
+
+
 def test_a_walk_whose_server_is_lost_is_told_and_goes_on_to_its_own_end(folder: Path):
     keeper = Keeper(folder)
     os.kill(keeper.servers[0], signal.SIGKILL)
