@@ -104,7 +104,7 @@ def goes_on(cell: Cell, name: str, folder: Path, log: Path) -> int | None:
 
 
 def changed_now(folder: Path) -> set[str]:
-    """The stages that differ from dvc.lock, once DVC's lock is free: a killed holder counts until the system reaps it."""
+    """The stages that differ from dvc.lock, once its lock is free: a killed holder counts until the system reaps it."""
     end = time.monotonic() + GRACE
     while True:
         try:
