@@ -1,0 +1,19 @@
+"""What the drives are told for one control period: the low-level command of a robot with PD drives."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ServoCommand:
+    """Torque of a drive = kp (target - reading) - kd velocity + torque, limited by the drive; n robots, J joints."""
+
+    target: np.ndarray
+    """(n, J) joint targets [rad]."""
+    torque: np.ndarray | None = None
+    """(n, J) feed-forward torque [N m]; None for none."""
+    kp: np.ndarray | None = None
+    """(J,) [N m/rad]; None for the robot's own gains."""
+    kd: np.ndarray | None = None
+    """(J,) [N m s/rad]; None for the robot's own gains."""
