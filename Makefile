@@ -3,6 +3,7 @@ SHELL := /bin/bash
 PYTHON ?= python3
 VENV ?= .venv
 MOTIONS ?=
+SEED ?=
 NAME ?=
 PORTS ?=
 
@@ -50,8 +51,8 @@ $(STAMP): requirements.lock requirements-torch.lock pyproject.toml
 # A gate that waits for an answer (status 3) is no error; scripts that must know call python -m flows.demo themselves.
 WAITS = || { status=$$?; test $$status -eq 3 || exit $$status; echo "make $@: not done, a gate waits for your answer (see above); then the same command goes on"; }
 
-demo: setup  ## the whole loop on embedded motions, or on MOTIONS=<folder> in a workspace under runs/
-	@$(BIN)/python -m flows.demo $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(NAME),--name "$(NAME)") $(PORTS) $(WAITS)
+demo: setup  ## the whole loop on embedded motions, or on MOTIONS=<folder>; SEED=<n> or null: another sealed robot
+	@$(BIN)/python -m flows.demo $(if $(MOTIONS),--motions "$(MOTIONS)") $(if $(SEED),--seed "$(SEED)") $(if $(NAME),--name "$(NAME)") $(PORTS) $(WAITS)
 
 smoke: setup  ## the loop with tiny budgets, in runs/smoke
 	@$(BIN)/python -m flows.demo --profile smoke --name $(or $(NAME),smoke) $(if $(MOTIONS),--motions "$(MOTIONS)") $(PORTS) $(WAITS)

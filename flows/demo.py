@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from bumblebee.errors import EXIT_BAD_INPUT
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 from flows import login
 from flows import workspace as workspaces
@@ -20,6 +20,7 @@ from flows.stages import changed_stages, read_stages, to_run
 from tasks import params, sections
 
 EXIT_WAITING = 3
+NULL = "null"  # the seed of a robot without undeclared effects
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -34,7 +35,7 @@ def started(options: argparse.Namespace) -> int:
         try:
             require_port("--prefect-port", options.prefect_port)
             require_port("--mlflow-port", options.mlflow_port)
-            folder = options.workspace or choose(options.name, options.profile, options.motions)
+            folder = options.workspace or choose(options.name, options.profile, options.motions, options.seed)
             return run(folder, options.prefect_port, options.mlflow_port)
         except KeyboardInterrupt:
             print("stopped; the same command continues after the last finished stage", file=sys.stderr)
@@ -48,6 +49,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--name", default="", help="workspace under runs/; by default after the motions' folder")
     made.add_argument("--workspace", type=Path, help="an existing workspace anywhere, as it is")
     made.add_argument("--profile", default="", help="file of profiles/ whose values replace those of params.yaml")
+    made.add_argument("--seed", default="", help="seed of the robot that is sealed, or `null`: nothing undeclared")
     add_ports(made)
     return made
 
@@ -58,14 +60,31 @@ def add_ports(made: argparse.ArgumentParser) -> None:
     made.add_argument("--mlflow-port", type=int, default=0, help="port of MLflow's server (default: a free one)")
 
 
-def choose(name: str, profile: str, motions: Path | None) -> Path:
+def choose(name: str, profile: str, motions: Path | None, seed: str = "") -> Path:
     """The checkout itself, or the workspace that the options ask for, made or brought up to date."""
-    if not (name or profile or motions):
+    if not (name or profile or motions or seed):
         return workspaces.HOME
+    robot = robot_of(seed)
     if motions is not None and not name:
         name = motions.expanduser().resolve().name
-    name = re.sub(r"[^A-Za-z0-9._-]+", "-", name or profile)
-    return workspaces.create(workspaces.HOME / "runs" / name, profile or None, motions)
+    name = name or profile or f"seed-{seed}"
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", name)
+    return workspaces.create(workspaces.HOME / "runs" / name, profile or None, motions, **robot)
+
+
+def robot_of(seed: str) -> dict[str, dict[str, int]]:
+    """The section `seal` that a seed asks for; `null` is the robot as it is declared.
+
+    Raises:
+        BadInput: for anything but a whole number or `null`.
+    """
+    if not seed:
+        return {}
+    if seed == NULL:
+        return {"seal": {"n_effects": 0}}
+    if not re.fullmatch("[0-9]{1,9}", seed):
+        raise BadInput("--seed", f"a number from 0 to 999999999, or {NULL}", seed[:80])
+    return {"seal": {"seed": int(seed)}}
 
 
 def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:

@@ -15,8 +15,9 @@ from flows.stages import Stage
 KEPT = 5  # runs of a stage that are remembered
 
 TYPICAL = {
-    "motions": 11, "seal": 2, "filter": 6, "base": 32, "cluster": 20, "experts": 60, "rollouts": 15, "ingest": 7,
-    "gate": 3, "diagnose": 200, "delta": 14, "refine": 95, "distill": 12, "evaluate": 17, "publish": 10, "report": 8,
+    "motions": 11, "seal": 40, "filter": 6, "base": 32, "cluster": 20, "experts": 60, "rollouts": 15, "ingest": 7,
+    "gate": 3, "diagnose": 200, "compensate": 6, "delta": 14, "refine": 95,
+    "control": 110, "distill": 12, "evaluate": 17, "publish": 10, "report": 8,
 }  # fmt: skip
 """Seconds on two cores. Training from docs/reports (2026-11-21, embedded demo), `diagnose` from docs/diagnosis.md, the
 rest from one `make smoke`: what counts is their shares, the scale comes from the run itself."""

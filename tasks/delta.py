@@ -4,9 +4,11 @@ It is trained on the rollouts that the diagnosis fitted and judged on those that
 """
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import mujoco
+import pandas as pd
 import torch
 
 from bumblebee.learning.delta import DeltaAction, DeltaConfig, magnitudes, make_network, save_delta
@@ -16,7 +18,7 @@ from bumblebee.learning.delta_train import train_delta
 from bumblebee.learning.recordings import Recordings, stack
 from bumblebee.measured.rollout import read_dataset
 from bumblebee.progress import progress
-from bumblebee.sim.effects import read_effects, runtime_hooks
+from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.sim.engines import make_engine
 from bumblebee.sim.rotations import rotate_inverse
@@ -27,39 +29,42 @@ from tasks.stage import load, log_run, output_folder, run_stage
 _WORLDS_TO_JUDGE = 64
 
 
+@dataclass(frozen=True)
+class Simulator:
+    """What a delta action corrects."""
+
+    model: mujoco.MjModel
+    """With foot sensors."""
+    hooks: RuntimeHooks
+    """The effects that are no part of the model."""
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A delta action and what it is worth."""
+
+    delta: DeltaAction
+    curve: pd.DataFrame
+    gain: Gain
+    """On held-out rollouts, against no delta in the same simulator."""
+    rollouts: tuple[str, ...]
+    """Ids of those it was trained on."""
+    magnitude_rad: dict[str, float]
+    """Mean absolute correction of each joint."""
+
+
 def main(round: int, cluster: str) -> None:
     """Fill models/delta/r<round>/<cluster>."""
     config = load("delta", DeltaConfig)
-    found = Path(f"data/diagnosis/r{round}")
-    model = load_model(found / "model.xml")
-    hooks = runtime_hooks(read_effects(found / "effects.yaml"), model)
-    offset = torch.as_tensor(hooks.encoder_offset, dtype=torch.float32)
-    train, held_out = recordings(round, cluster)
-    engine = make_engine("mujoco", model, config.num_envs, config.threads, hooks)
-    steps = int(config.episode_seconds / engine.control_dt + 0.5)
-    if train is None or len(train.windows(steps, 1)) == 0:
+    trained = train(corrected(round), round, cluster, config)
+    if trained is None:
         leave_out(round, cluster, config, f"no rollout to train on that lasts {config.episode_seconds:g} s")
         return
-    env = DeltaEnv(engine, train, config, offset)
-    total = config.iterations * config.steps_per_iteration * config.num_envs
-    with progress(total, f"delta action, round {round}, {cluster}", "frames") as bar:
-        delta, curve = train_delta(env, config, bar.update)
-    judge = make_engine("mujoco", model, _WORLDS_TO_JUDGE, config.threads, hooks)
-    nothing = Gain(0, {}, False, "no held-out rollouts")
-    gain = judged(judge, held_out, offset, delta) if held_out is not None else nothing
-    card = {
-        "round": round,
-        "cluster": cluster,
-        "promoted": gain.promoted,
-        "held_out": asdict(gain),
-        "train_rollouts": list(train.ids),
-        "magnitude_rad": magnitudes(delta, recorded_state(train), train.targets),
-        "config": asdict(config),
-    }
     target = Path(f"models/delta/r{round}/{cluster}")
     with output_folder(target) as folder:
-        save_delta(folder, delta, config.hidden, card)
-        curve.to_csv(folder / "curve.csv", index=False)
+        save_delta(folder, trained.delta, config.hidden, card(trained, round, cluster, config))
+        trained.curve.to_csv(folder / "curve.csv", index=False)
+    gain = trained.gain
     print(verdict(round, cluster, gain))
     numbers = {f"held_out/{h}/{k}": v for h, values in gain.change.items() for k, v in values.items() if v == v}
     tags = {"promoted": str(gain.promoted).lower()}
@@ -67,6 +72,50 @@ def main(round: int, cluster: str) -> None:
         "delta", cluster=cluster, round=round, params=config, metrics=numbers, curve=target / "curve.csv",
         artifacts=[target], tags=tags,
     )  # fmt: skip
+
+
+def corrected(round: int) -> Simulator:
+    """The simulator as the round's diagnosis describes the robot."""
+    found = Path(f"data/diagnosis/r{round}")
+    model = load_model(found / "model.xml")
+    return Simulator(model, runtime_hooks(read_effects(found / "effects.yaml"), model))
+
+
+def declared(round: int) -> Simulator:
+    """The simulator as the rollouts' maker declares the robot: no effect is known."""
+    model = load_model(Path(f"data/measured/r{round}") / "model.xml")
+    return Simulator(model, runtime_hooks([], model))
+
+
+def train(simulator: Simulator, round: int, cluster: str, config: DeltaConfig) -> Trained | None:
+    """Train and judge the cluster's delta action; None where no rollout is long enough to train on."""
+    offset = torch.as_tensor(simulator.hooks.encoder_offset, dtype=torch.float32)
+    train, held_out = recordings(round, cluster)
+    engine = make_engine("mujoco", simulator.model, config.num_envs, config.threads, simulator.hooks)
+    steps = int(config.episode_seconds / engine.control_dt + 0.5)
+    if train is None or len(train.windows(steps, 1)) == 0:
+        return None
+    env = DeltaEnv(engine, train, config, offset)
+    total = config.iterations * config.steps_per_iteration * config.num_envs
+    with progress(total, f"delta action, round {round}, {cluster}", "frames") as bar:
+        delta, curve = train_delta(env, config, bar.update)
+    judge = make_engine("mujoco", simulator.model, _WORLDS_TO_JUDGE, config.threads, simulator.hooks)
+    nothing = Gain(0, {}, False, "no held-out rollouts")
+    gain = judged(judge, held_out, offset, delta) if held_out is not None else nothing
+    return Trained(delta, curve, gain, tuple(train.ids), magnitudes(delta, recorded_state(train), train.targets))
+
+
+def card(trained: Trained, round: int, cluster: str, config: DeltaConfig) -> dict[str, object]:
+    """What is told about a delta action."""
+    return {
+        "round": round,
+        "cluster": cluster,
+        "promoted": trained.gain.promoted,
+        "held_out": asdict(trained.gain),
+        "train_rollouts": list(trained.rollouts),
+        "magnitude_rad": trained.magnitude_rad,
+        "config": asdict(config),
+    }
 
 
 def leave_out(round: int, cluster: str, config: DeltaConfig, reason: str) -> None:

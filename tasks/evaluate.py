@@ -7,7 +7,7 @@ import json
 import re
 import tempfile
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import pandas as pd
 
 from bumblebee.deploy.episodes import FALL_RULE, Episode, run_episodes
-from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.deploy.policy import ExportedPolicy, read_policy_contract
 from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.sensors import NO_NOISE, SensorNoise
 from bumblebee.deploy.stand_in_robots import StandInRobots
@@ -35,6 +35,7 @@ from bumblebee.evaluation.episodes import rollout_metrics
 from bumblebee.evaluation.summary import COLUMNS, comparisons, results
 from bumblebee.evaluation.thinning import thin
 from bumblebee.evaluation.untrained import export_untrained
+from bumblebee.io.read import read_json
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
@@ -42,6 +43,7 @@ from bumblebee.progress import progress
 from bumblebee.ranges import Count, Few, Line, Name, Range, Ranged, Seed, Size
 from tasks.params import FILE, read
 from tasks.rollouts import FILTERED, SEALED, cut, start_stand_in
+from tasks.seal_trial import export_shipped
 from tasks.stage import load, log_run, output_folder, run_stage
 
 OUT = Path("data/evaluation")
@@ -85,15 +87,23 @@ class Candidate:
     """A policy that is evaluated."""
 
     policy: str
-    """Name in the tables: untrained, base, expert-<cluster>-r<N>, generalist."""
+    """Name in the tables: untrained, shipped, base, expert-<cluster>-r<N>, the same with -compensated,
+    control-<kind>-<cluster>-r<N>, generalist."""
     kind: str
-    """untrained, base, expert or generalist."""
+    """untrained, shipped, base, expert, compensated, control-declared, control-delta or generalist."""
     folder: Path
     """The exported policy."""
     round: int | None = None
     """An expert's round."""
     cluster: str | None = None
     """An expert's cluster: it is run on that cluster's motions only."""
+    compensation: Path | None = None
+    """What its runner undoes at the joints: compensation.json."""
+
+    @property
+    def for_robot_only(self) -> bool:
+        """Whether it says something about the robot alone: the declared model has nothing to make up for."""
+        return self.kind == "compensated" or self.kind.startswith("control")
 
 
 def main() -> None:
@@ -103,7 +113,7 @@ def main() -> None:
     contract = frozen(clips, config)
     print(f"evaluation contract {contract.sha256}: {len(clips)} motions, seeds {list(config.seeds)}", flush=True)
     with tempfile.TemporaryDirectory() as scratch:
-        found, missing = candidates(Path(scratch) if config.untrained else None)
+        found, missing = candidates(Path(scratch), config.untrained)
         for name in missing:
             print(f"not evaluated, not there: {name}", flush=True)
         planned = plan(found, clips, cluster_of, config.seeds)
@@ -169,25 +179,58 @@ def settings(engine: str) -> dict[str, Any]:
     return {**engine_settings(StandInRobots(1, []).model), **told}
 
 
-def candidates(scratch: Path | None) -> tuple[list[Candidate], list[str]]:
-    """The policies that are there, and the names of those that are not; `scratch` takes an untrained one."""
+def candidates(scratch: Path | None, untrained: bool = True) -> tuple[list[Candidate], list[str]]:
+    """The policies that are there, and the names of those that are not.
+
+    Args:
+        scratch: takes an export of the shipped policy, where base began from it, and an untrained one; None: neither.
+        untrained: whether an untrained one is wanted.
+    """
     params = read()
-    rounds = [0, *(int(entry["n"]) for entry in params.get("rounds", []))]
+    clusters, rounds = params.get("clusters", []), params.get("rounds", [])
     wanted = [Candidate("base", "base", Path("models/base"))]
-    wanted += [
-        Candidate(f"expert-{cluster}-r{number}", "expert", Path(f"models/experts/r{number}/{cluster}"), number, cluster)
-        for number in rounds
-        for cluster in params.get("clusters", [])
-    ]
+    wanted += [expert(cluster, number) for number in (0, *(int(r["n"]) for r in rounds)) for cluster in clusters]
     wanted.append(Candidate("generalist", "generalist", Path("models/generalist")))
     found = [c for c in wanted if (c.folder / "contract.json").exists()]
     missing = [c.policy for c in wanted if c not in found]
     if not found:
         raise BadInput("models", "at least one exported policy", "none", "Train first.")
-    if scratch is not None:
+    found += [c for r in rounds for cluster in clusters for c in beside(cluster, int(r["n"]), int(r["parent"]))]
+    if came_along(Path("models/base")) and scratch is not None:
+        found.insert(0, Candidate("shipped", "shipped", export_shipped(scratch / "shipped")))
+    if untrained and scratch is not None:
         export_untrained(found[0].folder, scratch / "untrained")
         found.insert(0, Candidate("untrained", "untrained", scratch / "untrained"))
     return found, missing
+
+
+def expert(cluster: str, number: int) -> Candidate:
+    """A cluster's expert of a round."""
+    return Candidate(
+        f"expert-{cluster}-r{number}", "expert", Path(f"models/experts/r{number}/{cluster}"), number, cluster
+    )
+
+
+def beside(cluster: str, number: int, parent: int) -> list[Candidate]:
+    """What a round's refinement is held against, as far as it is there.
+
+    The policy that it began from, compensated, and the same training without the diagnosis.
+    """
+    before, plan = expert(cluster, parent), Path(f"models/compensation/r{number}/compensation.json")
+    found = [
+        Candidate(f"control-{kind}-{cluster}-r{number}", f"control-{kind}", folder, number, cluster)
+        for kind in ("declared", "delta")
+        if (folder := Path(f"models/control/r{number}/{cluster}/{kind}/policy")).exists()
+    ]
+    if plan.exists() and (before.folder / "contract.json").exists():
+        found.insert(0, replace(before, policy=f"{before.policy}-compensated", kind="compensated", compensation=plan))
+    return found
+
+
+def came_along(base: Path) -> bool:
+    """Whether the base policy began from the one that comes with BumbleBee."""
+    card = base / "card.json"
+    return card.exists() and read_json(card).get("parent") == "pretrained"
 
 
 def plan(
@@ -213,23 +256,41 @@ def run(
     config: EvaluateConfig,
     scratch: Path,
 ) -> pd.DataFrame:
-    """All episodes on one engine, one row each."""
-    by_name = {clip.name: clip for clip in clips}
-    rollouts = (nominal if engine == "nominal" else stand_in)(found, planned, by_name, config, scratch)
+    """All episodes on one engine, one row each; what would be the same episode is run once."""
+    about = {c.policy: c for c in found if engine == "stand_in" or not c.for_robot_only}
+    own = [episode for episode in planned if episode.policy in about]
+    first = {same(c): c for c in reversed(about.values())}
+    twin = {c.policy: first[same(c)].policy for c in about.values()}
+    once = {(twin[e.policy], e.motion, e.seed): e for e in own}
+    by_name, runs = {clip.name: clip for clip in clips}, list(once.values())
+    rollouts = (nominal if engine == "nominal" else stand_in)(list(about.values()), runs, by_name, config, scratch)
     thresholds = {motion["name"]: motion["threshold_m"] for motion in contract.motions}
-    about = {c.policy: c for c in found}
+    results = {
+        key: asdict(rollout_metrics(rollout, by_name[key[1]], thresholds[key[1]]))
+        for key, rollout in zip(once, rollouts, strict=True)
+    }
     rows = []
-    for episode, rollout in zip(planned, rollouts, strict=True):
+    for episode in own:
         clip, policy = by_name[episode.motion], about[episode.policy]
-        values = asdict(rollout_metrics(rollout, clip, thresholds[clip.name]))
         rows.append(
             {
                 **{"policy": policy.policy, "kind": policy.kind, "round": policy.round, "motion": clip.name},
                 **{"cluster": cluster_of.get(clip.name, ""), "family": clip.family, "split": clip.split},
-                **{"engine": engine, "seed": episode.seed, **values},
+                **{"engine": engine, "seed": episode.seed},
+                **results[twin[episode.policy], episode.motion, episode.seed],
             }
         )
     return pd.DataFrame(rows)[list(COLUMNS)].astype({"round": "Int64"})
+
+
+def same(candidate: Candidate) -> tuple[str, str]:
+    """What decides an episode beside motion and seed: the policy's file, and what its runner undoes."""
+    return file_hash(candidate), str(candidate.compensation or "")
+
+
+def file_hash(candidate: Candidate) -> str:
+    """sha256 of the exported policy."""
+    return str(read_policy_contract(candidate.folder / "contract.json")["onnx_sha256"])
 
 
 def nominal(
@@ -250,18 +311,27 @@ def stand_in(
     """On the stand-in robot, a process of its own, through measured rollouts."""
     write_library(scratch / "clips", list(clips.values()))
     episodes = [{"rollout_id": e.rollout_id, "policy": e.policy, "motion": e.motion, "seed": e.seed} for e in planned]
-    noise = asdict(config.start_noise)
-    work = {"policies": {c.policy: str(c.folder.resolve()) for c in found}, "episodes": episodes, "start_noise": noise}
+    work = {
+        "policies": {c.policy: str(c.folder.resolve()) for c in found},
+        "compensations": {c.policy: str(c.compensation.resolve()) for c in found if c.compensation},
+        "episodes": episodes,
+        "start_noise": asdict(config.start_noise),
+    }
     start_stand_in(work, scratch / "clips", scratch / "rollouts", scratch, config.threads)
     return (read_rollout(scratch / "rollouts" / f"{e.rollout_id}.parquet") for e in planned)
 
 
 def chain(found: list[Candidate]) -> list[tuple[str, str]]:
-    """What is compared with what: each step of the loop, and the generalist with all before it."""
-    rounds = sorted({c.round for c in found if c.round is not None})
-    steps = ["untrained", "base", *(f"experts-r{number}" for number in rounds), "generalist"]
+    """What is compared with what: each step of the loop, the generalist with all before it, each round's controls."""
+    rounds = sorted({c.round for c in found if c.kind == "expert" and c.round is not None})
+    steps = ["untrained", "shipped", "base", *(f"experts-r{number}" for number in rounds), "generalist"]
     pairs = list(pairwise(steps))
-    extra = [("base", steps[-2]), ("base", "generalist")]
+    extra = [("base", steps[-2]), ("base", "generalist"), ("shipped", "generalist")]
+    for before, after in pairwise(rounds):
+        controls = [f"control-{kind}-r{after}" for kind in ("declared", "delta")]
+        extra.append((f"experts-r{before}", f"experts-r{before}-compensated"))
+        extra += [(f"experts-r{before}", control) for control in controls]
+        extra += [(control, f"experts-r{after}") for control in controls]
     return list(dict.fromkeys(pairs + [pair for pair in extra if pair[0] != pair[1]]))
 
 

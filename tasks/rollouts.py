@@ -159,13 +159,15 @@ def run_stand_in(
         start_stand_in(plan, Path(scratch) / "clips", folder / "rollouts", Path(scratch), config.threads)
 
 
-def start_stand_in(plan: dict[str, Any], clips: Path, out: Path, work: Path, threads: int) -> None:
+def start_stand_in(
+    plan: dict[str, Any], clips: Path, out: Path, work: Path, threads: int, sealed: Path = SEALED
+) -> None:
     """Run a plan on the stand-in robot, in another process, which alone reads the sealed effects."""
-    if not SEALED.exists():
-        raise BadInput(SEALED, "the sealed robot", "no such file", "Run the stage seal.")
+    if not sealed.exists():
+        raise BadInput(sealed, "the sealed robot", "no such file", "Run the stage seal.")
     file = work / "plan.json"
     file.write_text(json.dumps(plan))
-    command = [sys.executable, "-m", "bumblebee.deploy.stand_in", "--sealed", str(SEALED), "--clips", str(clips)]
+    command = [sys.executable, "-m", "bumblebee.deploy.stand_in", "--sealed", str(sealed), "--clips", str(clips)]
     command += ["--plan", str(file), "--out", str(out), "--threads", str(threads), "--with-parent"]
     # The same code as ours, also where it is not installed and the workspace is elsewhere.
     code = os.pathsep.join(filter(None, (str(Path(bumblebee.__file__).parents[1]), os.environ.get("PYTHONPATH"))))

@@ -1,0 +1,72 @@
+"""Stage control: what the same training brings without the diagnosis: -> models/control/r<round>/<cluster>/<kind>.
+
+The expert that `refine` trains on in the corrected model is trained on with the same settings, seed and number of steps
+in the declared model (`declared`), and in the declared model with a delta action that was trained on it (`delta`, as
+ASAP does, whether or not it beats none). What refinement gains beyond these is what the diagnosis was worth.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import torch
+
+from bumblebee.learning.delta import DeltaConfig, action_adapter, save_delta
+from bumblebee.learning.trial import World
+from bumblebee.ranges import Ranged, Size
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.sensors import load_model
+from bumblebee.tracking.observations import action_scale
+from tasks.delta import card, declared, train
+from tasks.refine import RefineConfig, parent_of
+from tasks.stage import load, output_folder, run_stage
+from tasks.training import Job, cluster_clips, train_policy
+
+Adapter = Callable[[RobotState, torch.Tensor, torch.Tensor], torch.Tensor]
+
+
+@dataclass(frozen=True)
+class ControlConfig(Ranged):
+    """Which controls are trained beside the refinement; the settings of their training are those of `refine`."""
+
+    kinds: Annotated[tuple[Literal["declared", "delta"], ...], Size(0)] = ("declared", "delta")
+    """`declared`: in the declared model; `delta`: there, with a delta action. None: no controls, and half the time."""
+
+
+def main(round: int, cluster: str, kind: str) -> None:
+    """Fill models/control/r<round>/<cluster>/<kind>."""
+    load("control", ControlConfig)
+    config = load("refine", RefineConfig)
+    out = Path(f"models/control/r{round}/{cluster}/{kind}")
+    adapter = delta_alone(round, cluster, out / "action") if kind == "delta" else None
+    clips, share, tried = cluster_clips(cluster, config.others)
+    job = Job(
+        stage="control",
+        name=f"control-{kind}-{cluster}-r{round}",
+        out=out / "policy",
+        clips=clips,
+        tried=tried,
+        world=World(load_model(physics_hz=config.env.physics_hz), None, adapter, config.env.threads),
+        share=share,
+        parent=Path(f"models/experts/r{parent_of(round)}") / cluster,
+        cluster=cluster,
+        round=round,
+    )
+    train_policy(job, config)
+
+
+def delta_alone(round: int, cluster: str, target: Path) -> Adapter | None:
+    """The delta action of the declared model, used whatever it is worth; None without rollouts to learn it from."""
+    config = load("delta", DeltaConfig)
+    trained = train(declared(round), round, cluster, config)
+    if trained is None:
+        print(f"round {round}, {cluster}: no rollout is long enough for a delta action: this control has none")
+        return None
+    with output_folder(target) as folder:
+        save_delta(folder, trained.delta, config.hidden, card(trained, round, cluster, config))
+    return action_adapter(trained.delta, action_scale())
+
+
+if __name__ == "__main__":
+    run_stage(main)
