@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import pandas as pd
@@ -49,7 +50,7 @@ def main() -> None:
     total = config.iterations * config.steps * config.env.num_worlds
     with progress(total, "distil the generalist", "frames") as bar:
         generalist, curve = distill(env, experts, cluster, config, base, bar.update)
-    card = {
+    card: dict[str, Any] = {
         "from": [f"expert-{name}-r{shape.final_round}" for name in shape.clusters],
         "agreement": agreement(generalist, clips, model, hooks, config),
         "config": asdict(config),

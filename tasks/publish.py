@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -153,7 +153,15 @@ def publish(candidate: Candidate, result: dict[str, Any], standard: Standard, re
     """One version of one model, with its alias if it earns it; its facts for published.json."""
     policy = ExportedPolicy.load(candidate.folder)
     champion = registry.champion_tags(candidate.model)
-    verdict = both(related, against_champion(result["success"], champion, *astuple(standard), policy.sha256))
+    best = against_champion(
+        result["success"],
+        champion,
+        standard.contract,
+        standard.engine,
+        standard.replace_incomparable,
+        policy.sha256,
+    )
+    verdict = both(related, best)
     metrics = {
         "success": result["success"]["value"],
         "mpjpe_rad": result["mpjpe_rad"]["value"],
@@ -171,8 +179,8 @@ def publish(candidate: Candidate, result: dict[str, Any], standard: Standard, re
         registry.set_alias(candidate.model, CHAMPION, version)
         registry.describe(candidate.model, card)
     facts = {"version": version, "policy": candidate.policy, "folder": str(candidate.folder)}
-    facts["unchanged"] = is_unchanged(candidate)  # the same file as its parent
-    return {**facts, "promoted": verdict.promoted, "reason": verdict.reason, **metrics, "onnx_sha256": policy.sha256}
+    decided = {"unchanged": is_unchanged(candidate), "promoted": verdict.promoted, "reason": verdict.reason}
+    return {**facts, **decided, **metrics, "onnx_sha256": policy.sha256}
 
 
 if __name__ == "__main__":
