@@ -130,11 +130,17 @@ def leave_out(round: int, cluster: str, config: DeltaConfig, reason: str) -> Non
 
 
 def recordings(round: int, cluster: str) -> tuple[Recordings | None, Recordings | None]:
-    """The cluster's rollouts of this round, as the diagnosis split them: to train on, to judge by; None without any."""
+    """The cluster's rollouts of this round, as the diagnosis split them: to train on, to judge by; None without any.
+
+    A rollout that names no cluster is nobody's: a delta corrects the simulator for one cluster's motions.
+    """
     folder = Path(f"data/measured/r{round}")
     declared = load_model(folder / "model.xml")
     train_ids, held_out_ids = split(round)
-    own = [r for r in read_dataset(folder).rollouts if r.meta.get("cluster", cluster) == cluster]
+    everyones = read_dataset(folder).rollouts
+    own = [r for r in everyones if r.meta.get("cluster") == cluster]
+    if nameless := sum(not r.meta.get("cluster") for r in everyones):
+        print(f"round {round}: {nameless} of {len(everyones)} rollouts name no cluster and train no delta action")
     train = [r for r in own if r.rollout_id in train_ids]
     held_out = [r for r in own if r.rollout_id in held_out_ids]
     return stack(train, declared) if train else None, stack(held_out, declared) if held_out else None

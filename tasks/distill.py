@@ -1,9 +1,10 @@
 """Stage distill: the experts of the final round become one generalist, in the simulator of the last round."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import pandas as pd
@@ -12,9 +13,9 @@ from torch import Tensor
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.delta import action_adapter, load_delta
-from bumblebee.learning.distill import DistillConfig, distill, equal_shares
+from bumblebee.learning.distill import DistillConfig, distill
 from bumblebee.learning.export import export_policy
-from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.policy import Policy, Shape, load_policy
 from bumblebee.learning.trial import World, success_by_family, try_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
@@ -23,31 +24,33 @@ from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.engines import make_engine
 from bumblebee.sim.sensors import load_model
+from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.observations import action_scale
+from bumblebee.tracking.sampler import ClipShares
 from tasks.sections import loop
 from tasks.stage import load, log_run, output_folder, run_stage
 
-OUT = Path("models/generalist")
+OUT, BASE = Path("models/generalist"), Path("models/base")
 
 
 def main() -> None:
     """Fill models/generalist."""
     config, shape = load("distill", DistillConfig), loop()
     clips, cluster = training_clips(shape.clusters)
-    base = load_policy(Path("models/base"))
-    experts = {
-        i: load_policy(Path(f"models/experts/r{shape.final_round}/{name}")) for i, name in enumerate(shape.clusters)
-    }
+    base = load_policy(BASE)
+    folders = [Path(f"models/experts/r{shape.final_round}/{name}") for name in shape.clusters]
+    experts = {i: load_policy(folder) for i, folder in enumerate(folders)}
+    check_task({BASE: base.shape} | {folder: experts[i].shape for i, folder in enumerate(folders)}, config.env)
     model, hooks = simulator(shape.final_round, config.env.physics_hz)
     env = environment(clips, cluster, shape.final_round, hooks, config)
     env.action_adapter = deltas(env, cluster, shape.clusters, shape.final_round)
     total = config.iterations * config.steps * config.env.num_worlds
     with progress(total, "distil the generalist", "frames") as bar:
         generalist, curve = distill(env, experts, cluster, config, base, bar.update)
-    card = {
+    card: dict[str, Any] = {
         "from": [f"expert-{name}-r{shape.final_round}" for name in shape.clusters],
         "agreement": agreement(generalist, clips, model, hooks, config),
         "config": asdict(config),
@@ -72,6 +75,28 @@ def training_clips(clusters: tuple[str, ...]) -> tuple[list[Clip], list[int]]:
     return clips, [clusters.index(labels[clip.name]) for clip in clips]
 
 
+def check_task(shapes: Mapping[Path, Shape], task: EnvConfig) -> None:
+    """Refuse a policy that sees or means something else by its action than the task that the generalist learns in.
+
+    Args:
+        shapes: folder of each policy that teaches or starts -> its shape.
+        task: `distill.env`.
+    """
+    seen = task.observation
+    wanted = {
+        "action": task.action,
+        "ahead": tuple(task.ahead),
+        "terms": tuple(seen.terms),
+        "history": seen.history,
+        "now": tuple(seen.now),
+    }
+    for folder, shape in shapes.items():
+        for field, here in wanted.items():
+            if (came := getattr(shape, field)) != here:
+                do = "Give distill.env the experts' settings."
+                raise BadInput(f"{folder}: {field}", f"{here!r} as in distill.env", repr(came), do)
+
+
 def simulator(final_round: int, physics_hz: float) -> tuple[mujoco.MjModel, RuntimeHooks | None]:
     """The model that the last round corrected; the declared one if there was no round."""
     if final_round == 0:
@@ -88,11 +113,12 @@ def corrected(final_round: int) -> Path | None:
 def environment(
     clips: list[Clip], cluster: list[int], final_round: int, hooks: RuntimeHooks | None, config: DistillConfig
 ) -> TrackingEnv:
-    """The tracking task over all clusters, each with the same share of the frames."""
-    library = MotionLibrary(clips, config.env.ahead)
-    model = task_model(config.env, corrected(final_round))
-    engine = make_engine("mujoco", model, config.env.num_worlds, config.env.threads, hooks)
-    return TrackingEnv(library, engine, config.env, config.seed, clip_share=equal_shares(library.length, cluster))
+    """The tracking task over all clusters on the engine asked for, each cluster with the same share of the draws."""
+    own = config.env
+    model = task_model(own, corrected(final_round))
+    engine = make_engine(own.engine, model, own.num_worlds, own.threads, hooks, own.buffers)
+    library = MotionLibrary(clips, own.ahead, device=engine.device)
+    return TrackingEnv(library, engine, own, config.seed, clip_share=ClipShares.equal(cluster))
 
 
 def deltas(
@@ -105,7 +131,7 @@ def deltas(
     adapters = {i: action_adapter(delta, action_scale()) for i, delta in kept.items() if delta is not None}
     if not adapters:
         return None
-    of_clip = torch.as_tensor(cluster)
+    of_clip = torch.as_tensor(cluster, device=env.device)
 
     def adapt(state: RobotState, middle: Tensor, action: Tensor) -> Tensor:
         now, changed = of_clip[env.clip], action.clone()

@@ -3,7 +3,7 @@
 import json
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +15,7 @@ from bumblebee.measured import gate, gate_words
 from bumblebee.measured.intake import IntakeSummary, file_hash, incoming_files, intake, merge
 from bumblebee.measured.model_file import copy_model, load_model
 from bumblebee.measured.overview import write_overview
-from bumblebee.measured.rollout import read_rollout
+from bumblebee.measured.rollout import copy_of_cluster, read_rollout
 from bumblebee.measured.summary import summary_table
 from bumblebee.measured.thresholds import Thresholds
 from bumblebee.progress import progress
@@ -48,11 +48,12 @@ class IngestConfig(Ranged):
 def main(round: int) -> None:
     """Sort the rollouts of one round."""
     config = load("ingest", IngestConfig)
-    folders = dataset_folders(Path(incoming_of(config.incoming, round)))
+    incoming = Path(incoming_of(config.incoming, round))
+    folders = dataset_folders(incoming)
     with output_folder(f"data/measured/r{round}") as out:
         write_model(folders, config.model, out / "model.xml")
         limits = Thresholds(gains_relative=config.gains_tolerance)
-        batch = sort_rollouts(folders, out, policy_contracts(folders, round), limits)
+        batch = sort_rollouts(folders, out, policy_contracts(folders, round), limits, incoming)
         table = write_results(batch, round, out)
         if not batch.accepted:
             kept = keep_rejected(out, round)
@@ -123,16 +124,37 @@ def read_contract(path: Path) -> dict[str, Any]:
 
 
 def sort_rollouts(
-    folders: list[Path], out: Path, contracts: dict[str, dict[str, Any]], limits: Thresholds | None = None
+    folders: list[Path],
+    out: Path,
+    contracts: dict[str, dict[str, Any]],
+    limits: Thresholds | None = None,
+    incoming: Path | None = None,
 ) -> IntakeSummary:
-    """Every folder through the intake, with progress."""
+    """Every folder through the intake, with progress; a folder in `incoming` is a cluster's and gives it to its files.
+
+    All clusters' rollouts then lie in one folder, and only their metadata tell whose they are.
+    """
     model = mujoco.MjModel.from_xml_path(str(out / "model.xml"))
     total = sum(len(incoming_files(folder)) for folder in folders)
     good, bad = out / "rollouts", out / "quarantine"
     with progress(total, "checking rollouts", "files") as bar:
-        return merge(
-            intake(folder, good, bad, model, contracts, lambda file: bar.update(1, file), limits) for folder in folders
-        )
+
+        def taken(folder: Path) -> IntakeSummary:
+            batch = intake(folder, good, bad, model, contracts, lambda file: bar.update(1, file), limits)
+            return batch if incoming in (None, folder) else name_cluster(batch, good, folder.name)
+
+        return merge(map(taken, folders))
+
+
+def name_cluster(batch: IntakeSummary, accepted: Path, cluster: str) -> IntakeSummary:
+    """The batch of a cluster's folder; accepted copies that name no cluster now name it."""
+    for item in batch.items:
+        file = accepted / item.file
+        if item.accepted and not item.cluster:
+            file.rename(unnamed := accepted.parent / item.file)
+            copy_of_cluster(unnamed, file, cluster)
+            unnamed.unlink()
+    return replace(batch, items=tuple(replace(item, cluster=item.cluster or cluster) for item in batch.items))
 
 
 def write_results(batch: IntakeSummary, round: int, out: Path) -> dict[str, Any]:

@@ -1,8 +1,9 @@
 """Stage publish: every policy becomes a version in the registry; the alias champion moves where promotion holds."""
 
+import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,7 +16,7 @@ from bumblebee.ranges import Ranged
 from tasks import registry
 from tasks.lineage import path_hash
 from tasks.model_card import Evaluated, licences_of, model_card
-from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both
+from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both, unchanged
 from tasks.rollouts import RolloutsConfig
 from tasks.sections import Loop, loop
 from tasks.stage import load, output_file, run_stage
@@ -48,6 +49,8 @@ class Candidate:
     """The exported policy."""
     parent: str | None
     """Name in the evaluation of the policy it was trained from, where both do the same task."""
+    parent_folder: Path | None = None
+    """That policy's folder."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +78,8 @@ def main() -> None:
         if result is None:
             print(f"{candidate.policy}: not published, it has no results in the evaluation (no motion of its cluster)")
             continue
-        related = compare(episodes, candidate.parent, candidate.policy, engine, "all") if candidate.parent else None
         standard = Standard(contract, engine, config.replace_incomparable)
-        facts = publish(candidate, result, standard, against_parent(related))
+        facts = publish(candidate, result, standard, related(candidate, episodes, engine))
         facts["versions"] = [*models.get(candidate.model, {}).get("versions", []), facts["version"]]
         models[candidate.model] = facts
     for name in models:
@@ -91,13 +93,38 @@ def main() -> None:
 
 def candidates(shape: Loop) -> Iterator[Candidate]:
     """Every policy in the order in which it was trained, so that a later round meets its parent's version."""
-    yield Candidate("base", "base", Path("models/base"), None)
+    base = Path("models/base")
+    yield Candidate("base", "base", base, None)
     for cluster in shape.clusters:
         for number in range(shape.final_round + 1):
             folder = Path(f"models/experts/r{number}/{cluster}")
             parent = f"expert-{cluster}-r{number - 1}" if number else "base"
-            yield Candidate(f"expert-{cluster}", f"expert-{cluster}-r{number}", folder, parent)
+            its_folder = Path(f"models/experts/r{number - 1}/{cluster}") if number else base
+            yield Candidate(f"expert-{cluster}", f"expert-{cluster}-r{number}", folder, parent, its_folder)
     yield Candidate("generalist", "generalist", Path("models/generalist"), None)
+
+
+def is_unchanged(candidate: Candidate) -> bool:
+    """Whether the policy is its parent, to the byte."""
+    files = [folder / "policy.onnx" for folder in (candidate.folder, candidate.parent_folder) if folder is not None]
+    if len(files) < 2 or not all(file.is_file() for file in files):
+        return False
+    return file_sha256(files[0]) == file_sha256(files[1])
+
+
+def file_sha256(file: Path) -> str:
+    """sha256 of a file."""
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def related(candidate: Candidate, episodes: pd.DataFrame, engine: str) -> Verdict:
+    """The policy against its parent; one that is its parent is not compared with itself."""
+    if candidate.parent is None:
+        return against_parent(None)
+    if is_unchanged(candidate):
+        return unchanged(candidate.parent)
+    return against_parent(compare(episodes, candidate.parent, candidate.policy, engine, "all"))
 
 
 def deciding_engine(asked: str) -> str:
@@ -126,7 +153,15 @@ def publish(candidate: Candidate, result: dict[str, Any], standard: Standard, re
     """One version of one model, with its alias if it earns it; its facts for published.json."""
     policy = ExportedPolicy.load(candidate.folder)
     champion = registry.champion_tags(candidate.model)
-    verdict = both(related, against_champion(result["success"], champion, *astuple(standard)))
+    best = against_champion(
+        result["success"],
+        champion,
+        standard.contract,
+        standard.engine,
+        standard.replace_incomparable,
+        policy.sha256,
+    )
+    verdict = both(related, best)
     metrics = {
         "success": result["success"]["value"],
         "mpjpe_rad": result["mpjpe_rad"]["value"],
@@ -144,7 +179,8 @@ def publish(candidate: Candidate, result: dict[str, Any], standard: Standard, re
         registry.set_alias(candidate.model, CHAMPION, version)
         registry.describe(candidate.model, card)
     facts = {"version": version, "policy": candidate.policy, "folder": str(candidate.folder)}
-    return {**facts, "promoted": verdict.promoted, "reason": verdict.reason, **metrics, "onnx_sha256": policy.sha256}
+    decided = {"unchanged": is_unchanged(candidate), "promoted": verdict.promoted, "reason": verdict.reason}
+    return {**facts, **decided, **metrics, "onnx_sha256": policy.sha256}
 
 
 if __name__ == "__main__":

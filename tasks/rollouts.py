@@ -1,7 +1,8 @@
 """Stage rollouts: one cluster's expert runs on the robot for one round and measured rollouts come back.
 
 The robot is the stand-in, a process of its own, or, where `rollouts.source` names a folder, the user's: its files
-`<source>/r<N>/<cluster>/[rollouts/]*.parquet` are copied, the originals stay as they are.
+`<source>/r<N>/<cluster>/[rollouts/]*.parquet` are copied, the originals stay as they are. The folder says the cluster:
+the copy of a file that names none names it, a file that names another is refused.
 """
 
 import json
@@ -25,6 +26,7 @@ from bumblebee.deploy.sensors import NO_NOISE
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.episodes import rollout_metrics
 from bumblebee.evaluation.metrics import success_threshold
+from bumblebee.measured.rollout import copy_of_cluster
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
 from bumblebee.ranges import Count, Few, Place, Range, Ranged, Seed
@@ -182,7 +184,7 @@ def start_stand_in(
 
 
 def copy_users(source: Path, folder: Path) -> None:
-    """Copy the user's rollouts and model; the originals are not touched."""
+    """Copy the user's rollouts and model, each rollout with the cluster whose folder it is in; originals stay as is."""
     inner = source / "rollouts" if (source / "rollouts").is_dir() else source
     files = sorted(inner.glob("*.parquet")) if inner.is_dir() else []
     if not files:
@@ -191,7 +193,7 @@ def copy_users(source: Path, folder: Path) -> None:
         )
     (folder / "rollouts").mkdir()
     for file in files:
-        shutil.copy2(file, folder / "rollouts" / file.name)
+        copy_of_cluster(file, folder / "rollouts" / file.name, source.name)
     if (source / "model.xml").is_file():
         shutil.copy2(source / "model.xml", folder / "model.xml")
 

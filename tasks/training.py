@@ -27,6 +27,7 @@ from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
+from bumblebee.tracking.sampler import ClipShares
 from tasks.stage import log_run, output_folder, scratch
 
 FILTERED, LABELS = Path("data/filtered"), Path("data/clusters/labels.parquet")
@@ -70,8 +71,8 @@ class Job:
     tried: Sequence[Clip]
     """Clips to be tried on, held-out ones too."""
     world: World
-    share: torch.Tensor | None = None
-    """Factor on how often each clip is drawn."""
+    share: ClipShares | None = None
+    """Shares of the draws of groups of clips."""
     parent: Path | None = None
     """Folder of the policy to start from."""
     cluster: str | None = None
@@ -92,7 +93,7 @@ def training_clips() -> list[Clip]:
     return clips
 
 
-def cluster_clips(cluster: str, others: float) -> tuple[list[Clip], torch.Tensor, list[Clip]]:
+def cluster_clips(cluster: str, others: float) -> tuple[list[Clip], ClipShares, list[Clip]]:
     """The clips to train a cluster's expert on.
 
     Args:
@@ -100,7 +101,8 @@ def cluster_clips(cluster: str, others: float) -> tuple[list[Clip], torch.Tensor
         others: share of the draws that goes to the clips of the other clusters.
 
     Returns:
-        the training clips, how often each is drawn (N,), and the clips to try the expert on: all of its cluster.
+        the training clips, the shares of the draws of its own and of the others', and the clips to try the expert on:
+        all of its cluster.
     """
     labels = pd.read_parquet(LABELS).set_index("name")["cluster"]
     clips = [clip for clip in training_clips() if clip.name in labels.index]
@@ -108,10 +110,8 @@ def cluster_clips(cluster: str, others: float) -> tuple[list[Clip], torch.Tensor
     if not any(clip.split == "train" for clip in own):
         raise BadInput(LABELS, f"motions to train on in cluster {cluster}", "none", "Check `clusters`.")
     used = [clip for clip in clips if clip.split == "train" and (others > 0 or labels[clip.name] == cluster)]
-    mine = torch.tensor([labels[clip.name] == cluster for clip in used])
-    length = torch.tensor([float(clip.frames) for clip in used])
-    share = torch.where(mine, (1 - others) / length[mine].sum(), others / length[~mine].sum().clamp(min=1.0))
-    return used, share, own
+    group = torch.tensor([int(labels[clip.name] != cluster) for clip in used])
+    return used, ClipShares(group, torch.tensor([1 - others, others])), own
 
 
 def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:

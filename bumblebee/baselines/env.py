@@ -11,6 +11,7 @@ from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import ReferenceFrame
 from bumblebee.tracking.rewards import Step
+from bumblebee.tracking.sampler import ClipShares
 from bumblebee.tracking.terminations import key_distance
 from bumblebee.tracking.terms import add_terms
 
@@ -26,7 +27,7 @@ class BaselineEnv(TrackingEnv):
         engine: the robots; its worlds are randomised here.
         baseline: the task and the reward.
         seed: of every draw in here.
-        clip_share: (N,) optional factor on how often each clip is drawn.
+        clip_share: shares of the draws of groups of clips, if they are to hold whatever fails.
     """
 
     def __init__(
@@ -35,7 +36,7 @@ class BaselineEnv(TrackingEnv):
         engine: Engine,
         baseline: Baseline,
         seed: int = 0,
-        clip_share: Tensor | None = None,
+        clip_share: ClipShares | None = None,
     ) -> None:
         super().__init__(library, engine, baseline.env, seed, clip_share=clip_share)
         self.baseline = baseline

@@ -10,6 +10,7 @@ from scipy import stats
 
 CONFIDENCE = 0.95
 RESAMPLES = 4000
+ROUNDING = 1e-12  # what arithmetic may add to a share: an effective number of trials is a quotient
 EXACT_LIMIT = 14  # motions up to which all sign flips are listed: 2^14
 
 
@@ -30,14 +31,18 @@ class Estimate:
 
 
 def wilson(successes: float, trials: float, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Wilson's score interval of a proportion; (0, 1) where nothing was tried. `trials` may be an effective number."""
+    """Wilson's score interval of a proportion; (0, 1) where nothing was tried. `trials` may be an effective number.
+
+    The formula's lower end of none and upper end of all are 0 and 1; they are given as such, without rounding errors.
+    """
     if trials <= 0:
         return 0.0, 1.0
     z = float(stats.norm.ppf(0.5 + confidence / 2))
-    share = successes / trials
+    share = min(max(successes / trials, 0.0), 1.0)
     centre = (share + z**2 / (2 * trials)) / (1 + z**2 / trials)
     half = z / (1 + z**2 / trials) * np.sqrt(share * (1 - share) / trials + z**2 / (4 * trials**2))
-    return float(max(centre - half, 0.0)), float(min(centre + half, 1.0))
+    low, high = float(max(centre - half, 0.0)), float(min(centre + half, 1.0))
+    return 0.0 if share <= ROUNDING else low, 1.0 if share >= 1.0 - ROUNDING else high
 
 
 def success_rate(success: np.ndarray, motions: np.ndarray) -> Estimate:

@@ -1,6 +1,7 @@
 """From episodes to a summary: rates and errors with intervals by group, and paired comparisons by motion."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -108,6 +109,43 @@ def comparisons(episodes: pd.DataFrame, pairs: list[tuple[str, str]]) -> list[di
     splits = [ALL, *sorted(episodes["split"].unique())]
     found = [compare(episodes, a, b, engine, split) for a, b in pairs for engine in engines for split in splits]
     return [entry for entry in found if entry is not None]
+
+
+def same_files(files: Mapping[str, str], first: str, second: str) -> bool:
+    """Whether two sides of a comparison are the same policy files, so that there is nothing to compare.
+
+    A side "experts-r<N>" is every expert of round N: it is the same as one policy where each of them is, and as another
+    round where each cluster's two experts are. A cluster of which only one side has an expert is not compared, so it
+    does not count; where no cluster is left, or a policy is not known, the answer is no.
+
+    Args:
+        files: policy ("base", "expert-<cluster>-r<N>", ...) -> sha256 of its ONNX file.
+        first: one side of the comparison.
+        second: the other one.
+    """
+    one, other = _by_cluster(files, first), _by_cluster(files, second)
+    if first in files:
+        one = dict.fromkeys(other, files[first])
+    if second in files:
+        other = dict.fromkeys(one, files[second])
+    shared = one.keys() & other.keys()
+    return bool(shared) and all(one[cluster] == other[cluster] for cluster in shared)
+
+
+def unchanged_pairs(files: Mapping[str, str], pairs: Sequence[tuple[str, str]]) -> set[tuple[str, str]]:
+    """Those of the pairs whose two sides are the same policy files, see `same_files`."""
+    return {pair for pair in pairs if same_files(files, *pair)}
+
+
+def _by_cluster(files: Mapping[str, str], side: str) -> dict[str, str]:
+    """Cluster -> file of the experts that "experts-r<N>" stands for; of a single policy, its file under no cluster."""
+    if side in files:
+        return {"": files[side]}
+    ladder = re.fullmatch(r"experts-r(\d+)", side)
+    if ladder is None:
+        return {}
+    found = ((re.fullmatch(rf"expert-(.+)-r{ladder[1]}", policy), file) for policy, file in files.items())
+    return {match[1]: file for match, file in found if match}
 
 
 def _paired(first: pd.DataFrame, second: pd.DataFrame, engine: str, split: str) -> pd.DataFrame:

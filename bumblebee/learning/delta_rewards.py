@@ -1,7 +1,8 @@
 """Rewards of the delta-action policy, one function a row of the paper's table "Reward design for delta action model".
 
 The table prints its regularisation rows with dots on quantities that have none; the reading here: the action rate is
-the difference of two successive delta actions, the action norm is the norm of the delta action itself.
+the difference of two successive delta actions, the action norm is the norm of the delta action itself. Its limit rows
+are indicators, 1(x not in [x_min, x_max]), of any joint, as in `tracking.rewards`.
 """
 
 from dataclasses import dataclass
@@ -18,11 +19,11 @@ class DeltaRewardConfig(Ranged):
     """Weights of the table's rows."""
 
     torque_limits: Weight = -10.0
-    """Row "Torque limits": share of motors at their limit."""
+    """Row "Torque limits": any motor at its limit."""
     dof_pos_limits: Weight = -10.0
-    """Row "DoF position limits": share of joints beyond their range."""
+    """Row "DoF position limits": any joint beyond its range."""
     dof_vel_limits: Weight = -10.0
-    """Row "DoF velocity limits": share of joints beyond their speed."""
+    """Row "DoF velocity limits": any joint beyond its speed."""
     termination: Weight = -200.0
     """Row "Termination"; multiplied by the control period like every row."""
     dof_acc: Weight = -3e-8
@@ -48,8 +49,8 @@ class DeltaRewardConfig(Ranged):
 
 
 def beyond(values: Tensor, low: Tensor, high: Tensor) -> Tensor:
-    """Rows "... limits": share of the J values (B, J) outside [low, high], (B,)."""
-    return ((values < low) | (values > high)).float().mean(dim=-1)
+    """Rows "... limits": 1(x not in [x_min, x_max]), whether any of the J values (B, J) is outside, (B,)."""
+    return ((values < low) | (values > high)).any(dim=-1).float()
 
 
 def squared_norm(values: Tensor) -> Tensor:

@@ -1,7 +1,8 @@
 """DAgger from all experts into one generalist (paper, section 3.4 and the table "Hyperparameters for DAgger").
 
 The generalist acts, the expert of each motion's cluster says what it would have done there, and the generalist learns
-from everything gathered so far by KL(general || expert). Clusters are drawn with equal shares (appendix D).
+from everything gathered so far by KL(general || expert). Clusters are drawn with equal shares, whatever fails (appendix
+D: "each category is equally represented"): the environment's `clip_share` is `ClipShares.equal`.
 
 A teacher and its student are the same with one expert and two observations: in an environment with a group "student",
 the experts answer what they see in "policy", and who learns sees "student".
@@ -103,13 +104,6 @@ class Aggregate:
         """Draw `count` samples, with replacement."""
         rows = torch.randint(self.size, (count,), generator=generator, device=generator.device)
         return self.observation[rows], self.mean[rows], self.std[rows]
-
-
-def equal_shares(lengths: Tensor, cluster: Sequence[int]) -> Tensor:
-    """(N,) factors on the clips' frames that give every cluster the same share of the draws (appendix D)."""
-    index = torch.as_tensor(cluster, device=lengths.device)
-    total = torch.zeros(int(index.max()) + 1, device=lengths.device).index_add(0, index, lengths.float())
-    return lengths.float().mean() / total[index]
 
 
 def distill(

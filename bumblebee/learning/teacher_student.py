@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pandas as pd
-import torch
 
 from bumblebee.learning.config import PAPER, PpoConfig
 from bumblebee.learning.distill import PAPER_DAGGER, DistillConfig, distill
@@ -21,10 +20,11 @@ from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.presets import PAPER_TASK, STUDENT, distillation_task
+from bumblebee.tracking.sampler import ClipShares
 
 
 def make_env(
-    clips: Sequence[Clip], task: EnvConfig, seed: int = 0, share: torch.Tensor | None = None, model: Path | None = None
+    clips: Sequence[Clip], task: EnvConfig, seed: int = 0, share: ClipShares | None = None, model: Path | None = None
 ) -> TrackingEnv:
     """The task on its own engine.
 
@@ -32,7 +32,7 @@ def make_env(
         clips: what is followed.
         task: see `EnvConfig`.
         seed: of every draw.
-        share: (N,) optional factor on how often each clip is drawn.
+        share: shares of the draws of groups of clips, if they are to hold whatever fails.
         model: MJCF of a corrected robot; the declared one if there is none.
     """
     engine = make_engine(task.engine, task_model(task, model), task.num_worlds, task.threads, buffers=task.buffers)

@@ -6,8 +6,9 @@ One row a control tick. Row k holds the state sampled at `time[k]` and the comma
 
 import contextlib
 import os
+import shutil
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -155,6 +156,30 @@ def read_rollout(path: Path, limits: Limits = LIMITS) -> Rollout:
         return Rollout(meta.rollout_id, meta.joints, meta.control_hz, meta=meta.rest, **columns)
     except BadRollout as bad:
         raise BadRollout(path, bad.column, bad.rule, bad.expected, bad.came, bad.do) from None
+
+
+def copy_of_cluster(source: Path, target: Path, cluster: str) -> None:
+    """Copy a rollout that lies in the folder of a cluster, so that the copy names it; the original is left as it is.
+
+    A file that names this cluster, or cannot be read, is copied to the byte: the intake says what is wrong with it. Of
+    one that names none, the copy holds the contract's columns.
+
+    Raises:
+        BadInput: if it names another cluster.
+    """
+    try:
+        rollout = read_rollout(source)
+    except BadRollout:
+        shutil.copy2(source, target)
+        return
+    named = rollout.meta.get("cluster") or ""
+    if not named:
+        write_rollout(target, replace(rollout, meta=rollout.meta | {"cluster": cluster}))
+    elif named == cluster:
+        shutil.copy2(source, target)
+    else:
+        where = f"{source}: metadata: cluster"
+        raise BadInput(where, f"{cluster!r}, its folder's, or none", repr(named)[:80], "Move or correct the file.")
 
 
 def rollout_files(folder: Path) -> list[Path]:

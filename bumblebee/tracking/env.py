@@ -24,7 +24,7 @@ from bumblebee.tracking.observations import action_middle, action_scale, middle_
 from bumblebee.tracking.randomisation import draw_push, push_phase, randomise_worlds, regular_push
 from bumblebee.tracking.rewards import Limits, Reward, Step
 from bumblebee.tracking.rows import Rows
-from bumblebee.tracking.sampler import ClipSampler
+from bumblebee.tracking.sampler import ClipSampler, ClipShares
 from bumblebee.tracking.starts import start_state
 from bumblebee.tracking.statistics import Statistics
 from bumblebee.tracking.stretches import StretchSampler
@@ -49,7 +49,7 @@ class TrackingEnv(VecEnv):
         config: the task.
         seed: of every draw in here.
         action_adapter: what happens to an action before it reaches the motors (a learned delta), if anything.
-        clip_share: (N,) optional factor on how often each clip is drawn.
+        clip_share: shares of the draws of groups of clips, if they are to hold whatever fails.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class TrackingEnv(VecEnv):
         config: EnvConfig,
         seed: int = 0,
         action_adapter: ActionAdapter | None = None,
-        clip_share: Tensor | None = None,
+        clip_share: ClipShares | None = None,
     ) -> None:
         self.library, self.engine, self.action_adapter = library, engine, action_adapter
         self.cfg, device = config, engine.device

@@ -8,6 +8,8 @@ lost in it.
 import torch
 from torch import Tensor
 
+from bumblebee.tracking.sampler import Chances, ClipShares
+
 
 class StretchSampler:
     """Draws a stretch by its frames times (floor + the mean failure rate of it and the next one of its clip).
@@ -18,7 +20,7 @@ class StretchSampler:
         floor: share of the weight that success cannot take away.
         memory: share of a stretch's failure rate that one more robot leaves.
         start_share: share of the draws that start at frame 0 of the stretch's clip.
-        share: (N,) optional factor on each clip's weight.
+        shares: of the draws, of groups of clips, within which the above holds; None: one group.
     """
 
     def __init__(
@@ -28,7 +30,7 @@ class StretchSampler:
         floor: float = 0.3,
         memory: float = 0.98,
         start_share: float = 0.2,
-        share: Tensor | None = None,
+        shares: ClipShares | None = None,
     ) -> None:
         self.stretch, self.floor, self.memory, self.start_share = stretch, floor, memory, start_share
         device = length.device
@@ -43,16 +45,14 @@ class StretchSampler:
         """(S,) frames of each stretch."""
         self._next = torch.arange(len(self.clip), device=device)
         self._next[:-1] += (self.clip[1:] == self.clip[:-1]).long()
-        own = torch.ones_like(length, dtype=torch.float32) if share is None else share.to(device)
-        self._share = own[self.clip]
-        self.failure = torch.ones_like(self._share)
+        self._chances = Chances(None if shares is None else shares.of(self.clip), device)
+        self.failure = torch.ones_like(self.clip, dtype=torch.float32)
         """(S,) failure rate of each stretch; 1 for what was never tried."""
 
     def probabilities(self) -> Tensor:
         """Chance of each stretch, (S,)."""
         hard = 0.5 * (self.failure + self.failure[self._next])
-        weight = self.frames * self._share * (self.floor + hard)
-        return weight / weight.sum()
+        return self._chances(self.frames * (self.floor + hard))
 
     def draw(self, n: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """Clips (n,) and frames (n,) to start from."""

@@ -27,6 +27,18 @@ def test_wilson_agrees_with_newcombe_1998(successes: int, trials: int, low: floa
     assert wilson(successes, trials) == pytest.approx((low, high), abs=5e-5)
 
 
+@pytest.mark.parametrize("trials", [1, 3, 10, 36, 263, 2.7182818, 9.5, 12.345678])
+@pytest.mark.parametrize("confidence", [0.8, 0.95, 0.99])
+def test_wilson_ends_at_one_for_all_and_at_nought_for_none_exactly(trials: float, confidence: float) -> None:
+    """0.1 * 3 of 0.3 is all as well: an effective number of successes carries rounding errors."""
+    low, high = wilson(trials, trials, confidence)
+    assert high == 1.0 and 0.0 < low < 1.0
+    low, high = wilson(0.0, trials, confidence)
+    assert low == 0.0 and 0.0 < high < 1.0
+    assert wilson(np.nextafter(trials, 0), trials, confidence)[1] == 1.0
+    assert wilson(np.nextafter(trials, 2 * trials), trials, confidence)[1] == 1.0
+
+
 def test_independent_episodes_keep_wilsons_interval() -> None:
     success = np.array([1, 0] * 20)
     estimate = success_rate(success, np.arange(40))

@@ -5,7 +5,7 @@ import json
 import pandas as pd
 import pytest
 
-from bumblebee.evaluation.summary import COLUMNS, compare, comparisons, results
+from bumblebee.evaluation.summary import COLUMNS, compare, comparisons, results, same_files, unchanged_pairs
 
 
 def rows(
@@ -78,6 +78,30 @@ def test_a_comparison_pairs_motions_and_says_how_sure_it_is() -> None:
 def test_policies_without_common_episodes_are_not_compared() -> None:
     assert compare(EPISODES, "expert-c0-r0", "expert-c1-r0", "nominal", "all") is None
     assert compare(EPISODES, "base", "generalist", "nominal", "all") is None
+
+
+FILES = {
+    "untrained": "u", "base": "b", "expert-c0-r0": "b", "expert-c1-r0": "b", "expert-c0-r1": "b", "expert-c1-r1": "new",
+    "expert-c0-r2": "b", "expert-c1-r2": "new", "generalist": "g",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "same"),
+    [("untrained", "base", False), ("base", "base", True), ("base", "experts-r0", True), ("experts-r0", "base", True),
+     ("experts-r0", "experts-r1", False), ("base", "experts-r1", False), ("experts-r1", "experts-r2", True),
+     ("experts-r1", "generalist", False), ("expert-c0-r0", "expert-c0-r1", True), ("experts-r7", "base", False),
+     ("experts-r7", "experts-r8", False), ("nobody", "base", False), ("nobody", "nobody", False)],
+)  # fmt: skip
+def test_a_ladder_is_unchanged_only_where_every_clusters_file_is(first: str, second: str, same: bool) -> None:
+    assert same_files(FILES, first, second) is same
+    assert unchanged_pairs(FILES, [(first, second)]) == ({(first, second)} if same else set())
+
+
+def test_clusters_of_one_round_alone_do_not_count_and_names_may_look_like_rounds() -> None:
+    files = {"expert-walk-r1-r0": "a", "expert-walk-r1-r1": "a", "expert-sit-r1": "z", "expert-walk-r0": "y"}
+    assert same_files(files, "experts-r0", "experts-r1")
+    assert not same_files(files | {"expert-sit-r0": "x"}, "experts-r0", "experts-r1")
 
 
 def test_the_summary_is_strict_json() -> None:

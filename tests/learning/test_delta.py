@@ -66,10 +66,17 @@ def test_rewards_by_hand() -> None:
     assert rewards.closeness(x, ref).item() == pytest.approx(np.exp(-4 * 0.25), rel=1e-6)
     assert rewards.norm(x).item() == pytest.approx(0.5)
     assert rewards.squared_norm(x).item() == pytest.approx(0.25)
-    assert rewards.beyond(x, torch.tensor([0.0, 0.0]), torch.tensor([0.35, 0.35])).item() == 0.5
     turn = torch.tensor([[np.cos(0.1), np.sin(0.1), 0.0, 0.0]], dtype=torch.float32)
     still = torch.tensor([[1.0, 0.0, 0.0, 0.0]])
     assert rewards.rotation_closeness(turn, still).item() == pytest.approx(np.exp(-4 * 0.2**2), rel=1e-4)
+
+
+@pytest.mark.parametrize(("beyond", "penalty"), [(0, 0.0), (1, 1.0), (5, 1.0), (23, 1.0)])
+def test_the_limit_rows_say_whether_any_joint_is_beyond_however_many(beyond: int, penalty: float) -> None:
+    """The table's 1(x not in [x_min, x_max]), as the tracking task has it; not a share of the 23 joints."""
+    values = torch.zeros(2, 23)
+    values[0, :beyond] = -1.5
+    assert rewards.beyond(values, -torch.ones(23), torch.ones(23)).tolist() == [penalty, 0.0]
 
 
 def test_windows_stay_inside_their_rollout(recordings: Recordings) -> None:

@@ -1,10 +1,9 @@
-"""Distillation: the KL against torch's, equal shares, the ring, and a student that comes to agree with its experts."""
+"""Distillation: the KL against torch's, the ring, and a student that comes to agree with its experts."""
 
-import pytest
 import torch
 from torch.distributions import Independent, Normal, kl_divergence
 
-from bumblebee.learning.distill import Aggregate, equal_shares, gaussian, gaussian_kl
+from bumblebee.learning.distill import Aggregate, gaussian, gaussian_kl
 from bumblebee.learning.policy import Shape, new_actor
 
 
@@ -21,13 +20,6 @@ def test_kl_is_zero_only_between_equals() -> None:
     assert gaussian_kl(mean, std, mean, std).abs().max() < 1e-6
     assert (gaussian_kl(mean, std, mean + 0.1, std) > 0.1).all()
     assert (gaussian_kl(mean, std, mean, 2 * std) > 0.1).all()
-
-
-def test_every_cluster_gets_the_same_share_of_frames() -> None:
-    lengths, cluster = torch.tensor([100, 300, 50, 50]), [0, 0, 1, 2]
-    weight = lengths * equal_shares(lengths, cluster)
-    shares = [float(weight[torch.tensor(cluster) == c].sum()) for c in range(3)]
-    assert shares == pytest.approx([shares[0]] * 3)
 
 
 def test_the_ring_keeps_the_newest() -> None:

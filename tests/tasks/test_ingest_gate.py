@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.rollout import write_rollout
+from bumblebee.measured.rollout import read_rollout, write_rollout
 from bumblebee.robot.facts import joints
 from bumblebee.robot.model import gains
 from tasks import gate as gate_task
@@ -247,6 +247,46 @@ def test_the_automatic_answer_stands_when_the_same_files_come_in_again(workspace
     ingest.main(1)
     gate_task.main(1)
     assert Path("data/approvals/round-1.json").read_bytes() == first
+
+
+def test_files_that_name_no_cluster_get_their_folders_in_our_copies_alone(workspace: Setup) -> None:
+    """All clusters' rollouts lie together after it; what a person made lies where it was, to the byte."""
+    workspace()
+    for cluster in ("c0", "c1"):
+        nameless(Path(f"data/rollouts/r1/{cluster}/rollouts"))
+    before = {path: path.read_bytes() for path in Path("data/rollouts").rglob("*.parquet")}
+    ingest.main(1)
+    copies = [read_rollout(path) for path in sorted(Path("data/measured/r1/rollouts").iterdir())]
+    assert [copy.meta["cluster"] for copy in copies] == ["c0", "c1"]
+    assert {path: path.read_bytes() for path in before} == before
+    originals = {read_rollout(path).rollout_id: read_rollout(path) for path in before}
+    for copy in copies:
+        original = originals[copy.rollout_id]
+        assert copy.columns == original.columns and copy.meta == original.meta | {"cluster": copy.meta["cluster"]}
+        assert all(np.array_equal(getattr(copy, c), getattr(original, c)) for c in ("time", *copy.columns))
+    summary = json.loads(Path("data/measured/r1/summary.json").read_text())
+    assert set(summary["by_cluster"]) == {"c0", "c1"} and {file["cluster"] for file in summary["files"]} == {"c0", "c1"}
+    assert not list(Path("data/measured/r1").glob("*.parquet"))
+
+
+def test_one_folder_of_everything_says_no_cluster(workspace: Setup) -> None:
+    """The folder of a round is nobody's: its files are taken as they are."""
+    workspace()
+    shutil.move("data/rollouts/r1/c0/rollouts", "data/rollouts/r1/rollouts")
+    shutil.rmtree("data/rollouts/r1/c0")
+    shutil.rmtree("data/rollouts/r1/c1")
+    nameless(Path("data/rollouts/r1/rollouts"))
+    ingest.main(1)
+    [copy] = Path("data/measured/r1/rollouts").iterdir()
+    assert copy.read_bytes() == Path("data/rollouts/r1/rollouts", copy.name).read_bytes()
+
+
+def nameless(folder: Path) -> None:
+    """Take the cluster out of the metadata of the rollouts in a folder."""
+    for path in folder.iterdir():
+        rollout = read_rollout(path)
+        path.unlink()
+        write_rollout(path, replace(rollout, meta={k: v for k, v in rollout.meta.items() if k != "cluster"}))
 
 
 def test_the_gate_does_not_pass_data_that_changed_after_the_answer(workspace: Setup) -> None:

@@ -73,6 +73,12 @@ def evaluated(contract: str, engines: tuple[str, ...] = ("nominal", "stand_in"))
     Path("data/evaluation/summary.json").write_text(json.dumps(summary))
 
 
+def trained_again(gain: float = 0.01) -> None:
+    """Other weights for every policy."""
+    for file in list(Path("models").rglob("policy.onnx")):
+        write_export(file.parent, linear_onnx(gain), AHEAD)
+
+
 def written() -> dict[str, Any]:
     return json.loads(Path("data/published.json").read_text())
 
@@ -104,6 +110,7 @@ def test_with_a_real_robot_the_declared_model_decides(registry: Registry) -> Non
 def test_after_a_change_of_the_evaluation_the_champion_stays_until_it_is_asked_to_go(registry: Registry) -> None:
     publish.main()
     first = dict(registry.champions)
+    trained_again()
     evaluated("another")
     publish.main()
     assert registry.champions == first and len(registry.versions) == 2 * len(first)
@@ -111,3 +118,31 @@ def test_after_a_change_of_the_evaluation_the_champion_stays_until_it_is_asked_t
     Path("params.yaml").write_text(PARAMS.replace("publish: {}", "publish: {replace_incomparable: true}"))
     publish.main()
     assert all(int(registry.champions[name]) > int(version) for name, version in first.items())
+
+
+def test_a_policy_that_is_its_parents_file_is_said_to_be_unchanged_and_not_compared(
+    registry: Registry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compared: list[tuple[str, str]] = []
+    monkeypatch.setattr(publish, "compare", lambda _, first, second, *__: compared.append((first, second)))
+    publish.main()
+    assert not compared
+    facts = written()["models"]["expert-c0"]
+    assert facts["unchanged"] and facts["reason"] == "unchanged: the same file as its parent base; the first version"
+    assert not written()["models"]["base"]["unchanged"] and not written()["models"]["generalist"]["unchanged"]
+    write_export(Path("models/experts/r0/c0"), linear_onnx(0.01), AHEAD)
+    publish.main()
+    assert compared == [("base", "expert-c0-r0")] and not written()["models"]["expert-c0"]["unchanged"]
+
+
+def test_the_alias_stays_on_a_champion_of_the_same_file_and_follows_it_into_another_evaluation(
+    registry: Registry,
+) -> None:
+    publish.main()
+    first = dict(registry.champions)
+    publish.main()
+    assert registry.champions == first
+    assert written()["models"]["base"]["reason"].endswith("the champion is the same file and stays")
+    evaluated("another")
+    publish.main()
+    assert all(registry.champion_tags(name)["evaluation_contract"] == "another" for name in first)

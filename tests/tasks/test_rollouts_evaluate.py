@@ -10,7 +10,7 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.export import write_export
-from bumblebee.measured.rollout import read_dataset
+from bumblebee.measured.rollout import Rollout, read_dataset, read_rollout, write_rollout
 from bumblebee.motion.store import write_library
 from bumblebee.tracking.library import AHEAD
 from tasks import evaluate, rollouts, seal
@@ -90,6 +90,41 @@ def test_the_users_own_files_take_the_stand_ins_place(workspace: Path) -> None:
     assert (copied / "model.xml").exists()
     with pytest.raises(BadInput, match="mine/r1/c1"):
         rollouts.main(round=1, cluster="c1")
+
+
+def test_the_users_files_are_of_the_cluster_in_whose_folder_they_lie(workspace: Path) -> None:
+    """A copy names it where the file names none; the file itself is left alone, and one that names it is no other."""
+    own = workspace / "mine/r1/c0/rollouts"
+    for number, meta in enumerate(({}, {"cluster": "c0"}, {"cluster": ""}, {"cluster": None})):
+        write_rollout(own / f"walk{number}.parquet", brief(f"walk{number}", {"operator": "Ann", **meta}))
+    before = {path.name: path.read_bytes() for path in own.iterdir()}
+    (workspace / "params.yaml").write_text(PARAMS.replace("motions: 1,", "motions: 1, source: mine,"))
+    rollouts.main(round=1, cluster="c0")
+    copies = workspace / "data/rollouts/r1/c0/rollouts"
+    for path in sorted(copies.iterdir()):
+        assert read_rollout(path).meta == {"operator": "Ann", "cluster": "c0"}
+    assert len(list(copies.iterdir())) == 4 and {path.name: path.read_bytes() for path in own.iterdir()} == before
+    assert (copies / "walk1.parquet").read_bytes() == before["walk1.parquet"]
+
+
+@pytest.mark.parametrize("named", ["c1", 0.5, ["c0"]])
+def test_a_users_file_that_names_another_cluster_than_its_folder_is_refused(workspace: Path, named: object) -> None:
+    """One line with file and both names; nothing of the round is left."""
+    own = workspace / "mine/r1/c0"
+    write_rollout(own / "a.parquet", brief("a", {}))
+    write_rollout(own / "b.parquet", brief("b", {"cluster": named}))
+    (workspace / "params.yaml").write_text(PARAMS.replace("motions: 1,", "motions: 1, source: mine,"))
+    with pytest.raises(BadInput) as refused:
+        rollouts.main(round=1, cluster="c0")
+    line = str(refused.value)
+    assert "b.parquet: metadata: cluster: expected 'c0'" in line and f"came {named!r}" in line and "\n" not in line
+    assert not list((workspace / "data/rollouts/r1").glob("*"))
+
+
+def brief(name: str, meta: dict[str, object]) -> Rollout:
+    """Three ticks of one joint."""
+    still = np.zeros((3, 1))
+    return Rollout(name, ("knee",), 50.0, np.arange(3) / 50, still, still, joint_target=still, meta=meta)
 
 
 def test_evaluation_covers_policies_engines_and_splits(workspace: Path) -> None:

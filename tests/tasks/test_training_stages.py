@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+import torch
 import yaml
 
 from bumblebee.errors import BadInput
 from bumblebee.learning import pretrained
 from bumblebee.learning.policy import load_policy
 from bumblebee.motion.store import write_library
+from bumblebee.tracking.sampler import ClipSampler
 from tasks import base, experts, training
 from tests.tracking.clips import waving
 
@@ -56,10 +58,12 @@ def test_base_then_expert(workspace: Path) -> None:
 
 
 def test_an_expert_gives_the_others_their_share(workspace: Path) -> None:
-    """A tenth of the draws, by length, goes to the other cluster; with 0 none of its clips is used."""
+    """A tenth of the draws goes to the other cluster, though it alone fails; with 0 none of its clips is used."""
     used, share, tried = training.cluster_clips("c0", others=0.1)
-    weight = {clip.name: float(s) * clip.frames for clip, s in zip(used, share, strict=True)}
-    assert weight["b"] / sum(weight.values()) == pytest.approx(0.1)
+    sampler = ClipSampler(torch.tensor([clip.frames for clip in used]), shares=share)
+    sampler.failure[:] = torch.tensor([float(clip.name == "b") for clip in used])
+    chance = dict(zip((clip.name for clip in used), sampler.probabilities().tolist(), strict=True))
+    assert chance["b"] == pytest.approx(0.1)
     assert {clip.name for clip in tried} == {"a", "c"}
     assert {clip.name for clip in training.cluster_clips("c0", others=0.0)[0]} == {"a", "c"}
 

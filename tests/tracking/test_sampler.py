@@ -8,7 +8,7 @@ import torch
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import from_rotation_vector
 from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.sampler import ClipSampler
+from bumblebee.tracking.sampler import ClipSampler, ClipShares
 from bumblebee.tracking.terminations import fallen, key_distance, success_threshold, threshold_at
 from tests.tracking.clips import waving
 
@@ -52,10 +52,51 @@ def test_draws_are_reproducible_within_the_clip_and_start_at_zero_as_often_as_as
     assert 0.18 < (frame == 0).float().mean() < 0.24
 
 
-def test_a_share_of_nought_silences_a_clip() -> None:
-    """The share multiplies the weight."""
-    sampler = ClipSampler(LENGTH, share=torch.tensor([1.0, 0.0, 1.0]))
-    assert sampler.probabilities()[1] == 0
+def test_a_share_of_nought_silences_a_group() -> None:
+    """The others have it."""
+    sampler = ClipSampler(LENGTH, shares=ClipShares(torch.tensor([0, 1, 0]), torch.tensor([1.0, 0.0])))
+    assert sampler.probabilities().tolist() == pytest.approx([0.25, 0.0, 0.75])
+
+
+FAILURES = [(0.0, 0.0, 0.6), (1.0, 0.0, 0.0), (0.3, 0.3, 0.3), (0.0, 1.0, 1.0)]
+
+
+@pytest.mark.parametrize("failures", FAILURES)
+def test_equal_shares_of_groups_hold_whatever_fails(failures: tuple[float, ...]) -> None:
+    """Three groups of one, two and one clips of all lengths: a third of the draws each."""
+    sampler = ClipSampler(torch.tensor([100, 50, 30, 300]), shares=ClipShares.equal([0, 1, 1, 2]))
+    sampler.failure[:] = torch.tensor([failures[0], failures[1], failures[1], failures[2]])
+    chance = sampler.probabilities()
+    assert [float(chance[0]), float(chance[1:3].sum()), float(chance[3])] == pytest.approx([1 / 3] * 3)
+
+
+@pytest.mark.parametrize("failures", FAILURES)
+def test_unequal_shares_of_groups_hold_whatever_fails(failures: tuple[float, ...]) -> None:
+    """A tenth is a tenth, though the others' clips fail and one's own do not."""
+    shares = ClipShares(torch.tensor([0, 1, 1]), torch.tensor([0.9, 0.1]))
+    sampler = ClipSampler(LENGTH, shares=shares)
+    sampler.failure[:] = torch.tensor(failures)
+    assert sampler.probabilities()[0].item() == pytest.approx(0.9)
+    drawn, _ = sampler.draw(20_000, torch.Generator().manual_seed(0))
+    assert float((drawn > 0).float().mean()) == pytest.approx(0.1, abs=0.01)
+
+
+def test_within_a_group_longer_and_failing_clips_are_drawn_more() -> None:
+    """As without groups: length times (floor + failure)."""
+    sampler = ClipSampler(LENGTH, floor=0.3, shares=ClipShares(torch.tensor([1, 0, 0]), torch.tensor([3.0, 1.0])))
+    sampler.failure[:] = torch.tensor([0.0, 0.7, 0.2])
+    short, long = 100 * 1.0, 300 * 0.5
+    assert sampler.probabilities().tolist() == pytest.approx(
+        [0.25, 0.75 * short / (short + long), 0.75 * long / (short + long)]
+    )
+
+
+def test_a_group_without_a_clip_leaves_its_share_to_the_others() -> None:
+    """A cluster all of whose clips are held out."""
+    chance = ClipSampler(LENGTH, shares=ClipShares.equal([0, 3, 0])).probabilities()
+    assert chance[1].item() == pytest.approx(0.5) and torch.isfinite(chance).all()
+    alone = ClipSampler(LENGTH, shares=ClipShares(torch.zeros(3, dtype=torch.long), torch.tensor([0.9, 0.1])))
+    assert torch.equal(alone.probabilities(), ClipSampler(LENGTH).probabilities())
 
 
 def test_the_curriculum_only_tightens() -> None:

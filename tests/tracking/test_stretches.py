@@ -2,6 +2,7 @@
 
 import torch
 
+from bumblebee.tracking.sampler import ClipShares
 from bumblebee.tracking.stretches import StretchSampler
 
 
@@ -39,9 +40,13 @@ def test_a_share_of_the_draws_begins_at_the_clips_first_frame():
     assert frame.eq(0).all() and set(clip.tolist()) == {0, 1}
 
 
-def test_a_factor_on_a_clip_moves_its_weight():
-    own = StretchSampler(torch.tensor([4, 4]), 4, share=torch.tensor([1.0, 3.0]))
-    assert torch.allclose(own.probabilities(), torch.tensor([0.25, 0.75]))
+def test_shares_of_groups_of_clips_hold_whatever_stretch_fails():
+    own = StretchSampler(
+        torch.tensor([10, 3, 4]), 4, shares=ClipShares(torch.tensor([0, 1, 0]), torch.tensor([1.0, 3.0]))
+    )
+    for failure in ([0.0, 0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0, 0.2]):
+        own.failure[:] = torch.tensor(failure)
+        assert torch.isclose(own.probabilities()[3], torch.tensor(0.75))
 
 
 def test_a_lost_world_raises_the_rate_of_its_stretch_alone():
