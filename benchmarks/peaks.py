@@ -16,7 +16,6 @@ from bumblebee.deploy.episodes import start_states
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import CONTROL_HZ
 from bumblebee.deploy.runner import PolicyRunner, reference_library
-from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.deploy.stand_in_robots import StandInRobots
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.learning import pretrained
@@ -53,12 +52,12 @@ def peaks(policy: ExportedPolicy, clips: list[Clip]) -> np.ndarray:
     for tick in range(int(lengths.max())):
         alive = np.flatnonzero(tick < lengths)
         sensors = robots.read()[alive]
-        target = runner.step(alive, tick, sensors)[1]
-        rate = (target - before[alive]) * CONTROL_HZ
+        command = runner.step(alive, tick, sensors)[1]
+        rate = (command.target - before[alive]) * CONTROL_HZ
         now = np.abs(np.stack((sensors.joint_torque, sensors.joint_vel, np.nan_to_num(rate))))
         most[:, alive] = np.maximum(most[:, alive], now)
-        before[alive] = target
-        robots.step(alive, ServoCommand(target))
+        before[alive] = command.target
+        robots.step(alive, command)
     return np.median(most, axis=1).T
 
 

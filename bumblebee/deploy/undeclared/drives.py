@@ -17,8 +17,8 @@ class Gains(Law):
 
     def gains(self, kp: np.ndarray, kd: np.ndarray) -> None:
         """Before the limit."""
-        kp[self.joint] *= self.kp
-        kd[self.joint] *= self.kd
+        kp[..., self.joint] *= self.kp
+        kd[..., self.joint] *= self.kd
 
 
 @dataclass
@@ -31,8 +31,8 @@ class Strength(Law):
 
     def gains(self, kp: np.ndarray, kd: np.ndarray) -> None:
         """Before the limit, as a weak motor constant does."""
-        kp[self.joint] *= self.factor
-        kd[self.joint] *= self.factor
+        kp[..., self.joint] *= self.factor
+        kd[..., self.joint] *= self.factor
 
     def feed_forward(self, world: World, torque: np.ndarray) -> np.ndarray:
         """The same."""

@@ -31,7 +31,7 @@ class World:
     error: np.ndarray | None = None
     """(R, J) command minus reading [rad]."""
     kp: np.ndarray | None = None
-    """(J,) the servos' gains now [N m/rad]."""
+    """(J,) or (R, J) the servos' gains now [N m/rad]."""
 
     def column(self, joint: str) -> int:
         """Index of a joint."""
@@ -91,7 +91,7 @@ class Law:
         """Change the compiled model."""
 
     def gains(self, kp: np.ndarray, kd: np.ndarray) -> None:
-        """Change the servo's gains (J,) in place."""
+        """Change the servos' gains, (J,) or (R, J), in place."""
 
     def start(self, world: World, target: np.ndarray) -> None:
         """Begin at rest under `target` (R, J), which has long been held."""

@@ -184,7 +184,7 @@ class DeadBand(Law):
         """Take the proportional part of the dead band out."""
         j = world.column(self.joint)
         torque = torque.copy()
-        torque[:, j] -= world.kp[j] * np.clip(world.error[:, j], -self.band, self.band)
+        torque[:, j] -= world.kp[..., j] * np.clip(world.error[:, j], -self.band, self.band)
         return torque
 
 

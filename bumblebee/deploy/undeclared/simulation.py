@@ -45,7 +45,7 @@ class Moving:
 
 @dataclass(frozen=True)
 class Gains:
-    """Of the servos, (J,) each: kp [N m/rad], kd [N m s/rad], and those that the drives reckon with."""
+    """Of the servos, (J,) or (n, J) each: kp [N m/rad], kd [N m s/rad], and those that the drives reckon with."""
 
     kp: np.ndarray
     kd: np.ndarray
