@@ -23,8 +23,8 @@ import numpy as np
 
 from benchmarks.undeclared.excite import StandPlan
 from benchmarks.undeclared.flight import fly, rollouts
-from benchmarks.undeclared.kinds import KINDS, Place
 from benchmarks.undeclared.robots import declared
+from bumblebee.deploy.undeclared.kinds import KINDS, Place
 from bumblebee.measured.rollout import write_rollout
 
 SECONDS = 8.0

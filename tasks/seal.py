@@ -4,28 +4,25 @@ Only the stand-in's process reads that file, and the report at the very end. Wit
 """
 
 import json
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
-from bumblebee.deploy.stand_in_effects import PARAMETERS, seal
-from bumblebee.ranges import Name, Range, Ranged, Seed
-from bumblebee.robot.facts import g1_bodies, joint_names, joints
-from bumblebee.robot.model import gains
+from bumblebee.deploy.stand_in_effects import SCHEMA, declared_g1, entry, seal
+from bumblebee.deploy.undeclared.faults import largest, peaks
+from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place, fits
+from bumblebee.ranges import Name, Range, Ranged, Seed, Share
+from bumblebee.robot.facts import g1_bodies, joint_names
 from tasks.stage import load, output_file, run_stage
 
 OUT = Path("data/sealed/robot.json")
-UNITS = {
-    "coulomb_friction": "N m",
-    "viscous_friction": "N m s/rad",
-    "armature": "kg m^2",
-    "motor_strength": "",
-    "command_delay": "s",
-    "encoder_offset": "rad",
-    "link_mass": "kg",
-}
+SMALLEST = 0.4  # share of a kind's largest size that every size has, before `severity`
+LIGHT = 0.25  # kg: bodies below are left out, an effect on them is none
+OF_G1 = tuple(name for name, kind in KINDS.items() if fits(kind, "g1"))
+BODIES = tuple(name for name, body in g1_bodies().items() if float(body["mass"]) >= LIGHT)
 
 
 @dataclass(frozen=True)
@@ -34,77 +31,106 @@ class SealConfig(Ranged):
 
     seed: Seed = 7
     """Of the draw."""
-    n_effects: Annotated[int, Range(least=0, most=1000)] = 2
-    """Number of effects, each of another kind on another joint or body; 0: the diagnosis' null test."""
-    kinds: tuple[Name, ...] = tuple(PARAMETERS)
-    """Kinds to draw from."""
-    joints: tuple[Name, ...] = tuple(
-        f"{side}_{name}_joint"
-        for side in ("left", "right")
-        for name in ("hip_pitch", "knee", "ankle_pitch", "shoulder_pitch", "elbow")
-    )
-    """Joints to draw from: those that most motions move."""
-    bodies: tuple[Name, ...] = ("torso_link", "pelvis", "left_knee_link", "right_knee_link")
-    """Bodies to draw from for `link_mass`."""
+    n_effects: Annotated[int, Range(least=0, most=1000)] = 3
+    """Number of effects, each of another kind at another place; 0: the diagnosis' null test."""
+    kinds: tuple[Name, ...] = OF_G1
+    """Kinds to draw from, those of the diagnosis' catalogue and those outside it."""
+    outside: Share = 0.34
+    """Chance that one of the effects, never more, is of a kind outside the catalogue."""
+    severity: Annotated[float, Range(above=0, most=100)] = 1.0
+    """Factor on the sizes, which are else 0.4 to 1.0 of the largest fault of their kind and never above it."""
+    joints: tuple[Name, ...] = joint_names()
+    """Joints to draw from."""
+    bodies: tuple[Name, ...] = BODIES
+    """Bodies to draw from, for what sits on a body."""
 
     def __post_init__(self) -> None:
-        """Refuse names that do not exist, and more effects than kinds or joints."""
+        """Refuse names that do not exist, and more effects than kinds or places."""
         super().__post_init__()
-        self.require_names("kinds", PARAMETERS)
+        self.require_names("kinds", OF_G1)
         self.require_names("joints", joint_names())
-        self.require_names("bodies", g1_bodies())
-        self.require(bool(self.bodies) or "link_mass" not in self.kinds, "bodies", "at least one for link_mass")
-        most = min(len(self.kinds), len(self.joints))
-        self.require(self.n_effects <= most, "n_effects", f"at most {most}, as many as there are kinds and joints")
+        self.require_names("bodies", BODIES)
+        for field, on in (("joints", "joint"), ("bodies", "body")):
+            needed = next((kind.name for kind in self.of(self.kinds) if kind.on == on), "")
+            self.require(bool(getattr(self, field)) or not needed, field, f"at least one for {needed}")
+        most = self.room(strange=True)
+        self.require(self.n_effects <= most, "n_effects", f"at most {most}, as many as there are kinds and places")
+
+    @staticmethod
+    def of(names: Iterable[str], outside: bool | None = None) -> list[Kind]:
+        """The kinds of these names: all, those outside the catalogue, or those in it."""
+        return [KINDS[name] for name in names if outside is None or KINDS[name].outside == outside]
+
+    def room(self, strange: bool) -> int:
+        """How many effects fit the kinds and places, with one from outside the catalogue (if there is) or without."""
+        kinds = self.of(self.kinds, outside=False) + (self.of(self.kinds, outside=True)[:1] if strange else [])
+        return sum(
+            min(sum(kind.on == on for kind in kinds), len(self.spots(on))) for on in ("joint", "body", "base", "whole")
+        )
+
+    def spots(self, on: str) -> Sequence[str]:
+        """Names of the places for what sits on a joint, on a body, on the base (its IMU) or on the whole robot."""
+        return {"joint": self.joints, "body": self.bodies, "base": ("pelvis",)}.get(on, ("",))
 
 
 def main() -> None:
     """Draw and seal."""
     config = load("seal", SealConfig)
-    effects = draw(config)
-    sealed: dict[str, Any] = {
-        "schema": 1,
+    sealed = sealed_robot(config, 0)
+    with output_file(OUT) as path:
+        path.write_text(json.dumps(sealed, indent=1) + "\n")
+    print(f"sealed {len(sealed['effects'])} effects, sha256 {sealed['sha256'][:12]}")
+
+
+def sealed_robot(config: SealConfig, attempt: int) -> dict[str, Any]:
+    """What stands in the file after so many draws that were drawn again."""
+    effects = draw(config, attempt)
+    return {
+        "schema": SCHEMA,
         "sealed": "Undeclared effects of the stand-in robot, for its process and the final report only.",
         "seed": config.seed,
+        "attempt": attempt,
         "effects": effects,
         "sha256": seal(effects),
     }
-    with output_file(OUT) as path:
-        path.write_text(json.dumps(sealed, indent=1) + "\n")
-    print(f"sealed {len(effects)} effects, sha256 {sealed['sha256'][:12]}")
 
 
-def draw(config: SealConfig) -> list[dict[str, Any]]:
-    """The effects as they stand in the file; the same configuration gives the same effects."""
-    rng = np.random.default_rng(config.seed)
-    kinds = rng.permutation(config.kinds)[: config.n_effects]
-    places = iter(rng.permutation(config.joints))
-    effects = []
-    for kind in map(str, kinds):
-        place = str(rng.choice(config.bodies)) if kind == "link_mass" else str(next(places))
-        value = size(kind, place, rng)
-        parameter = {PARAMETERS[kind]: value}
-        effects.append({"effect": kind, "where": [place], "parameters": parameter, "unit": UNITS[kind]})
-    return effects
+def draw(config: SealConfig, attempt: int = 0) -> list[dict[str, Any]]:
+    """The effects as they stand in the file; the same configuration and attempt give the same effects."""
+    rng = np.random.default_rng([config.seed, attempt])
+    inside, outside = (config.of(config.kinds, outside=which) for which in (False, True))
+    strange = rng.random() < config.outside or config.n_effects > config.room(strange=False)
+    order = [outside[int(rng.integers(len(outside)))]] if outside and strange else []
+    order += [inside[i] for i in rng.permutation(len(inside))]
+    effects: list[dict[str, Any]] = []
+    taken: set[tuple[str, str]] = set()
+    for kind in order:
+        free = [name for name in config.spots(kind.on) if (kind.on, name) not in taken]
+        if len(effects) == config.n_effects or not free:
+            continue
+        place = drawn_place(str(rng.choice(free)), rng)
+        taken.add((kind.on, place.name))
+        effects.append(entry(kind, place, size(kind, place, config.severity, rng)))
+    return [effects[i] for i in rng.permutation(len(effects))]
 
 
-def size(kind: str, place: str, rng: np.random.Generator) -> float:
-    """A noticeable size of an effect, absolute: what the joint or body then has, not what is added to it."""
-    share = float(rng.uniform())
-    if kind == "link_mass":
-        declared = float(g1_bodies()[place]["mass"])
-        return round(declared * (1.3 + 0.3 * share), 3)
-    joint = next(joint for joint in joints() if joint.name == place)
-    kp, kd = gains(joint)
-    sizes = {
-        "coulomb_friction": kp * (0.015 + 0.015 * share),  # holds the joint up to 0.015-0.03 rad off its target
-        "viscous_friction": kd * (0.4 + 0.4 * share),
-        "armature": joint.armature * (2.0 + share),
-        "motor_strength": 0.65 + 0.15 * share,
-        "command_delay": round(0.010 + 0.010 * share, 3),  # the stand-in delays by whole milliseconds
-        "encoder_offset": (0.03 + 0.03 * share) * float(rng.choice([-1, 1])),
+def drawn_place(name: str, rng: np.random.Generator) -> Place:
+    """A place with what a size leaves open, and what the declared robot does there."""
+    robot = declared_g1()
+    drawn = {
+        "sign": int(rng.choice([-1, 1])),
+        "axis": int(rng.integers(3)),
+        "number": int(rng.integers(4, 13)),
+        "other": str(rng.choice([joint for joint in robot.joints if joint != name])),
     }
-    return round(sizes[kind], 5)
+    return Place(robot, name, drawn, *peaks().get(name, (0.0, 0.0, 0.0)))
+
+
+def size(kind: Kind, place: Place, severity: float, rng: np.random.Generator) -> float:
+    """A size that matters, of four digits, in the kind's own measure."""
+    most = largest(kind, place)
+    wanted = float(f"{most * min(1.0, severity * rng.uniform(SMALLEST, 1.0)):.4g}")
+    return float(np.clip(wanted, kind.least(place), most))
 
 
 if __name__ == "__main__":

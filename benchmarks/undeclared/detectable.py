@@ -3,7 +3,7 @@
 Windows of 0.1 s of the true robot are compared with two robots, restarted from noisy readings and given the same
 commands: one without the effect and one with it, at its true size. What the effect remembers of commands and readings
 is known; what none of them shows (on which side play touches, how far a shaft is twisted, how a mount leans, what an
-encoder rounded off) is guessed from noisy readings (`truth.resume`). How far the two robots come apart is whitened,
+encoder rounded off) is guessed from noisy readings (`resume`). How far the two robots come apart is whitened,
 window by window, by the covariance of what noise in that window's start and readings makes of such a comparison, and
 what is guessed wrong, over all windows. What the declared model at 5 ms does otherwise than the same robot at 1 ms is
 taken out, joint by joint, with a free amplitude: an effect that looks like another integrator cannot be told from it.
@@ -33,7 +33,7 @@ import numpy as np
 
 from benchmarks.undeclared.flight import NOISE, Flight
 from benchmarks.undeclared.restarts import HORIZON, TICKS, Windows, windows_of
-from benchmarks.undeclared.robots import Declared
+from bumblebee.deploy.undeclared.declared import Declared
 
 CHI2 = 25.0
 _MOST, _COMPARED, _DRAWS = 160, 32, 3  # windows looked at, of these compared on a floating base, draws of their noise

@@ -10,10 +10,11 @@ import numpy as np
 from benchmarks.undeclared.detectable import CHI2, Eye, chi_square, make_eye, minimal_size
 from benchmarks.undeclared.excite import HZ, Plan, make_plan
 from benchmarks.undeclared.flight import Flight, fly, rollouts
-from benchmarks.undeclared.kinds import KINDS, Place, places
 from benchmarks.undeclared.lottery import Case, draw_signs
-from benchmarks.undeclared.robots import Declared, declared
-from benchmarks.undeclared.truth.law import Law
+from benchmarks.undeclared.robots import declared
+from bumblebee.deploy.undeclared.declared import Declared
+from bumblebee.deploy.undeclared.kinds import KINDS, Place, places
+from bumblebee.deploy.undeclared.law import Law
 from bumblebee.measured.rollout import Rollout
 
 SECONDS = {"arm": 5.0, "stand": 6.0, "track": 6.0}

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from benchmarks.undeclared.robots import Declared
+from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.robot.facts import stand_pose
 
 HZ = 50.0

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.undeclared.excite import HZ, Plan, fallen
-from benchmarks.undeclared.robots import Declared
-from benchmarks.undeclared.truth.law import Law
-from benchmarks.undeclared.truth.simulation import TrueRobots
+from bumblebee.deploy.undeclared.declared import Declared
+from bumblebee.deploy.undeclared.law import Law
+from bumblebee.deploy.undeclared.simulation import TrueRobots
 from bumblebee.measured.rollout import Rollout
 
 # Standard deviations of the sensors' white noise: rad, rad/s, rad, rad/s, m/s, m.

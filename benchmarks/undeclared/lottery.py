@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.undeclared.kinds import CATALOGUE, KINDS, OUTSIDE, fits
+from bumblebee.deploy.undeclared.kinds import CATALOGUE, KINDS, OUTSIDE, fits
 
 VERSION = 6  # of what a case's number means; a change of kinds, robots, motions or sizes raises it
 

@@ -15,10 +15,10 @@ from scipy.linalg import hadamard
 
 from benchmarks.undeclared.excite import HZ
 from benchmarks.undeclared.flight import NOISE, Flight
-from benchmarks.undeclared.robots import Declared
-from benchmarks.undeclared.truth.law import Law, Seen
-from benchmarks.undeclared.truth.resume import resumed
-from benchmarks.undeclared.truth.simulation import TrueRobots
+from benchmarks.undeclared.resume import resumed
+from bumblebee.deploy.undeclared.declared import Declared
+from bumblebee.deploy.undeclared.law import Law, Seen
+from bumblebee.deploy.undeclared.simulation import TrueRobots
 
 HORIZON, TICKS = 5, (2, 5)  # control periods
 _FIRST = 10  # ticks before the first window

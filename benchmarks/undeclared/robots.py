@@ -1,10 +1,8 @@
-"""What is declared of each robot: the model that the diagnosis gets, and the figures that the truth starts from."""
-
-from dataclasses import dataclass
+"""The robots of the benchmark: an arm of five joints, and the G1 on a floor."""
 
 import mujoco
-import numpy as np
 
+from bumblebee.deploy.undeclared.declared import Declared, describe
 from bumblebee.robot.model import build_spec
 
 ARM_XML = """<mujoco model="bench_arm">
@@ -33,53 +31,6 @@ ARM_XML = """<mujoco model="bench_arm">
 </actuator></mujoco>"""
 
 
-@dataclass(frozen=True, eq=False)
-class Declared:
-    """One robot as its maker describes it; J joints in the model's order."""
-
-    name: str
-    spec: mujoco.MjSpec
-    """5 ms, position servos."""
-    joints: tuple[str, ...]
-    bodies: tuple[str, ...]
-    """Bodies that move and have a mass."""
-    kp: np.ndarray
-    """(J,) [N m/rad]."""
-    kd: np.ndarray
-    """(J,) [N m s/rad]."""
-    limit: np.ndarray
-    """(J,) [N m]."""
-    armature: np.ndarray
-    """(J,) [kg m^2]."""
-    friction: np.ndarray
-    """(J,) declared dry friction [N m]."""
-    damping: np.ndarray
-    """(J,) [N m s/rad]."""
-    mass: dict[str, float]
-    """Body -> [kg]."""
-    floating: bool
-
-
 def declared(robot: str) -> Declared:
     """`arm` (five joints on a fixed base, no contact) or any other name: the G1 on a floor."""
-    spec = mujoco.MjSpec.from_string(ARM_XML) if robot == "arm" else build_spec()
-    model = spec.compile()
-    hinges = [j for j in range(model.njnt) if model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_HINGE)]
-    dofs = model.jnt_dofadr[hinges]
-    servo = {int(model.actuator_trnid[a, 0]): a for a in range(model.nu)}
-    rows = [servo[j] for j in hinges]
-    moving = [b for b in range(1, model.nbody) if model.body_weldid[b] and model.body_mass[b] > 0]
-    return Declared(
-        name=robot,
-        spec=spec,
-        joints=tuple(model.joint(j).name for j in hinges),
-        bodies=tuple(model.body(b).name for b in moving),
-        kp=model.actuator_gainprm[rows, 0].copy(),
-        kd=-model.actuator_biasprm[rows, 2],
-        limit=model.actuator_forcerange[rows, 1].copy(),
-        armature=model.dof_armature[dofs].copy(),
-        friction=model.dof_frictionloss[dofs].copy(),
-        damping=model.dof_damping[dofs].copy(),
-        mass={model.body(b).name: float(model.body_mass[b]) for b in moving},
-        floating=robot != "arm",
-    )
+    return describe(robot, mujoco.MjSpec.from_string(ARM_XML) if robot == "arm" else build_spec())

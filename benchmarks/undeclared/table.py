@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.undeclared.kinds import KINDS
 from benchmarks.undeclared.stats import bootstrap, wilson
+from bumblebee.deploy.undeclared.kinds import KINDS
 
 Row = dict[str, Any]
 RIVALS = ("fit_everything", "ridge", "pace", "delta")

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.undeclared.robots import Declared
 from bumblebee.deploy.episodes import start_states
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.runner import PolicyRunner, reference_library
 from bumblebee.deploy.sensors import Sensors
+from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library

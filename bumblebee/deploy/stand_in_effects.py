@@ -1,110 +1,123 @@
-"""The stand-in's own reading of sealed effects: arrays that its simulation multiplies, adds and delays with.
+"""The sealed file: reads it, and makes laws of its effects.
 
 Independent of `bumblebee.sim.effects` on purpose: what the diagnosis finds must not share code with what it looks for.
 """
 
 import hashlib
 import json
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 
+from bumblebee.deploy.undeclared.declared import Declared, describe
+from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place, fits, places
+from bumblebee.deploy.undeclared.law import Law
 from bumblebee.errors import BadInput
+from bumblebee.robot.model import build_spec
 
-PARAMETERS = {
-    "coulomb_friction": "frictionloss",
-    "viscous_friction": "damping",
-    "armature": "armature",
-    "motor_strength": "factor",
-    "command_delay": "delay",
-    "encoder_offset": "offset",
-    "link_mass": "mass",
-}
-STEP_MS = 1
+SCHEMA = 2
+UNITS = {
+    "coulomb_friction": "N m", "viscous_friction": "N m s/rad", "stribeck_friction": "N m, rad/s",
+    "asymmetric_friction": "N m", "armature": "kg m^2", "torque_limit": "N m", "torque_speed_limit": "rad/s",
+    "command_delay": "s", "torque_lag": "s", "encoder_delay": "s", "encoder_offset": "rad", "imu_offset": "rad",
+    "encoder_quantisation": "rad", "backlash": "rad", "series_elasticity": "N m/rad", "cogging": "N m",
+    "joint_spring": "N m/rad", "hysteresis": "N m, rad", "link_mass": "kg", "link_com": "m", "link_inertia": "kg m^2",
+    "ground_compliance": "s", "ground_slope": "rad", "thermal_fade": "1/s", "strength_drift": "1/s",
+    "external_wrench": "N, N m", "position_friction": "N m", "odd_cogging": "N m", "cross_coupling": "N m/rad",
+    "tendon": "N m/rad", "dwell_friction": "N m", "rate_limit": "rad/s", "quantised_command": "rad",
+    "drag": "N m s^2/rad^2", "dead_band": "rad", "ripple": "N m",
+}  # fmt: skip
+"""Kind -> unit of its parameters; a kind that is not here has a share or a factor."""
+_DRAWN = {"sign": int, "axis": int, "number": int, "other": str}
+_PEAKS = ("peak_torque", "peak_speed", "peak_rate")
 
-
-@dataclass(frozen=True)
-class SealedEffects:
-    """What is undeclared in this robot; J joints in the model's order.
-
-    `coulomb` (J,) [N m], `viscous` (J,) [N m s/rad], `strength` (J,) factor on the servo's torque, `delay_ms` (J,)
-    whole milliseconds of command delay, `offset` (J,) [rad] that encoders add, `armature` {dof: kg m^2}, `mass`
-    {body id: kg}.
-    """
-
-    coulomb: np.ndarray
-    viscous: np.ndarray
-    strength: np.ndarray
-    delay_ms: np.ndarray
-    offset: np.ndarray
-    armature: dict[int, float]
-    mass: dict[int, float]
+Json = dict[str, Any]
 
 
-def read_sealed(path: Path) -> list[dict[str, Any]]:
-    """The effects in a sealed file; one whose seal (sha256 of the effects) is broken is refused."""
+@cache
+def declared_g1() -> Declared:
+    """The G1 as its maker describes it."""
+    return describe("g1", build_spec())
+
+
+def read_sealed(path: Path) -> list[Json]:
+    """The effects in a sealed file; another schema, or a seal (sha256 of the effects) that is broken, is refused."""
     try:
         sealed = json.loads(Path(path).read_text())
-        effects, claimed = sealed["effects"], sealed["sha256"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        schema, effects, claimed = sealed.get("schema"), sealed["effects"], sealed["sha256"]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise BadInput(path, "a sealed robot with effects and sha256", f"{type(error).__name__}: {error}") from None
+    if schema != SCHEMA:
+        raise BadInput(f"{path}: field schema", str(SCHEMA), str(schema)[:12], "Seal it anew.")
     if seal(effects) != claimed:
         raise BadInput(
             f"{path}: field sha256", seal(effects)[:12], str(claimed)[:12], "The seal is broken: seal it anew."
         )
+    to_laws(effects, path)
     return effects
 
 
-def seal(effects: list[dict[str, Any]]) -> str:
+def seal(effects: list[Json]) -> str:
     """sha256 of the effects as canonical JSON."""
     return hashlib.sha256(json.dumps(effects, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
-def to_arrays(effects: list[dict[str, Any]], model: mujoco.MjModel, where: object = "effects") -> SealedEffects:
-    """Effects as arrays over the model's joints (all actuated hinges, in order)."""
-    joints = [model.joint(i).name for i in range(1, model.njnt)]
-    neutral = np.zeros(len(joints))
-    found = SealedEffects(neutral.copy(), neutral.copy(), neutral + 1, neutral.copy(), neutral.copy(), {}, {})
-    for index, effect in enumerate(effects):
-        place = f"{where}: effects[{index}]"
-        kind, names = effect.get("effect"), effect.get("where", [])
-        if kind not in PARAMETERS:
-            raise BadInput(place, f"one of {', '.join(PARAMETERS)}", str(kind))
-        value = effect.get("parameters", {}).get(PARAMETERS[kind])
-        if not isinstance(value, int | float) or not np.isfinite(value):
-            raise BadInput(f"{place}: {kind}.{PARAMETERS[kind]}", "a number", str(value))
-        if kind == "link_mass":
-            found.mass.update({_body(model, name, place): float(value) for name in names})
-        else:
-            _set_joints(found, kind, [_index(joints, name, place) for name in names or joints], float(value))
-    return found
-
-
-def _set_joints(found: SealedEffects, kind: str, joints: list[int], value: float) -> None:
-    if kind == "armature":
-        found.armature.update(dict.fromkeys((6 + joint for joint in joints), value))
-        return
-    rows = {
-        "coulomb_friction": found.coulomb,
-        "viscous_friction": found.viscous,
-        "motor_strength": found.strength,
-        "command_delay": found.delay_ms,
-        "encoder_offset": found.offset,
+def entry(kind: Kind, place: Place, size: float) -> Json:
+    """One effect as it stands in the file: what it is in the contract's words, and what its law is made of."""
+    _, parameters = kind.make(place, size)
+    return {
+        "effect": kind.name,
+        "where": [place.name] if place.name else [],
+        "parameters": {name: float(value) for name, value in parameters.items()},
+        "unit": UNITS.get(kind.name, ""),
+        "size": float(size),
+        "draw": {**place.draw, **{name: getattr(place, name) for name in _PEAKS}},
     }
-    rows[kind][joints] = round(value * 1000 / STEP_MS) if kind == "command_delay" else value
 
 
-def _index(names: list[str], name: str, place: str) -> int:
-    if name not in names:
-        raise BadInput(f"{place}: where", "a joint of the model", str(name))
-    return names.index(name)
+def to_laws(effects: Sequence[Json], where: object = "effects") -> list[Law]:
+    """The laws of a robot with these effects."""
+    if not isinstance(effects, list):
+        raise BadInput(f"{where}: effects", "a list", type(effects).__name__)
+    return [_law(effect, f"{where}: effects[{index}]") for index, effect in enumerate(effects)]
 
 
-def _body(model: mujoco.MjModel, name: str, place: str) -> int:
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-    if body < 0:
-        raise BadInput(f"{place}: where", "a body of the model", str(name))
-    return body
+def _law(effect: Json, where: str) -> Law:
+    name = effect.get("effect") if isinstance(effect, dict) else None
+    kind = KINDS.get(name) if isinstance(name, str) else None
+    if kind is None or not fits(kind, "g1"):
+        raise BadInput(where, "a kind of effect that a G1 can have", str(name)[:40])
+    place = _place(effect, kind, where)
+    size, least, most = effect.get("size"), max(kind.least(place), 0.0), kind.most(place)
+    if not _number(size) or not least <= size <= most * (1 + 1e-9):
+        raise BadInput(f"{where}: {name}: size", f"a number from {least:g} to {most:g}", str(size)[:40])
+    law, parameters = kind.make(place, float(size))
+    told = effect.get("parameters")
+    same = isinstance(told, dict) and told.keys() == parameters.keys() and all(map(_number, told.values()))
+    if not same or not all(np.isclose(told[key], parameters[key], rtol=1e-6, atol=1e-12) for key in parameters):
+        raise BadInput(f"{where}: {name}: parameters", f"those of its size, {parameters}", str(told), "Seal it anew.")
+    return law
+
+
+def _place(effect: Json, kind: Kind, where: str) -> Place:
+    """Where it sits, and what was drawn there."""
+    robot, names, drawn = declared_g1(), effect.get("where"), effect.get("draw")
+    allowed = places(kind, robot)
+    name = names[0] if isinstance(names, list) and len(names) == 1 else "" if names == [] else None
+    if name not in allowed:
+        words = f"one {kind.on} of the model" if any(allowed) else "nothing"
+        raise BadInput(f"{where}: {kind.name}: where", words, str(names)[:60])
+    fine = isinstance(drawn, dict) and all(isinstance(drawn.get(key), of) for key, of in _DRAWN.items())
+    fine = fine and all(_number(drawn.get(key)) and drawn[key] >= 0 for key in _PEAKS)
+    fine = fine and drawn["sign"] in (-1, 1) and 0 <= drawn["axis"] <= 2 and drawn["other"] in robot.joints
+    if not fine:
+        words = f"sign, axis, number, other and {', '.join(_PEAKS)}"
+        raise BadInput(f"{where}: {kind.name}: draw", words, str(drawn)[:60])
+    return Place(robot, name, {key: drawn[key] for key in _DRAWN}, *(float(drawn[key]) for key in _PEAKS))
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))

@@ -6,14 +6,15 @@ import pytest
 from benchmarks.undeclared.detectable import chi_square, make_eye
 from benchmarks.undeclared.excite import HZ, make_plan
 from benchmarks.undeclared.flight import fly
+from benchmarks.undeclared.resume import resumed
 from benchmarks.undeclared.robots import declared
-from benchmarks.undeclared.truth.bodies import Slope
-from benchmarks.undeclared.truth.drives import Drift, Fade, TorqueLag
-from benchmarks.undeclared.truth.law import Seen
-from benchmarks.undeclared.truth.resume import resumed
-from benchmarks.undeclared.truth.rubbing import Backlash, Coulomb, Elastic, Hysteresis
-from benchmarks.undeclared.truth.signals import CommandDelay, DroppedCommands, EncoderDelay, EncoderOffset
-from benchmarks.undeclared.truth.strange import DwellFriction, LooseMount, RateLimit
+from bumblebee.deploy.undeclared.bodies import Slope
+from bumblebee.deploy.undeclared.drives import Drift, Fade, TorqueLag
+from bumblebee.deploy.undeclared.friction import Coulomb, Hysteresis
+from bumblebee.deploy.undeclared.gears import Backlash, Elastic
+from bumblebee.deploy.undeclared.law import Seen
+from bumblebee.deploy.undeclared.outside import DwellFriction, LooseMount, RateLimit
+from bumblebee.deploy.undeclared.signals import CommandDelay, DroppedCommands, EncoderDelay, EncoderOffset
 
 ARM = declared("arm")
 PICKS = np.array([(0, 12), (2, 30), (1, 30), (2, 47)])

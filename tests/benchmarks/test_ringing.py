@@ -4,11 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from benchmarks.undeclared.kinds import KINDS, Place
-from benchmarks.undeclared.ringing import softest
 from benchmarks.undeclared.robots import declared
-from benchmarks.undeclared.truth.rubbing import Elastic
-from benchmarks.undeclared.truth.simulation import TrueRobots
+from bumblebee.deploy.undeclared.gears import Elastic
+from bumblebee.deploy.undeclared.kinds import KINDS, Place
+from bumblebee.deploy.undeclared.ringing import softest
+from bumblebee.deploy.undeclared.simulation import TrueRobots
 
 ARM = declared("arm")
 POSE = np.array([[0.0, 0.5, 0.6, 0.0, 0.3]])

@@ -9,11 +9,11 @@ from benchmarks.undeclared.detectable import CHI2, _of_grid, chi_square, make_ey
 from benchmarks.undeclared.draw import draw
 from benchmarks.undeclared.excite import make_plan
 from benchmarks.undeclared.flight import fly
-from benchmarks.undeclared.kinds import CATALOGUE, OUTSIDE
 from benchmarks.undeclared.lottery import Case, Suite
 from benchmarks.undeclared.robots import declared
-from benchmarks.undeclared.truth.rubbing import Viscous
-from benchmarks.undeclared.truth.signals import DroppedCommands, ImuOffset
+from bumblebee.deploy.undeclared.friction import Viscous
+from bumblebee.deploy.undeclared.kinds import CATALOGUE, OUTSIDE
+from bumblebee.deploy.undeclared.signals import DroppedCommands, ImuOffset
 
 CONTRACT = {
     "viscous_friction",

@@ -7,18 +7,21 @@ import numpy as np
 import pytest
 
 import benchmarks.undeclared as package
+import bumblebee.deploy.undeclared as undeclared
 from benchmarks.undeclared.excite import make_plan
 from benchmarks.undeclared.flight import fly, rollouts
-from benchmarks.undeclared.kinds import KINDS, Place, fits, places
 from benchmarks.undeclared.robots import declared
-from benchmarks.undeclared.truth.bodies import Slope
-from benchmarks.undeclared.truth.law import World
-from benchmarks.undeclared.truth.rubbing import Armature, Backlash, Coulomb, Elastic, Hysteresis
-from benchmarks.undeclared.truth.signals import Line
-from benchmarks.undeclared.truth.simulation import TrueRobots
+from bumblebee.deploy.servo_command import ServoCommand
+from bumblebee.deploy.undeclared.bodies import Slope
+from bumblebee.deploy.undeclared.friction import Armature, Coulomb, Hysteresis
+from bumblebee.deploy.undeclared.gears import Backlash, Elastic
+from bumblebee.deploy.undeclared.kinds import KINDS, Place, fits, places
+from bumblebee.deploy.undeclared.law import World
+from bumblebee.deploy.undeclared.signals import Line
+from bumblebee.deploy.undeclared.simulation import TrueRobots
 
 ARM = declared("arm")
-APART = ("robots", "excite", "flight", "kinds", "restarts", "detectable", "lottery", "draw", "tracking")
+APART = ("robots", "excite", "flight", "resume", "restarts", "detectable", "lottery", "draw", "tracking")
 
 
 def _imports(path: Path) -> set[str]:
@@ -29,8 +32,9 @@ def _imports(path: Path) -> set[str]:
 
 def test_truth_and_lottery_import_nothing_of_the_diagnosis_or_of_the_simulators_effects():
     home = Path(package.__file__).parent
-    files = [*(home / "truth").glob("*.py"), *(home / f"{name}.py" for name in APART)]
-    assert len(files) > 10
+    body = Path(undeclared.__file__).parent
+    files = [*body.glob("*.py"), *(home / f"{name}.py" for name in APART)]
+    assert len(files) > 18
     for file in files:
         for name in _imports(file):
             assert not name.startswith(("bumblebee.diagnosis", "bumblebee.sim")), (file.name, name)
@@ -77,11 +81,11 @@ def test_dry_friction_holds_a_joint_that_is_pushed_less_than_its_level():
     robots.reset(np.zeros((1, 5)), np.zeros((1, 5)), target)
     target[0, 0] = 1.5 / ARM.kp[0]  # asks for 1.5 N m
     for _ in range(25):
-        robots.step(target)
+        robots.step(ServoCommand(target))
     assert abs(robots.state()[0][0, 0]) < 2e-4
     target[0, 0] = 4.0 / ARM.kp[0]
     for _ in range(25):
-        robots.step(target)
+        robots.step(ServoCommand(target))
     assert robots.state()[0][0, 0] > 0.01
 
 

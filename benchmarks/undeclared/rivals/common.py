@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.undeclared.robots import Declared
 from benchmarks.undeclared.sight import error_of as residual_error
+from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.sim.effects import Effect
 

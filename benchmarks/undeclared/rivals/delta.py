@@ -10,8 +10,8 @@ from mujoco.batch import Batch
 
 from benchmarks.undeclared.rivals.common import Answer
 from benchmarks.undeclared.rivals.ridge import cross_validated
-from benchmarks.undeclared.robots import Declared
 from benchmarks.undeclared.sight import error_of
+from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.diagnosis.signals import difference, simulated_readings
 

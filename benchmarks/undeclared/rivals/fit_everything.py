@@ -12,7 +12,7 @@ from benchmarks.undeclared.rivals.common import (
     named,
     residuals_of,
 )
-from benchmarks.undeclared.robots import Declared
+from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.diagnosis.problem import Problem
 
 _ROUNDS = 3

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from benchmarks.undeclared.kinds import KINDS
 from benchmarks.undeclared.rivals.common import Answer, error_of
-from benchmarks.undeclared.robots import Declared
+from bumblebee.deploy.undeclared.declared import Declared
+from bumblebee.deploy.undeclared.kinds import KINDS
 from bumblebee.sim.effects import CATALOGUE, Effect
 
 

@@ -7,7 +7,7 @@ Tutorial", table 1), on parameters in units of a step. The cost is the mean squa
 import numpy as np
 
 from benchmarks.undeclared.rivals.common import Answer, Parameter, error_of, joint_parameters, named, residuals_of
-from benchmarks.undeclared.robots import Declared
+from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.diagnosis.problem import Problem
 from bumblebee.sim.effects import Effect
 

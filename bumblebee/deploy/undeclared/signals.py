@@ -1,15 +1,16 @@
 """Laws of commands on their way to the drives, and of what encoders and IMU say."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
-from benchmarks.undeclared.truth.law import Law, Seen, World
+from bumblebee.deploy.servo_command import ServoCommand
+from bumblebee.deploy.undeclared.law import Law, Seen, World
 
 
 class Line:
-    """A delay line of (R,) values, one a millisecond; delays need not be whole milliseconds."""
+    """A delay line of (R, ...) values, one a millisecond; delays need not be whole milliseconds."""
 
     def __init__(self, delay: float, dt: float, first: np.ndarray) -> None:
         self._whole, self._share = int(delay / dt), delay / dt - int(delay / dt)
@@ -39,14 +40,16 @@ class CommandDelay(Law):
 
     def start(self, world: World, target: np.ndarray) -> None:
         """The first command has long been under way."""
-        self._line = Line(self.delay, world.dt, target[:, world.column(self.joint)])
+        first = target[:, world.column(self.joint)]
+        self._line = Line(self.delay, world.dt, np.stack((first, np.zeros_like(first)), axis=1))
 
-    def command(self, world: World, target: np.ndarray) -> np.ndarray:
-        """As it was."""
+    def command(self, world: World, command: ServoCommand) -> ServoCommand:
+        """As it was, target and feed-forward torque together."""
         j = world.column(self.joint)
-        target = target.copy()
-        target[:, j] = self._line.push(target[:, j])
-        return target
+        target = command.target.copy()
+        torque = np.zeros_like(target) if command.torque is None else command.torque.copy()
+        target[:, j], torque[:, j] = self._line.push(np.stack((target[:, j], torque[:, j]), axis=1)).T
+        return replace(command, target=target, torque=torque)
 
 
 @dataclass
@@ -62,13 +65,14 @@ class DroppedCommands(Law):
 
     def start(self, world: World, target: np.ndarray) -> None:
         """The first is there."""
-        self._last = target.copy()
+        self._last, self._torque = target.copy(), np.zeros_like(target)
 
-    def tick(self, world: World, target: np.ndarray) -> np.ndarray:
-        """Lost for a robot as a whole."""
-        lost = world.rng.random(world.count) < self.share
-        self._last = np.where(lost[:, None], self._last, target)
-        return self._last
+    def tick(self, world: World, command: ServoCommand) -> ServoCommand:
+        """Lost for a robot as a whole, with its feed-forward torque."""
+        lost = (world.chance() < self.share)[:, None]
+        self._last = np.where(lost, self._last, command.target)
+        self._torque = np.where(lost, self._torque, 0.0 if command.torque is None else command.torque)
+        return replace(command, target=self._last, torque=self._torque)
 
 
 @dataclass

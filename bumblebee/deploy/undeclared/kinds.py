@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.undeclared.ringing import softest
-from benchmarks.undeclared.robots import Declared
-from benchmarks.undeclared.truth import bodies, drives, rubbing, signals, strange
-from benchmarks.undeclared.truth.law import Law
+from bumblebee.deploy.undeclared import bodies, drives, friction, gears, outside, signals
+from bumblebee.deploy.undeclared.declared import Declared
+from bumblebee.deploy.undeclared.law import Law
+from bumblebee.deploy.undeclared.ringing import softest
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ def _fixed(value: float) -> Callable[[Place], float]:
 
 def _gain(kp: bool, kd: bool) -> Callable[[Place, float], Made]:
     def make(p: Place, s: float) -> Made:
-        factor = 1 + p.draw["sign"] * s if not (kp and kd) else 1 - s
+        factor = 1 + p.draw["sign"] * s
         return drives.Gains(p.j, factor if kp else 1.0, factor if kd else 1.0), {"factor": factor}
 
     return make
@@ -151,23 +151,24 @@ _L, _KP, _KD = (lambda x: _scaled("limit", x)), (lambda x: _scaled("kp", x)), (l
 
 CATALOGUE: tuple[Kind, ...] = (
     Kind("coulomb_friction", "joint",
-         lambda p, s: (rubbing.Coulomb(p.name, p.of(p.robot.friction) + s),
+         lambda p, s: (friction.Coulomb(p.name, p.of(p.robot.friction) + s),
                        {"frictionloss": p.of(p.robot.friction) + s}), _L(0.01), _L(0.2)),
     Kind("viscous_friction", "joint",
-         lambda p, s: (rubbing.Viscous(p.name, s), {"damping": p.of(p.robot.damping) + s}), _KD(0.03), _KD(1.0)),
+         lambda p, s: (friction.Viscous(p.name, s), {"damping": p.of(p.robot.damping) + s}), _KD(0.03), _KD(1.0)),
     Kind("stribeck_friction", "joint",
-         lambda p, s: (rubbing.Stribeck(p.name, s), {"stiction": 0.6 * s, "velocity": rubbing.STRIBECK_SPEED}),
+         lambda p, s: (friction.Stribeck(p.name, s), {"stiction": 0.6 * s, "velocity": friction.STRIBECK_SPEED}),
          _L(0.01), _L(0.2), parts=("coulomb_friction",)),
-    Kind("load_dependent_friction", "joint", _plain(lambda p, s: rubbing.LoadFriction(p.name, s), "coefficient"),
+    Kind("load_dependent_friction", "joint", _plain(lambda p, s: friction.LoadFriction(p.name, s), "coefficient"),
          _fixed(0.05), _fixed(0.6)),
     Kind("asymmetric_friction", "joint",
-         lambda p, s: (rubbing.AsymmetricFriction(p.name, s, 0.25 * s) if p.draw["sign"] > 0
-                       else rubbing.AsymmetricFriction(p.name, 0.25 * s, s),
+         lambda p, s: (friction.AsymmetricFriction(p.name, s, 0.25 * s) if p.draw["sign"] > 0
+                       else friction.AsymmetricFriction(p.name, 0.25 * s, s),
                        {"difference": 0.75 * s * p.draw["sign"]}), _L(0.01), _L(0.2), parts=("coulomb_friction",)),
     Kind("armature", "joint",
-         lambda p, s: (rubbing.Armature(p.name, p.of(p.robot.armature) * (1 + s)),
+         lambda p, s: (friction.Armature(p.name, p.of(p.robot.armature) * (1 + s)),
                        {"armature": p.of(p.robot.armature) * (1 + s)}), _fixed(0.2), _fixed(4.0)),
-    Kind("motor_strength", "joint", _gain(True, True), _fixed(0.03), _fixed(0.6)),
+    Kind("motor_strength", "joint", lambda p, s: (drives.Strength(p.j, 1 - s), {"factor": 1 - s}),
+         _fixed(0.03), _fixed(0.6)),
     Kind("kp", "joint", _gain(True, False), _fixed(0.03), _fixed(0.5)),
     Kind("kd", "joint", _gain(False, True), _fixed(0.05), _fixed(0.6)),
     Kind("torque_limit", "joint",
@@ -193,22 +194,22 @@ CATALOGUE: tuple[Kind, ...] = (
     Kind("encoder_quantisation", "joint", _plain(lambda p, s: signals.EncoderQuantisation(p.name, s), "step"),
          _fixed(0.003), _fixed(0.05), group="sensor"),
     Kind("backlash", "joint",
-         lambda p, s: (rubbing.Backlash(p.name, s, p.draw["sign"] > 0), {"gap": s, "encoder": _read(p)}),
+         lambda p, s: (gears.Backlash(p.name, s, p.draw["sign"] > 0), {"gap": s, "encoder": _read(p)}),
          _fixed(0.01), _fixed(0.12)),
     Kind("series_elasticity", "joint",
-         lambda p, s: (rubbing.Elastic(p.name, 1 / s, p.draw["sign"] > 0),
+         lambda p, s: (gears.Elastic(p.name, 1 / s, p.draw["sign"] > 0),
                        {"stiffness": 1 / s, "encoder": _read(p),
-                        "loss": rubbing.LOSS * np.sqrt(rubbing.ROTOR * p.of(p.robot.armature) * s),
-                        "share": 1 - rubbing.ROTOR}),
+                        "loss": gears.LOSS * np.sqrt(gears.ROTOR * p.of(p.robot.armature) * s),
+                        "share": 1 - gears.ROTOR}),
          lambda p: 0.1 / p.of(p.robot.kp), _softest,
          least=lambda p: 0.02 / p.of(p.robot.kp)),
-    Kind("cogging", "joint", lambda p, s: (rubbing.Cogging(p.name, s, p.draw["number"]),
+    Kind("cogging", "joint", lambda p, s: (friction.Cogging(p.name, s, p.draw["number"]),
                        {"sine": s, "cosine": 0.0, "periods": float(p.draw["number"])}),
          _L(0.01), _L(0.15)),
     Kind("joint_spring", "joint", 
-         lambda p, s: (rubbing.Spring(p.name, s), {"stiffness": s, "preload": 0.0}), _KP(0.03), _KP(0.6)),
+         lambda p, s: (friction.Spring(p.name, s), {"stiffness": s, "preload": 0.0}), _KP(0.03), _KP(0.6)),
     Kind("hysteresis", "joint", 
-         lambda p, s: (rubbing.Hysteresis(p.name, s), {"amplitude": s, "width": rubbing.REACH, "dahl": 1.0}),
+         lambda p, s: (friction.Hysteresis(p.name, s), {"amplitude": s, "width": friction.REACH, "dahl": 1.0}),
          _L(0.01), _L(0.15)),
     Kind("link_mass", "body", _mass, _fixed(0.1), _fixed(1.5), group="mass"),
     Kind("link_com", "body",
@@ -233,32 +234,32 @@ CATALOGUE: tuple[Kind, ...] = (
 )  # fmt: skip
 
 OUTSIDE: tuple[Kind, ...] = (
-    Kind("position_friction", "joint", lambda p, s: (strange.PositionFriction(p.name, s), {"level": s}),
+    Kind("position_friction", "joint", lambda p, s: (outside.PositionFriction(p.name, s), {"level": s}),
          _L(0.01), _L(0.15), depends=("position",)),
-    Kind("odd_cogging", "joint", lambda p, s: (strange.OddCogging(p.name, s), {"amplitude": s}),
+    Kind("odd_cogging", "joint", lambda p, s: (outside.OddCogging(p.name, s), {"amplitude": s}),
          _L(0.01), _L(0.12), depends=("position",)),
-    Kind("gain_cycle", "joint", lambda p, s: (strange.GainCycle(p.name, s), {"share": s}),
+    Kind("gain_cycle", "joint", lambda p, s: (outside.GainCycle(p.name, s), {"share": s}),
          _fixed(0.03), _fixed(0.5), depends=("time",)),
     Kind("cross_coupling", "joint",
-         lambda p, s: (strange.CrossCoupling(p.name, p.draw["other"], s), {"stiffness": s}),
+         lambda p, s: (outside.CrossCoupling(p.name, p.draw["other"], s), {"stiffness": s}),
          _KP(0.03), _KP(0.3), depends=("another joint", "other")),
-    Kind("tendon", "joint", lambda p, s: (strange.Tendon(p.name, s, 0.1), {"stiffness": s}),
+    Kind("tendon", "joint", lambda p, s: (outside.Tendon(p.name, s, 0.1), {"stiffness": s}),
          _KP(0.03), _KP(0.5), depends=("position",)),
-    Kind("dwell_friction", "joint", lambda p, s: (strange.DwellFriction(p.name, s), {"level": s}),
+    Kind("dwell_friction", "joint", lambda p, s: (outside.DwellFriction(p.name, s), {"level": s}),
          _L(0.01), _L(0.2), depends=("history", "velocity", "time")),
-    Kind("rate_limit", "joint", lambda p, s: (strange.RateLimit(p.name, p.peak_rate / (1 + s)),
+    Kind("rate_limit", "joint", lambda p, s: (outside.RateLimit(p.name, p.peak_rate / (1 + s)),
                                               {"rate": p.peak_rate / (1 + s)}),
          _fixed(0.2), _fixed(5.0), depends=("command", "history", "velocity", "target")),
-    Kind("quantised_command", "joint", lambda p, s: (strange.QuantisedCommand(p.name, s), {"step": s}),
+    Kind("quantised_command", "joint", lambda p, s: (outside.QuantisedCommand(p.name, s), {"step": s}),
          _fixed(0.01), _fixed(0.2), depends=("command", "target")),
-    Kind("loose_mount", "base", lambda p, s: (strange.LooseMount(1 / s), {"stiffness": 1 / s}),
+    Kind("loose_mount", "base", lambda p, s: (outside.LooseMount(1 / s), {"stiffness": 1 / s}),
          _fixed(1e-4), _fixed(1 / 300), least=_fixed(1e-5), robots="arm",
          depends=("another joint", "other", "history", "torque")),
-    Kind("drag", "joint", lambda p, s: (strange.Drag(p.name, s), {"drag": s}),
+    Kind("drag", "joint", lambda p, s: (outside.Drag(p.name, s), {"drag": s}),
          _KD(0.01), _KD(0.5), depends=("velocity",)),
-    Kind("dead_band", "joint", lambda p, s: (strange.DeadBand(p.name, p.of(p.robot.kp), s), {"band": s}),
+    Kind("dead_band", "joint", lambda p, s: (outside.DeadBand(p.name, s), {"band": s}),
          _fixed(0.005), _fixed(0.08), depends=("torque", "command", "target", "error")),
-    Kind("ripple", "joint", lambda p, s: (strange.Ripple(p.name, s), {"amplitude": s}),
+    Kind("ripple", "joint", lambda p, s: (outside.Ripple(p.name, s), {"amplitude": s}),
          _L(0.01), _L(0.15), depends=("time",)),
 )  # fmt: skip
 

@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 from scipy.linalg import expm
 
-from benchmarks.undeclared.robots import Declared
-from benchmarks.undeclared.truth.rubbing import LOSS, ROTOR
-from benchmarks.undeclared.truth.simulation import STEP
+from bumblebee.deploy.undeclared.declared import Declared
+from bumblebee.deploy.undeclared.gears import LOSS, ROTOR
+from bumblebee.deploy.undeclared.simulation import STEP
 
 _DIES = -1.0  # [1/s] growth of the slowest swing, at most
 _MARGIN = 1.25  # of the stiffness, for poses in which the link weighs less
@@ -23,7 +23,7 @@ def growth(rotor: float, link: float, stiffness: float, kp: float, kd: float) ->
     Args:
         rotor: inertia of the rotor [kg m^2].
         link: of the link, whose angle and speed the servo reads.
-        stiffness: of the spring between them [N m/rad], damped as `truth.rubbing.Elastic` is.
+        stiffness: of the spring between them [N m/rad], damped as `gears.Elastic` is.
         kp: servo's gain [N m/rad].
         kd: [N m s/rad].
     """

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from benchmarks.undeclared.truth.law import Law, World
+from bumblebee.deploy.undeclared.law import Law, World
 
 
 @dataclass

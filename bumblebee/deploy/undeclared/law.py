@@ -1,9 +1,12 @@
 """A law: one undeclared effect as the places where it acts on a simulated millisecond; neutral unless overridden."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+
+from bumblebee.deploy.servo_command import ServoCommand
 
 
 @dataclass
@@ -15,8 +18,8 @@ class World:
     """R."""
     dt: float
     """[s]."""
-    rng: np.random.Generator
-    """Of what is random in the truth itself, such as which commands are lost."""
+    rng: np.random.Generator | Sequence[np.random.Generator]
+    """Of what is random in the truth itself, such as which commands are lost; or one of each robot."""
     time: float | np.ndarray = 0.0
     """[s] since the start, or (R,) of each robot."""
     q: np.ndarray | None = None
@@ -27,10 +30,18 @@ class World:
     """(R, J) torque of the drives in the last millisecond [N m]."""
     error: np.ndarray | None = None
     """(R, J) command minus reading [rad]."""
+    kp: np.ndarray | None = None
+    """(J,) or (R, J) the servos' gains now [N m/rad]."""
 
     def column(self, joint: str) -> int:
         """Index of a joint."""
         return self.joints.index(joint)
+
+    def chance(self) -> np.ndarray:
+        """(R,) numbers drawn evenly from [0, 1)."""
+        if isinstance(self.rng, np.random.Generator):
+            return self.rng.random(self.count)
+        return np.array([rng.random() for rng in self.rng])
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +67,11 @@ class Seen:
 
 
 class Law:
-    """One undeclared effect."""
+    """One undeclared effect on R robots.
+
+    What it remembers of a robot is a row of an array (R, ...) or of a `signals.Line`, in an attribute whose name begins
+    with `_`: `memory` takes rows out and puts them back, so that a robot that does not move does not age.
+    """
 
     first = False
     """Whether it changes the model before the others do."""
@@ -66,6 +81,8 @@ class Law:
     """Share of the ticks, drawn at random, in which it strikes."""
     grid = 0.0
     """Step of the encoder's readings [rad]; 0 for none."""
+    believed = True
+    """Whether the drive knows of the gains that it makes of the declared ones."""
 
     def spec(self, spec: mujoco.MjSpec) -> None:
         """Change the structure before it is compiled."""
@@ -74,7 +91,7 @@ class Law:
         """Change the compiled model."""
 
     def gains(self, kp: np.ndarray, kd: np.ndarray) -> None:
-        """Change the servo's gains (J,) in place."""
+        """Change the servos' gains, (J,) or (R, J), in place."""
 
     def start(self, world: World, target: np.ndarray) -> None:
         """Begin at rest under `target` (R, J), which has long been held."""
@@ -82,13 +99,17 @@ class Law:
     def settle(self, model: mujoco.MjModel, seen: Seen, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Guess what no reading determines, here and in the states (W, nq), (W, nv) of `model`, in place."""
 
-    def tick(self, world: World, target: np.ndarray) -> np.ndarray:
-        """What becomes of a command (R, J) when it is issued, once a control period."""
-        return target
+    def tick(self, world: World, command: ServoCommand) -> ServoCommand:
+        """What becomes of a command of R robots when it is issued, once a control period."""
+        return command
 
-    def command(self, world: World, target: np.ndarray) -> np.ndarray:
+    def command(self, world: World, command: ServoCommand) -> ServoCommand:
         """What becomes of a command on its way to the servo, every millisecond."""
-        return target
+        return command
+
+    def feed_forward(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """What the drive makes of a feed-forward torque (R, J) [N m]; the servo's own is in `gains`."""
+        return torque
 
     def sense(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What the encoders say; called once a millisecond and may keep memory."""

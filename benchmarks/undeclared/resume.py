@@ -12,10 +12,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from benchmarks.undeclared.robots import Declared
-from benchmarks.undeclared.truth.law import Law, Seen
-from benchmarks.undeclared.truth.signals import Line
-from benchmarks.undeclared.truth.simulation import TrueRobots
+from bumblebee.deploy.undeclared.declared import Declared
+from bumblebee.deploy.undeclared.law import Law, Seen
+from bumblebee.deploy.undeclared.signals import Line
+from bumblebee.deploy.undeclared.simulation import TrueRobots
 
 
 def resumed(

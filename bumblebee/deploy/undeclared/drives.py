@@ -4,21 +4,41 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.undeclared.truth.law import Law, World
+from bumblebee.deploy.undeclared.law import Law, World
 
 
 @dataclass
 class Gains(Law):
-    """Servo gains times `kp` and `kd`; both together are the motor's strength."""
+    """Servo gains times `kp` and `kd`."""
 
     joint: int
     kp: float = 1.0
     kd: float = 1.0
 
     def gains(self, kp: np.ndarray, kd: np.ndarray) -> None:
+        """Before the limit."""
+        kp[..., self.joint] *= self.kp
+        kd[..., self.joint] *= self.kd
+
+
+@dataclass
+class Strength(Law):
+    """A motor that gives `factor` times what its drive asks for, unknown to the drive."""
+
+    joint: int
+    factor: float
+    believed = False
+
+    def gains(self, kp: np.ndarray, kd: np.ndarray) -> None:
         """Before the limit, as a weak motor constant does."""
-        kp[self.joint] *= self.kp
-        kd[self.joint] *= self.kd
+        kp[..., self.joint] *= self.factor
+        kd[..., self.joint] *= self.factor
+
+    def feed_forward(self, world: World, torque: np.ndarray) -> np.ndarray:
+        """The same."""
+        torque = torque.copy()
+        torque[:, self.joint] *= self.factor
+        return torque
 
 
 @dataclass
@@ -61,13 +81,12 @@ class TorqueLag(Law):
 
     def start(self, world: World, target: np.ndarray) -> None:
         """Begin with the first torque asked."""
-        self._now = None
+        self._now = np.full(world.count, np.nan)
 
     def drive(self, world: World, torque: np.ndarray) -> np.ndarray:
         """Exact first-order filter."""
         j = world.column(self.joint)
-        if self._now is None:
-            self._now = torque[:, j].copy()
+        self._now = np.where(np.isnan(self._now), torque[:, j], self._now)
         self._now = self._now + (torque[:, j] - self._now) * (1 - np.exp(-world.dt / self.constant))
         torque = torque.copy()
         torque[:, j] = self._now

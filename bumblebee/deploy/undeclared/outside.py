@@ -1,11 +1,12 @@
 """Laws outside the catalogue: what a robot may have and no list foresaw."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
-from benchmarks.undeclared.truth.law import Law, Seen, World
+from bumblebee.deploy.servo_command import ServoCommand
+from bumblebee.deploy.undeclared.law import Law, Seen, World
 
 PERIOD = 0.02  # [s] between commands
 
@@ -107,13 +108,13 @@ class RateLimit(Law):
         """At the first target."""
         self._now = target[:, world.column(self.joint)].copy()
 
-    def tick(self, world: World, target: np.ndarray) -> np.ndarray:
+    def tick(self, world: World, command: ServoCommand) -> ServoCommand:
         """Slew."""
         j, most = world.column(self.joint), self.rate * PERIOD
+        target = command.target.copy()
         self._now = self._now + np.clip(target[:, j] - self._now, -most, most)
-        target = target.copy()
         target[:, j] = self._now
-        return target
+        return replace(command, target=target)
 
 
 @dataclass
@@ -123,12 +124,12 @@ class QuantisedCommand(Law):
     joint: str
     step: float
 
-    def tick(self, world: World, target: np.ndarray) -> np.ndarray:
+    def tick(self, world: World, command: ServoCommand) -> ServoCommand:
         """Rounded."""
         j = world.column(self.joint)
-        target = target.copy()
+        target = command.target.copy()
         target[:, j] = np.round(target[:, j] / self.step) * self.step
-        return target
+        return replace(command, target=target)
 
 
 @dataclass
@@ -177,14 +178,13 @@ class DeadBand(Law):
     """The servo does nothing while the error is below `band` [rad]."""
 
     joint: str
-    kp: float
     band: float
 
     def drive(self, world: World, torque: np.ndarray) -> np.ndarray:
         """Take the proportional part of the dead band out."""
         j = world.column(self.joint)
         torque = torque.copy()
-        torque[:, j] -= self.kp * np.clip(world.error[:, j], -self.band, self.band)
+        torque[:, j] -= world.kp[..., j] * np.clip(world.error[:, j], -self.band, self.band)
         return torque
 
 
