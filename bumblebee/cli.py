@@ -1,4 +1,4 @@
-"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`.
+"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`, `compensate`.
 
 Status 0: done, 2: unusable input or output, 1: an error that should not happen; one line on standard error each.
 """
@@ -129,6 +129,27 @@ def import_(
     try_output(dataset)
     ids = import_dataset(source, kind, dataset, model, columns)
     print(f"{len(ids)} rollouts: {', '.join(ids[:6])}{' ...' if len(ids) > 6 else ''}")
+
+
+@app.command()
+def compensate(
+    effects: Annotated[Path, typer.Argument(metavar="EFFECTS.yaml", help="What the diagnosis found.")],
+    out: Annotated[Path, typer.Option("--out", help="File for the compensation, JSON.")],
+    model: Annotated[
+        Path | None, typer.Option("--model", help="MJCF that the policy was trained on; the declared G1 by default.")
+    ] = None,
+    leave_out: Annotated[bool, typer.Option("--leave-out", help="Go on without what cannot be undone.")] = False,
+    overwrite: Overwrite = False,
+) -> None:
+    """What a policy's runner can undo at the joints, without training."""
+    from bumblebee.deploy.compensation_file import claim_compensation, table_of, write_compensation
+    from bumblebee.deploy.compensation_plan import compensate_file
+
+    claim_compensation(out, overwrite, [path for path in (effects, model) if path])
+    compensation = compensate_file(effects, model, leave_out=leave_out)
+    print(table_of(compensation))
+    write_compensation(out, compensation)
+    print(f"written: {out}, sha256 {compensation.sha256[:12]}")
 
 
 def _teller() -> Callable[[str], None]:

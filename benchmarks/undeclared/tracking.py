@@ -57,4 +57,4 @@ class TrackPlan:
             joint_torque=np.zeros((len(qpos), joints)),
             foot_force=np.zeros((len(qpos), 2, 3)),
         )
-        return self._runner.step(self._everyone, tick, sensors)[1]
+        return self._runner.step(self._everyone, tick, sensors)[1].target

@@ -1,16 +1,18 @@
 """Runs policies on robots, one clip each, and records what the sensors said: the measured rollouts."""
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
+from bumblebee.deploy.compensation import Compensation
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import CONTROL_HZ, Robots
 from bumblebee.deploy.runner import PolicyRunner, reference_key, reference_library
 from bumblebee.deploy.sensors import SensorNoise, Sensors, add_noise, draws
+from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.measured.rollout import Rollout
 from bumblebee.motion import quaternions
@@ -51,6 +53,7 @@ def run_episodes(
     noise: SensorNoise,
     start: StartNoise | None = None,
     on_tick: Callable[[int], None] = lambda ended: None,
+    compensations: Mapping[str, Compensation] | None = None,
 ) -> list[Rollout]:
     """Run all episodes side by side and return their rollouts in order; a robot that falls stops there.
 
@@ -62,13 +65,15 @@ def run_episodes(
         noise: on what the policy and the log get.
         start: noise of the start state.
         on_tick: told after each control tick how many robot ticks were simulated in it.
+        compensations: by the episodes' keys of policies; one policy with and without has two keys.
     """
+    compensations = compensations or {}
     robots = make_robots(len(episodes))
     own = [clips[episode.motion] for episode in episodes]
     lengths = np.array([clip.frames for clip in own])
     rngs = [_generator(episode) for episode in episodes]
     qpos, qvel = start_states(own, rngs, start or StartNoise())
-    groups = _groups(episodes, policies, own)
+    groups = _groups(episodes, policies, own, compensations)
     held = np.zeros_like(qpos[:, 7:])
     for ids, runner in groups:
         held[ids] = runner.hold()
@@ -84,12 +89,13 @@ def run_episodes(
         if not len(alive):
             break
         sensors = add_noise(true[alive], noise, np.stack([normal[i][tick] for i in alive]))
-        action, target = _act(groups, alive, tick, sensors)
-        log.add(alive, sensors, action, target)
-        robots.step(alive, target)
+        action, command = _act(groups, alive, tick, sensors)
+        log.add(alive, sensors, action, command.target)
+        robots.step(alive, command)
         on_tick(len(alive))
     return [
-        log.rollout(i, episode, policies[episode.policy], clips[episode.motion]) for i, episode in enumerate(episodes)
+        log.rollout(i, e, policies[e.policy], clips[e.motion], compensations.get(e.policy))
+        for i, e in enumerate(episodes)
     ]
 
 
@@ -130,24 +136,30 @@ class _Log:
         for row, robot in enumerate(robots):
             self._rows[robot].append({name: values[row] for name, values in columns.items()})
 
-    def rollout(self, robot: int, episode: Episode, policy: ExportedPolicy, clip: Clip) -> Rollout:
+    def rollout(
+        self, robot: int, episode: Episode, policy: ExportedPolicy, clip: Clip, undone: Compensation | None
+    ) -> Rollout:
         rows = self._rows[robot]
         stacked = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
         servo = [gains(joint) for joint in robot_joints()]
         meta = {
             "robot": policy.contract.get("robot", "g1_23dof"),
-            "kp": [kp for kp, _ in servo],
-            "kd": [kd for _, kd in servo],
+            "kp": [kp for kp, _ in servo] if undone is None else undone.kp.tolist(),
+            "kd": [kd for _, kd in servo] if undone is None else undone.kd.tolist(),
             "motion": clip.name,
             "policy": {"name": episode.policy, "version": "", "sha256": policy.sha256},
             **episode.meta,
+            **({} if undone is None else {"compensation": undone.sha256}),
         }
         time = np.arange(len(rows)) / CONTROL_HZ
         return Rollout(episode.rollout_id, joint_names(), CONTROL_HZ, time, meta=meta, **stacked)
 
 
 def _groups(
-    episodes: Sequence[Episode], policies: dict[str, ExportedPolicy], clips: list[Clip]
+    episodes: Sequence[Episode],
+    policies: dict[str, ExportedPolicy],
+    clips: list[Clip],
+    compensations: Mapping[str, Compensation],
 ) -> list[tuple[np.ndarray, PolicyRunner]]:
     """Episodes by policy: their indices and a runner over them."""
     members: dict[str, list[int]] = {}
@@ -161,19 +173,27 @@ def _groups(
         wanted = reference_key(policy)
         if wanted not in shared:
             shared[wanted] = reference_library(policy, distinct)
-        groups.append((np.array(ids), PolicyRunner(policy, shared[wanted], [clips[i].name for i in ids])))
+        names = [clips[i].name for i in ids]
+        groups.append((np.array(ids), PolicyRunner(policy, shared[wanted], names, compensations.get(key))))
     return groups
 
 
-def _act(groups: list, alive: np.ndarray, tick: int, sensors: Sensors) -> tuple[np.ndarray, np.ndarray]:
-    """Actions and targets (n, J) of the living robots, each by its own policy."""
+def _act(groups: list, alive: np.ndarray, tick: int, sensors: Sensors) -> tuple[np.ndarray, ServoCommand]:
+    """Actions (n, J) of the living robots and the command to them, each by its own policy."""
     action, target = np.zeros_like(sensors.joint_pos), np.zeros_like(sensors.joint_pos)
+    torque, more = np.zeros_like(target), False
+    kp, kd = (np.tile(gain, (len(target), 1)) for gain in np.array([gains(joint) for joint in robot_joints()]).T)
     for ids, runner in groups:
         rows = np.flatnonzero(np.isin(alive, ids))
         if len(rows):
             inside = np.searchsorted(ids, alive[rows])
-            action[rows], target[rows] = runner.step(inside, tick, sensors[rows])
-    return action, target
+            action[rows], command = runner.step(inside, tick, sensors[rows])
+            target[rows] = command.target
+            if command.torque is not None:
+                torque[rows], more = command.torque, True
+            if command.kp is not None:
+                kp[rows], kd[rows], more = command.kp, command.kd, True
+    return action, ServoCommand(target, torque, kp, kd) if more else ServoCommand(target)
 
 
 def _fallen(true: Sensors, clips: list[Clip], robots: np.ndarray, tick: int) -> np.ndarray:

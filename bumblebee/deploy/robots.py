@@ -1,4 +1,4 @@
-"""Many robots in MuJoCo behind one small face: put them somewhere, read them, hold joint targets for one tick."""
+"""Many robots in MuJoCo behind one small face: put them somewhere, read them, hold a command for one tick."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -10,14 +10,17 @@ import numpy as np
 from mujoco.batch import Batch
 
 from bumblebee.deploy.sensors import Sensors
+from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.motion import quaternions
+from bumblebee.robot.facts import joints as robot_joints
+from bumblebee.robot.model import gains
 from bumblebee.sim.sensors import load_model
 
 CONTROL_HZ = 50.0
 
 
 class Robots(Protocol):
-    """B robots on a floor, moved by joint targets at 50 Hz."""
+    """B robots on a floor, moved by commands to their drives at 50 Hz."""
 
     model: mujoco.MjModel
 
@@ -27,8 +30,8 @@ class Robots(Protocol):
     def read(self) -> Sensors:
         """True readings of all B robots."""
 
-    def step(self, robots: np.ndarray, targets: np.ndarray) -> None:
-        """Hold targets (n, J) for one control period on `robots` (n,); the others stand still in time."""
+    def step(self, robots: np.ndarray, command: ServoCommand) -> None:
+        """Hold a command for one control period on `robots` (n,); the others stand still in time."""
 
 
 class NominalRobots:
@@ -37,13 +40,17 @@ class NominalRobots:
     Args:
         count: number of robots.
         threads: of the simulation.
+        model: another G1 with position servos instead of the declared one, such as a corrected model; what its gains
+            are in units of the declared ones, gains that a command brings are, too.
     """
 
-    def __init__(self, count: int, threads: int = 2) -> None:
-        self.model = load_model()
+    def __init__(self, count: int, threads: int = 2, model: mujoco.MjModel | None = None) -> None:
+        self.model = load_model() if model is None else model
         self.batch = Batch(self.model, count, threads)
         self._steps = round(1.0 / CONTROL_HZ / self.model.opt.timestep)
         self._view = BatchView(self.batch)
+        self._gains: tuple[np.ndarray, np.ndarray] | None = None  # (B, J, n) gain and bias, once a command changes them
+        self._declared = np.array([gains(joint) for joint in robot_joints()])
 
     def reset(self, qpos: np.ndarray, qvel: np.ndarray, targets: np.ndarray) -> None:
         """Put all robots at qpos (B, 7 + J), qvel (B, 6 + J) with their servos at targets (B, J)."""
@@ -55,10 +62,29 @@ class NominalRobots:
         """True readings of all robots; torque and foot force are those of the last physics step."""
         return self._view.sensors(self._view.actuator_force)
 
-    def step(self, robots: np.ndarray, targets: np.ndarray) -> None:
-        """Hold targets (n, J) [rad] for 20 ms on `robots` (n,)."""
-        self._view.ctrl[robots] = targets
+    def step(self, robots: np.ndarray, command: ServoCommand) -> None:
+        """Hold a command for 20 ms on `robots` (n,); its torque counts within the drives' limits, as theirs does."""
+        self._set_gains(robots, command)
+        control = command.target
+        if command.torque is not None:
+            gain = self.model.actuator_gainprm[:, 0] if self._gains is None else self._gains[0][robots, :, 0]
+            control = control + command.torque / gain
+        self._view.ctrl[robots] = control
         self.batch.step(ids=robots, nstep=self._steps)
+
+    def _set_gains(self, robots: np.ndarray, command: ServoCommand) -> None:
+        """Write the gains of the servos of `robots` (n,) in the model's fields, which each robot then has apart."""
+        if self._gains is None:
+            if command.kp is None and command.kd is None:
+                return
+            self._gains = self.batch.expand("actuator_gainprm"), self.batch.expand("actuator_biasprm")
+        kp = 1.0 if command.kp is None else command.kp / self._declared[:, 0]
+        kd = 1.0 if command.kd is None else command.kd / self._declared[:, 1]
+        gain, bias, model = *self._gains, self.model
+        gain[robots, :, 0] = kp * model.actuator_gainprm[:, 0]
+        bias[robots, :, 0] = kp * model.actuator_biasprm[:, 0]  # what an encoder that is off does to the servo
+        bias[robots, :, 1] = kp * model.actuator_biasprm[:, 1]
+        bias[robots, :, 2] = kd * model.actuator_biasprm[:, 2]
 
 
 class SideBySide:
@@ -91,13 +117,13 @@ class SideBySide:
             **{f.name: np.concatenate([getattr(r, f.name) for r in readings])[order] for f in fields(Sensors)}
         )
 
-    def step(self, robots: np.ndarray, targets: np.ndarray) -> None:
+    def step(self, robots: np.ndarray, command: ServoCommand) -> None:
         """See `Robots.step`."""
         jobs = []
         for number, part in enumerate(self._parts):
             own = robots % self._threads == number
             if own.any():
-                jobs.append(self._pool.submit(part.step, robots[own] // self._threads, targets[own]))
+                jobs.append(self._pool.submit(part.step, robots[own] // self._threads, command[own]))
         for job in jobs:
             job.result()
 

@@ -1,4 +1,4 @@
-"""The policy's 50 Hz step on the robot: from sensor readings to joint targets.
+"""The policy's 50 Hz step on the robot: from sensor readings to the drives' command.
 
 The observation is the training environment's own (`tracking.terms.see`), fed with forward kinematics of the measured
 joints where the simulator would know the bodies' places.
@@ -10,8 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from bumblebee.deploy.compensation import Compensation
+from bumblebee.deploy.compensation_runtime import Compensator
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.sensors import Sensors
+from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import forward_key_positions
 from bumblebee.sim.engine import RobotState
@@ -41,9 +44,16 @@ class PolicyRunner:
         policy: what acts.
         library: the reference motions, as `reference_library` makes them for this policy.
         names: (B) the clip of each robot.
+        compensation: what is undone at the joints; None for nothing.
     """
 
-    def __init__(self, policy: ExportedPolicy, library: MotionLibrary, names: Sequence[str]) -> None:
+    def __init__(
+        self,
+        policy: ExportedPolicy,
+        library: MotionLibrary,
+        names: Sequence[str],
+        compensation: Compensation | None = None,
+    ) -> None:
         self.policy, self._library = policy, library
         order = {name: index for index, name in enumerate(library.names)}
         self._ids = torch.tensor([order[name] for name in names])
@@ -53,27 +63,36 @@ class PolicyRunner:
         self._seen, self._middle = policy.seen, action_middle(policy.contract["action"]["base"])
         self._past: Tensor | None = None  # (B, H, D) terms of the last control steps, the oldest first
         self._begun = torch.zeros(len(names), dtype=torch.bool)
+        self.compensation, self._undo = compensation, None
+        if compensation is not None:
+            self._undo = Compensator(compensation, library, self._ids.numpy(), self._dt)
 
     def hold(self) -> np.ndarray:
         """Joint targets (B, J) [rad] that carry each clip's first frame: what the servos hold before the start."""
-        return self._reference(np.arange(len(self._ids)), -1).hold_pos.numpy().astype(np.float64)
+        held = self._reference(np.arange(len(self._ids)), -1).hold_pos.numpy().astype(np.float64)
+        return held if self._undo is None else self._undo.hold(held)
 
     def observe(self, robots: np.ndarray, tick: int, sensors: Sensors) -> Tensor:
         """Observations (n, D) of `robots` (n,) at control tick `tick`; sensors are those of these robots."""
-        steps, now = self._look(robots, tick, sensors)
+        steps, now = self._look(robots, tick, self._seen_by_policy(sensors))
         return torch.cat((steps.flatten(1), now), dim=-1)
 
-    def step(self, robots: np.ndarray, tick: int, sensors: Sensors) -> tuple[np.ndarray, np.ndarray]:
-        """Actions and joint targets [rad], (n, J) each, of `robots` (n,) at control tick `tick`."""
-        rows = torch.as_tensor(robots)
+    def step(self, robots: np.ndarray, tick: int, sensors: Sensors) -> tuple[np.ndarray, ServoCommand]:
+        """Actions (n, J) and the drives' command of `robots` (n,) at control tick `tick`."""
+        rows, sensors = torch.as_tensor(robots), self._seen_by_policy(sensors)
         steps, now = self._look(robots, tick, sensors)
         action = torch.as_tensor(self.policy.act(torch.cat((steps.flatten(1), now), dim=-1).numpy()))
         self._last_action[rows] = action
         if self._past is None:
             self._past = torch.zeros(len(self._ids), *steps.shape[1:])
         self._past[rows], self._begun[rows] = steps, True
-        target = joint_targets(self._reference(robots, tick), action, self._scale, self._middle)
-        return action.numpy().astype(np.float64), target.numpy().astype(np.float64)
+        wanted = joint_targets(self._reference(robots, tick), action, self._scale, self._middle)
+        target = wanted.numpy().astype(np.float64)
+        command = ServoCommand(target) if self._undo is None else self._undo.command(robots, tick, sensors, target)
+        return action.numpy().astype(np.float64), command
+
+    def _seen_by_policy(self, sensors: Sensors) -> Sensors:
+        return sensors if self._undo is None else self._undo.seen(sensors)
 
     def _look(self, robots: np.ndarray, tick: int, sensors: Sensors) -> tuple[Tensor, Tensor]:
         """What `robots` (n,) see over time (n, H, D) and of the newest step alone (n, N).

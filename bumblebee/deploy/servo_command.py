@@ -14,6 +14,11 @@ class ServoCommand:
     torque: np.ndarray | None = None
     """(n, J) feed-forward torque [N m]; None for none."""
     kp: np.ndarray | None = None
-    """(J,) [N m/rad]; None for the robot's own gains."""
+    """(J,), or (n, J) where robots differ, [N m/rad]; None for the robot's own gains."""
     kd: np.ndarray | None = None
-    """(J,) [N m s/rad]; None for the robot's own gains."""
+    """(J,) or (n, J) [N m s/rad]; None for the robot's own gains."""
+
+    def __getitem__(self, rows: np.ndarray) -> "ServoCommand":
+        """The command to some of the robots, by index or mask (n,)."""
+        kp, kd = (gain if gain is None or gain.ndim == 1 else gain[rows] for gain in (self.kp, self.kd))
+        return ServoCommand(self.target[rows], None if self.torque is None else self.torque[rows], kp, kd)

@@ -17,6 +17,7 @@ LONGEST_ID = 200  # bytes: a motion's name with round and cluster before it; fil
 LARGEST = 1e9  # of a rate or gain
 REQUIRED_KEYS = ("schema", "rollout_id", "joints", "control_hz")
 OPTIONAL_KEYS = ("robot", "kp", "kd", "motion", "cluster", "policy", "recorded_at", "operator", "notes")
+OPTIONAL_KEYS += ("compensation",)  # sha256 of what was undone at the joints meanwhile
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,14 @@ def lead_angles(clip: Clip) -> np.ndarray:
     return np.clip(static_torques(clip) / kp, -_LARGEST, _LARGEST).astype(np.float32)
 
 
-def static_torques(clip: Clip) -> np.ndarray:
-    """Torques (T, 23) [N m] that hold each frame of the clip at rest on the feet that touch the floor in it."""
-    model = _model()
+def static_torques(clip: Clip, model: mujoco.MjModel | None = None) -> np.ndarray:
+    """Torques (T, 23) [N m] that hold each frame of the clip at rest on the feet that touch the floor in it.
+
+    Args:
+        clip: T frames.
+        model: a G1 of other masses than the declared one's.
+    """
+    model = _model() if model is None else model
     data = mujoco.MjData(model)
     count, joint_count = clip.frames, clip.joint_pos.shape[1]
     gravity = np.zeros((count, joint_count))

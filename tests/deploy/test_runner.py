@@ -40,11 +40,11 @@ def test_observation_and_motion_equal_the_engines_step_by_step(
         sensors, reference = robots.read(), library.frames(ids, torch.full((1,), (tick + 1) * 0.02))
         expected = observe(engine.state(), reference, last)
         assert torch.allclose(runner.observe(np.array([0]), tick, sensors), expected, atol=2e-4), tick
-        _, target = runner.step(np.array([0]), tick, sensors)
+        _, command = runner.step(np.array([0]), tick, sensors)
         last = torch.as_tensor(policy.act(expected.numpy()))
         wanted = joint_targets(reference, last, torch.as_tensor(policy.scale, dtype=torch.float32))
-        assert np.allclose(target, wanted.numpy(), atol=1e-4)
-        robots.step(np.array([0]), target)
+        assert np.allclose(command.target, wanted.numpy(), atol=1e-4)
+        robots.step(np.array([0]), command)
         engine.step(wanted)
 
 
