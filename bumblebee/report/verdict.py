@@ -3,13 +3,14 @@
 from itertools import pairwise
 
 from bumblebee.report import noise_floor
+from bumblebee.report.names import label, ladder, last_policy, pair
 from bumblebee.report.page import Fact
-from bumblebee.report.policy_sections import ENGINES, NOT_YOURS, engines, ladder
+from bumblebee.report.policy_sections import ENGINES, NOT_YOURS, engines
 from bumblebee.report.residual_figure import value_and_interval
 from bumblebee.report.results import Json, LoopResults, RoundResults
 from bumblebee.report.success_figure import pick
 from bumblebee.report.truth import match
-from bumblebee.report.wording import change, number, percent, plural
+from bumblebee.report.wording import changes, number, percent, plural
 
 PRETRAINED = (
     "Training began from the policy that comes along, which real motions on a GPU had taught most of this already; "
@@ -28,7 +29,7 @@ def verdict(results: LoopResults) -> list[str]:
 
 def _headline(results: LoopResults) -> str:
     engine = engines(results)[0]
-    last = ladder(results)[-1]
+    last = last_policy(results)
     rates = {
         split: pick(results.evaluation["results"], policy=last, engine=engine, split=split, group="all")
         for split in ("train", "test")
@@ -45,13 +46,13 @@ def _headline(results: LoopResults) -> str:
 
 def _first_steps(results: LoopResults) -> list[str]:
     engine, names = engines(results)[0], ladder(results)
-    pairs = {
-        (c["from"], c["to"]): c
-        for c in results.evaluation["comparisons"]
-        if c["engine"] == engine and c["split"] == "all"
-    }
-    wanted = [p for p in pairwise(names[1:]) if p in pairs]
-    return [f"Success {ENGINES[engine]}, {a} → {b}: {change(pairs[a, b])}." for a, b in wanted]
+    pairs = {(a, b): pair(results.evaluation, a, b, engine) for a, b in pairwise(names[1:])}
+    where = ENGINES[engine].capitalize()
+    return [
+        f"{where}, {label(results, a)} → {label(results, b)}: {changes(found)}."
+        for (a, b), found in pairs.items()
+        if found is not None
+    ]
 
 
 def _found(results: LoopResults, turn: RoundResults) -> str:
@@ -110,7 +111,7 @@ def _delta(turn: RoundResults) -> str:
 
 def facts(results: LoopResults) -> list[Fact]:
     """The few numbers to read first."""
-    engine, last = engines(results)[0], ladder(results)[-1]
+    engine, last = engines(results)[0], last_policy(results)
     rates = {
         split: pick(results.evaluation["results"], policy=last, engine=engine, split=split, group="all")
         for split in ("train", "test")
@@ -158,7 +159,7 @@ def _round_facts(results: LoopResults, turn: RoundResults) -> list[Fact]:
 
 def _short(results: LoopResults) -> list[str]:
     """Families in which the last policy fails more often than not."""
-    engine, last = engines(results)[0], ladder(results)[-1]
+    engine, last = engines(results)[0], last_policy(results)
     weak = [
         f"{e['group']} ({100 * e['success']['value']:.0f} %)"
         for e in pick(results.evaluation["results"], policy=last, engine=engine, split="all", group_by="family")

@@ -36,6 +36,11 @@ def estimate(value: float, half: float = 0.1, motions: int = 9) -> dict[str, Any
     return {"value": value, "ci95": [max(value - half, 0.0), value + half], "n": motions, "motions": motions}
 
 
+def difference(value: float, half: float, p: float, motions: int = 9) -> dict[str, Any]:
+    """A paired difference as data/evaluation/summary.json has it."""
+    return {"value": value, "ci95": [value - half, value + half], "p": p, "motions": motions}
+
+
 def entry(policy: str, engine: str, split: str, by: str, group: str, rate: float) -> dict[str, Any]:
     errors = {key: estimate(0.1) for key in ("mpjpe_rad", "mpkpe_mm")}
     base = {"policy": policy, "engine": engine, "split": split, "group_by": by, "group": group, "n": 9}
@@ -92,10 +97,10 @@ def loop_results(
         for split in ("all", "train", "test")
         for by, group in (("all", "all"), ("family", "walk"))
     ]  # fmt: skip
-    gain = {"value": 0.1, "ci95": [-0.05, 0.25], "p": 0.2, "motions": 9}
-    step = {"engine": "stand_in", "split": "all", "motions": 9, "success": gain}
-    steps = [{"from": a, "to": b, **step}
-             for a, b in pairwise(list(RATES)[1:])]  # fmt: skip
+    measured = {"success": difference(0.1, 0.15, 0.2), "mpjpe_rad": difference(-0.002, 0.004, 0.4)}
+    step = {"engine": "stand_in", "motions": 9, **measured, "mpkpe_mm": difference(3.0, 8.0, 0.5)}
+    pairs = [*pairwise(list(RATES)[1:]), ("base", "experts-r1"), ("base", "generalist")]
+    steps = [{"from": a, "to": b, "split": split, **step} for split in ("all", "train", "test") for a, b in pairs]
     held = {
         "rollouts": 6,
         "change": {"1.0": {"without": 0.1, "with": 0.09, "relative": -0.1, "low": -0.2, "high": 0.1}},
