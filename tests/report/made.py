@@ -90,6 +90,7 @@ def loop_results(
         "separation_random_split": {"speed": 0.1},
     }
     clusters = {"k": 2, "suggested_k": 3, "clusters": {"c0": row, "c1": row}, "audit": audit, "loss": {"infonce": 0.5}}
+    clusters["clips"] = {"train": 2, "held_out": 1, "with_captions": 3, "texts": {"made": 3}}
     clusters["plane_variance"] = [0.5, 0.25]
     entries = [
         entry(policy, "stand_in", split, by, group, rate)
