@@ -1,7 +1,7 @@
 """Sections about the policies: how they learned and follow, which step of the loop helped, what is published."""
 
 from bumblebee.report.curves_figure import curves_figures
-from bumblebee.report.names import BASE, everyone, label, pair
+from bumblebee.report.names import everyone, label, pair, reference
 from bumblebee.report.page import Block, Section, heading, image, note, table, text
 from bumblebee.report.results import Json, LoopResults
 from bumblebee.report.success_figure import pick, success_figure
@@ -102,18 +102,18 @@ def _three(comparison: Json) -> tuple[str, ...]:
 
 
 def _rates(results: LoopResults, policies: list[str], engine: str) -> Block:
-    """Each policy's numbers, and its success against the base policy's: what the loop added to what it began with."""
-    rows = []
+    """Each policy's numbers, and its success against what the loop began with: what the loop added."""
+    rows, first = [], reference(results.evaluation)
     for policy in policies:
         for split, name in (("train", "training"), ("test", "held out")):
             found = pick(results.evaluation["results"], policy=policy, engine=engine, split=split, group="all")
-            against = pair(results.evaluation, BASE, policy, engine, split)
+            against = pair(results.evaluation, first, policy, engine, split)
             gain = "–" if against is None else change(against)
             for e in found:
                 errors = (number(e["mpjpe_rad"]), number(e["mpkpe_mm"], 0))
                 rows.append((label(results, policy), name, str(e["n"]), percent(e["success"]), gain, *errors))
-    against_base = f"success against {label(results, BASE)}"
-    header = ("policy", "motions", "episodes", "success", against_base, "MPJPE [rad]", "MPKPE [mm]")
+    against_first = f"success against {label(results, first)}"
+    header = ("policy", "motions", "episodes", "success", against_first, "MPJPE [rad]", "MPKPE [mm]")
     caption = (
         "MPJPE, MPKPE: mean error of joint angles and of key bodies' positions, over all episodes up to their end. "
         "Their intervals come from few motions where they are wide."
