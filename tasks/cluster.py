@@ -73,7 +73,7 @@ def tell(result: Clustering) -> None:
     print(f"{summary['k']} clusters (the elbow suggests {summary['suggested_k']})")
     for name, row in summary["clusters"].items():
         size = f"{row['clips']} clips, {row['held_out_clips']} held out"
-        print(f"  {name}  {row['label']}: {size}, {row['speed']:.2f} m/s; {row['keywords'] or 'no captions'}")
+        print(f"  {name}  {row['label']}: {size}, {row['speed']:.2f} m/s; {row['keywords'] or 'no keywords'}")
     if summary["moved_to_fill"]:
         print(f"  moved so that no cluster is too small: {', '.join(summary['moved_to_fill'])}")
 

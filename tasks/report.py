@@ -1,7 +1,6 @@
 """Stage report: everything that the loop found, on one page that holds all it needs: reports/report.html."""
 
 import json
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -10,23 +9,23 @@ from typing import Any
 
 import pandas as pd
 
-from bumblebee.measured.rollout import Rollout, read_rollout
+from bumblebee.evaluation.summary import comparisons
 from bumblebee.motion.store import read_index
 from bumblebee.ranges import Line, Name, Ranged, Seed
 from bumblebee.report.data_sections import clusters_section, motions_section
-from bumblebee.report.filmstrip import film
 from bumblebee.report.loop_picture import Box, loop_picture
-from bumblebee.report.page import Block, Section, note, render, still, text
-from bumblebee.report.page import film as film_block
+from bumblebee.report.names import reference, same_files
+from bumblebee.report.opening import opening, opening_lines
+from bumblebee.report.page import render
 from bumblebee.report.policy_sections import registry_section, success_section, training_section
 from bumblebee.report.results import LoopResults, RoundResults
 from bumblebee.report.round_sections import round_section
-from bumblebee.report.verdict import facts, verdict
+from bumblebee.report.verdict import verdict
 from bumblebee.report.wording import plural
-from bumblebee.robot.model import build_spec
+from tasks.film import compensation_file, film_blocks
 from tasks.lineage import git_sha
-from tasks.rollouts import FILTERED, SEALED, RolloutsConfig, start_stand_in
-from tasks.sections import Loop, loop
+from tasks.rollouts import SEALED, RolloutsConfig
+from tasks.sections import Loop, Round, loop
 from tasks.stage import load, log_run, output_file, run_stage
 
 OUT = Path("reports/report.html")
@@ -39,11 +38,11 @@ class ReportConfig(Ranged):
     title: Name = "BumbleBee: from motions to a registered generalist"
     """The page's heading."""
     film: bool = True
-    """Run the generalist once more on the stand-in robot and show it."""
+    """Run a motion that the round won back on the stand-in robot, before and after, and show both."""
     film_motion: Line = ""
-    """Motion of the film; empty: the liveliest one that it follows."""
+    """Motion of the film; empty: the liveliest that was won back, else the liveliest that the generalist follows."""
     seed: Seed = 3
-    """Of the film's start state and sensor noise."""
+    """Of the start state and the sensor noise where no motion was won back and one run is shown alone."""
 
 
 def main() -> None:
@@ -52,24 +51,23 @@ def main() -> None:
     results = collect(shape)
     sections = [motions_section(results), clusters_section(results), training_section(results)]
     sections += [round_section(results, turn) for turn in results.rounds]
-    sections.append(success_section(results))
-    if config.film and not results.real_robot:
-        sections.append(film_section(config))
-    sections.append(registry_section(results))
+    sections += [success_section(results), registry_section(results)]
+    film = film_blocks(results, config.film_motion, config.seed) if config.film and not results.real_robot else []
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     subtitle = f"{when} · code {git_sha()[:12]} · evaluation contract {results.evaluation['contract_sha256'][:12]}"
-    page = render(config.title, subtitle, verdict(results), picture(results), sections, facts(results))
+    page = render(config.title, subtitle, verdict(results), picture(results), sections, opening(results, film))
     with output_file(OUT) as file:
         file.write_text(page)
     print(f"report: {OUT} ({OUT.stat().st_size / 1e6:.1f} MB)")
-    for line in verdict(results):
+    for line in opening_lines(results):
         print(f"  {line}")
     log_run("report", params=config, artifacts=[OUT])
 
 
 def collect(shape: Loop) -> LoopResults:
     """Read what the stages left."""
-    library = read_index(Path("data/motions"))
+    library, evaluation = read_index(Path("data/motions")), _json(Path("data/evaluation/summary.json"))
+    base = _json(Path("models/base/card.json"))
     return LoopResults(
         library=library,
         skipped=_table(Path("data/motions/skipped.csv"), ("file", "reason")),
@@ -78,13 +76,26 @@ def collect(shape: Loop) -> LoopResults:
         elbow=pd.read_csv("data/clusters/elbow.csv"),
         clusters=_json(Path("data/clusters/summary.json")),
         curves=dict(curves(shape)),
-        evaluation=_json(Path("data/evaluation/summary.json")),
+        evaluation=with_reference(evaluation),
         contract=_json(Path("data/evaluation/contract.json")),
         published=_json(Path("data/published.json")),
         sealed=sealed_truth(),
-        rounds=tuple(round_results(turn.n, shape.clusters) for turn in shape.rounds if turn.n <= shape.final_round),
-        pretrained=_json(Path("models/base/card.json")).get("parent") == "pretrained",
+        rounds=tuple(round_results(turn, shape.clusters) for turn in shape.rounds if turn.n <= shape.final_round),
+        pretrained=base.get("parent") == "pretrained",
+        base_trained_on=base.get("kept") != "parent",
     )
+
+
+def with_reference(evaluation: dict[str, Any]) -> dict[str, Any]:
+    """The evaluation with every policy compared with the one that the loop began with, where it is not yet."""
+    first = reference(evaluation)
+    names = list(dict.fromkeys(entry["policy"] for entry in evaluation["results"]))
+    there = {(c["from"], c["to"]) for c in evaluation["comparisons"]}
+    lacking = [(first, name) for name in names if name not in (first, "untrained") and (first, name) not in there]
+    more = comparisons(pd.read_parquet("data/evaluation/episodes.parquet"), lacking)
+    unchanged = [{"unchanged": True} if same_files(evaluation, first, c["to"]) else {} for c in more]
+    added = [{**c, **mark} for c, mark in zip(more, unchanged, strict=True)]
+    return {**evaluation, "comparisons": [*evaluation["comparisons"], *added]}
 
 
 def sealed_truth() -> dict[str, Any] | None:
@@ -104,8 +115,9 @@ def curves(shape: Loop) -> Iterator[tuple[str, pd.DataFrame]]:
             yield name, pd.read_csv(folder / "curve.csv")
 
 
-def round_results(n: int, clusters: tuple[str, ...]) -> RoundResults:
-    """One round's intake, gate, diagnosis and delta actions."""
+def round_results(turn: Round, clusters: tuple[str, ...]) -> RoundResults:
+    """One round's intake, gate, diagnosis, compensation and delta actions."""
+    n, plan = turn.n, compensation_file(turn.n)
     cards = {cluster: Path(f"models/delta/r{n}/{cluster}/card.json") for cluster in clusters}
     return RoundResults(
         n=n,
@@ -113,6 +125,8 @@ def round_results(n: int, clusters: tuple[str, ...]) -> RoundResults:
         gate=_json(Path(f"data/gates/round-{n}.json")),
         diagnosis=_json(Path(f"data/diagnosis/r{n}/diagnosis.json")),
         deltas={cluster: _json(path) for cluster, path in cards.items() if path.exists()},
+        parent=turn.parent,
+        compensation=_json(plan) if plan.exists() else None,
     )
 
 
@@ -144,53 +158,6 @@ def picture(results: LoopResults) -> str:
         Box("refine", "corrected model", "learn"),
     ]
     return loop_picture(top, bottom, f"{plural(len(results.rounds), 'round')}: measured, explained, refined")
-
-
-def film_section(config: ReportConfig) -> Section:
-    """The generalist on the stand-in robot, once more, in pictures."""
-    motion, why = chosen_motion(config)
-    rollout = run_once(motion, config.seed)
-    spec = build_spec()
-    spec.compile()
-    shown = film(rollout, spec.to_xml())
-    blocks: list[Block] = [
-        text(
-            f"'{motion}' on the stand-in robot: {why}. The film is one more episode, with its own start and sensor "
-            "noise, so it may end otherwise than those that were counted."
-        )
-    ]
-    if shown.sheet is not None:
-        caption = "Measured joint angles and base pose, drawn off-screen, at real speed. Arrow keys step on the slider."
-        blocks.append(film_block(shown.sheet, f"Film of '{motion}'", caption, f"The robot during '{motion}'."))
-    blocks += [still(uri, f"{at:.1f} s", f"The robot {at:.1f} s after the start.") for at, uri in shown.stills]
-    return Section("film", "Film", (*blocks, note(shown.note)))
-
-
-def chosen_motion(config: ReportConfig) -> tuple[str, str]:
-    """The motion asked for; else the liveliest that the generalist followed on the robot, else the longest followed."""
-    if config.film_motion:
-        return config.film_motion, "the motion that was asked for"
-    episodes = pd.read_parquet("data/evaluation/episodes.parquet")
-    own = episodes[(episodes["policy"] == "generalist") & (episodes["engine"] == "stand_in")]
-    speed = pd.read_csv("data/clusters/statistics.csv").set_index("name")["speed"]
-    own = own.assign(speed=own["motion"].map(speed).fillna(0.0))
-    good = own[own["success"]]
-    if len(good):
-        return str(
-            good.sort_values("speed").iloc[-1]["motion"]
-        ), "the fastest motion that the generalist followed to the end in the evaluation"
-    return str(
-        own.sort_values("frames").iloc[-1]["motion"]
-    ), "the motion that the generalist followed longest in the evaluation, though not to the end"
-
-
-def run_once(motion: str, seed: int) -> Rollout:
-    """One rollout of the generalist on the stand-in robot."""
-    episode = {"rollout_id": "film", "policy": "generalist", "motion": motion, "seed": seed}
-    plan: dict[str, Any] = {"policies": {"generalist": str(Path("models/generalist").resolve())}, "episodes": [episode]}
-    with tempfile.TemporaryDirectory() as folder:
-        start_stand_in(plan, FILTERED, Path(folder) / "rollouts", Path(folder), threads=1)
-        return read_rollout(Path(folder) / "rollouts" / "film.parquet")
 
 
 def _json(path: Path) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from bumblebee.clustering.autoencoder import TextMotionAutoencoder
 from bumblebee.clustering.config import ClusterConfig
 from bumblebee.clustering.features import motion_windows
 from bumblebee.clustering.statistics import clip_statistics
-from bumblebee.clustering.text import TokenTable, embed_captions, plain_text
+from bumblebee.clustering.text import TokenTable, embed_captions, evidence, plain_text
 from bumblebee.clustering.train import encode_clips, train
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
@@ -75,6 +75,20 @@ def cluster_clips(
     return Clustering(labels, statistics, elbow, curve, summary, model)
 
 
+def family_beside_text(clip: Clip) -> str:
+    """The family that the clip's agreement with its cluster is judged by; "" where that would be circular.
+
+    A caption made of the file's name is what the autoencoder saw, and the family was read from the same name.
+    """
+    return "" if clip.caption_source == "name" else clip.family
+
+
+def texts_by_source(clips: Sequence[Clip]) -> dict[str, int]:
+    """How many clips have their texts from where: "file", "made", "name", "none" or "unknown"."""
+    sources = ["none" if not clip.captions else clip.caption_source or "unknown" for clip in clips]
+    return {source: sources.count(source) for source in sorted(set(sources))}
+
+
 def _enough(training: int, k: int, min_clips: int) -> None:
     if training < k * min_clips:
         expected = f"at least {k} x {min_clips} training clips for {k} clusters"
@@ -107,14 +121,15 @@ def _summary(
 ) -> dict[str, Any]:
     train_clips = [clip for clip, use in zip(clips, fitted, strict=True) if use]
     train_statistics = statistics[fitted].reset_index(drop=True)
-    table = audit.cluster_table(train_statistics, [clip.captions for clip in train_clips], clusters.labels, len(names))
+    texts = [evidence(clip.captions, clip.caption_source, clip.name) for clip in train_clips]
+    table = audit.cluster_table(train_statistics, texts, clusters.labels, len(names))
     held_out = np.bincount(clusters.predict(latents[~fitted]), minlength=len(names))
     rows = table.to_dict("records")
     by_name = {
         name: {**row, "held_out_clips": int(count), "share": row["clips"] / len(train_clips)}
         for name, row, count in zip(names, rows, held_out, strict=True)
     }
-    families = [clip.family for clip in train_clips]
+    families = [family_beside_text(clip) for clip in train_clips]
     return {
         "k": len(names),
         "suggested_k": kmeans.knee(elbow),
@@ -122,6 +137,7 @@ def _summary(
             "train": len(train_clips),
             "held_out": int((~fitted).sum()),
             "with_captions": sum(bool(clip.captions) for clip in clips),
+            "texts": texts_by_source(clips),
         },
         "clusters": by_name,
         "plane_variance": kmeans.plane_shares(latents, fitted),

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from sklearn.feature_extraction.text import ENGLISH_STOP_WORDS, TfidfVectorizer
 
-from bumblebee.clustering.text import plain_text
+from bumblebee.clustering.text import FILLERS, plain_text
 from bumblebee.motion.clip import Clip, foot_contacts, velocities
 from bumblebee.robot.facts import joint_names
 
@@ -16,7 +16,7 @@ COLUMNS = ("displacement", "z_move", "speed", "joint", "lower_joint", "upper_joi
 
 _WALKS = 0.15  # m/s: above it a cluster is called a walk; the paper's stands reach 0.148, its walks start at 0.353
 _FLIES, _BOUNCES = 0.03, 1.5  # a jump is in the air for more than this share and bounces this often the median cluster
-_NO_KEYWORDS = {"person", "man", "woman", "someone", "figure", "robot", "human", "does", "doing", "makes"}
+_NEARLY_ALL = 0.8  # of the clips with a text: a word that so many have is the captions' form, not their meaning
 
 
 def clip_statistics(clip: Clip) -> dict[str, float]:
@@ -45,18 +45,39 @@ def clip_statistics(clip: Clip) -> dict[str, float]:
 
 
 def keywords(captions: Sequence[Sequence[str]], labels: np.ndarray, k: int, count: int = 4) -> list[list[str]]:
-    """The words that set each cluster's captions apart, by tf-idf with one document a cluster."""
-    pooled = [
-        " ".join(plain_text(text) for i in np.flatnonzero(labels == c) for text in captions[int(i)]) for c in range(k)
-    ]
-    stop = sorted(ENGLISH_STOP_WORDS | _NO_KEYWORDS)
+    """The words that set each cluster's captions apart, by tf-idf with one document a cluster.
+
+    A word counts for a cluster only where a larger share of its clips has it than of the others, and not at all where
+    nearly all clips have it.
+
+    Args:
+        captions: of each clip, those that are evidence of its meaning (`bumblebee.clustering.text.evidence`).
+        labels: each clip's cluster.
+        k: number of clusters.
+        count: most words of a cluster.
+    """
+    texts = [" ".join(plain_text(text) for text in own) for own in captions]
+    pooled = [" ".join(texts[int(i)] for i in np.flatnonzero(labels == c)) for c in range(k)]
+    stop = sorted(ENGLISH_STOP_WORDS | FILLERS)
     vectorizer = TfidfVectorizer(stop_words=stop, token_pattern=r"[A-Za-z]{3,}", sublinear_tf=True)
     try:
         weights = vectorizer.fit_transform(pooled).toarray()
     except ValueError:  # no caption holds a word that is not a stop word
         return [[] for _ in range(k)]
+    told = np.array([bool(text.strip()) for text in texts])
+    has = (vectorizer.transform(texts).toarray() > 0)[told]
+    for c in range(k):
+        weights[c] *= _marks(has, labels[told] == c)
     words = vectorizer.get_feature_names_out()
     return [[str(words[i]) for i in np.argsort(-row, kind="stable")[:count] if row[i] > 0] for row in weights]
+
+
+def _marks(has: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """(W,) whether each word tells the cluster's clips `own` (N,) from the others, from who `has` it (N, W)."""
+    if not own.any() or own.all():
+        return np.zeros(has.shape[1], bool)  # nothing to be told apart from
+    inside, outside = has[own].mean(0), has[~own].mean(0)
+    return (inside > outside) & (has.mean(0) < _NEARLY_ALL)
 
 
 def names(table: pd.DataFrame) -> list[str]:

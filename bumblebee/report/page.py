@@ -26,19 +26,33 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Fact:
-    """One of the numbers at the top of the page."""
+class Share:
+    """A share from 0 to 1 with its 95 % interval, and in words."""
 
-    label: str
-    value: str
-    detail: str
+    value: float
+    low: float
+    high: float
+    words: str
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A share with its interval as a bar; `None` where it was not measured."""
+
+    called: str
+    note: str
+    robot: Share | None
+    declared: Share | None
+    quiet: bool = False
+    """Drawn paler: a control."""
 
 
 @dataclass(frozen=True)
 class Block:
     """One piece of a section; which fields count depends on `kind`.
 
-    Kinds: text, note, heading, list, table, film; and, side by side where there is room: image, still.
+    Kinds: text, note, heading, list, table, film, bars, pairs (a table whose rows stack on a phone); and, side by side
+    where there is room: image, still.
     """
 
     kind: str
@@ -51,6 +65,9 @@ class Block:
     header: tuple[str, ...] = ()
     rows: tuple[tuple[str | Cell, ...], ...] = ()
     sheet: Sheet | None = None
+    bars: tuple[Bar, ...] = ()
+    panels: tuple[str, ...] = ()
+    """Headings over the parts of a film that stand side by side in it."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +99,11 @@ class Part:
     def lead(self) -> bool:
         """Whether these are introductory words alone, which stand above the other parts."""
         return all(block.kind in ("text", "note") for block in self.blocks)
+
+    @property
+    def aside(self) -> bool:
+        """Whether it stands in the first screen's second column: a film, its stills, a list of differences."""
+        return any(block.kind in ("film", "still", "list") for block in self.blocks)
 
     @property
     def runs(self) -> list[tuple[str, list[Block]]]:
@@ -123,9 +145,21 @@ def still(uri: str, caption: str, alt: str) -> Block:
     return Block("still", uri=_inside(uri), caption=caption, alt=alt)
 
 
-def film(sheet: Sheet, title: str, caption: str, alt: str) -> Block:
-    """A film with its player."""
-    return Block("film", uri=_inside(sheet.uri), title=title, caption=caption, alt=alt, sheet=sheet)
+def film(sheet: Sheet, title: str, caption: str, alt: str, panels: Sequence[str] = ()) -> Block:
+    """A film with its player; `panels` are headings over its parts, where it shows several side by side."""
+    uri = _inside(sheet.uri)
+    return Block("film", uri=uri, title=title, caption=caption, alt=alt, sheet=sheet, panels=tuple(panels))
+
+
+def bars(rows: Sequence[Bar], header: Sequence[str], title: str, caption: str = "") -> Block:
+    """Shares as bars: `header` says what the robot's and the declared model's are called, "" leaves a column out."""
+    return Block("bars", bars=tuple(rows), header=tuple(header), title=title, caption=caption)
+
+
+def pairs(header: Sequence[str], rows: Sequence[Sequence[str | Cell]], title: str, caption: str = "") -> Block:
+    """A table of few columns whose cells stand below each other, with their column's name, on a phone."""
+    filled = tuple(tuple(row) for row in rows)
+    return Block("pairs", header=tuple(header), rows=filled, title=title, caption=caption)
 
 
 def _inside(uri: str) -> str:
@@ -146,20 +180,21 @@ def render(
     verdict: Sequence[str],
     picture: str,
     sections: Sequence[Section],
-    facts: Sequence[Fact] = (),
+    opening: Section | None = None,
 ) -> str:
     """The page; `picture` is the only markup that is passed through, and must come from `loop_picture`."""
     environment = Environment(autoescape=select_autoescape(default=True), trim_blocks=True, lstrip_blocks=True)
     folder = files("bumblebee.report")
-    films = any(block.kind == "film" for section in sections for block in section.blocks)
+    every = [*sections, *([opening] if opening else [])]
+    films = any(block.kind == "film" for section in every for block in section.blocks)
     player = folder.joinpath("player.js").read_text() if films else ""
     return environment.from_string(folder.joinpath("page.html.j2").read_text()).render(
         title=title,
         subtitle=subtitle,
+        opening=opening,
         verdict=list(verdict),
         picture=Markup(picture),
         sections=list(sections),
-        facts=list(facts),
         style=Markup(folder.joinpath("page.css").read_text()),
         player=Markup(player),
         policy=policy(player),

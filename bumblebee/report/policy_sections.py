@@ -1,26 +1,21 @@
 """Sections about the policies: how they learned and follow, which step of the loop helped, what is published."""
 
-from typing import Any
-
 from bumblebee.report.curves_figure import curves_figures
+from bumblebee.report.names import everyone, label, pair, reference
 from bumblebee.report.page import Block, Section, heading, image, note, table, text
-from bumblebee.report.results import LoopResults
+from bumblebee.report.results import Json, LoopResults
 from bumblebee.report.success_figure import pick, success_figure
-from bumblebee.report.wording import change, duration, number, percent, plural
+from bumblebee.report.wording import MEASURES, SAME_FILE, change, duration, number, percent, plural
 
 NOT_YOURS = (
     "Policies were evaluated in simulation only: on the declared model and on a stand-in robot with made-up effects. "
     "Neither is your robot, on which only the measured rollouts were taken."
 )
 ENGINES = {"stand_in": "on the stand-in robot", "nominal": "on the declared model"}
-_CLAIMS = "Paired by motion. A step improved or is worse only if the interval leaves out zero and p is at most 0.05."
-
-
-def ladder(results: LoopResults) -> list[str]:
-    """Policies in the order of the loop: untrained, base, all experts by round, generalist."""
-    names = list(dict.fromkeys(entry["policy"] for entry in results.evaluation["results"]))
-    experts = sorted(name for name in names if name.startswith("experts-r"))
-    return [n for n in ("untrained", "base", *experts, "generalist") if n in names]
+_CLAIMS = (
+    "Paired by motion. Better or worse only if the 95 % interval leaves out zero and p is at most 0.05. Success: more "
+    "is better. MPJPE, MPKPE: less is better, over episodes that both followed to the end."
+)
 
 
 def engines(results: LoopResults) -> list[str]:
@@ -54,7 +49,7 @@ def training_section(results: LoopResults) -> Section:
 
 def success_section(results: LoopResults) -> Section:
     """Success, MPJPE and MPKPE by policy, engine and split; by family and cluster; paired comparisons."""
-    entries, policies = results.evaluation["results"], ladder(results)
+    entries, policies = results.evaluation["results"], everyone(results)
     contract = results.contract
     blocks: list[Block] = [
         text(
@@ -68,41 +63,57 @@ def success_section(results: LoopResults) -> Section:
     if results.real_robot:
         blocks.append(text(NOT_YOURS))
     for engine in engines(results):
-        blocks += [heading(f"{ENGINES[engine]}".capitalize()), _rates(entries, policies, engine)]
+        blocks += [heading(f"{ENGINES[engine]}".capitalize()), _rates(results, policies, engine)]
         for group in ("family", "cluster"):
-            picture = success_figure(entries, policies, engine, group)
+            named = {policy: label(results, policy) for policy in policies}
+            picture = success_figure(entries, named, engine, group)
             if picture:
                 blocks.append(
                     image(picture, f"Success by {group}, {ENGINES[engine]}", "All motions; lines: 95 % intervals.")
                 )
+    blocks += [heading("Which step helped"), *_steps(results)]
+    return Section("success", "Success", tuple(blocks))
+
+
+def _steps(results: LoopResults) -> list[Block]:
+    """Every paired comparison in all three measures, and in words."""
     parts = {"all": "all", "test": "held out"}
     where = {engine: name.removeprefix("on the ") for engine, name in ENGINES.items()}
     rows = [
         (
-            f"{c['from']} → {c['to']}",
+            f"{label(results, c['from'])} → {label(results, c['to'])}",
             where[engine],
             parts[c["split"]],
             str(c["motions"]),
-            change(c),
+            *_three(c),
         )
         for engine in engines(results)
         for c in results.evaluation["comparisons"]
         if c["engine"] == engine and c["split"] in parts
     ]
-    header = ("step", "where", "motions", "n", "success")
-    blocks += [heading("Which step helped"), table(header, rows, _CLAIMS, "steps of the loop")]
-    return Section("success", "Success", tuple(blocks))
+    header = ("step", "where", "motions", "n", *(name for name, *_ in MEASURES.values()))
+    return [table(header, rows, _CLAIMS, "steps of the loop")]
 
 
-def _rates(entries: list[dict[str, Any]], policies: list[str], engine: str) -> Block:
-    rows = []
+def _three(comparison: Json) -> tuple[str, ...]:
+    if comparison.get("unchanged"):
+        return (SAME_FILE, "–", "–")
+    return tuple(change(comparison, measure) for measure in MEASURES)
+
+
+def _rates(results: LoopResults, policies: list[str], engine: str) -> Block:
+    """Each policy's numbers, and its success against what the loop began with: what the loop added."""
+    rows, first = [], reference(results.evaluation)
     for policy in policies:
         for split, name in (("train", "training"), ("test", "held out")):
-            found = pick(entries, policy=policy, engine=engine, split=split, group="all")
+            found = pick(results.evaluation["results"], policy=policy, engine=engine, split=split, group="all")
+            against = pair(results.evaluation, first, policy, engine, split)
+            gain = "–" if against is None else change(against)
             for e in found:
                 errors = (number(e["mpjpe_rad"]), number(e["mpkpe_mm"], 0))
-                rows.append((policy, name, str(e["n"]), percent(e["success"]), *errors))
-    header = ("policy", "motions", "episodes", "success", "MPJPE [rad]", "MPKPE [mm]")
+                rows.append((label(results, policy), name, str(e["n"]), percent(e["success"]), gain, *errors))
+    against_first = f"success against {label(results, first)}"
+    header = ("policy", "motions", "episodes", "success", against_first, "MPJPE [rad]", "MPKPE [mm]")
     caption = (
         "MPJPE, MPKPE: mean error of joint angles and of key bodies' positions, over all episodes up to their end. "
         "Their intervals come from few motions where they are wide."
@@ -116,7 +127,8 @@ def registry_section(results: LoopResults) -> Section:
     for name, model in results.published.get("models", {}).items():
         versions = ", ".join(str(version) for version in model["versions"])
         champion = "–" if model.get("champion") is None else f"version {model['champion']}"
-        rows.append((name, str(model["version"]), versions, champion, model["reason"], str(model["onnx_sha256"])[:12]))
+        digest = str(model["onnx_sha256"])[:12]
+        rows.append((label(results, name), str(model["version"]), versions, champion, model["reason"], digest))
     blocks: tuple[Block, ...] = (
         table(("model", "newest", "in this run", "@champion", "why", "ONNX sha256"), rows, "", "registered models"),
         note("Look one up: mlflow.pyfunc.load_model('models:/generalist@champion'), with the server of `make serve`."),

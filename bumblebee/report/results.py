@@ -22,6 +22,10 @@ class RoundResults:
     """data/diagnosis/rN/diagnosis.json."""
     deltas: dict[str, Json]
     """Cluster -> card of its delta action."""
+    parent: int = 0
+    """The round whose experts ran on the robot in it."""
+    compensation: Json | None = None
+    """data/compensation/rN/compensation.json; None where nothing was planned."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,8 @@ class LoopResults:
     """The turns with the robot."""
     pretrained: bool = False
     """Whether the base policy went on from the one that comes along."""
+    base_trained_on: bool = False
+    """Whether the base stage kept a policy of its own training, and not the one that it went on from."""
 
     @property
     def real_robot(self) -> bool:

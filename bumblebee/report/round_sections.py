@@ -3,6 +3,7 @@
 from typing import Any
 
 from bumblebee.report import noise_floor
+from bumblebee.report.compensation import compensation_table
 from bumblebee.report.page import Block, Cell, Section, bullets, heading, image, note, table, text
 from bumblebee.report.residual_figure import residual_figure, value_and_interval
 from bumblebee.report.results import LoopResults, RoundResults
@@ -41,6 +42,8 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
     blocks += [note(under)] if under else []
     blocks += [bullets(lines)] if lines else []
     blocks.append(text(_remains(diagnosis)))
+    undone = compensation_table(turn.compensation)
+    blocks += [heading("Undone at the joint, without training"), *undone] if undone else []
     blocks += [heading("Delta actions"), *_deltas(turn.deltas)]
     return Section(f"round-{turn.n}", f"Round {turn.n} with the robot", tuple(blocks))
 
@@ -90,7 +93,8 @@ def _truth_row(pair: Match) -> tuple[str | Cell, ...]:
         estimate += f" ({signed(100 * pair.relative_error, 1)} %{inside})"
     if pair.sealed is None:
         return truth, value, Cell(f"{name} (not sealed)", "missed"), estimate, _share(pair.found)
-    mark = Cell("found" if pair.through == "exact" else f"its class: {name}", "found")
+    how = {"exact": "found", "class": f"its class: {name}", "form": f"as a law without a name: {name}"}
+    mark = Cell(how[pair.through], "found")
     return truth, value, mark, estimate, _share(pair.found)
 
 

@@ -13,7 +13,8 @@ class Match:
     sealed: Json | None
     found: Json | None
     through: str = ""
-    """"exact", or "class" where the data cannot tell the found effect from the sealed one."""
+    """"exact"; "class" where the data cannot tell the found effect from the sealed one; "form" where a law without a
+    name was found at the sealed place."""
 
     @property
     def relative_error(self) -> float | None:
@@ -35,16 +36,32 @@ class Match:
 
 
 def match(sealed: list[Json], found: list[Json]) -> list[Match]:
-    """Pair sealed and found effects: same effect on the same place first, then by the found effect's class."""
+    """Pair sealed and found effects: the same effect and place first, then its class, then a discovered form there."""
     left, rows = list(found), []
     for truth in sealed:
         exact = next((f for f in left if _same(f, truth)), None)
         close = next((f for f in left if any(_same(e, truth) for e in f.get("equivalent", []))), None)
-        hit = exact or close
+        form = next((f for f in left if f["effect"] == "discovered" and _there(f, truth)), None)
+        hit = exact or close or form
         if hit is not None:
             left.remove(hit)
-        rows.append(Match(truth, hit, "" if hit is None else "exact" if hit is exact else "class"))
+        rows.append(Match(truth, hit, _through(hit, exact, close)))
     return rows + [Match(None, extra) for extra in left]
+
+
+def hits(sealed: list[Json], found: list[Json]) -> tuple[int, int, int]:
+    """(sealed and found, sealed, found but not sealed)."""
+    rows = match(sealed, found)
+    count = sum(1 for row in rows if row.sealed is not None and row.found is not None)
+    return count, len(sealed), sum(1 for row in rows if row.sealed is None)
+
+
+def _through(hit: Json | None, exact: Json | None, close: Json | None) -> str:
+    return "" if hit is None else "exact" if hit is exact else "class" if hit is close else "form"
+
+
+def _there(a: Json, b: Json) -> bool:
+    return not b["where"] or bool(set(a["where"]) & set(b["where"]))
 
 
 def _same(a: Json, b: Json) -> bool:

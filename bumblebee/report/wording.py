@@ -46,30 +46,58 @@ def number(entry: dict[str, Any], digits: int = 3, factor: float = 1.0) -> str:
     return f"{text} [{max(factor * low, 0.0):.{digits}f}, {factor * high:.{digits}f}]"
 
 
-def change(entry: dict[str, Any]) -> str:
-    """A difference of rates in percentage points with its interval and what it shows.
+SAME_FILE = "the same file, nothing to compare"
+MEASURES = {
+    "success": ("success", 100.0, 0, "points", 1),
+    "mpjpe_rad": ("MPJPE", 1e3, 1, "mrad", -1),
+    "mpkpe_mm": ("MPKPE", 1.0, 1, "mm", -1),
+}
+"""Key of a paired comparison -> its name, factor to the unit shown, digits, unit, and which sign is better."""
+
+
+def change(entry: dict[str, Any], measure: str = "success") -> str:
+    """A paired difference with its interval and what it shows; success in percentage points.
 
     Two rates differ by 100 points at most, so an interval from few motions is cut there.
     """
-    difference = entry["success"]
-    if difference["value"] is None:
-        return "not comparable"
+    if entry.get("unchanged"):
+        return SAME_FILE
+    difference = entry.get(measure) or {}
+    if difference.get("value") is None:
+        return "not comparable" if measure == "success" else "no episode that both followed"
+    _, factor, digits, unit, better = MEASURES[measure]
+    words = f"{signed(factor * difference['value'], digits)} {unit}"
     low, high = difference["ci95"]
-    points = f"{signed(100 * difference['value'])} points"
     if low is None or high is None:
-        return f"{points}, too few motions for an interval"
-    p = difference["p"]
+        return f"{words}, too few motions for an interval"
     if difference["value"] == low == high == 0:
         return "the same on every motion: no difference shown"
-    low, high = max(low, -1.0), min(high, 1.0)
-    return f"{points} [{signed(100 * low)}, {signed(100 * high)}], p = {p:.2g}: {shown(low, high, p)}"
+    if measure == "success":
+        low, high = max(low, -1.0), min(high, 1.0)
+    p = difference["p"]
+    interval = f"[{signed(factor * low, digits)}, {signed(factor * high, digits)}]"
+    return f"{words} {interval}, p = {p:.2g}: {shown(low, high, p, better)}"
 
 
-def shown(low: float, high: float, p: float) -> str:
-    """What a gain's interval and the paired test over motions show together; few motions can fool either."""
+def changes(entry: dict[str, Any]) -> str:
+    """All three differences in one line; one sentence where both are the same file."""
+    if entry.get("unchanged"):
+        return SAME_FILE
+    return "; ".join(f"{MEASURES[m][0]} {change(entry, m)}" for m in MEASURES if m in entry)
+
+
+def shown(low: float, high: float, p: float, better: int = 1) -> str:
+    """What a difference's interval and the paired test over motions show together; few motions can fool either.
+
+    Args:
+        low: end of the 95 % interval.
+        high: its other end.
+        p: of the paired test.
+        better: 1 where more is better (success), -1 where less is (errors).
+    """
     if p > ALPHA or low <= 0 <= high:
         return "no difference shown"
-    return "improved" if low > 0 else "worse"
+    return "better" if better * low > 0 else "worse"
 
 
 def effect_line(effect: dict[str, Any]) -> tuple[str, str, str]:

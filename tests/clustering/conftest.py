@@ -30,7 +30,8 @@ def made_clip(name: str, kind: str, seed: int = 0, seconds: float = 2.0, split: 
     root_pos = np.stack([np.cos(yaw) * speed * time, np.sin(yaw) * speed * time, np.full_like(time, 0.78)], 1)
     root_pos[:, :2] += draw.uniform(-2, 2, 2)
     quat = np.tile([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)], (len(time), 1))
-    return make_clip(name, 50.0, root_pos, quat, joint_pos, captions=(TEXTS[kind],), family=kind, split=split)
+    return make_clip(name, 50.0, root_pos, quat, joint_pos, captions=(TEXTS[kind],), family=kind, split=split,
+                     caption_source="file")  # fmt: skip
 
 
 @pytest.fixture(scope="session")

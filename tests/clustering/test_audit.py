@@ -36,6 +36,16 @@ def test_keywords_are_what_sets_a_cluster_apart() -> None:
     assert keywords([(), ()], np.array([0, 1]), 2) == [[], []]
 
 
+def test_words_that_nearly_all_captions_have_and_verbs_of_templates_are_no_keywords() -> None:
+    captions = [(f"a person performs slowly {what}",) for what in ("walking", "walking", "waving", "waving", "waving")]
+    assert keywords(captions, np.array([0, 0, 1, 1, 1]), 2) == [["walking"], ["waving"]]
+
+
+def test_a_word_that_is_no_more_frequent_in_a_cluster_than_elsewhere_does_not_name_it() -> None:
+    captions = [("walks left",), ("walks",), ("waves left",), ("waves",)]
+    assert keywords(captions, np.array([0, 0, 1, 1]), 2) == [["walks"], ["waves"]]
+
+
 def test_names_follow_the_papers_table() -> None:
     """Jump, two walks by speed, three stands by the legs' share."""
     rows = [

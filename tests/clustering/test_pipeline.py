@@ -9,6 +9,7 @@ from bumblebee.clustering.config import ClusterConfig
 from bumblebee.clustering.pipeline import Clustering, cluster_clips
 from bumblebee.clustering.text import TokenTable
 from bumblebee.errors import BadInput
+from bumblebee.motion.captions import caption_from_name
 from bumblebee.motion.clip import Clip
 
 
@@ -28,7 +29,7 @@ def test_summary_counts_every_clip(result: Clustering, library: list[Clip]) -> N
     rows = result.summary["clusters"]
     assert sum(row["clips"] + row["held_out_clips"] for row in rows.values()) == len(library) == len(result.labels)
     assert [row["label"] for row in rows.values()] == ["stand", "walk"]
-    assert result.summary["clips"] == {"train": 14, "held_out": 2, "with_captions": 16}
+    assert result.summary["clips"] == {"train": 14, "held_out": 2, "with_captions": 16, "texts": {"file": 16}}
     assert result.elbow["k"].tolist() == list(range(1, 7)) and len(result.curve) == 25
 
 
@@ -40,6 +41,17 @@ def test_held_out_clips_change_nothing(library: list[Clip], table: TokenTable, t
     kept = both[both["split"] == "train"].reset_index(drop=True)
     assert kept["cluster"].tolist() == alone["cluster"].tolist()
     assert kept["x"].to_numpy() == pytest.approx(alone["x"].to_numpy(), abs=1e-5)
+
+
+def test_where_texts_and_families_come_from_the_same_names_there_is_no_agreement_and_no_keyword(
+    library: list[Clip], table: TokenTable, tiny: ClusterConfig
+) -> None:
+    """Families read from names agree with clusters of texts made from the same names: that would prove nothing."""
+    named = [replace(clip, captions=(caption_from_name(clip.name),), caption_source="name") for clip in library]
+    summary = cluster_clips(named, ["c0", "c1"], replace(tiny, epochs=1), table=table).summary
+    assert summary["audit"]["family_ari"] is None
+    assert [row["keywords"] for row in summary["clusters"].values()] == ["", ""]
+    assert summary["clips"]["texts"] == {"name": len(library)}
 
 
 def test_too_few_clips_are_refused_before_any_work(library: list[Clip], tiny: ClusterConfig) -> None:

@@ -6,8 +6,9 @@ import pytest
 import torch
 
 from bumblebee.clustering import text
-from bumblebee.clustering.text import PACKAGE, embed_captions, plain_text
+from bumblebee.clustering.text import PACKAGE, embed_captions, evidence, plain_text
 from bumblebee.errors import BadInput
+from bumblebee.motion.captions import caption_from_name
 
 
 def test_real_encoder_knows_what_walking_is() -> None:
@@ -49,3 +50,13 @@ def test_folder_that_does_not_load_is_named(tmp_path: Path) -> None:
     (tmp_path / "config.json").write_text("{}")
     with pytest.raises(BadInput, match="text_encoder"):
         embed_captions(["a person walks"], str(tmp_path))
+
+
+def test_words_of_a_file_name_are_no_evidence_of_what_a_motion_means() -> None:
+    """Neither as the library's own template nor copied into a caption file."""
+    made = caption_from_name("J_Dance11_Gnarly")
+    assert evidence((made,), "name", "J_Dance11_Gnarly") == ()
+    assert evidence(("a person performs dance gnarly",), "file", "J_Dance11_Gnarly") == ()
+    assert evidence(("a man swings both arms#a/DET#0.0#0.0",), "file", "dance_11") == ("a man swings both arms",)
+    assert evidence(("a person bows",), "made", "bow") == ("a person bows",)
+    assert evidence(("a person bows",), "", "bow") == ()  # nobody knows where it came from

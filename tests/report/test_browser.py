@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from bumblebee.report.filmstrip import sheet
-from bumblebee.report.page import Section, film
-from tests.report.made import TRUTH, found, page
+from bumblebee.report.page import Section, film, heading
+from tests.report.made import TRUTH, found, page, page_of, won_back
 
 sync_api = pytest.importorskip("playwright.sync_api")
 CHROMIUM = next(
@@ -145,4 +145,61 @@ def test_lines_stay_readable_and_figures_fill_the_width(browser: Any, file: Path
     wide = "[...document.querySelectorAll('.figures figure, table')]"
     right = f"Math.max(...{wide}.map(e => e.getBoundingClientRect().right))"
     assert shown.evaluate(right) > 0.7 * width
+    shown.close()
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page that opens with the robot won back, and a film of two runs side by side."""
+    frames = np.zeros((12, 300, 584, 3), np.uint8)
+    frames[:] = np.arange(12)[:, None, None, None] * 20
+    panels = ("before: falls after 1.9 s", "refined: followed to the end")
+    block = film(sheet(frames, 10.0), "walk_fast", "The counted episodes themselves.", "The robot twice.", panels)
+    path = tmp_path_factory.mktemp("first") / "report.html"
+    path.write_text(page_of(won_back(), film=[heading("The same motion on the robot, before and after"), block]))
+    return path
+
+
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (1440, 900)])
+def test_the_first_screen_is_whole_and_can_be_read(browser: Any, first: Path, width: int, height: int) -> None:
+    shown = browser.new_page(viewport={"width": width, "height": height})
+    shown.goto(first.as_uri())
+    assert shown.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert shown.evaluate("document.querySelector('.opening').getBoundingClientRect().top") < 120
+    cut = """() => [...document.querySelectorAll('.opening *')].filter(e => {
+        if (e.closest('.screen, caption')) return false;
+        const box = e.getBoundingClientRect();
+        return box.width && (box.right > innerWidth + 1 || box.left < -1 || e.scrollWidth > e.clientWidth + 1
+            && getComputedStyle(e).display != 'inline' && e.clientWidth);
+    }).map(e => e.outerHTML.slice(0, 80))"""
+    assert shown.evaluate(cut) == []
+    small = f"""() => [...document.querySelectorAll('.opening *')].filter(e => e.innerText?.trim()
+        && parseFloat(getComputedStyle(e).fontSize) < {SMALLEST}).map(e => e.outerHTML.slice(0, 80))"""
+    assert shown.evaluate(small) == []
+    bottom = "document.querySelector('.opening {}').getBoundingClientRect().bottom"
+    if width > 1000:  # beside each other: all of it fits
+        assert shown.evaluate(bottom.format("table.bars")) < height
+        assert shown.evaluate(bottom.format(".film .controls")) < height
+    assert shown.evaluate(bottom.format(".headline")) < height / 2
+    shown.close()
+
+
+def test_one_button_plays_both_runs_and_each_has_its_heading(browser: Any, first: Path) -> None:
+    shown = browser.new_page(viewport={"width": 390, "height": 844})
+    shown.goto(first.as_uri())
+    assert shown.locator(".opening .play").count() == shown.locator(".opening .screen img").count() == 1
+    halves = shown.evaluate("[...document.querySelectorAll('.panels span')].map(e => e.getBoundingClientRect().left)")
+    assert halves[1] > 390 / 2 - 10 > halves[0]
+    assert "before: falls after 1.9 s" in shown.inner_text(".panels")
+    shown.locator(".play").click()
+    sync_api.expect(shown.locator(".film input")).to_have_value(re.compile("^([2-9]|1[01])$"))
+    shown.close()
+
+
+def test_a_bar_is_as_long_as_its_share(browser: Any, first: Path) -> None:
+    shown = browser.new_page(viewport={"width": 1440, "height": 900})
+    shown.goto(first.as_uri())
+    share = "(() => { const b = [...document.querySelectorAll('.bar')][0], i = b.querySelector('i');"
+    share += " return i.getBoundingClientRect().width / b.getBoundingClientRect().width })()"
+    assert shown.evaluate(share) == pytest.approx(0.22, abs=0.01)
     shown.close()

@@ -3,7 +3,8 @@
 import pytest
 
 from bumblebee.report import noise_floor
-from bumblebee.report.verdict import facts, verdict
+from bumblebee.report.opening import opening_lines
+from bumblebee.report.verdict import verdict
 from tests.report.made import TRUTH, block, found, loop_results
 
 FLOOR = {"value": 4.39, "ci95": [3.0, 5.0]}
@@ -30,7 +31,7 @@ def test_the_verdict_explains_an_error_below_the_floor_and_shows_the_floors_inte
     results.rounds[0].diagnosis["error"] |= {"after": block(0.00325), "floor": block(0.0034)}
     (line,) = [line for line in verdict(results) if "noise floor" in line]
     assert "noise floor 3.40 [3.06, 3.74] mrad (no more than sensor noise explains)" in line
-    assert any("noise floor 3.40 [3.06, 3.74]" in fact.detail for fact in facts(results))
+    assert any("noise floor 3.40 [3.06, 3.74]" in line for line in opening_lines(results))
 
 
 def test_errors_below_the_floors_interval_are_listed_one_by_one() -> None:

@@ -72,14 +72,14 @@ def test_a_real_robot_has_no_truth_to_show() -> None:
 
 @pytest.mark.parametrize(
     ("low", "high", "p", "said"),
-    [(0.1, 0.2, 0.01, "improved"), (-0.2, -0.1, 0.05, "worse"), (-0.1, 0.1, 0.01, "no difference shown"),
+    [(0.1, 0.2, 0.01, "better"), (-0.2, -0.1, 0.05, "worse"), (-0.1, 0.1, 0.01, "no difference shown"),
      (0.1, 0.2, 0.06, "no difference shown"), (-0.2, -0.1, 0.5, "no difference shown")],
 )  # fmt: skip
 def test_claims_need_the_interval_and_the_test(low: float, high: float, p: float, said: str) -> None:
     assert shown(low, high, p) == said
 
 
-@pytest.mark.parametrize(("motions", "said"), [(2, "no difference shown"), (6, "improved")])
+@pytest.mark.parametrize(("motions", "said"), [(2, "no difference shown"), (6, "better")])
 def test_two_motions_prove_nothing_however_alike_they_are(motions: int, said: str) -> None:
     gains = np.ones(motions)
     success = {"value": 1.0, "ci95": list(bootstrap_mean(gains)), "p": sign_flip_test(gains)}

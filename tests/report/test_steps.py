@@ -1,0 +1,75 @@
+"""Every step is told in all three measures, in words; what came along is told apart from what the loop taught."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from bumblebee.report.names import everyone, label, ladder, last_policy
+from bumblebee.report.policy_sections import registry_section, success_section
+from bumblebee.report.results import LoopResults
+from bumblebee.report.verdict import verdict
+from bumblebee.report.wording import SAME_FILE, change, changes
+from tests.report.made import TRUTH, difference, found, loop_results
+
+
+def told(results: LoopResults) -> dict[str, list[tuple[str, ...]]]:
+    """Rows of each table in the success section, by the table's name."""
+    blocks = success_section(results).blocks
+    return {b.title: [tuple(str(cell) for cell in row) for row in b.rows] for b in blocks if b.kind == "table"}
+
+
+def with_step(**more: Any) -> LoopResults:
+    made = loop_results([found()], [TRUTH])
+    changed = [{**c, **more} for c in made.evaluation["comparisons"]]
+    return replace(made, evaluation={**made.evaluation, "comparisons": changed})
+
+
+def test_a_round_that_makes_joint_errors_worse_is_said_beside_equal_success() -> None:
+    results = with_step(
+        success=difference(0.0, 0.1, 1.0), mpjpe_rad=difference(0.004, 0.001, 0.01), mpkpe_mm=difference(-8, 3, 0.02)
+    )
+    row = told(results)["steps of the loop"][0]
+    assert row[-3].endswith("no difference shown")
+    assert row[-2] == "+4.0 mrad [+3.0, +5.0], p = 0.01: worse"
+    assert row[-1].endswith("mm [−11.0, −5.0], p = 0.02: better")
+    assert any("MPJPE" in line and "worse" in line for line in verdict(results))
+
+
+def test_a_file_is_not_compared_with_itself() -> None:
+    results = with_step(unchanged=True)
+    assert all(row[-3:] == (SAME_FILE, "–", "–") for row in told(results)["steps of the loop"])
+    assert changes({"unchanged": True, "success": difference(0, 0, 1)}) == SAME_FILE
+    assert not any("no difference shown" in line for line in verdict(results))
+
+
+def test_a_difference_without_pairs_says_so() -> None:
+    nothing = {"value": None, "ci95": [None, None], "p": None, "motions": 0}
+    assert change({"mpjpe_rad": nothing}, "mpjpe_rad") == "no episode that both followed"
+    assert change({"success": nothing}) == "not comparable"
+
+
+@pytest.mark.parametrize(
+    ("shipped", "trained_on", "called"),
+    [(True, False, "base (shipped)"), (True, True, "base (shipped, trained on)"), (False, False, "base")],
+)
+def test_what_came_along_is_told_apart_in_every_table(shipped: bool, trained_on: bool, called: str) -> None:
+    results = replace(loop_results([found()], [TRUTH]), pretrained=shipped, base_trained_on=trained_on)
+    tables = told(results)
+    rates = tables["success on the stand-in robot"]
+    assert called in {row[0] for row in rates} and ("base" in {row[0] for row in rates}) == (called == "base")
+    gains = {row[0]: row[4] for row in rates if row[1] == "training"}
+    assert gains["generalist"] != "–" and gains[called] == "–"
+    assert any(row[0].startswith(f"{called} →") for row in tables["steps of the loop"])
+    assert registry_section(results).blocks[0].rows[0][0] == called
+
+
+def test_controls_stand_beside_their_round_and_are_no_step_of_the_loop() -> None:
+    made = loop_results([found()], [TRUTH])
+    names = ["experts-r10", "control-delta-r1", "experts-r0-compensated", "base", "experts-r1", "experts-r0"]
+    results = replace(made, evaluation={**made.evaluation, "results": [{"policy": name} for name in names]})
+    assert ladder(results) == ["base", "experts-r0", "experts-r0-compensated", "experts-r1", "experts-r10"]
+    assert everyone(results)[3:5] == ["experts-r1", "control-delta-r1"]
+    assert last_policy(results) == "experts-r10"
+    assert label(results, "control-delta-r1") == "control r1: delta alone"
+    assert label(results, "experts-r0-compensated") == "experts-r0, compensated"
