@@ -1,11 +1,14 @@
 """Stage seal: draws the stand-in robot's undeclared effects by seed and seals them in data/sealed/robot.json.
 
-Only the stand-in's process reads that file, and the report at the very end. With a real robot this stage has no use.
+A robot on which the shipped policy loses next to nothing has nothing to win back: it is drawn again, a little worse,
+until the policy loses a share of the motions. Only the stand-in's process reads the file, and the report at the very
+end. With a real robot this stage has no use, and nothing is tried.
 """
 
 import json
+import tempfile
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,11 +17,18 @@ import numpy as np
 from bumblebee.deploy.stand_in_effects import SCHEMA, declared_g1, entry, seal
 from bumblebee.deploy.undeclared.faults import largest, peaks
 from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place, fits
-from bumblebee.ranges import Name, Range, Ranged, Seed, Share
+from bumblebee.errors import BadInput
+from bumblebee.evaluation.thinning import thin
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.store import read_index, read_library
+from bumblebee.ranges import Count, Few, Name, PartOf, Range, Ranged, Seed, Share
 from bumblebee.robot.facts import g1_bodies, joint_names
+from tasks.rollouts import FILTERED, RolloutsConfig, cut
+from tasks.seal_trial import export_shipped, followed, try_robot
 from tasks.stage import load, output_file, run_stage
 
 OUT = Path("data/sealed/robot.json")
+WORSE = 1.1  # sizes of a draw over those of the draw before
 SMALLEST = 0.4  # share of a kind's largest size that every size has, before `severity`
 LIGHT = 0.25  # kg: bodies below are left out, an effect on them is none
 OF_G1 = tuple(name for name, kind in KINDS.items() if fits(kind, "g1"))
@@ -38,7 +48,21 @@ class SealConfig(Ranged):
     outside: Share = 0.34
     """Chance that one of the effects, never more, is of a kind outside the catalogue."""
     severity: Annotated[float, Range(above=0, most=100)] = 1.0
-    """Factor on the sizes, which are else 0.4 to 1.0 of the largest fault of their kind and never above it."""
+    """Factor on the sizes, which are else 0.4 to 1.0 of what is still a robot with a fault."""
+    loses: PartOf = 1 / 3
+    """Share of the motions, of those that it follows on the declared model, that the shipped policy must lose."""
+    stands: Annotated[float, Range(least=0, most=3600)] = 2.0
+    """Median time that it must follow a motion all the same [s]: a robot that falls at once gives no data."""
+    draws: Count = 40
+    """How often a robot is drawn at most; each draw is a tenth worse than the one before."""
+    motions: Count = 12
+    """Motions of the trial."""
+    max_seconds: Annotated[float, Range(least=0.1, most=3600)] = 6.0
+    """Longer motions are cut to their beginning [s]."""
+    trial_seed: Seed = 977
+    """Of the trial's start states and sensor noise; no other stage uses it."""
+    threads: Few = 2
+    """CPU threads of the trial."""
     joints: tuple[Name, ...] = joint_names()
     """Joints to draw from."""
     bodies: tuple[Name, ...] = BODIES
@@ -74,12 +98,44 @@ class SealConfig(Ranged):
 
 
 def main() -> None:
-    """Draw and seal."""
+    """Draw until the robot is worth it, and seal."""
     config = load("seal", SealConfig)
-    sealed = sealed_robot(config, 0)
+    rehearsed = load("rollouts", RolloutsConfig).source is None
+    sealed = found(config) if config.n_effects and rehearsed else sealed_robot(config, 0)
     with output_file(OUT) as path:
         path.write_text(json.dumps(sealed, indent=1) + "\n")
     print(f"sealed {len(sealed['effects'])} effects, sha256 {sealed['sha256'][:12]}")
+
+
+def found(config: SealConfig) -> dict[str, Any]:
+    """The first robot drawn on which the shipped policy loses enough, and stands long enough to be measured.
+
+    Raises:
+        BadInput: when none of the draws is such a robot.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        policy = export_shipped(Path(scratch) / "shipped")
+        clips = followed(policy, trial_clips(config), config.trial_seed, config.threads)
+        if not clips:
+            raise BadInput(FILTERED, "motions that the shipped policy follows on the declared model", "none")
+        for attempt in range(config.draws):
+            sealed = sealed_robot(config, attempt)
+            trial = try_robot(policy, sealed, clips, config.trial_seed, config.threads)
+            worth = trial.lost >= config.loses and trial.seconds >= config.stands
+            lost = f"the shipped policy loses {trial.lost:.0%} of {len(clips)} motions, median {trial.seconds:.1f} s"
+            print(f"draw {attempt + 1}: {lost}{'' if worth else ', drawn again'}", flush=True)
+            if worth:
+                return sealed | {"trial": {**asdict(trial), "motions": len(clips)}}
+    came = f"none in {config.draws} draws"
+    raise BadInput("params.yaml: seal", f"a robot on which {config.loses:.0%} are lost", came, "Raise seal.severity.")
+
+
+def trial_clips(config: SealConfig) -> list[Clip]:
+    """Some training motions of every family, cut to their beginning."""
+    index = read_index(FILTERED)
+    own = index[index["split"] == "train"]
+    names = thin(own.assign(cluster=own["family"]), config.motions)
+    return [cut(clip, config.max_seconds) for clip in read_library(FILTERED, names)]
 
 
 def sealed_robot(config: SealConfig, attempt: int) -> dict[str, Any]:
@@ -108,10 +164,24 @@ def draw(config: SealConfig, attempt: int = 0) -> list[dict[str, Any]]:
         free = [name for name in config.spots(kind.on) if (kind.on, name) not in taken]
         if len(effects) == config.n_effects or not free:
             continue
-        place = drawn_place(str(rng.choice(free)), rng)
+        place = drawn_place(somewhere(free, rng), rng)
         taken.add((kind.on, place.name))
-        effects.append(entry(kind, place, size(kind, place, config.severity, rng)))
+        effects.append(entry(kind, place, size(kind, place, config.severity * WORSE**attempt, rng)))
     return [effects[i] for i in rng.permutation(len(effects))]
+
+
+def somewhere(names: Sequence[str], rng: np.random.Generator) -> str:
+    """One of the places: half of the time in the legs, else in the waist or in the arms, each as often."""
+    regions = [[n for n in names if region(n) == which] for which in ("leg", "leg", "waist", "arm")]
+    free = [some for some in regions if some]
+    return str(rng.choice(free[int(rng.integers(len(free)))]))
+
+
+def region(name: str) -> str:
+    """Where a joint or body is: leg, waist or arm; what is neither counts as waist."""
+    if any(part in name for part in ("hip", "knee", "ankle")):
+        return "leg"
+    return "arm" if any(part in name for part in ("shoulder", "elbow", "wrist", "hand")) else "waist"
 
 
 def drawn_place(name: str, rng: np.random.Generator) -> Place:
@@ -127,10 +197,9 @@ def drawn_place(name: str, rng: np.random.Generator) -> Place:
 
 
 def size(kind: Kind, place: Place, severity: float, rng: np.random.Generator) -> float:
-    """A size that matters, of four digits, in the kind's own measure."""
-    most = largest(kind, place)
-    wanted = float(f"{most * min(1.0, severity * rng.uniform(SMALLEST, 1.0)):.4g}")
-    return float(np.clip(wanted, kind.least(place), most))
+    """A size that matters, of four digits, in the kind's own measure: 0.4 to 1.0 of a fault, times `severity`."""
+    wanted = float(f"{largest(kind, place) * severity * rng.uniform(SMALLEST, 1.0):.4g}")
+    return float(np.clip(wanted, kind.least(place), kind.most(place)))
 
 
 if __name__ == "__main__":

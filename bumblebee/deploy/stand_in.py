@@ -6,7 +6,7 @@
 
 It takes the robot's place: its effects are sealed in a file that nothing else reads before the loop's report.
 A plan is {"policies": {key: folder}, "episodes": [{"rollout_id", "policy", "motion", "seed", "meta"}],
-"start_noise": {...}}; meta and start_noise may be absent.
+"start_noise": {...}, "compensations": {key: compensation.json}}; meta and the last two may be absent.
 """
 
 import argparse
@@ -18,6 +18,8 @@ from pathlib import Path
 
 import mujoco
 
+from bumblebee.deploy.compensation import Compensation
+from bumblebee.deploy.compensation_file import load_compensations
 from bumblebee.deploy.episodes import Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import SideBySide
@@ -47,7 +49,7 @@ def main(argv: list[str] | None = None) -> int:
 def run(options: argparse.Namespace) -> None:
     """Run all episodes and write one file each."""
     effects = read_sealed(options.sealed) if options.sealed else []
-    folders, episodes, start = _plan(options) if options.plan else _named(options)
+    folders, episodes, start, undone = _plan(options) if options.plan else _named(options)
     if not episodes:
         raise BadInput(options.plan or "--names", "at least one episode", "none")
     policies = {key: ExportedPolicy.load(Path(folder)) for key, folder in folders.items()}
@@ -66,7 +68,7 @@ def run(options: argparse.Namespace) -> None:
             bar.update(count)
 
         make = lambda count: SideBySide(lambda part: StandInRobots(part, effects), count, options.threads)  # noqa: E731
-        rollouts = run_episodes(make, episodes, policies, clips, SensorNoise(), start, tick)
+        rollouts = run_episodes(make, episodes, policies, clips, SensorNoise(), start, tick, undone)
     for rollout in rollouts:
         rollout.meta.update({key: value for key, value in recorded.items() if key not in rollout.meta})
         rollout.meta["notes"] = _ending(rollout.frames, clips[rollout.meta["motion"]])
@@ -79,7 +81,7 @@ def _ending(frames: int, clip: Clip) -> str:
     )
 
 
-def _named(options: argparse.Namespace) -> tuple[dict[str, Path], list[Episode], StartNoise]:
+def _named(options: argparse.Namespace) -> tuple[dict[str, Path], list[Episode], StartNoise, dict[str, Compensation]]:
     """Every named clip, `--rollouts` times, by one policy."""
     if not options.policy or not options.names:
         raise BadInput("command line", "--policy and --names, or --plan", "neither")
@@ -90,16 +92,17 @@ def _named(options: argparse.Namespace) -> tuple[dict[str, Path], list[Episode],
         for name in options.names
         for run in range(options.rollouts)
     ]
-    return {key: options.policy}, episodes, StartNoise()
+    return {key: options.policy}, episodes, StartNoise(), {}
 
 
-def _plan(options: argparse.Namespace) -> tuple[dict[str, str], list[Episode], StartNoise]:
+def _plan(options: argparse.Namespace) -> tuple[dict[str, str], list[Episode], StartNoise, dict[str, Compensation]]:
     try:
         plan = json.loads(options.plan.read_text())
         episodes = [Episode(**episode) for episode in plan["episodes"]]
-        return dict(plan["policies"]), episodes, StartNoise(**plan.get("start_noise", {}))
+        policies, start = dict(plan["policies"]), StartNoise(**plan.get("start_noise", {}))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInput(options.plan, "a plan with policies and episodes", f"{type(error).__name__}: {error}") from None
+    return policies, episodes, start, load_compensations(plan, options.plan)
 
 
 def _options(argv: list[str] | None) -> argparse.Namespace:
