@@ -195,7 +195,7 @@ def _remarks(results: LoopResults, turn: RoundResults) -> list[str]:
 
 def _share(effect: Json | None) -> str:
     share = None if effect is None else effect.get("explains")
-    return "–" if share is None else f"{100 * share:.0f} %"
+    return "–" if share is None else f"{100 * share:.0f}\u00a0%"
 
 
 def _success(results: LoopResults, turn: RoundResults) -> list[Block]:
