@@ -25,10 +25,18 @@ class Planned:
 
 
 def planned(document: Json | None) -> tuple[Planned, ...]:
-    """The entries of compensation.json; the only function that knows its keys."""
+    """The entries of compensation.json; the only function that knows its keys.
+
+    `done` says how an effect is undone, `size` with which numbers, `why_not` why it is not; else empty.
+    """
     return tuple(
-        Planned(str(e["effect"]), tuple(e.get("where") or ()), bool(e.get("done")), str(e.get("what", "")))
-        for e in (document or {}).get("plan", [])
+        Planned(
+            str(entry["effect"]),
+            tuple(entry.get("where") or ()),
+            bool(entry.get("done")),
+            "; ".join(str(entry[key]) for key in ("done", "size", "why_not") if entry.get(key)),
+        )
+        for entry in (document or {}).get("plan", [])
     )
 
 

@@ -1,6 +1,7 @@
 """An effect in few words: its name, its place and its size with unit, as sealed and as found."""
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 from bumblebee.report.figures import short_joint
@@ -30,15 +31,13 @@ def places(where: Sequence[str]) -> str:
 
 
 def sealed_size(effect: Json) -> str:
-    """The sealed values with their units."""
+    """The sealed values with their units: the catalogue's, else those of the seal ("N m, rad") in order."""
     kind = CATALOGUE.get(effect["effect"])
     known = {p.name: p.unit for p in kind.parameters} if kind else {}
-    given = effect.get("units", effect.get("unit", ""))
-    parts = []
-    for name, value in effect["parameters"].items():
-        unit = given.get(name, "") if isinstance(given, dict) else known.get(name, given)
-        parts.append((name, _number(value), unit))
-    return _joined(parts)
+    given = str(effect.get("unit", "")).split(", ")
+    units = [known.get(name, unit) for name, unit in zip_longest(effect["parameters"], given, fillvalue="")]
+    rows = zip(effect["parameters"].items(), units, strict=False)
+    return _joined([(name, _number(value), unit) for (name, value), unit in rows])
 
 
 def found_size(effect: Json) -> str:

@@ -103,12 +103,14 @@ def _null(results: LoopResults, turn: RoundResults, found: list[Json]) -> str:
     """A robot that lacks nothing: the loop must find nothing and leave everything as it is."""
     changed = _changed(results, turn)
     if found:
-        wrongly = "; ".join(f"{named(effect)} {found_size(effect)}" for effect in found)
-        said = f"Nothing was undeclared; wrongly found: {wrongly}."
+        listed = "; ".join(f"{named(effect)} {found_size(effect)}" for effect in found)
+        said = f"Nothing was undeclared; wrongly found: {listed}."
         return f"{said} Changed on that ground: {', '.join(changed)}." if changed else f"{said} Nothing was changed."
+    wrongly = turn.diagnosis["unexplained"]["significant"]
+    named_nothing = "nothing was named, but structure was wrongly flagged" if wrongly else "nothing was found"
     if not changed:
-        return "Nothing was undeclared; nothing was found; nothing was changed."
-    return f"Nothing was undeclared; nothing was found; changed nevertheless: {', '.join(changed)}."
+        return f"Nothing was undeclared; {named_nothing}; nothing was changed."
+    return f"Nothing was undeclared; {named_nothing}; changed nevertheless: {', '.join(changed)}."
 
 
 def _changed(results: LoopResults, turn: RoundResults) -> list[str]:
@@ -195,7 +197,7 @@ def _remarks(results: LoopResults, turn: RoundResults) -> list[str]:
 
 def _share(effect: Json | None) -> str:
     share = None if effect is None else effect.get("explains")
-    return "–" if share is None else f"{100 * share:.0f} %"
+    return "–" if share is None else f"{100 * share:.0f}\u00a0%"
 
 
 def _success(results: LoopResults, turn: RoundResults) -> list[Block]:

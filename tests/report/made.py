@@ -143,9 +143,10 @@ FORM = {
 }  # fmt: skip
 PLAN = {
     "plan": [
-        {"effect": "coulomb_friction", "where": ["left_knee_joint"], "done": True, "what": "+1.15 N m along the speed"},
-        {"effect": "command_delay", "where": ["right_hip_pitch_joint"], "done": False,
-         "what": "a delay cannot be undone at the joint; its velocity gain is lowered by 12 %"},
+        {"effect": "coulomb_friction", "where": ["left_knee_joint"], "done": "torque along the speed asked for",
+         "size": "1.15 N m", "why_not": ""},
+        {"effect": "command_delay", "where": ["right_hip_pitch_joint"], "done": "", "size": "",
+         "why_not": "14 ms are more than the reference can be read ahead"},
     ]
 }  # fmt: skip
 WON = {

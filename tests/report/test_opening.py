@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from bumblebee.report.compensation import compensation_line, compensation_table
+from bumblebee.report.effect_words import sealed_size
 from bumblebee.report.opening import headline, opening, opening_lines
 from bumblebee.report.page import Block
 from bumblebee.report.results import LoopResults
@@ -34,7 +35,9 @@ def without(results: LoopResults, **changed: Any) -> LoopResults:
 def test_each_sealed_effect_stands_beside_what_was_found_with_its_share() -> None:
     friction, delay, law, false = effects(won_back())
     assert plain(friction[0][0]) == "coulomb friction, L knee: 1.2 N m"
-    assert plain(friction[1][0]) == "1.15 [1.05, 1.25] N m (−4.2 %, interval holds it)" and friction[2][0] == "71 %"
+    assert (
+        plain(friction[1][0]) == "1.15 [1.05, 1.25] N m (−4.2 %, interval holds it)" and plain(friction[2][0]) == "71 %"
+    )
     assert delay[1][1] == "flagged" and "depending on target, velocity" in delay[1][0]
     assert "outside the catalogue" in law[0][0] and law[1][1] == "found" and "sin(12*q)" in law[1][0]
     assert false[0] == ("not sealed", "missed") and "kd, L elbow" in false[1][0]
@@ -91,14 +94,17 @@ def untouched(results: LoopResults) -> LoopResults:
 
 
 def test_a_null_seal_that_changes_nothing_is_told_in_one_sentence() -> None:
-    results = untouched(won_back([], []))
+    flagged = untouched(won_back([], []))
+    assert "nothing was named, but structure was wrongly flagged; nothing was changed" in headline(flagged)
+    left = {"significant": False, "p": 0.4, "where": [], "depends_on": [], "description": ""}
+    results = without(flagged, diagnosis={**flagged.rounds[0].diagnosis, "unexplained": left})
     assert headline(results) == "Nothing was undeclared; nothing was found; nothing was changed."
     assert effects(results) == []
 
 
 @pytest.mark.parametrize(
     ("reported", "said"),
-    [([], "nothing was found; changed nevertheless: 1 compensation set, experts trained on."),
+    [([], "wrongly flagged; changed nevertheless: 1 compensation set, experts trained on."),
      ([found()], "wrongly found: coulomb friction, L knee 1.15 [1.05, 1.25] N m. Changed on that ground:")],
 )  # fmt: skip
 def test_a_null_seal_that_did_something_says_what(reported: list[dict[str, Any]], said: str) -> None:
@@ -138,7 +144,8 @@ def test_what_was_undone_at_the_joint_is_one_line_above_and_a_table_below() -> N
     assert compensation_line(PLAN).endswith("1 of 2; left: command delay, R hip pitch.")
     assert compensation_line(None) == "" and compensation_table({"plan": []}) == []
     (table,) = compensation_table(PLAN)
-    assert table.rows[0][2] == "+1.15 N m along the speed"
+    assert table.rows[0][2] == "torque along the speed asked for; 1.15 N m"
+    assert table.rows[1][1:] == ("left", "14 ms are more than the reference can be read ahead")
     assert "Undone at the joint, without training</h3>" in page_of(won_back())
 
 
@@ -154,3 +161,12 @@ def test_an_interval_of_a_difference_that_is_missing_is_no_claim() -> None:
     changed = [{**c, "success": few} for c in made.evaluation["comparisons"]]
     lines = step_differences({**made.evaluation, "comparisons": changed}, made.rounds[0])
     assert all(line.endswith("too few motions for an interval") for line in lines)
+
+
+def test_each_parameter_of_a_sealed_effect_has_its_own_unit() -> None:
+    inside = {"effect": "stribeck_friction", "where": [], "parameters": {"stiction": 1.0, "velocity": 0.2}, "unit": "x"}
+    assert plain(sealed_size(inside)) == "stiction 1 N m, velocity 0.2 rad/s"
+    beyond = {"effect": "sticky_gear", "where": [], "parameters": {"torque": 2, "width": 0.1}, "unit": "N m, rad"}
+    assert plain(sealed_size(beyond)) == "torque 2 N m, width 0.1 rad"
+    alone = {"effect": "sticky_gear", "where": [], "parameters": {"torque": 2, "teeth": 9}, "unit": "N m"}
+    assert plain(sealed_size(alone)) == "torque 2 N m, teeth 9"
