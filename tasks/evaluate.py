@@ -15,6 +15,7 @@ from typing import Annotated, Any
 
 import pandas as pd
 
+from bumblebee.deploy.compensation_file import read_compensation
 from bumblebee.deploy.episodes import FALL_RULE, Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy, read_policy_contract
 from bumblebee.deploy.robots import NominalRobots
@@ -32,7 +33,7 @@ from bumblebee.evaluation.contract import (
 )
 from bumblebee.evaluation.engines import engine_settings
 from bumblebee.evaluation.episodes import rollout_metrics
-from bumblebee.evaluation.summary import COLUMNS, comparisons, results
+from bumblebee.evaluation.summary import COLUMNS, comparisons, results, unchanged_pairs
 from bumblebee.evaluation.thinning import thin
 from bumblebee.evaluation.untrained import export_untrained
 from bumblebee.io.read import read_json
@@ -105,6 +106,11 @@ class Candidate:
         """Whether it says something about the robot alone: the declared model has nothing to make up for."""
         return self.kind == "compensated" or self.kind.startswith("control")
 
+    def told(self) -> dict[str, Any]:
+        """As it stands in summary.json; an export made for this evaluation alone has no folder."""
+        folder = "" if self.kind in ("untrained", "shipped") else str(self.folder)
+        return {**asdict(self), "folder": folder, "compensation": str(self.compensation or "")}
+
 
 def main() -> None:
     """Evaluate every policy there is."""
@@ -120,15 +126,16 @@ def main() -> None:
         tables = [
             run(engine, found, planned, clips, contract, cluster_of, config, Path(scratch)) for engine in config.engines
         ]
+        pairs = chain(found)
+        same_pairs = unchanged_pairs({c.policy: " ".join(same(c)) for c in found}, pairs)
     episodes = pd.concat(tables, ignore_index=True)
-    pairs = chain(found)
     summary = {
         "schema": 1,
         "contract_sha256": contract.sha256,
-        "policies": [{**asdict(c), "folder": str(c.folder) if c.kind != "untrained" else ""} for c in found],
+        "policies": [c.told() for c in found],
         "missing": missing,
         "results": results(episodes),
-        "comparisons": comparisons(episodes, pairs),
+        "comparisons": [c | {"unchanged": (c["from"], c["to"]) in same_pairs} for c in comparisons(episodes, pairs)],
     }
     with output_folder(OUT) as folder:
         write_contract(folder / "contract.json", contract)
@@ -223,7 +230,9 @@ def beside(cluster: str, number: int, parent: int) -> list[Candidate]:
         if (folder := Path(f"models/control/r{number}/{cluster}/{kind}/policy")).exists()
     ]
     if plan.exists() and (before.folder / "contract.json").exists():
-        found.insert(0, replace(before, policy=f"{before.policy}-compensated", kind="compensated", compensation=plan))
+        undone = plan if any(step.done for step in read_compensation(plan).plan) else None
+        name = f"{before.policy}-compensated"
+        found.insert(0, replace(before, policy=name, kind="compensated", compensation=undone))
     return found
 
 
@@ -329,7 +338,8 @@ def chain(found: list[Candidate]) -> list[tuple[str, str]]:
     extra = [("base", steps[-2]), ("base", "generalist"), ("shipped", "generalist")]
     for before, after in pairwise(rounds):
         controls = [f"control-{kind}-r{after}" for kind in ("declared", "delta")]
-        extra.append((f"experts-r{before}", f"experts-r{before}-compensated"))
+        compensated = f"experts-r{before}-compensated"
+        extra += [(f"experts-r{before}", compensated), (compensated, f"experts-r{after}")]
         extra += [(f"experts-r{before}", control) for control in controls]
         extra += [(control, f"experts-r{after}") for control in controls]
     return list(dict.fromkeys(pairs + [pair for pair in extra if pair[0] != pair[1]]))

@@ -21,14 +21,21 @@ COLUMNS = (
     "success", "mpjpe_rad", "mpkpe_mm", "frames", "end_reason",
 )  # fmt: skip
 ALL = "all"
+TOGETHER = {
+    "expert": "experts-r{}",
+    "compensated": "experts-r{}-compensated",
+    "control-declared": "control-declared-r{}",
+    "control-delta": "control-delta-r{}",
+}
+"""Kind of policy -> name of all clusters' policies of a round together, each on its own cluster's motions."""
 
 
 def results(episodes: pd.DataFrame) -> list[dict[str, Any]]:
     """One entry for each policy, engine, split and group.
 
-    `policy` is also "experts-r<N>": every motion by its own cluster's expert of round N. `group_by` is "all",
-    "family" or "cluster" (of the motion). Errors are means over motions, over all episodes up to termination and,
-    apart, over successful ones (`*_successful`), since errors of failures stop at the failure and so flatter it.
+    `policy` is also "experts-r<N>": every motion by its own cluster's expert of round N (`TOGETHER`). `group_by` is
+    "all", "family" or "cluster" (of the motion). Errors are means over motions, over all episodes up to termination
+    and, apart, over successful ones (`*_successful`), since errors of failures stop at the failure and so flatter it.
     """
     return [
         {
@@ -63,12 +70,12 @@ def numbers(rows: pd.DataFrame) -> dict[str, Any]:
 
 
 def policies(episodes: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
-    """Each policy's episodes, then those of all experts of a round together as "experts-r<N>"."""
+    """Each policy's episodes, then those of all experts of a round together under the names of `TOGETHER`."""
     for name in episodes["policy"].drop_duplicates():
         yield str(name), episodes[episodes["policy"] == name]
-    experts = episodes[episodes["kind"] == "expert"]
-    for number, rows in experts.groupby("round", sort=True):
-        yield f"experts-r{int(number)}", rows
+    for kind, name in TOGETHER.items():
+        for number, rows in episodes[episodes["kind"] == kind].groupby("round", sort=True):
+            yield name.format(int(number)), rows
 
 
 def compare(episodes: pd.DataFrame, first: str, second: str, engine: str, split: str) -> dict[str, Any] | None:
@@ -114,8 +121,8 @@ def comparisons(episodes: pd.DataFrame, pairs: list[tuple[str, str]]) -> list[di
 def same_files(files: Mapping[str, str], first: str, second: str) -> bool:
     """Whether two sides of a comparison are the same policy files, so that there is nothing to compare.
 
-    A side "experts-r<N>" is every expert of round N: it is the same as one policy where each of them is, and as another
-    round where each cluster's two experts are. A cluster of which only one side has an expert is not compared, so it
+    A side "experts-r<N>" is every expert of round N (likewise the others of `TOGETHER`): it is the same as one policy
+    where each of them is, and as another round where each cluster's two experts are. A cluster of which only one side has an expert is not compared, so it
     does not count; where no cluster is left, or a policy is not known, the answer is no.
 
     Args:
@@ -141,11 +148,17 @@ def _by_cluster(files: Mapping[str, str], side: str) -> dict[str, str]:
     """Cluster -> file of the experts that "experts-r<N>" stands for; of a single policy, its file under no cluster."""
     if side in files:
         return {"": files[side]}
-    ladder = re.fullmatch(r"experts-r(\d+)", side)
-    if ladder is None:
-        return {}
-    found = ((re.fullmatch(rf"expert-(.+)-r{ladder[1]}", policy), file) for policy, file in files.items())
+    member = _member(side)
+    found = ((re.fullmatch(member, policy), file) for policy, file in files.items()) if member else ()
     return {match[1]: file for match, file in found if match}
+
+
+def _member(side: str) -> str:
+    """Pattern of the policies that a name of `TOGETHER` stands for, their cluster its group; "" for another name."""
+    if match := re.fullmatch(r"experts-r(\d+)(-compensated)?", side):
+        return rf"expert-(.+)-r{match[1]}{match[2] or ''}"
+    match = re.fullmatch(r"(control-[a-z]+)-r(\d+)", side)
+    return rf"{match[1]}-(.+)-r{match[2]}" if match else ""
 
 
 def _paired(first: pd.DataFrame, second: pd.DataFrame, engine: str, split: str) -> pd.DataFrame:
