@@ -13,7 +13,7 @@ import sys
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -52,6 +52,9 @@ class RolloutsConfig(Ranged):
     by themselves; with another folder, run `dvc repro -f` for this stage."""
     threads: Few = 2
     """CPU threads of the stand-in."""
+    base: Literal["mocap", "odometry", "none"] = "mocap"
+    """What the stand-in knows of its base's place: motion capture of 1 mm; odometry that drifts, as on a robot in the
+    field; none: the policy gets the odometry and the log no base_pos."""
     max_seconds: Annotated[float, Range(least=0.1, most=3600)] = 10.0
     """Longer clips are cut to their beginning [s]."""
 
@@ -155,7 +158,7 @@ def run_stand_in(
         for clip in clips
         for run in range(config.repeats)
     ]
-    plan = {"policies": {name: str(policy.resolve())}, "episodes": episodes}
+    plan = {"policies": {name: str(policy.resolve())}, "episodes": episodes, "base": config.base}
     with tempfile.TemporaryDirectory() as scratch:
         write_library(Path(scratch) / "clips", clips)
         start_stand_in(plan, Path(scratch) / "clips", folder / "rollouts", Path(scratch), config.threads)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bumblebee.deploy.compensation import Compensation
+from bumblebee.deploy.odometry import placed
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import CONTROL_HZ, Robots
 from bumblebee.deploy.runner import PolicyRunner, reference_key, reference_library
@@ -79,6 +80,7 @@ def run_episodes(
         held[ids] = runner.hold()
     robots.reset(qpos, qvel, held)
     normal = [rng.standard_normal((clip.frames, draws(qpos.shape[1] - 7))) for rng, clip in zip(rngs, own, strict=True)]
+    place = placed(noise, qpos[:, :3], rngs, 1.0 / CONTROL_HZ)
     log, ended = _Log(len(episodes)), np.zeros(len(episodes), dtype=bool)
     for tick in range(int(lengths.max())):
         alive = np.flatnonzero(~ended & (tick < lengths))
@@ -88,7 +90,7 @@ def run_episodes(
         alive = np.setdiff1d(alive, fallen)
         if not len(alive):
             break
-        sensors = add_noise(true[alive], noise, np.stack([normal[i][tick] for i in alive]))
+        sensors = place(alive, add_noise(true[alive], noise, np.stack([normal[i][tick] for i in alive])))
         action, command = _act(groups, alive, tick, sensors)
         log.add(alive, sensors, action, command.target)
         robots.step(alive, command)

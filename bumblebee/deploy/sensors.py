@@ -46,6 +46,8 @@ class SensorNoise:
     """Odometry [m/s]."""
     base_pos: float = 0.001
     """Motion capture [m]."""
+    base: str = "mocap"
+    """How the base's place is known: `mocap`, or `odometry`, which drifts (`bumblebee.deploy.odometry`)."""
 
 
 NO_NOISE = SensorNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

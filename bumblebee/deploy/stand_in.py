@@ -6,13 +6,17 @@
 
 It takes the robot's place: its effects are sealed in a file that nothing else reads before the loop's report.
 A plan is {"policies": {key: folder}, "episodes": [{"rollout_id", "policy", "motion", "seed", "meta"}],
-"start_noise": {...}, "compensations": {key: compensation.json}}; meta and the last two may be absent.
+"start_noise": {...}, "base": ..., "compensations": {key: compensation.json}}; meta and the last three may be absent.
+
+`base` says what the robot knows of its base's place: `mocap`, 1 mm of noise; `odometry`, which drifts, for the policy
+as for the log; `none`, odometry for the policy and no `base_pos` in the log.
 """
 
 import argparse
 import json
 import os
 import sys
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -33,6 +37,22 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
 from bumblebee.progress import progress
 
+BASES = ("mocap", "odometry", "none")
+
+
+@dataclass(frozen=True)
+class Work:
+    """What is run."""
+
+    policies: dict[str, Path]
+    """Key -> folder."""
+    episodes: list[Episode]
+    start: StartNoise
+    base: str
+    """One of `BASES`."""
+    undone: dict[str, Compensation]
+    """By the keys of policies."""
+
 
 def main(argv: list[str] | None = None) -> int:
     """Run the process; returns its exit status."""
@@ -49,10 +69,11 @@ def main(argv: list[str] | None = None) -> int:
 def run(options: argparse.Namespace) -> None:
     """Run all episodes and write one file each."""
     effects = read_sealed(options.sealed) if options.sealed else []
-    folders, episodes, start, undone = _plan(options) if options.plan else _named(options)
+    work = _plan(options) if options.plan else _named(options)
+    episodes = work.episodes
     if not episodes:
         raise BadInput(options.plan or "--names", "at least one episode", "none")
-    policies = {key: ExportedPolicy.load(Path(folder)) for key, folder in folders.items()}
+    policies = {key: ExportedPolicy.load(folder) for key, folder in work.policies.items()}
     clips = {clip.name: clip for clip in read_library(options.clips, sorted({e.motion for e in episodes}))}
     existing = [e.rollout_id for e in episodes if (options.out / f"{e.rollout_id}.parquet").exists()]
     if existing:
@@ -68,8 +89,9 @@ def run(options: argparse.Namespace) -> None:
             bar.update(count)
 
         make = lambda count: SideBySide(lambda part: StandInRobots(part, effects), count, options.threads)  # noqa: E731
-        rollouts = run_episodes(make, episodes, policies, clips, SensorNoise(), start, tick, undone)
-    for rollout in rollouts:
+        noise = SensorNoise(base="mocap" if work.base == "mocap" else "odometry")
+        rollouts = run_episodes(make, episodes, policies, clips, noise, work.start, tick, work.undone)
+    for rollout in rollouts if work.base != "none" else [replace(rollout, base_pos=None) for rollout in rollouts]:
         rollout.meta.update({key: value for key, value in recorded.items() if key not in rollout.meta})
         rollout.meta["notes"] = _ending(rollout.frames, clips[rollout.meta["motion"]])
         write_rollout(options.out / f"{rollout.rollout_id}.parquet", rollout)
@@ -81,7 +103,7 @@ def _ending(frames: int, clip: Clip) -> str:
     )
 
 
-def _named(options: argparse.Namespace) -> tuple[dict[str, Path], list[Episode], StartNoise, dict[str, Compensation]]:
+def _named(options: argparse.Namespace) -> Work:
     """Every named clip, `--rollouts` times, by one policy."""
     if not options.policy or not options.names:
         raise BadInput("command line", "--policy and --names, or --plan", "neither")
@@ -92,17 +114,20 @@ def _named(options: argparse.Namespace) -> tuple[dict[str, Path], list[Episode],
         for name in options.names
         for run in range(options.rollouts)
     ]
-    return {key: options.policy}, episodes, StartNoise(), {}
+    return Work({key: options.policy}, episodes, StartNoise(), options.base or BASES[0], {})
 
 
-def _plan(options: argparse.Namespace) -> tuple[dict[str, str], list[Episode], StartNoise, dict[str, Compensation]]:
+def _plan(options: argparse.Namespace) -> Work:
     try:
         plan = json.loads(options.plan.read_text())
+        policies = {key: Path(folder) for key, folder in plan["policies"].items()}
         episodes = [Episode(**episode) for episode in plan["episodes"]]
-        policies, start = dict(plan["policies"]), StartNoise(**plan.get("start_noise", {}))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        start, base = StartNoise(**plan.get("start_noise", {})), options.base or plan.get("base", BASES[0])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise BadInput(options.plan, "a plan with policies and episodes", f"{type(error).__name__}: {error}") from None
-    return policies, episodes, start, load_compensations(plan, options.plan)
+    if base not in BASES:
+        raise BadInput(f"{options.plan}: base", f"one of {', '.join(BASES)}", str(base)[:40])
+    return Work(policies, episodes, start, base, load_compensations(plan, options.plan))
 
 
 def _options(argv: list[str] | None) -> argparse.Namespace:
@@ -120,6 +145,7 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--cluster", default="", help="cluster, for the metadata")
     parser.add_argument("--prefix", default="", help="of the rollouts' names")
     parser.add_argument("--seed", type=int, default=0, help="of start states and sensor noise")
+    parser.add_argument("--base", choices=BASES, help="what it knows of its base's place; mocap, or as the plan says")
     parser.add_argument("--threads", type=int, default=2, help="of the simulation")
     parser.add_argument("--with-parent", action="store_true", help="end when the process that started it is gone")
     parser.add_argument("--operator", default="stand-in", help="for the metadata")

@@ -68,10 +68,12 @@ def seal(effects: list[Json]) -> str:
 def entry(kind: Kind, place: Place, size: float) -> Json:
     """One effect as it stands in the file: what it is in the contract's words, and what its law is made of."""
     _, parameters = kind.make(place, size)
+    _, neutral = kind.make(place, max(kind.least(place), 1e-9 * kind.first(place)))
+    changed = sorted(parameters, key=lambda name: bool(np.isclose(parameters[name], neutral[name])))
     return {
         "effect": kind.name,
         "where": [place.name] if place.name else [],
-        "parameters": {name: float(value) for name, value in parameters.items()},
+        "parameters": {name: float(parameters[name]) for name in changed},  # those that the size changes come first
         "unit": UNITS.get(kind.name, ""),
         "size": float(size),
         "draw": {**place.draw, **{name: getattr(place, name) for name in _PEAKS}},

@@ -35,8 +35,8 @@ class StandInRobots:
         rng = np.random.default_rng(0)
         self._body = TrueRobots(replace(robot, spec=spec), to_laws(effects), count, rng, solver=None)
         self.model: mujoco.MjModel = self._body.model
-        self.kp, self.kd = self._body.kp, self._body.kd
-        self._view = BatchView(self._body.batch)
+        self.batch, self.kp, self.kd = self._body.batch, self._body.kp, self._body.kd
+        self._view = BatchView(self.batch)
 
     def reset(self, qpos: np.ndarray, qvel: np.ndarray, targets: np.ndarray) -> None:
         """Put all robots at qpos (B, 7 + J), qvel (B, 6 + J), as if targets (B, J) had long been held."""

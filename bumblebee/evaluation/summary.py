@@ -122,8 +122,8 @@ def same_files(files: Mapping[str, str], first: str, second: str) -> bool:
     """Whether two sides of a comparison are the same policy files, so that there is nothing to compare.
 
     A side "experts-r<N>" is every expert of round N (likewise the others of `TOGETHER`): it is the same as one policy
-    where each of them is, and as another round where each cluster's two experts are. A cluster of which only one side has an expert is not compared, so it
-    does not count; where no cluster is left, or a policy is not known, the answer is no.
+    where each of them is, and as another round where each cluster's two experts are. A cluster of which only one side
+    has an expert is not compared, so it does not count; where none is left, or a policy is not known, the answer is no.
 
     Args:
         files: policy ("base", "expert-<cluster>-r<N>", ...) -> sha256 of its ONNX file.

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from benchmarks.undeclared.robots import declared
+from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.deploy.undeclared.gears import Elastic
 from bumblebee.deploy.undeclared.kinds import KINDS, Place
 from bumblebee.deploy.undeclared.ringing import softest
@@ -20,7 +21,7 @@ def speeds(joint: str, compliance: float) -> tuple[float, float]:
     robots.reset(POSE, np.zeros_like(POSE), POSE + 0.02)
     path = []
     for _ in range(50):
-        robots.step(POSE + 0.02)
+        robots.step(ServoCommand(POSE + 0.02))
         path.append(robots.state()[1][0, ARM.joints.index(joint)])
     return float(np.sqrt(np.mean(np.square(path[:10])))), float(np.sqrt(np.mean(np.square(path[-10:]))))
 
@@ -52,7 +53,7 @@ def test_a_shaft_swings_as_two_masses_do() -> None:
     law._damping, law._angle, law._given = 0.0, law._angle + 0.01, law._given + 6.0
     twist = []
     for _ in range(200):
-        robots._cycle(POSE, robots.everyone)
+        robots.step(ServoCommand(POSE), cycles=1)
         twist.append(law._angle[0] - robots.state()[0][0, 4])
     signs = np.flatnonzero(np.diff(np.sign(twist)) > 0)
     measured = 2 * np.pi * (len(signs) - 1) / ((signs[-1] - signs[0]) * 1e-3)

@@ -8,20 +8,22 @@ import numpy as np
 import pytest
 
 from bumblebee.deploy.stand_in import main
-from bumblebee.deploy.stand_in_effects import read_sealed, seal, to_arrays
+from bumblebee.deploy.stand_in_effects import declared_g1, entry, read_sealed, seal
+from bumblebee.deploy.undeclared.kinds import KINDS, Place
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import read_rollout
 from bumblebee.motion.store import write_library
 from bumblebee.robot.facts import joint_names, joints
-from bumblebee.robot.model import build_model, gains
+from bumblebee.robot.model import gains
 from bumblebee.tracking.feed_forward import lead_angles
 from tests.deploy.conftest import nod
 
-OFFSET = {"effect": "encoder_offset", "where": ["right_elbow_joint"], "parameters": {"offset": 0.05}}
+DRAWN = {"sign": 1, "axis": 0, "number": 8, "other": "left_knee_joint"}
+OFFSET = entry(KINDS["encoder_offset"], Place(declared_g1(), "right_elbow_joint", DRAWN), 0.05)
 
 
-def sealed(path: Path, effects: list[dict]) -> Path:
-    path.write_text(json.dumps({"schema": 1, "effects": effects, "sha256": seal(effects)}))
+def sealed(path: Path, effects: list[dict], schema: int = 2) -> Path:
+    path.write_text(json.dumps({"schema": schema, "effects": effects, "sha256": seal(effects)}))
     return path
 
 
@@ -90,18 +92,46 @@ def test_nothing_is_overwritten(arguments: Callable, tmp_path: Path, capsys: pyt
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"effect": "gremlin"}, "coulomb_friction"),
-        ({"where": ["left_tail_joint"]}, "a joint of the model"),
-        ({"parameters": {"angle": 0.1}}, r"encoder_offset\.offset"),
-        ({"effect": "link_mass", "where": ["tail"], "parameters": {"mass": 1.0}}, "a body of the model"),
+        ({"effect": "gremlin"}, "a kind of effect that a G1 can have"),
+        ({"effect": "loose_mount"}, "a kind of effect that a G1 can have"),  # an arm's
+        ({"effect": ["encoder_offset"]}, "a kind of effect that a G1 can have"),
+        ({"where": ["left_tail_joint"]}, "one joint of the model"),
+        ({"where": []}, "one joint of the model"),
+        ({"where": [["right_elbow_joint"]]}, "one joint of the model"),
+        ({"effect": "link_mass", "where": ["tail"]}, "one body of the model"),
+        ({"effect": "ground_friction"}, "where: expected nothing"),
+        ({"size": 0.5}, "size: expected a number from 0 to 0.12"),
+        ({"size": -0.01}, "size: expected a number"),
+        ({"size": "much"}, "size: expected a number"),
+        ({"size": float("nan")}, "size: expected a number"),
+        ({"draw": {}}, "draw: expected sign, axis, number, other"),
+        ({"draw": {**OFFSET["draw"], "sign": 2}}, "draw: expected sign"),
+        ({"draw": {**OFFSET["draw"], "other": "left_tail_joint"}}, "draw: expected sign"),
+        ({"parameters": {"angle": 0.05}}, "parameters: expected those of its size"),
+        ({"parameters": {"offset": 0.06}}, "parameters: expected those of its size"),
+        ({"parameters": {"offset": None}}, "parameters: expected those of its size"),
     ],
 )
-def test_effects_it_does_not_know_are_named(change: dict, expected: str) -> None:
-    with pytest.raises(BadInput, match=expected):
-        to_arrays([{**OFFSET, **change}], build_model(), "robot.json")
+def test_effects_it_cannot_have_are_named_in_one_line(change: dict, expected: str, tmp_path: Path) -> None:
+    path = sealed(tmp_path / "robot.json", [{**OFFSET, **change}])
+    with pytest.raises(BadInput, match=expected) as refused:
+        read_sealed(path)
+    assert "\n" not in str(refused.value) and "effects[0]" in str(refused.value)
 
 
-@pytest.mark.parametrize("content", ["", "{}", '{"effects": []}'])
+@pytest.mark.parametrize("schema", [1, None, 3])
+def test_a_robot_sealed_by_another_schema_is_refused(schema: int | None, tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"field schema: expected 2, came .*Seal it anew"):
+        read_sealed(sealed(tmp_path / "robot.json", [OFFSET], schema))
+
+
+@pytest.mark.parametrize("effects", [[3], {"a": 1}, [None]])
+def test_what_is_no_effect_is_refused(effects: object, tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"robot\.json: effects"):
+        read_sealed(sealed(tmp_path / "robot.json", effects))
+
+
+@pytest.mark.parametrize("content", ["", "{}", "[]", "3", '{"effects": []}'])
 def test_a_file_that_is_not_sealed_is_refused(tmp_path: Path, content: str) -> None:
     (tmp_path / "robot.json").write_text(content)
     with pytest.raises(BadInput, match=r"robot\.json"):

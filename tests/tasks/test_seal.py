@@ -1,59 +1,112 @@
-"""Sealing: by seed, noticeable, on distinct places, nothing for the null robot."""
+"""Sealing: by seed and attempt, from the whole catalogue and outside it, of sizes that matter, at distinct places."""
 
+from collections import Counter
 from dataclasses import replace
 
 import pytest
 
-from bumblebee.deploy.stand_in_effects import PARAMETERS, to_arrays
+from bumblebee.deploy.stand_in_effects import declared_g1, to_laws
+from bumblebee.deploy.undeclared.faults import LARGEST, largest, peaks
+from bumblebee.deploy.undeclared.kinds import CATALOGUE, KINDS, Place
 from bumblebee.errors import BadInput
-from bumblebee.robot.facts import g1_bodies, joints
-from bumblebee.robot.model import build_model, gains
-from tasks.seal import SealConfig, draw
+from bumblebee.report.truth import match
+from bumblebee.robot.facts import joint_names
+from bumblebee.sim import effect_catalogue
+from tasks.seal import BODIES, OF_G1, SealConfig, draw
 
 
-def test_the_seed_decides_and_others_draw_otherwise() -> None:
-    draws = [draw(SealConfig(seed=seed)) for seed in range(20)]
-    assert draws == [draw(SealConfig(seed=seed)) for seed in range(20)]
+def test_seed_and_attempt_decide_and_others_draw_otherwise() -> None:
+    draws = [draw(SealConfig(seed=seed), attempt) for seed in range(10) for attempt in range(2)]
+    assert draws == [draw(SealConfig(seed=seed), attempt) for seed in range(10) for attempt in range(2)]
     assert len({str(effects) for effects in draws}) == 20
 
 
-def test_effects_are_of_distinct_kinds_on_distinct_places_and_the_robot_takes_them() -> None:
-    model = build_model()
-    for seed in range(10):
-        effects = draw(SealConfig(seed=seed, n_effects=4))
-        assert len({e["effect"] for e in effects}) == len({e["where"][0] for e in effects}) == 4
-        to_arrays(effects, model)
+def test_effects_are_of_distinct_kinds_at_distinct_places_and_the_robot_takes_them() -> None:
+    for seed in range(30):
+        effects = draw(SealConfig(seed=seed, n_effects=6))
+        spots = {(KINDS[e["effect"]].on, *e["where"]) for e in effects}
+        assert len({e["effect"] for e in effects}) == len(spots) == len(to_laws(effects)) == 6
+
+
+def test_every_kind_that_a_g1_can_have_is_drawn_and_every_joint_and_body_of_weight() -> None:
+    drawn = [e for seed in range(250) for e in draw(SealConfig(seed=seed, outside=1.0, n_effects=8))]
+    assert {e["effect"] for e in drawn} == set(OF_G1)
+    assert set(joint_names()) | set(BODIES) <= {name for e in drawn for name in e["where"]}
+
+
+@pytest.mark.parametrize(("chance", "least", "most"), [(0.0, 0, 0), (0.34, 40, 95), (1.0, 200, 200)])
+def test_at_most_one_effect_is_outside_the_catalogue_and_as_often_as_told(chance: float, least: int, most: int) -> None:
+    counts = Counter(
+        sum(KINDS[e["effect"]].outside for e in draw(SealConfig(seed=seed, outside=chance))) for seed in range(200)
+    )
+    assert set(counts) <= {0, 1} and least <= counts[1] <= most
 
 
 def test_a_null_robot_has_none() -> None:
-    assert draw(SealConfig(n_effects=0)) == []
+    assert draw(SealConfig(n_effects=0, outside=1.0)) == []
 
 
-@pytest.mark.parametrize("kind", PARAMETERS)
-def test_every_kind_is_noticeable_in_its_own_unit(kind: str) -> None:
-    """Away from the declared value by a margin that a servo or a scale would feel, in every draw."""
-    table = {joint.name: joint for joint in joints()}
-    for seed in range(30):
-        (effect,) = draw(SealConfig(seed=seed, kinds=(kind,), n_effects=1))
-        value, place = effect["parameters"][PARAMETERS[kind]], effect["where"][0]
-        if kind == "link_mass":
-            assert value >= 1.29 * g1_bodies()[place]["mass"]
-            continue
-        kp, kd = gains(table[place])
-        margin = {
-            "coulomb_friction": value / kp >= 0.0149,
-            "viscous_friction": value / kd >= 0.39,
-            "armature": value >= 1.99 * table[place].armature,
-            "motor_strength": 0.5 < value <= 0.81,
-            "command_delay": 0.01 <= value <= 0.02,
-            "encoder_offset": abs(value) >= 0.029,
-        }
-        assert margin[kind], (kind, value)
+@pytest.mark.parametrize("kind", OF_G1)
+def test_every_size_is_at_least_four_tenths_of_the_largest_fault_and_severity_takes_it_there(kind: str) -> None:
+    for seed in range(5):
+        for severity, least in ((1.0, 0.399), (50.0, 0.999)):
+            wanted = SealConfig(seed=seed, kinds=(kind,), n_effects=1, outside=1.0, severity=severity)
+            (effect,) = draw(wanted)
+            drawn = {name: effect["draw"][name] for name in ("sign", "axis", "number", "other")}
+            where = effect["where"][0] if effect["where"] else ""
+            most = largest(KINDS[kind], Place(declared_g1(), where, drawn, *peaks().get(where, (0, 0, 0))))
+            assert least * most <= effect["size"] <= most
+
+
+def test_the_largest_faults_are_stated_for_every_kind_and_the_usual_peaks_for_every_joint() -> None:
+    assert set(LARGEST) == set(OF_G1) and set(peaks()) == set(joint_names())
+
+
+def test_parameters_have_the_names_of_the_catalogue() -> None:
+    for kind in CATALOGUE:
+        (effect,) = draw(SealConfig(kinds=(kind.name,), n_effects=1))
+        declared = {parameter.name for parameter in effect_catalogue.CATALOGUE[kind.name].parameters}
+        assert set(effect["parameters"]) <= declared, kind.name
+
+
+def test_an_effect_outside_the_catalogue_never_pairs_by_name_and_one_inside_does() -> None:
+    inside, outside = (draw(SealConfig(kinds=(k,), n_effects=1, outside=1.0, joints=("left_knee_joint",)))[0]
+                       for k in ("coulomb_friction", "drag"))  # fmt: skip
+    found = [
+        {"effect": name, "where": ["left_knee_joint"], "parameters": {}} for name in ("coulomb_friction", "discovered")
+    ]
+    rows = match([inside, outside], found)
+    assert [(row.sealed, row.found) for row in rows] == [(inside, found[0]), (outside, None), (None, found[1])]
 
 
 @pytest.mark.parametrize(
-    "change", [{"kinds": ("gremlin",)}, {"joints": ("left_tail",)}, {"bodies": ("tail",)}, {"n_effects": 9}]
+    "change",
+    [
+        {"kinds": ("gremlin",)},
+        {"kinds": ("loose_mount",)},  # a G1 has no mount
+        {"joints": ("left_tail",)},
+        {"joints": ()},
+        {"bodies": ("tail",)},
+        {"bodies": ("left_ankle_pitch_link",)},  # too light to be felt
+        {"n_effects": 99},
+    ],
 )
 def test_what_does_not_exist_is_named(change: dict) -> None:
     with pytest.raises(BadInput, match=f"SealConfig.{next(iter(change))}"):
         draw(replace(SealConfig(), **change))
+
+
+@pytest.mark.parametrize(
+    ("kinds", "most"),
+    [
+        (("coulomb_friction", "viscous_friction", "link_mass"), 2),  # one joint, two bodies
+        (("ground_friction", "ground_slope", "imu_offset"), 2),  # one ground, one IMU
+        (("drag", "ripple"), 1),  # outside: never more than one
+        (("coulomb_friction", "drag"), 1),
+    ],
+)
+def test_as_many_effects_as_places_allow_are_drawn_and_one_more_is_refused(kinds: tuple[str, ...], most: int) -> None:
+    config = SealConfig(kinds=kinds, joints=("left_knee_joint",), bodies=("pelvis", "torso_link"), n_effects=most)
+    assert all(len(draw(replace(config, seed=seed))) == most for seed in range(20))
+    with pytest.raises(BadInput, match=rf"SealConfig.n_effects: expected at most {most}"):
+        replace(config, n_effects=most + 1)
