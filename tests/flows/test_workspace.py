@@ -6,6 +6,7 @@ import pytest
 import yaml
 
 from bumblebee.errors import BadInput
+from flows import demo
 from flows import workspace as workspaces
 from flows.stages import read_stages
 from tasks.params import read
@@ -71,3 +72,16 @@ def test_missing_motions_and_unknown_names_are_bad_input(tmp_path: Path):
         workspaces.create(tmp_path / "lab", profile="smkoe")
     with pytest.raises(BadInput, match="a workspace"):
         workspaces.named("no-such-workspace")
+
+
+@pytest.mark.parametrize(
+    ("seed", "seal"), [("", {}), ("3", {"seal": {"seed": 3}}), ("null", {"seal": {"n_effects": 0}})]
+)
+def test_a_seed_asks_for_another_sealed_robot_and_null_for_none(seed: str, seal: dict):
+    assert demo.robot_of(seed) == seal
+
+
+@pytest.mark.parametrize("seed", ["x", "-1", "1.5", "3; rm", "9" * 20])
+def test_a_seed_that_is_no_number_is_refused_in_one_line(seed: str):
+    with pytest.raises(BadInput, match="--seed: expected a number"):
+        demo.robot_of(seed)

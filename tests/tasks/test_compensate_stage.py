@@ -1,0 +1,38 @@
+"""The stage compensate: what a round's effects make of the runner's commands."""
+
+from pathlib import Path
+
+import pytest
+
+from bumblebee.deploy.compensation_file import read_compensation
+from bumblebee.sim.effects import Effect, single, write_effects
+from tasks import compensate
+
+
+@pytest.fixture
+def diagnosed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(compensate, "log_run", lambda *_, **__: None)
+    Path("params.yaml").write_text("compensate: {}\n")
+    Path("data/diagnosis/r1").mkdir(parents=True)
+    return tmp_path
+
+
+def test_what_can_be_undone_is_and_what_cannot_is_listed_with_its_reason(
+    diagnosed: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    effects = [single("encoder_offset", "left_knee_joint", 0.05), single("backlash", "left_hip_yaw_joint", 0.02)]
+    write_effects(Path("data/diagnosis/r1/effects.yaml"), effects)
+    compensate.main(1)
+    made = read_compensation(Path("models/compensation/r1/compensation.json"))
+    assert [bool(step.done) for step in made.plan] == [True, False]
+    assert made.plan[1].why_not
+    assert made.encoder_offset[made.joints.index("left_knee_joint")] == 0.05
+    assert "1 of 2 effects undone" in capsys.readouterr().out
+
+
+def test_a_robot_that_lacks_nothing_is_sent_its_own_gains(diagnosed: Path) -> None:
+    write_effects(Path("data/diagnosis/r1/effects.yaml"), list[Effect]())
+    compensate.main(1)
+    made = read_compensation(Path("models/compensation/r1/compensation.json"))
+    assert not made.plan and not made.encoder_offset.any() and not made.dry.any()
