@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from bumblebee.deploy.undeclared.declared import Declared, describe
+from bumblebee.deploy.undeclared.faults import largest
 from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place, fits, places
 from bumblebee.deploy.undeclared.law import Law
 from bumblebee.errors import BadInput
@@ -93,7 +94,7 @@ def _law(effect: Json, where: str) -> Law:
     if kind is None or not fits(kind, "g1"):
         raise BadInput(where, "a kind of effect that a G1 can have", str(name)[:40])
     place = _place(effect, kind, where)
-    size, least, most = effect.get("size"), max(kind.least(place), 0.0), kind.most(place)
+    size, least, most = effect.get("size"), kind.least(place), largest(kind, place)
     if not _number(size) or not least <= size <= most * (1 + 1e-9):
         raise BadInput(f"{where}: {name}: size", f"a number from {least:g} to {most:g}", str(size)[:40])
     law, parameters = kind.make(place, float(size))

@@ -3,10 +3,13 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from bumblebee.deploy.runner import PolicyRunner
+from bumblebee.deploy.sensors import Sensors
 from bumblebee.deploy.stand_in import main
 from bumblebee.deploy.stand_in_effects import declared_g1, entry, read_sealed, seal
 from bumblebee.deploy.undeclared.kinds import KINDS, Place
@@ -81,6 +84,48 @@ def test_a_broken_seal_is_refused(arguments: Callable, tmp_path: Path, capsys: p
     assert not (tmp_path / "out").exists()
 
 
+def test_odometry_drifts_for_policy_and_log_and_none_leaves_the_column_out(
+    arguments: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[np.ndarray] = []
+    real = PolicyRunner.step
+
+    def step(self: PolicyRunner, robots: np.ndarray, tick: int, sensors: Sensors) -> Any:
+        seen.append(sensors.base_pos[0].copy())
+        return real(self, robots, tick, sensors)
+
+    monkeypatch.setattr(PolicyRunner, "step", step)
+    places = {}
+    for base in ("mocap", "odometry", "none"):
+        seen.clear()
+        assert main(arguments([], base, "--names", "b", "--base", base)) == 0
+        rollout = read_rollout(tmp_path / base / "b-0.parquet")
+        places[base] = np.array(seen)
+        if base == "none":
+            assert rollout.base_pos is None and rollout.base_lin_vel is not None
+        else:
+            assert np.array_equal(rollout.base_pos, places[base])
+    assert np.array_equal(places["none"], places["odometry"])
+    apart = np.linalg.norm(places["odometry"] - places["mocap"], axis=1)
+    assert 1e-4 < apart[1:].max() < 0.02
+    steps = [np.abs(np.diff(places[base], n=2, axis=0)).max() for base in ("mocap", "odometry")]
+    assert steps[1] < 0.5 * steps[0]
+
+
+@pytest.mark.parametrize("base", ["gps", 3, None, ["mocap"]])
+def test_a_plan_with_an_unknown_base_is_refused(
+    base: object, arguments: Callable, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    line = arguments([], "out")
+    plan = {"policies": {"p": line[line.index("--policy") + 1]}, "base": base}
+    plan["episodes"] = [{"rollout_id": "x", "policy": "p", "motion": "a", "seed": 0}]
+    (tmp_path / "plan.json").write_text(json.dumps(plan))
+    assert main([*line, "--plan", str(tmp_path / "plan.json")]) == 2
+    err = capsys.readouterr().err
+    assert "plan.json: base: expected one of mocap, odometry, none" in err and err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
 def test_nothing_is_overwritten(arguments: Callable, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     assert main(arguments([], "out", "--names", "a")) == 0
     before = (tmp_path / "out" / "a-0.parquet").read_bytes()
@@ -100,7 +145,7 @@ def test_nothing_is_overwritten(arguments: Callable, tmp_path: Path, capsys: pyt
         ({"where": [["right_elbow_joint"]]}, "one joint of the model"),
         ({"effect": "link_mass", "where": ["tail"]}, "one body of the model"),
         ({"effect": "ground_friction"}, "where: expected nothing"),
-        ({"size": 0.5}, "size: expected a number from 0 to 0.12"),
+        ({"size": 0.5}, "size: expected a number from 0 to 0.25"),
         ({"size": -0.01}, "size: expected a number"),
         ({"size": "much"}, "size: expected a number"),
         ({"size": float("nan")}, "size: expected a number"),

@@ -63,6 +63,17 @@ def test_a_round_of_one_cluster_gives_a_dataset_of_the_contract(workspace: Path)
     assert not np.array_equal(dataset.rollouts[0].joint_pos, dataset.rollouts[1].joint_pos)
 
 
+@pytest.mark.parametrize("base", ["odometry", "none"])
+def test_the_stand_in_logs_the_place_that_it_is_said_to_know(base: str, workspace: Path) -> None:
+    (workspace / "params.yaml").write_text(PARAMS.replace("motions: 1,", f"motions: 1, base: {base},"))
+    seal.main()
+    rollouts.main(round=1, cluster="c0")
+    for rollout in read_dataset(workspace / "data/rollouts/r1/c0").rollouts:
+        assert (rollout.base_pos is None) == (base == "none")
+        if base == "odometry":  # smooth, where motion capture jumps by a millimetre
+            assert np.abs(np.diff(rollout.base_pos, n=2, axis=0)).max() < 0.002
+
+
 def test_without_a_sealed_robot_the_stage_says_so_and_leaves_nothing(workspace: Path) -> None:
     with pytest.raises(BadInput, match=r"data/sealed/robot\.json"):
         rollouts.main(round=1, cluster="c0")
