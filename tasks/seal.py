@@ -28,7 +28,7 @@ from tasks.seal_trial import export_shipped, followed, try_robot
 from tasks.stage import load, output_file, run_stage
 
 OUT = Path("data/sealed/robot.json")
-WORSE = 1.15  # sizes of a draw over those of the draw before
+WORSE = 1.1  # sizes of a draw over those of the draw before
 SMALLEST = 0.4  # share of a kind's largest size that every size has, before `severity`
 LIGHT = 0.25  # kg: bodies below are left out, an effect on them is none
 OF_G1 = tuple(name for name, kind in KINDS.items() if fits(kind, "g1"))
@@ -47,14 +47,14 @@ class SealConfig(Ranged):
     """Kinds to draw from, those of the diagnosis' catalogue and those outside it."""
     outside: Share = 0.34
     """Chance that one of the effects, never more, is of a kind outside the catalogue."""
-    severity: Annotated[float, Range(above=0, most=100)] = 2.0
-    """Factor on the sizes, else 0.4 to 1.0 of the largest fault that its owner might not see."""
+    severity: Annotated[float, Range(above=0, most=100)] = 1.5
+    """Factor on the sizes, which are else 0.4 to 1.0 of the largest fault of their kind and never above it."""
     loses: PartOf = 1 / 3
     """Share of the motions, of those that it follows on the declared model, that the shipped policy must lose."""
     stands: Annotated[float, Range(least=0, most=3600)] = 2.0
     """Median time that it must follow a motion all the same [s]: a robot that falls at once gives no data."""
     draws: Count = 40
-    """How often a robot is drawn at most; each draw is 15 % worse than the one before."""
+    """How often a robot is drawn at most; each draw is a tenth worse than the one before."""
     motions: Count = 12
     """Motions of the trial."""
     max_seconds: Annotated[float, Range(least=0.1, most=3600)] = 6.0
@@ -198,8 +198,9 @@ def drawn_place(name: str, rng: np.random.Generator) -> Place:
 
 def size(kind: Kind, place: Place, severity: float, rng: np.random.Generator) -> float:
     """A size that matters, of four digits, in the kind's own measure: 0.4 to 1.0 of a fault, times `severity`."""
-    wanted = float(f"{largest(kind, place) * severity * rng.uniform(SMALLEST, 1.0):.4g}")
-    return float(np.clip(wanted, kind.least(place), kind.most(place)))
+    most = largest(kind, place)
+    wanted = float(f"{most * min(1.0, severity * rng.uniform(SMALLEST, 1.0)):.4g}")
+    return float(np.clip(wanted, kind.least(place), most))
 
 
 if __name__ == "__main__":
