@@ -8,7 +8,7 @@ import json
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -95,14 +95,21 @@ def _law(effect: Json, where: str) -> Law:
         raise BadInput(where, "a kind of effect that a G1 can have", str(name)[:40])
     place = _place(effect, kind, where)
     size, least, most = effect.get("size"), kind.least(place), largest(kind, place)
-    if not _number(size) or not least <= size <= most * (1 + 1e-9):
-        raise BadInput(f"{where}: {name}: size", f"a number from {least:g} to {most:g}", str(size)[:40])
+    if not _number(size) or not least <= size <= most * (1 + 1e-9) or size <= 0:
+        raise BadInput(f"{where}: {name}: size", f"a number above {least:g}, at most {most:g}", str(size)[:40])
     law, parameters = kind.make(place, float(size))
     told = effect.get("parameters")
-    same = isinstance(told, dict) and told.keys() == parameters.keys() and all(map(_number, told.values()))
-    if not same or not all(np.isclose(told[key], parameters[key], rtol=1e-6, atol=1e-12) for key in parameters):
-        raise BadInput(f"{where}: {name}: parameters", f"those of its size, {parameters}", str(told), "Seal it anew.")
+    if not _same(told, parameters):
+        raise BadInput(
+            f"{where}: {name}: parameters", f"those of its size, {parameters}", str(told)[:60], "Seal it anew."
+        )
     return law
+
+
+def _same(told: object, parameters: dict[str, float]) -> bool:
+    if not isinstance(told, dict) or told.keys() != parameters.keys() or not all(map(_number, told.values())):
+        return False
+    return all(np.isclose(told[key], parameters[key], rtol=1e-6, atol=1e-12) for key in parameters)
 
 
 def _place(effect: Json, kind: Kind, where: str) -> Place:
@@ -113,14 +120,19 @@ def _place(effect: Json, kind: Kind, where: str) -> Place:
     if name not in allowed:
         words = f"one {kind.on} of the model" if any(allowed) else "nothing"
         raise BadInput(f"{where}: {kind.name}: where", words, str(names)[:60])
-    fine = isinstance(drawn, dict) and all(isinstance(drawn.get(key), of) for key, of in _DRAWN.items())
-    fine = fine and all(_number(drawn.get(key)) and drawn[key] >= 0 for key in _PEAKS)
-    fine = fine and drawn["sign"] in (-1, 1) and 0 <= drawn["axis"] <= 2 and drawn["other"] in robot.joints
-    if not fine:
+    if not isinstance(drawn, dict) or not _drawn(drawn, robot):
         words = f"sign, axis, number, other and {', '.join(_PEAKS)}"
         raise BadInput(f"{where}: {kind.name}: draw", words, str(drawn)[:60])
     return Place(robot, name, {key: drawn[key] for key in _DRAWN}, *(float(drawn[key]) for key in _PEAKS))
 
 
-def _number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+def _drawn(drawn: Json, robot: Declared) -> bool:
+    """Whether a draw is one: the side, axis, harmonic and other joint, and what the declared robot does there."""
+    whole = all(isinstance(drawn.get(key), of) for key, of in _DRAWN.items())
+    if not whole or not all(_number(drawn.get(key)) and drawn[key] >= 0 for key in _PEAKS):
+        return False
+    return drawn["sign"] in (-1, 1) and 0 <= drawn["axis"] <= 2 and drawn["other"] in robot.joints
+
+
+def _number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and -1e9 < value < 1e9

@@ -1,7 +1,7 @@
 """A law: one undeclared effect as the places where it acts on a simulated millisecond; neutral unless overridden."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -20,17 +20,17 @@ class World:
     """[s]."""
     rng: np.random.Generator | Sequence[np.random.Generator]
     """Of what is random in the truth itself, such as which commands are lost; or one of each robot."""
-    time: float | np.ndarray = 0.0
-    """[s] since the start, or (R,) of each robot."""
-    q: np.ndarray | None = None
+    time: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    """(R,) since the start [s]."""
+    q: np.ndarray = field(default_factory=lambda: np.zeros((1, 0)))
     """(R, J) true joint positions [rad]."""
-    v: np.ndarray | None = None
+    v: np.ndarray = field(default_factory=lambda: np.zeros((1, 0)))
     """(R, J) true joint velocities [rad/s]."""
-    torque: np.ndarray | None = None
+    torque: np.ndarray = field(default_factory=lambda: np.zeros((1, 0)))
     """(R, J) torque of the drives in the last millisecond [N m]."""
-    error: np.ndarray | None = None
+    error: np.ndarray = field(default_factory=lambda: np.zeros((1, 0)))
     """(R, J) command minus reading [rad]."""
-    kp: np.ndarray | None = None
+    kp: np.ndarray = field(default_factory=lambda: np.zeros(0))
     """(J,) or (R, J) the servos' gains now [N m/rad]."""
 
     def column(self, joint: str) -> int:
@@ -77,12 +77,18 @@ class Law:
     """Whether it changes the model before the others do."""
     parts = 1
     """Steps of the mechanics in a millisecond that it needs."""
-    chance = 1.0
-    """Share of the ticks, drawn at random, in which it strikes."""
-    grid = 0.0
-    """Step of the encoder's readings [rad]; 0 for none."""
     believed = True
     """Whether the drive knows of the gains that it makes of the declared ones."""
+
+    @property
+    def chance(self) -> float:
+        """Share of the ticks, drawn at random, in which it strikes."""
+        return 1.0
+
+    @property
+    def grid(self) -> float:
+        """Step of the encoder's readings [rad]; 0 for none."""
+        return 0.0
 
     def spec(self, spec: mujoco.MjSpec) -> None:
         """Change the structure before it is compiled."""

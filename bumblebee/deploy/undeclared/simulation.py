@@ -8,7 +8,6 @@ other torques are computed here in NumPy.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
@@ -16,11 +15,10 @@ from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.deploy.undeclared.law import Law, World
 from bumblebee.deploy.undeclared.memory import put, taken
+from bumblebee.deploy.undeclared.model import SOLVER, overriding, true_model
 
 STEP = 0.001  # [s]
 CYCLES = 20  # of 1 ms in a control period of 20 ms
-SOLVER = 50  # iterations: the declared G1's 5 of 6 line-search steps do not converge on dry friction
-_STIFF = (0.004, 1.0), (0.999, 0.999)  # solref and solimp of dry friction
 _HOOKS = ("tick", "command", "feed_forward", "sense", "read", "drive", "saturate", "transmit", "passive", "friction",
           "inertia", "push")  # fmt: skip
 
@@ -77,11 +75,11 @@ class TrueRobots:
         self.robot, self.laws = robot, sorted(laws, key=lambda law: not law.first)
         self._parts = max((law.parts for law in self.laws), default=1)
         self._parts = max(self._parts, parts)
-        self.model = _true_model(robot, self.laws, STEP / self._parts, solver)
+        self.model = true_model(robot, self.laws, STEP / self._parts, solver)
         self.kp, self.kd = robot.kp.copy(), robot.kd.copy()
         ids = [self.model.joint(name).id for name in robot.joints]
         self._q, self._v = _span(self.model.jnt_qposadr[ids]), _span(self.model.jnt_dofadr[ids])
-        self._acting = {hook: _overriding(self.laws, hook) for hook in _HOOKS}
+        self._acting = {hook: overriding(self.laws, hook) for hook in _HOOKS}
         self._unknown = any(not law.believed for law in self.laws)
         self.world = World(robot.joints, count, STEP, rng)
         self.batch = Batch(self.model, count, 1)
@@ -281,32 +279,7 @@ class TrueRobots:
             self._wrench[now.rows] = wrench
 
 
-def _overriding(laws: Sequence[Law], hook: str) -> tuple[int, ...]:
-    return tuple(i for i, law in enumerate(laws) if getattr(type(law), hook) is not getattr(Law, hook))
-
-
 def _span(addresses: np.ndarray) -> slice:
     """Addresses that follow each other, as a slice."""
     assert np.array_equal(addresses, np.arange(addresses[0], addresses[0] + len(addresses)))
     return slice(int(addresses[0]), int(addresses[0]) + len(addresses))
-
-
-def _true_model(robot: Declared, laws: Sequence[Law], step: float, solver: int | None) -> mujoco.MjModel:
-    spec = robot.spec.copy()
-    for law in laws:
-        law.spec(spec)
-    for key in list(spec.keys):
-        spec.delete(key)
-    spec.option.timestep, spec.option.integrator = step, mujoco.mjtIntegrator.mjINT_EULER
-    rubs = bool(_overriding(laws, "friction"))
-    if solver is not None or rubs:
-        spec.option.iterations = spec.option.ls_iterations = solver or SOLVER
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-    model = spec.compile()
-    dofs = [model.joint(name).dofadr[0] for name in robot.joints]
-    if rubs:
-        model.dof_solref[dofs], model.dof_solimp[dofs, :2] = _STIFF
-    for law in sorted(laws, key=lambda law: not law.first):
-        law.model(model)
-    mujoco.mj_setConst(model, mujoco.MjData(model))
-    return model
