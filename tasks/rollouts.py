@@ -57,6 +57,11 @@ class RolloutsConfig(Ranged):
     field; none: the policy gets the odometry and the log no base_pos."""
     max_seconds: Annotated[float, Range(least=0.1, most=3600)] = 10.0
     """Longer clips are cut to their beginning [s]."""
+    stop_tilt: Annotated[float, Range(above=0, most=180)] = 25.0
+    """The operator stops the stand-in where its pelvis leans so far away from its reference [degrees]: what comes after
+    is a fall, of which the drives' logs say nothing that a model could be fitted to."""
+    stop_drop: Annotated[float, Range(above=0, most=2)] = 0.2
+    """The same where it is so far below [m]."""
 
 
 def main(round: int, cluster: str) -> None:
@@ -158,7 +163,8 @@ def run_stand_in(
         for clip in clips
         for run in range(config.repeats)
     ]
-    plan = {"policies": {name: str(policy.resolve())}, "episodes": episodes, "base": config.base}
+    stop = {"tilt_deg": config.stop_tilt, "drop_m": config.stop_drop}
+    plan = {"policies": {name: str(policy.resolve())}, "episodes": episodes, "base": config.base, "stop": stop}
     with tempfile.TemporaryDirectory() as scratch:
         write_library(Path(scratch) / "clips", clips)
         start_stand_in(plan, Path(scratch) / "clips", folder / "rollouts", Path(scratch), config.threads)

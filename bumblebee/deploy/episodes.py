@@ -24,10 +24,21 @@ from bumblebee.robot.facts import joints as robot_joints
 from bumblebee.robot.model import gains
 from bumblebee.tracking.library import MotionLibrary
 
-FALL_TILT = np.radians(60.0)  # of the pelvis' up axis against the reference's
-FALL_DROP = 0.35  # m: of the pelvis below the reference's
 MAX_LIFT = 0.10  # m: a start is lifted or lowered by no more than this to stand on the floor
-FALL_RULE = {"tilt_deg": 60.0, "drop_m": FALL_DROP, "max_start_lift_m": MAX_LIFT}
+
+
+@dataclass(frozen=True)
+class Stop:
+    """When an episode ends before its clip does."""
+
+    tilt_deg: float = 60.0
+    """Angle of the pelvis' up axis from the reference's."""
+    drop_m: float = 0.35
+    """How far the pelvis is below the reference's."""
+
+
+FALL = Stop()
+FALL_RULE = {"tilt_deg": FALL.tilt_deg, "drop_m": FALL.drop_m, "max_start_lift_m": MAX_LIFT}
 
 
 @dataclass(frozen=True)
@@ -55,6 +66,7 @@ def run_episodes(
     start: StartNoise | None = None,
     on_tick: Callable[[int], None] = lambda ended: None,
     compensations: Mapping[str, Compensation] | None = None,
+    stop: Stop = FALL,
 ) -> list[Rollout]:
     """Run all episodes side by side and return their rollouts in order; a robot that falls stops there.
 
@@ -67,6 +79,7 @@ def run_episodes(
         start: noise of the start state.
         on_tick: told after each control tick how many robot ticks were simulated in it.
         compensations: by the episodes' keys of policies; one policy with and without has two keys.
+        stop: when a robot counts as fallen.
     """
     compensations = compensations or {}
     robots = make_robots(len(episodes))
@@ -85,7 +98,7 @@ def run_episodes(
     for tick in range(int(lengths.max())):
         alive = np.flatnonzero(~ended & (tick < lengths))
         true = robots.read()
-        fallen = alive[_fallen(true, [own[i] for i in alive], alive, tick)] if tick else alive[:0]
+        fallen = alive[_fallen(true, [own[i] for i in alive], alive, tick, stop)] if tick else alive[:0]
         ended[fallen] = True
         alive = np.setdiff1d(alive, fallen)
         if not len(alive):
@@ -198,7 +211,7 @@ def _act(groups: list, alive: np.ndarray, tick: int, sensors: Sensors) -> tuple[
     return action, ServoCommand(target, torque, kp, kd) if more else ServoCommand(target)
 
 
-def _fallen(true: Sensors, clips: list[Clip], robots: np.ndarray, tick: int) -> np.ndarray:
+def _fallen(true: Sensors, clips: list[Clip], robots: np.ndarray, tick: int, stop: Stop) -> np.ndarray:
     """Which of the robots lie or are no longer numbers: (n,) bool."""
     if not len(robots):
         return np.zeros(0, dtype=bool)
@@ -207,7 +220,7 @@ def _fallen(true: Sensors, clips: list[Clip], robots: np.ndarray, tick: int) -> 
     up = np.array([0.0, 0.0, 1.0])
     cosine = np.sum(quaternions.rotate(quat, up) * quaternions.rotate(wanted, up), axis=1)
     drop = np.array([clip.root_pos[tick, 2] for clip in clips]) - height
-    return ~((cosine > np.cos(FALL_TILT)) & (drop < FALL_DROP))
+    return ~((cosine > np.cos(np.radians(stop.tilt_deg))) & (drop < stop.drop_m))
 
 
 def _generator(episode: Episode) -> np.random.Generator:

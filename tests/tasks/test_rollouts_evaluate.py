@@ -19,7 +19,7 @@ from tests.deploy.conftest import linear_onnx, nod
 PARAMS = """
 clusters: [c0, c1]
 rounds: [{n: 1, parent: 0}]
-seal: {seed: 3}
+seal: {seed: 3, loses: 0, stands: 0, draws: 1, threads: 1}
 rollouts: {motions: 1, repeats: 2, threads: 1}
 evaluate: {threads: 1}
 """
@@ -167,7 +167,7 @@ def test_another_sealed_robot_is_another_contract(workspace: Path) -> None:
     clips, hashes = [nod("a", 10)], {}
     for engines in (("nominal",), ("nominal", "stand_in")):
         for seed in (3, 4):
-            (workspace / "params.yaml").write_text(PARAMS.replace("seed: 3", f"seed: {seed}"))
+            (workspace / "params.yaml").write_text(PARAMS.replace("seed: 3,", f"seed: {seed},"))
             seal.main()
             hashes[engines, seed] = evaluate.frozen(clips, evaluate.EvaluateConfig(engines=engines)).sha256
     assert hashes[("nominal",), 3] == hashes[("nominal",), 4]
