@@ -110,6 +110,7 @@ def check_within(compensation: Compensation, where: object) -> None:
         "encoder_offset": (c.encoder_offset, -limits.offset, limits.offset),
         "encoder_delay": (c.encoder_delay, 0.0, limits.look_ahead),
         "lead_time": (c.lead_time, -limits.look_ahead, limits.look_ahead),
+        "torque_lead": (c.torque_lead, 0.0, limits.look_ahead),
         "strength": (c.strength, limits.gain_least / limits.gain_most, limits.gain_most / limits.gain_least),
         "stiction_speed": (c.stiction_speed, 1e-3, 100.0),
         "load_friction": (c.load_friction, 0.0, 2.0),
