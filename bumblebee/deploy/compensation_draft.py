@@ -9,7 +9,7 @@ import numpy as np
 from bumblebee.deploy.compensation import Compensation, Load, PlannedEffect
 from bumblebee.deploy.compensation_limits import CompensationLimits
 from bumblebee.errors import BadInput
-from bumblebee.robot.facts import joint_names, joints
+from bumblebee.robot.facts import g1_bodies, joint_names, joints
 from bumblebee.robot.model import gains
 from bumblebee.sim.effects import Effect
 
@@ -31,9 +31,11 @@ class DeclaredRobot:
     @classmethod
     def of(cls, model: mujoco.MjModel, where: object = "model") -> "DeclaredRobot":
         """From the model that the policy was trained on; one without the G1's joints is a `BadInput`."""
-        have = {model.joint(i).name for i in range(model.njnt)}
-        if missing := [name for name in joint_names() if name not in have]:
-            raise BadInput(where, "a model of the G1", f"one without {missing[0]} ({len(missing)} joints missing)")
+        have = {model.joint(i).name for i in range(model.njnt)} | {model.body(i).name for i in range(model.nbody)}
+        if missing := [name for name in (*joint_names(), *g1_bodies()) if name not in have]:
+            raise BadInput(
+                where, "a model of the G1", f"one without {missing[0]} ({len(missing)} joints, bodies missing)"
+            )
         table = joints()
         return cls(
             model=model,
