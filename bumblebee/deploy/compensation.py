@@ -52,7 +52,9 @@ class Compensation:
     encoder_delay: np.ndarray
     """(J,) [s] age of a reading."""
     lead_time: np.ndarray
-    """(J,) [s] by which the reference's part of the command is sent earlier; negative: later."""
+    """(J,) [s] by which the reference's part of the target is sent earlier; negative: later."""
+    torque_lead: np.ndarray
+    """(J,) [s] from sending a feed-forward torque until it acts."""
     kp: np.ndarray
     """(J,) [N m/rad] sent to the drive."""
     kd: np.ndarray

@@ -9,7 +9,7 @@ import numpy as np
 from bumblebee.deploy.compensation import Compensation, Load, PlannedEffect
 from bumblebee.deploy.compensation_limits import CompensationLimits
 from bumblebee.errors import BadInput
-from bumblebee.robot.facts import joint_names, joints
+from bumblebee.robot.facts import g1_bodies, joint_names, joints
 from bumblebee.robot.model import gains
 from bumblebee.sim.effects import Effect
 
@@ -31,9 +31,11 @@ class DeclaredRobot:
     @classmethod
     def of(cls, model: mujoco.MjModel, where: object = "model") -> "DeclaredRobot":
         """From the model that the policy was trained on; one without the G1's joints is a `BadInput`."""
-        have = {model.joint(i).name for i in range(model.njnt)}
-        if missing := [name for name in joint_names() if name not in have]:
-            raise BadInput(where, "a model of the G1", f"one without {missing[0]} ({len(missing)} joints missing)")
+        have = {model.joint(i).name for i in range(model.njnt)} | {model.body(i).name for i in range(model.nbody)}
+        if missing := [name for name in (*joint_names(), *g1_bodies()) if name not in have]:
+            raise BadInput(
+                where, "a model of the G1", f"one without {missing[0]} ({len(missing)} joints, bodies missing)"
+            )
         table = joints()
         return cls(
             model=model,
@@ -76,9 +78,16 @@ class Draft:
 
     @property
     def lead_time(self) -> np.ndarray:
-        """(J,) [s]: a command that comes late is sent early; a drive that reads late is told where the joint was."""
-        a = self.arrays
-        return a["command_delay"] + a["torque_lag"] - a["encoder_delay"]
+        """(J,) [s] for targets: one that comes late is sent early, a drive that reads late is told where the joint was.
+
+        A lag of the torque counts for nothing: within the drive's loop it hardly delays what follows a target slowly.
+        """
+        return self.arrays["command_delay"] - self.arrays["encoder_delay"]
+
+    @property
+    def torque_lead(self) -> np.ndarray:
+        """(J,) [s] for feed-forward torques."""
+        return self.arrays["command_delay"] + self.arrays["torque_lag"]
 
     @property
     def kp(self) -> np.ndarray:
@@ -117,7 +126,7 @@ class Draft:
         _within(where, f"a kd sent of at most {most:g} times the declared one", self.kd / robot.kd, 0.0, most)
         offset, ahead = limits.offset, limits.look_ahead
         _within(where, f"an offset of at most {offset:g} rad", a["encoder_offset"], -offset, offset, "rad")
-        for times in (self.lead_time, a["encoder_delay"]):
+        for times in (self.lead_time, self.torque_lead, a["encoder_delay"]):
             _within(
                 where, f"at most {1000 * ahead:g} ms to look ahead", 1000 * times, -1000 * ahead, 1000 * ahead, "ms"
             )
@@ -137,6 +146,7 @@ class Draft:
             kp=self.kp,
             kd=self.kd,
             lead_time=self.lead_time,
+            torque_lead=self.torque_lead,
             damping=self.viscous - (self.robot.kd - self.kd_wanted),
             bias=0.5 * a["asymmetry"] - a["preload"],
             imu=self.imu,

@@ -18,8 +18,8 @@ from bumblebee.io.read import read_json
 from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output, write_file
 from bumblebee.ranges import Unfit
 from bumblebee.robot.facts import g1_bodies, joint_names
+from bumblebee.robot.model import build_model
 from bumblebee.sim.effect_terms import read_term
-from bumblebee.sim.sensors import load_model
 
 _LIMITS = Limits(text_bytes=4 << 20, nodes=60_000)
 _ROBOT, _AGAIN = "g1_23dof", "Make it again with `bumblebee compensate`."
@@ -103,13 +103,14 @@ def load_compensations(plan: Mapping[str, Any], where: object) -> dict[str, Comp
 
 def check_within(compensation: Compensation, where: object) -> None:
     """Refuse numbers beyond the compensation's own limits, whoever made them."""
-    c, limits, robot = compensation, compensation.limits, DeclaredRobot.of(load_model())
+    c, limits, robot = compensation, compensation.limits, DeclaredRobot.of(build_model())
     held = {
         "kp": (c.kp / robot.kp, limits.gain_least, limits.gain_most),
         "kd": (c.kd / robot.kd, limits.gain_least * limits.damping_left, limits.gain_most),
         "encoder_offset": (c.encoder_offset, -limits.offset, limits.offset),
         "encoder_delay": (c.encoder_delay, 0.0, limits.look_ahead),
         "lead_time": (c.lead_time, -limits.look_ahead, limits.look_ahead),
+        "torque_lead": (c.torque_lead, 0.0, limits.look_ahead),
         "strength": (c.strength, limits.gain_least / limits.gain_most, limits.gain_most / limits.gain_least),
         "stiction_speed": (c.stiction_speed, 1e-3, 100.0),
         "load_friction": (c.load_friction, 0.0, 2.0),

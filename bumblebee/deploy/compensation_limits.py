@@ -26,6 +26,9 @@ class CompensationLimits(Ranged):
     look_ahead: Annotated[float, Range(above=0, most=0.1)] = 0.06
     """[s] by which the reference is sent earlier or later, and a reading carried on: three control steps; a policy that
     is later than that has lost more than its reference."""
+    correction_share: Annotated[float, Range(least=0, most=1)] = 0.5
+    """Of a command's delay over which the policy's own correction is carried on at its present rate: at 40 ms on
+    eight joints half of it gained most of what there was to gain, and all of it brought the robot down."""
     friction_share: Annotated[float, Range(least=0, most=0.95)] = 0.8
     """Share of friction that is fed forward: less than all, so that it never moves a joint by itself, even where the
     estimate is a tenth too large."""

@@ -11,10 +11,11 @@ from bumblebee.deploy.compensation_draft import DeclaredRobot, Draft
 from bumblebee.deploy.compensation_limits import CompensationLimits
 from bumblebee.deploy.compensation_rules import CannotUndo, undo
 from bumblebee.errors import BadInput
+from bumblebee.measured.model_file import load_model
 from bumblebee.robot.facts import g1_bodies, joint_names
+from bumblebee.robot.model import build_model
 from bumblebee.sim.effect_terms import read_term
 from bumblebee.sim.effects import CATALOGUE, Effect, effects_yaml, read_effects
-from bumblebee.sim.sensors import load_model
 
 LEAVE_OUT = "Take it out, or pass --leave-out to start without it."
 
@@ -41,7 +42,7 @@ def compensate(
         BadInput: for the first effect beyond a limit, on a joint or body that the G1 does not have, or that no drive
             can undo, unless `leave_out`.
     """
-    draft = Draft(DeclaredRobot.of(load_model() if model is None else model), limits or CompensationLimits())
+    draft = Draft(DeclaredRobot.of(build_model() if model is None else model), limits or CompensationLimits())
     plan: list[PlannedEffect] = []
     refused: list[BadInput] = []
     for index, effect in enumerate(effects):
@@ -73,7 +74,9 @@ def compensate_file(
     """The same from `effects.yaml`, and the MJCF of the model that the policy was trained on."""
     effects = read_effects(path)
     digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
-    return compensate(effects, load_model(model) if model else None, limits, leave_out, path, digest)
+    declared = load_model(model) if model else build_model()
+    DeclaredRobot.of(declared, model or "model")  # says which file, if it is another robot's
+    return compensate(effects, declared, limits, leave_out, path, digest)
 
 
 def _columns(place: str, effect: Effect) -> list[int]:

@@ -31,18 +31,19 @@ class ReferenceTable:
         self._fps = library.fps
         self._frames = np.array([clip.frames for clip in library.clips])
         self._start = np.cumsum(self._frames) - self._frames
-        rows: dict[str, list[np.ndarray]] = {name: [] for name in ("hold", "speed", "acceleration", "weight", "static")}
-        rows["bent"] = []
+        names = ("hold", "lead", "speed", "acceleration", "weight", "bent")
+        rows: dict[str, list[np.ndarray]] = {name: [] for name in names}
         for index, clip in enumerate(library.clips):
             time = torch.arange(clip.frames) / library.fps
-            rows["hold"].append(library.frames(torch.full((clip.frames,), index), time).hold_pos.numpy())
+            frames = library.frames(torch.full((clip.frames,), index), time)
+            rows["hold"].append(frames.hold_pos.numpy())
+            rows["lead"].append(frames.lead.numpy())
             speed = velocities(clip).joint_vel
             rows["speed"].append(speed)
             rows["acceleration"].append(differences(speed, clip.fps))
-            weight, static = _torques(compensation, clip)
+            weight = _weight(compensation, clip)
             _check_weight(compensation, clip, weight)
             rows["weight"].append(weight)
-            rows["static"].append(static)
             rows["bent"].append(_bent(compensation, clip))
         self._rows = {name: np.concatenate(parts).astype(np.float64) for name, parts in rows.items()}
 
@@ -59,13 +60,12 @@ class ReferenceTable:
         return np.where(frame[None] <= last, value, 0.0) if moving else value
 
 
-def _torques(compensation: Compensation, clip: Clip) -> tuple[np.ndarray, np.ndarray]:
-    """Torques (T, J) [N m] that the loads' weight adds to what holds the clip, and all that holds it."""
-    nothing = np.zeros(clip.joint_pos.shape)
-    if not compensation.loads and not compensation.load_friction.any():
-        return nothing, nothing
-    true = static_torques(clip, _model(compensation.loads, 1))
-    return (true - static_torques(clip, _model(compensation.loads, 0)) if compensation.loads else nothing), true
+def _weight(compensation: Compensation, clip: Clip) -> np.ndarray:
+    """Torques (T, J) [N m] that the loads' weight adds to what holds the clip."""
+    if not compensation.loads:
+        return np.zeros(clip.joint_pos.shape)
+    declared, true = (static_torques(clip, _model(compensation.loads, which)) for which in (0, 1))
+    return true - declared
 
 
 def _model(loads: Sequence[Load], which: int) -> mujoco.MjModel:

@@ -106,7 +106,7 @@ def _stribeck(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str
 def _load_friction(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str, str]:
     draft.arrays["load_friction"][columns] = effect.value()
     size = draft.limits.friction_share * effect.value()
-    return f"{_along(draft)}, of the torque that holds the reference", f"{size:.3g} of it"
+    return f"{_along(draft)}, of the torque that the drive reports", f"{size:.3g} of it"
 
 
 def _asymmetric(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str, str]:
@@ -196,7 +196,9 @@ def _discovered(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[s
     return how, " ".join(f"{value:+.3g} {text[:40]}" for text, value in effect.parameters.items())[:120]
 
 
-_EARLY = "the reference's part is sent that much earlier; answers to what is read stay late"
+_EARLY = "the reference's part is sent that much earlier, corrections are carried on; answers to what is read stay late"
+_LAG = "feed-forward torque is sent that much earlier; the drive's loop takes up its lag in what follows a target"
+_CARRIED = "readings are carried on by their velocity, the drive is told where the joint was; its damping stays late"
 _RULES: dict[str, Rule] = {
     "encoder_offset": _encoder_offset,
     "imu_offset": _imu_offset,
@@ -215,9 +217,7 @@ _RULES: dict[str, Rule] = {
     "link_mass": _mass,
     "link_com": _com,
     "command_delay": _late("command_delay", _EARLY),
-    "torque_lag": _late("torque_lag", _EARLY),
-    "encoder_delay": _late(
-        "encoder_delay", "readings are carried on by their velocity, the drive is told where the joint was"
-    ),
+    "torque_lag": _late("torque_lag", _LAG),
+    "encoder_delay": _late("encoder_delay", _CARRIED),
     "discovered": _discovered,
 }

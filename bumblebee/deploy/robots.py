@@ -63,14 +63,18 @@ class NominalRobots:
         return self._view.sensors(self._view.actuator_force)
 
     def step(self, robots: np.ndarray, command: ServoCommand) -> None:
-        """Hold a command for 20 ms on `robots` (n,); its torque counts within the drives' limits, as theirs does."""
+        """Hold a command for 20 ms on `robots` (n,)."""
+        self.tell(robots, command)
+        self.batch.step(ids=robots, nstep=self._steps)
+
+    def tell(self, robots: np.ndarray, command: ServoCommand) -> None:
+        """Give the servos of `robots` (n,) a command; its torque counts within their limits, as their own does."""
         self._set_gains(robots, command)
         control = command.target
         if command.torque is not None:
             gain = self.model.actuator_gainprm[:, 0] if self._gains is None else self._gains[0][robots, :, 0]
             control = control + command.torque / gain
         self._view.ctrl[robots] = control
-        self.batch.step(ids=robots, nstep=self._steps)
 
     def _set_gains(self, robots: np.ndarray, command: ServoCommand) -> None:
         """Write the gains of the servos of `robots` (n,) in the model's fields, which each robot then has apart."""
