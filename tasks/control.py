@@ -52,6 +52,7 @@ def main(round: int, cluster: str, kind: str) -> None:
         parent=Path(f"models/experts/r{parent_of(round)}") / cluster,
         cluster=cluster,
         round=round,
+        better_of=False,
     )
     train_policy(job, config)
 

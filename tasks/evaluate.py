@@ -182,7 +182,11 @@ def settings(engine: str) -> dict[str, Any]:
         return {**engine_settings(NominalRobots(1, 1).model), "sensor_noise": None}
     if not SEALED.exists():
         raise BadInput(SEALED, "the sealed robot", "no such file", "Run the stage seal.")
-    told = {"sensor_noise": asdict(SensorNoise()), "sealed_file_sha256": sha256(SEALED.read_bytes()).hexdigest()}
+    told = {
+        "sensor_noise": asdict(SensorNoise()),
+        "judged_by": "true state",
+        "sealed_file_sha256": sha256(SEALED.read_bytes()).hexdigest(),
+    }
     return {**engine_settings(StandInRobots(1, []).model), **told}
 
 
@@ -325,6 +329,7 @@ def stand_in(
         "compensations": {c.policy: str(c.compensation.resolve()) for c in found if c.compensation},
         "episodes": episodes,
         "start_noise": asdict(config.start_noise),
+        "judged": True,
     }
     start_stand_in(work, scratch / "clips", scratch / "rollouts", scratch, config.threads)
     return (read_rollout(scratch / "rollouts" / f"{e.rollout_id}.parquet") for e in planned)

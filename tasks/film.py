@@ -152,7 +152,7 @@ def run(
 ) -> dict[str, Rollout]:
     """Rollouts on the stand-in robot by their ids."""
     plan: dict[str, Any] = {"policies": {key: str(path.resolve()) for key, path in policies.items()}}
-    plan["episodes"] = episodes
+    plan |= {"episodes": episodes, "judged": True}
     plan |= {"start_noise": start_noise} if start_noise else {}
     plan |= {"compensations": compensations} if compensations else {}
     with tempfile.TemporaryDirectory() as folder:

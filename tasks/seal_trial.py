@@ -61,7 +61,7 @@ def try_robot(policy: Path, sealed: dict[str, Any], clips: Sequence[Clip], seed:
     planned = [
         {"rollout_id": e.rollout_id, "policy": KEY, "motion": e.motion, "seed": seed} for e in episodes(clips, seed)
     ]
-    plan = {"policies": {KEY: str(policy.resolve())}, "episodes": planned}
+    plan = {"policies": {KEY: str(policy.resolve())}, "episodes": planned, "judged": True}
     with tempfile.TemporaryDirectory() as scratch:
         work = Path(scratch)
         write_library(work / "clips", list(clips))

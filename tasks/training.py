@@ -79,6 +79,8 @@ class Job:
     round: int | None = None
     model: Path | None = None
     """MJCF of the corrected robot that is trained on, the declared one without; the task adds its ground and delays."""
+    better_of: bool = True
+    """Whether the parent is kept where training made it no better; a control is what its steps made of it."""
 
 
 def training_clips() -> list[Clip]:
@@ -148,7 +150,7 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     leave()
     after = _try(trainer.policy(), job, config)
     policy, kept = trainer.policy(), after
-    if job.parent is not None and _score(after) < _score(before):
+    if job.better_of and job.parent is not None and _score(after) < _score(before):
         policy, kept = load_policy(job.parent), before
     card = _card(job, config, trainer, before, after) | _outcome(before, kept)
     card["kept"] = "child" if kept is after else "parent"

@@ -67,6 +67,7 @@ def run_episodes(
     on_tick: Callable[[int], None] = lambda ended: None,
     compensations: Mapping[str, Compensation] | None = None,
     stop: Stop = FALL,
+    judged: bool = False,
 ) -> list[Rollout]:
     """Run all episodes side by side and return their rollouts in order; a robot that falls stops there.
 
@@ -80,6 +81,8 @@ def run_episodes(
         on_tick: told after each control tick how many robot ticks were simulated in it.
         compensations: by the episodes' keys of policies; one policy with and without has two keys.
         stop: when a robot counts as fallen.
+        judged: whether the rollouts hold the true state, as motion capture sees it, in place of the readings that the
+            policy acted on: an encoder that is off would else be judged by its own reading.
     """
     compensations = compensations or {}
     robots = make_robots(len(episodes))
@@ -105,7 +108,7 @@ def run_episodes(
             break
         sensors = place(alive, add_noise(true[alive], noise, np.stack([normal[i][tick] for i in alive])))
         action, command = _act(groups, alive, tick, sensors)
-        log.add(alive, sensors, action, command.target)
+        log.add(alive, robots.truth()[alive] if judged else sensors, action, command.target)
         robots.step(alive, command)
         on_tick(len(alive))
     return [

@@ -30,6 +30,9 @@ class Robots(Protocol):
     def read(self) -> Sensors:
         """True readings of all B robots."""
 
+    def truth(self) -> Sensors:
+        """What sensors without noise or faults would say, as motion capture would: for judging, never for acting."""
+
     def step(self, robots: np.ndarray, command: ServoCommand) -> None:
         """Hold a command for one control period on `robots` (n,); the others stand still in time."""
 
@@ -61,6 +64,10 @@ class NominalRobots:
     def read(self) -> Sensors:
         """True readings of all robots; torque and foot force are those of the last physics step."""
         return self._view.sensors(self._view.actuator_force)
+
+    def truth(self) -> Sensors:
+        """See `Robots.truth`: these sensors have no faults."""
+        return self.read()
 
     def step(self, robots: np.ndarray, command: ServoCommand) -> None:
         """Hold a command for 20 ms on `robots` (n,)."""
@@ -115,7 +122,14 @@ class SideBySide:
 
     def read(self) -> Sensors:
         """See `Robots.read`."""
-        readings = [part.read() for part in self._parts]
+        return self._gathered([part.read() for part in self._parts])
+
+    def truth(self) -> Sensors:
+        """See `Robots.truth`."""
+        return self._gathered([part.truth() for part in self._parts])
+
+    def _gathered(self, readings: list[Sensors]) -> Sensors:
+        """The parts' readings in the robots' own order."""
         order = np.argsort(np.concatenate(self._members))
         return Sensors(
             **{f.name: np.concatenate([getattr(r, f.name) for r in readings])[order] for f in fields(Sensors)}

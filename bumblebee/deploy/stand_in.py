@@ -8,6 +8,7 @@ It takes the robot's place: its effects are sealed in a file that nothing else r
 A plan is {"policies": {key: folder}, "episodes": [{"rollout_id", "policy", "motion", "seed", "meta"}],
 "start_noise": {...}, "base": ..., "stop": {...}, "compensations": {key: compensation.json}}; meta and all from
 start_noise on may be absent. `stop` is when an episode ends before its clip does (`episodes.Stop`).
+`judged`: the rollouts hold the true state in place of readings, for the evaluation.
 
 `base` says what the robot knows of its base's place: `mocap`, 1 mm of noise; `odometry`, which drifts, for the policy
 as for the log; `none`, odometry for the policy and no `base_pos` in the log.
@@ -54,6 +55,7 @@ class Work:
     undone: dict[str, Compensation]
     """By the keys of policies."""
     stop: Stop = FALL
+    judged: bool = False
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -92,7 +94,9 @@ def run(options: argparse.Namespace) -> None:
 
         make = lambda count: SideBySide(lambda part: StandInRobots(part, effects), count, options.threads)  # noqa: E731
         noise = SensorNoise(base="mocap" if work.base == "mocap" else "odometry")
-        rollouts = run_episodes(make, episodes, policies, clips, noise, work.start, tick, work.undone, work.stop)
+        rollouts = run_episodes(
+            make, episodes, policies, clips, noise, work.start, tick, work.undone, work.stop, work.judged
+        )
     for rollout in rollouts if work.base != "none" else [replace(rollout, base_pos=None) for rollout in rollouts]:
         rollout.meta.update({key: value for key, value in recorded.items() if key not in rollout.meta})
         rollout.meta["notes"] = _ending(rollout.frames, clips[rollout.meta["motion"]])
@@ -125,12 +129,12 @@ def _plan(options: argparse.Namespace) -> Work:
         policies = {key: Path(folder) for key, folder in plan["policies"].items()}
         episodes = [Episode(**episode) for episode in plan["episodes"]]
         start, base = StartNoise(**plan.get("start_noise", {})), options.base or plan.get("base", BASES[0])
-        stop = Stop(**plan.get("stop", {}))
+        stop, judged = Stop(**plan.get("stop", {})), bool(plan.get("judged", False))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise BadInput(options.plan, "a plan with policies and episodes", f"{type(error).__name__}: {error}") from None
     if base not in BASES:
         raise BadInput(f"{options.plan}: base", f"one of {', '.join(BASES)}", str(base)[:40])
-    return Work(policies, episodes, start, base, load_compensations(plan, options.plan), stop)
+    return Work(policies, episodes, start, base, load_compensations(plan, options.plan), stop, judged)
 
 
 def _options(argv: list[str] | None) -> argparse.Namespace:

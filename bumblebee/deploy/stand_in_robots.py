@@ -51,6 +51,10 @@ class StandInRobots:
         true = self._view.sensors(self._body.reported)
         return replace(true, joint_pos=position, joint_vel=velocity, base_quat=self._body.orientation())
 
+    def truth(self) -> Sensors:
+        """See `Robots.truth`."""
+        return self._view.sensors(self._body.reported)
+
     def step(self, robots: np.ndarray, command: ServoCommand, cycles: int = CYCLES) -> None:
         """Command the drives of `robots` (n,) for 20 ms: 20 servo cycles of 1 ms; the others stand still in time."""
         self._body.step(command, robots, cycles)
