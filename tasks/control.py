@@ -33,6 +33,11 @@ class ControlConfig(Ranged):
     kinds: Annotated[tuple[Literal["declared", "delta"], ...], Size(0)] = ("declared", "delta")
     """`declared`: in the declared model; `delta`: there, with a delta action. None: no controls, and half the time."""
 
+    def __post_init__(self) -> None:
+        """Refuse a control that would be trained twice."""
+        super().__post_init__()
+        self.require(len(set(self.kinds)) == len(self.kinds), "kinds", "distinct kinds")
+
 
 def main(round: int, cluster: str, kind: str) -> None:
     """Fill models/control/r<round>/<cluster>/<kind>."""

@@ -36,7 +36,6 @@ from bumblebee.evaluation.episodes import rollout_metrics
 from bumblebee.evaluation.summary import COLUMNS, comparisons, results, unchanged_pairs
 from bumblebee.evaluation.thinning import thin
 from bumblebee.evaluation.untrained import export_untrained
-from bumblebee.io.read import read_json
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
@@ -243,7 +242,7 @@ def beside(cluster: str, number: int, parent: int) -> list[Candidate]:
 def came_along(base: Path) -> bool:
     """Whether the base policy began from the one that comes with BumbleBee."""
     card = base / "card.json"
-    return card.exists() and read_json(card).get("parent") == "pretrained"
+    return card.exists() and json.loads(card.read_text()).get("parent") == "pretrained"
 
 
 def plan(
