@@ -19,6 +19,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import torch
+from torch import Tensor
 
 from benchmarks.baselines.methods import METHODS, RANDOMISATIONS, Method, changed, method, require_kept
 from benchmarks.baselines.trial import Tried, report
@@ -32,12 +33,14 @@ from bumblebee.files import save_tensors
 from bumblebee.learning.distill import DistillConfig, distill
 from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.learning.ppo import CURVE, Trainer
+from bumblebee.motion.clip import Clip
 from bumblebee.motion.pieces import motion_of
 from bumblebee.sim.engines import make_engine
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
+from bumblebee.tracking.sampler import ClipShares
 
 STUDENT_SHARE = 0.3
 RESUME, STUDENT_FOLDER, SETTINGS = "resume.pt", "student", "settings.json"
@@ -57,11 +60,19 @@ def make_env(own: Method, rows: list[Packed], seed: int, share: float) -> Tracki
     """The method's task; embedded motions are drawn `share` times as often for their length."""
     task = own.env
     engine = make_engine(task.engine, task_model(task), task.num_worlds, task.threads, buffers=task.buffers)
-    clips, factors = [row.clip for row in rows], shares(rows, share)
+    clips = [row.clip for row in rows]
+    factors = grouped(shares(rows, share), clips)
     if own.baseline is None:
         return TrackingEnv(MotionLibrary(clips, task.ahead, device=engine.device), engine, task, seed, None, factors)
     library = MovingLibrary(clips, task.ahead, device=engine.device)
     return BaselineEnv(library, engine, replace(own.baseline, env=task), seed, factors)
+
+
+def grouped(factors: Tensor, clips: list[Clip]) -> ClipShares:
+    """Clips of the same factor (N,) as a group, whose share of the draws is that factor times its frames."""
+    values, group = torch.unique(factors, return_inverse=True)
+    frames = torch.zeros(len(values)).index_add(0, group, torch.tensor([float(clip.frames) for clip in clips]))
+    return ClipShares(group, values * frames)
 
 
 class Clock:
