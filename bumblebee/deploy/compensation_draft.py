@@ -109,7 +109,8 @@ class Draft:
         """(J,) [N m] that may be sent at most for effects of a known size."""
         a = self.arrays
         out = self.limits.friction_share * (np.abs(a["dry"]) + a["stiction"])
-        out += np.abs(0.5 * a["asymmetry"] - a["preload"]) + np.abs(a["spring"]) * np.abs(self.robot.ranges).max(axis=1)
+        reach = np.minimum(np.abs(self.robot.ranges).max(axis=1), self.limits.spring_reach)
+        out += np.abs(0.5 * a["asymmetry"] - a["preload"]) + np.abs(a["spring"]) * reach
         for column, sine, cosine, _ in self.cogging:
             out[column] += np.hypot(sine, cosine)
         for column, amplitude, _, _ in self.hysteresis:
