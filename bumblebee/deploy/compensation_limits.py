@@ -33,8 +33,8 @@ class CompensationLimits(Ranged):
     """Share of friction that is fed forward: less than all, so that it never moves a joint by itself, even where the
     estimate is a tenth too large."""
     spring_reach: Annotated[float, Range(above=0, most=3.2)] = 0.5
-    """[rad] of a joint's angle at which a spring's torque is held against `torque_share`: what whole-body motions ask of
-    hips and ankles; beyond it the torque stays at that share."""
+    """[rad] of a joint's angle at which a spring's torque is held against `torque_share`: what motions ask of hips
+    and ankles; beyond it the torque stays at that share."""
     still_speed: Annotated[float, Range(above=0, most=2)] = 0.1
     """[rad/s] over which the sign of the intended velocity is smoothed: below it a joint is about to turn round, and a
     jump of the torque would shake it."""
