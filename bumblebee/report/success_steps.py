@@ -69,10 +69,18 @@ def step_differences(summary: Json, turn: RoundResults, engine: str = ROBOT) -> 
     }
     found = {words: pair(summary, a, b, engine) for words, (a, b) in called.items()}
     return [
-        f"{b} against {a}: {change(c)}"
+        f"{b} against {a}: {_told(c)}"
         for (b, a), c in found.items()
         if c is not None and all(_rate(summary, c[side], engine) for side in ("from", "to"))
     ]
+
+
+def _told(entry: Json) -> str:
+    """The change in success; where that shows nothing, the one in the key bodies' error beside it."""
+    said = change(entry)
+    error = (entry.get("mpkpe_mm") or {}).get("value")
+    told = "no difference shown" in said and error is not None and not entry.get("unchanged")
+    return f"{said}; MPKPE {change(entry, 'mpkpe_mm')}" if told else said
 
 
 def _rate(summary: Json, policy: str, engine: str) -> Json | None:
