@@ -17,14 +17,13 @@ import numpy as np
 from bumblebee.deploy.stand_in_effects import SCHEMA, declared_g1, entry, seal
 from bumblebee.deploy.undeclared.faults import largest, peaks
 from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place, fits
-from bumblebee.errors import BadInput
 from bumblebee.evaluation.thinning import thin
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library
 from bumblebee.ranges import Count, Few, Name, PartOf, Range, Ranged, Seed, Share
 from bumblebee.robot.facts import g1_bodies, joint_names
 from tasks.rollouts import FILTERED, RolloutsConfig, cut
-from tasks.seal_trial import export_shipped, followed, try_robot
+from tasks.seal_trial import Trial, export_shipped, followed, try_robot
 from tasks.stage import load, output_file, run_stage
 
 OUT = Path("data/sealed/robot.json")
@@ -53,7 +52,7 @@ class SealConfig(Ranged):
     """Share of the motions, of those that it follows on the declared model, that the shipped policy must lose."""
     stands: Annotated[float, Range(least=0, most=3600)] = 2.0
     """Median time that it must follow a motion all the same [s]: a robot that falls at once gives no data."""
-    draws: Count = 40
+    draws: Count = 20
     """How often a robot is drawn at most; each draw is a tenth worse than the one before."""
     motions: Count = 12
     """Motions of the trial."""
@@ -110,24 +109,27 @@ def main() -> None:
 def found(config: SealConfig) -> dict[str, Any]:
     """The first robot drawn on which the shipped policy loses enough, and stands long enough to be measured.
 
-    Raises:
-        BadInput: when none of the draws is such a robot.
+    Where there is none among the draws, the one on which it loses most: a line says so, and the loop goes on.
     """
     with tempfile.TemporaryDirectory() as scratch:
         policy = export_shipped(Path(scratch) / "shipped")
         clips = followed(policy, trial_clips(config), config.trial_seed, config.threads)
         if not clips:
-            raise BadInput(FILTERED, "motions that the shipped policy follows on the declared model", "none")
+            print("the shipped policy follows none of the trial's motions on the declared model: nothing to lose")
+            return sealed_robot(config, 0)
+        tried: list[tuple[Trial, dict[str, Any]]] = []
         for attempt in range(config.draws):
             sealed = sealed_robot(config, attempt)
             trial = try_robot(policy, sealed, clips, config.trial_seed, config.threads)
+            tried.append((trial, sealed | {"trial": {**asdict(trial), "motions": len(clips)}}))
             worth = trial.lost >= config.loses and trial.seconds >= config.stands
             lost = f"the shipped policy loses {trial.lost:.0%} of {len(clips)} motions, median {trial.seconds:.1f} s"
-            print(f"draw {attempt + 1}: {lost}{'' if worth else ', drawn again'}", flush=True)
+            print(f"draw {attempt + 1}: {lost}{'' if worth else ', not taken'}", flush=True)
             if worth:
-                return sealed | {"trial": {**asdict(trial), "motions": len(clips)}}
-    came = f"none in {config.draws} draws"
-    raise BadInput("params.yaml: seal", f"a robot on which {config.loses:.0%} are lost", came, "Raise seal.severity.")
+                return tried[-1][1]
+    trial, sealed = max(tried, key=lambda one: (one[0].seconds >= config.stands, one[0].lost))
+    print(f"none of {config.draws} draws loses {config.loses:.0%}: the one that loses {trial.lost:.0%} is sealed")
+    return sealed
 
 
 def trial_clips(config: SealConfig) -> list[Clip]:

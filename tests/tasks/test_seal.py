@@ -97,15 +97,26 @@ def test_a_robot_is_drawn_again_until_the_policy_loses_a_third_and_yet_can_be_me
     assert sealed["attempt"] == 2 and sealed["effects"] == draw(SealConfig(seed=4), 2)
     assert sealed["trial"]["lost"] == 0.5
     said = capsys.readouterr().out
-    assert said.count("drawn again") == 2
+    assert said.count("not taken") == 2
     assert not any(effect["effect"] in said for effect in sealed["effects"])  # the seal stays closed
 
 
-def test_where_no_draw_will_do_one_line_says_so_and_nothing_is_sealed(trials: list[Trial]) -> None:
-    trials += [Trial(0.0, 5.0)] * 3
-    with pytest.raises(BadInput, match=r"33% are lost, came none in 3 draws"):
-        seal.main()
-    assert not seal.OUT.exists()
+def test_where_no_draw_will_do_the_one_that_loses_most_and_stands_is_sealed_and_a_line_says_so(
+    trials: list[Trial], capsys: pytest.CaptureFixture[str]
+) -> None:
+    trials += [Trial(0.1, 5.0), Trial(0.25, 5.0), Trial(1.0, 0.3)]
+    seal.main()
+    assert json.loads(seal.OUT.read_text())["attempt"] == 1
+    assert "none of 3 draws loses 33%: the one that loses 25% is sealed" in capsys.readouterr().out
+
+
+def test_motions_that_the_policy_does_not_follow_at_all_are_no_reason_to_stop(
+    trials: list[Trial], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(seal, "followed", lambda *_: [])
+    seal.main()
+    assert json.loads(seal.OUT.read_text())["attempt"] == 0
+    assert "nothing to lose" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("line", ["seal: {n_effects: 0}\nrollouts: {}", "seal: {}\nrollouts: {source: mine}"])
