@@ -15,6 +15,7 @@ from tasks import params
 
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")
+FIELD_BASE = "none"  # who brings motions has, on the robot, odometry to act on and no motion capture to log
 GENERATED = ".params.generated.yaml"  # what params.yaml was when it was last made here
 
 
@@ -47,6 +48,7 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
         if not source.is_dir():
             raise BadInput(source, "a folder of motion files", "no such folder", "Check MOTIONS.")
         content = merge(content, {"motions": {"source": str(source)}})
+        content = merge({"rollouts": {"base": FIELD_BASE}}, content)  # unless the settings say otherwise
     content = merge(content, over)
     folder.mkdir(parents=True, exist_ok=True)
     for name in CODE:

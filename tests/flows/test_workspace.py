@@ -53,6 +53,10 @@ def test_settings_that_were_edited_in_the_workspace_are_kept(tmp_path: Path):
     workspaces.create(folder, motions=tmp_path / "mocap")
     now = read(folder / "params.yaml")
     assert now["gate"] == {"mode": "ask"} and now["motions"]["source"] == str(tmp_path / "mocap")
+    assert now["rollouts"]["base"] == "none"
+    (folder / "params.yaml").write_text((folder / "params.yaml").read_text().replace("base: none", "base: mocap"))
+    workspaces.create(folder, motions=tmp_path / "mocap")
+    assert read(folder / "params.yaml")["rollouts"]["base"] == "mocap"
 
 
 def test_the_users_motions_are_a_dependency_of_the_stage_that_reads_them(tmp_path: Path):
