@@ -36,9 +36,9 @@ class Recordings:
     ids: tuple[str, ...]
 
     def windows(self, frames: int, stride: int) -> Tensor:
-        """First rows of all windows of `frames` steps, every `stride` rows of each rollout, (W,)."""
+        """First rows of all windows of `frames` steps, every `stride` rows of each rollout, (W,); a shorter one has none."""
         rows = [
-            torch.arange(int(first), int(first + length) - frames, stride)
+            torch.arange(int(first), int(first) + max(int(length) - frames, 0), stride)
             for first, length in zip(self.start, self.length, strict=True)
         ]
         return torch.cat(rows) if rows else torch.zeros(0, dtype=torch.long)

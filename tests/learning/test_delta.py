@@ -79,6 +79,13 @@ def test_the_limit_rows_say_whether_any_joint_is_beyond_however_many(beyond: int
     assert rewards.beyond(values, -torch.ones(23), torch.ones(23)).tolist() == [penalty, 0.0]
 
 
+def test_a_rollout_that_is_shorter_than_a_window_has_none() -> None:
+    """A log that ends where the operator stopped is no reason for the others to be lost."""
+    rows = torch.zeros(70, 1)
+    recordings = Recordings(rows, rows, rows, torch.tensor([0, 10]), torch.tensor([10, 60]), ("short", "long"))
+    assert recordings.windows(50, 5).tolist() == [10, 15]
+
+
 def test_windows_stay_inside_their_rollout(recordings: Recordings) -> None:
     rows = recordings.windows(50, 5)
     assert len(rows) == 3 * 4
