@@ -36,7 +36,7 @@ class Recordings:
     ids: tuple[str, ...]
 
     def windows(self, frames: int, stride: int) -> Tensor:
-        """First rows of all windows of `frames` steps, every `stride` rows of each rollout, (W,); a shorter one has none."""
+        """First rows of all windows of `frames` steps, every `stride` rows of each longer rollout, (W,)."""
         rows = [
             torch.arange(int(first), int(first) + max(int(length) - frames, 0), stride)
             for first, length in zip(self.start, self.length, strict=True)
