@@ -4,13 +4,17 @@ No training: the policy that was measured is tried again with it in the evaluati
 Effects that no drive can undo, or only beyond a limit, are left out here; the plan says which, and why.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from bumblebee.deploy.compensation import Compensation, PlannedEffect
 from bumblebee.deploy.compensation_file import table_of, write_compensation
 from bumblebee.deploy.compensation_limits import CompensationLimits
-from bumblebee.deploy.compensation_plan import compensate_file
+from bumblebee.deploy.compensation_plan import compensate
+from bumblebee.measured.intake import file_hash
 from bumblebee.ranges import Ranged
+from bumblebee.sim.effects import read_effects
+from tasks.rollouts import parent_round
 from tasks.stage import load, log_run, output_folder, run_stage
 
 
@@ -26,7 +30,7 @@ def main(round: int) -> None:
     """Fill models/compensation/r<round>."""
     config = load("compensate", CompensateConfig)
     found, target = Path(f"data/diagnosis/r{round}/effects.yaml"), Path(f"models/compensation/r{round}")
-    compensation = compensate_file(found, limits=config.limits, leave_out=True)
+    compensation = undone_after(parent_round(round), found, config.limits)
     with output_folder(target) as folder:
         write_compensation(folder / "compensation.json", compensation)
     undone = sum(bool(step.done) for step in compensation.plan)
@@ -34,6 +38,22 @@ def main(round: int) -> None:
     print(f"round {round}: {undone} of {len(compensation.plan)} effects undone at the joint")
     metrics = {"effects": len(compensation.plan), "undone": undone}
     log_run("compensate", round=round, params=config, metrics=metrics, artifacts=[target])
+
+
+def undone_after(parent: int, found: Path, limits: CompensationLimits) -> Compensation:
+    """What undoes the effects `found` for experts of the round `parent`.
+
+    What that round's own diagnosis found they were trained with, and to undo it again would be to do it twice. It is
+    left out also where a cluster's expert stayed what it was.
+    """
+    effects = read_effects(found)
+    trained = read_effects(Path(f"data/diagnosis/r{parent}/effects.yaml")) if parent else []
+    known = {(effect.effect, frozenset(effect.where)) for effect in trained}
+    new = [effect for effect in effects if (effect.effect, frozenset(effect.where)) not in known]
+    made = compensate(new, None, limits, leave_out=True, where=found, effects_sha256=file_hash(found))
+    why = f"the experts were trained with it in round {parent}"
+    left = tuple(PlannedEffect(e.effect, e.where, "", "", why) for e in effects if e not in new)
+    return replace(made, plan=(*made.plan, *left))
 
 
 if __name__ == "__main__":

@@ -6,37 +6,22 @@ ASAP does, whether or not it beats none). What refinement gains beyond these is 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
 
 import torch
 
 from bumblebee.learning.delta import DeltaConfig, action_adapter, save_delta
 from bumblebee.learning.trial import World
-from bumblebee.ranges import Ranged, Size
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.observations import action_scale
+from tasks.control_config import ControlConfig
 from tasks.delta import card, declared, train
 from tasks.refine import RefineConfig, parent_of
 from tasks.stage import load, output_folder, run_stage
 from tasks.training import Job, cluster_clips, train_policy
 
 Adapter = Callable[[RobotState, torch.Tensor, torch.Tensor], torch.Tensor]
-
-
-@dataclass(frozen=True)
-class ControlConfig(Ranged):
-    """Which controls are trained beside the refinement; the settings of their training are those of `refine`."""
-
-    kinds: Annotated[tuple[Literal["declared", "delta"], ...], Size(0)] = ("declared", "delta")
-    """`declared`: in the declared model; `delta`: there, with a delta action. None: no controls, and half the time."""
-
-    def __post_init__(self) -> None:
-        """Refuse a control that would be trained twice."""
-        super().__post_init__()
-        self.require(len(set(self.kinds)) == len(self.kinds), "kinds", "distinct kinds")
 
 
 def main(round: int, cluster: str, kind: str) -> None:

@@ -7,17 +7,15 @@ import json
 import re
 import tempfile
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from hashlib import sha256
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
 import pandas as pd
 
-from bumblebee.deploy.compensation_file import read_compensation
 from bumblebee.deploy.episodes import FALL_RULE, Episode, run_episodes
-from bumblebee.deploy.policy import ExportedPolicy, read_policy_contract
+from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.sensors import NO_NOISE, SensorNoise
 from bumblebee.deploy.stand_in_robots import StandInRobots
@@ -35,15 +33,14 @@ from bumblebee.evaluation.engines import engine_settings
 from bumblebee.evaluation.episodes import rollout_metrics
 from bumblebee.evaluation.summary import COLUMNS, comparisons, results, unchanged_pairs
 from bumblebee.evaluation.thinning import thin
-from bumblebee.evaluation.untrained import export_untrained
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
 from bumblebee.progress import progress
 from bumblebee.ranges import Count, Few, Line, Name, Range, Ranged, Seed, Size
-from tasks.params import FILE, read
+from tasks.candidates import Candidate, candidates, chain, same
+from tasks.params import FILE
 from tasks.rollouts import FILTERED, SEALED, cut, start_stand_in
-from tasks.seal_trial import export_shipped
 from tasks.stage import load, log_run, output_folder, run_stage
 
 OUT = Path("data/evaluation")
@@ -80,35 +77,6 @@ class EvaluateConfig(Ranged):
         self.require(len(set(self.seeds)) == len(self.seeds), "seeds", "distinct numbers")
         digest = not self.contract or bool(re.fullmatch("[0-9a-f]{64}", self.contract))
         self.require(digest, "contract", "nothing, or a sha256 of 64 digits")
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A policy that is evaluated."""
-
-    policy: str
-    """Name in the tables: untrained, shipped, base, expert-<cluster>-r<N>, the same with -compensated,
-    control-<kind>-<cluster>-r<N>, generalist."""
-    kind: str
-    """untrained, shipped, base, expert, compensated, control-declared, control-delta or generalist."""
-    folder: Path
-    """The exported policy."""
-    round: int | None = None
-    """An expert's round."""
-    cluster: str | None = None
-    """An expert's cluster: it is run on that cluster's motions only."""
-    compensation: Path | None = None
-    """What its runner undoes at the joints: compensation.json."""
-
-    @property
-    def for_robot_only(self) -> bool:
-        """Whether it says something about the robot alone: the declared model has nothing to make up for."""
-        return self.kind == "compensated" or self.kind.startswith("control")
-
-    def told(self) -> dict[str, Any]:
-        """As it stands in summary.json; an export made for this evaluation alone has no folder."""
-        folder = "" if self.kind in ("untrained", "shipped") else str(self.folder)
-        return {**asdict(self), "folder": folder, "compensation": str(self.compensation or "")}
 
 
 def main() -> None:
@@ -189,62 +157,6 @@ def settings(engine: str) -> dict[str, Any]:
     return {**engine_settings(StandInRobots(1, []).model), **told}
 
 
-def candidates(scratch: Path | None, untrained: bool = True) -> tuple[list[Candidate], list[str]]:
-    """The policies that are there, and the names of those that are not.
-
-    Args:
-        scratch: takes an export of the shipped policy, where base began from it, and an untrained one; None: neither.
-        untrained: whether an untrained one is wanted.
-    """
-    params = read()
-    clusters, rounds = params.get("clusters", []), params.get("rounds", [])
-    wanted = [Candidate("base", "base", Path("models/base"))]
-    wanted += [expert(cluster, number) for number in (0, *(int(r["n"]) for r in rounds)) for cluster in clusters]
-    wanted.append(Candidate("generalist", "generalist", Path("models/generalist")))
-    found = [c for c in wanted if (c.folder / "contract.json").exists()]
-    missing = [c.policy for c in wanted if c not in found]
-    if not found:
-        raise BadInput("models", "at least one exported policy", "none", "Train first.")
-    found += [c for r in rounds for cluster in clusters for c in beside(cluster, int(r["n"]), int(r["parent"]))]
-    if came_along(Path("models/base")) and scratch is not None:
-        found.insert(0, Candidate("shipped", "shipped", export_shipped(scratch / "shipped")))
-    if untrained and scratch is not None:
-        export_untrained(found[0].folder, scratch / "untrained")
-        found.insert(0, Candidate("untrained", "untrained", scratch / "untrained"))
-    return found, missing
-
-
-def expert(cluster: str, number: int) -> Candidate:
-    """A cluster's expert of a round."""
-    return Candidate(
-        f"expert-{cluster}-r{number}", "expert", Path(f"models/experts/r{number}/{cluster}"), number, cluster
-    )
-
-
-def beside(cluster: str, number: int, parent: int) -> list[Candidate]:
-    """What a round's refinement is held against, as far as it is there.
-
-    The policy that it began from, compensated, and the same training without the diagnosis.
-    """
-    before, plan = expert(cluster, parent), Path(f"models/compensation/r{number}/compensation.json")
-    found = [
-        Candidate(f"control-{kind}-{cluster}-r{number}", f"control-{kind}", folder, number, cluster)
-        for kind in ("declared", "delta")
-        if (folder := Path(f"models/control/r{number}/{cluster}/{kind}/policy")).exists()
-    ]
-    if plan.exists() and (before.folder / "contract.json").exists():
-        undone = plan if any(step.done for step in read_compensation(plan).plan) else None
-        name = f"{before.policy}-compensated"
-        found.insert(0, replace(before, policy=name, kind="compensated", compensation=undone))
-    return found
-
-
-def came_along(base: Path) -> bool:
-    """Whether the base policy began from the one that comes with BumbleBee."""
-    card = base / "card.json"
-    return card.exists() and json.loads(card.read_text()).get("parent") == "pretrained"
-
-
 def plan(
     found: list[Candidate], clips: list[Clip], cluster_of: dict[str, str], seeds: tuple[int, ...]
 ) -> list[Episode]:
@@ -295,16 +207,6 @@ def run(
     return pd.DataFrame(rows)[list(COLUMNS)].astype({"round": "Int64"})
 
 
-def same(candidate: Candidate) -> tuple[str, str]:
-    """What decides an episode beside motion and seed: the policy's file, and what its runner undoes."""
-    return file_hash(candidate), str(candidate.compensation or "")
-
-
-def file_hash(candidate: Candidate) -> str:
-    """sha256 of the exported policy."""
-    return str(read_policy_contract(candidate.folder / "contract.json")["onnx_sha256"])
-
-
 def nominal(
     found: list[Candidate], planned: list[Episode], clips: dict[str, Clip], config: EvaluateConfig, scratch: Path
 ) -> list[Rollout]:
@@ -332,21 +234,6 @@ def stand_in(
     }
     start_stand_in(work, scratch / "clips", scratch / "rollouts", scratch, config.threads)
     return (read_rollout(scratch / "rollouts" / f"{e.rollout_id}.parquet") for e in planned)
-
-
-def chain(found: list[Candidate]) -> list[tuple[str, str]]:
-    """What is compared with what: each step of the loop, the generalist with all before it, each round's controls."""
-    rounds = sorted({c.round for c in found if c.kind == "expert" and c.round is not None})
-    steps = ["untrained", "shipped", "base", *(f"experts-r{number}" for number in rounds), "generalist"]
-    pairs = list(pairwise(steps))
-    extra = [("base", steps[-2]), ("base", "generalist"), ("shipped", "generalist")]
-    for before, after in pairwise(rounds):
-        controls = [f"control-{kind}-r{after}" for kind in ("declared", "delta")]
-        compensated = f"experts-r{before}-compensated"
-        extra += [(f"experts-r{before}", compensated), (compensated, f"experts-r{after}")]
-        extra += [(f"experts-r{before}", control) for control in controls]
-        extra += [(control, f"experts-r{after}") for control in controls]
-    return list(dict.fromkeys(pairs + [pair for pair in extra if pair[0] != pair[1]]))
 
 
 def headline(summary: dict) -> dict[str, float]:

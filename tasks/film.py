@@ -20,7 +20,7 @@ from tasks.rollouts import FILTERED, cut, start_stand_in
 
 CLUSTERS, EPISODES = Path("data/clusters"), Path("data/evaluation/episodes.parquet")
 _MOST, _LEAD = 3, 4.0  # candidates that are run; seconds of the film before the failure
-_REAL_SPEED = "Measured joint angles and base pose at real speed; what has fallen stands still and pale."
+_REAL_SPEED = "True joint angles and base pose at real speed; what has fallen stands still and pale."
 
 
 def film_blocks(results: LoopResults, asked: str, seed: int) -> list[Block]:
@@ -111,7 +111,7 @@ def alone(episodes: pd.DataFrame, speed: dict[str, float], asked: str, seed: int
 def alone_blocks(shown: Film, motion: str) -> list[Block]:
     """The film of one run, or its stills."""
     if shown.sheet is not None:
-        caption = "Measured joint angles and base pose at real speed. Arrow keys step on the slider."
+        caption = "True joint angles and base pose at real speed. Arrow keys step on the slider."
         return [film_block(shown.sheet, f"Generalist: '{motion}'", caption, f"The robot during '{motion}'.")]
     stills = [still(uri, f"{at:.1f} s", f"The robot {at:.1f} s after the start.") for at, uri in shown.stills]
     return [*stills, note(shown.note)]

@@ -1,13 +1,17 @@
 """Refine an expert in the corrected simulator: -> models/experts/r<round>/<cluster> (paper, section 3.4).
 
 The simulator is the round's corrected model, the effects that MJCF cannot hold, and the delta action if it was kept.
+Where a round found nothing and kept no delta action there is nothing new to learn: the expert stays what it is.
 """
 
+import json
+import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.delta import action_adapter, load_delta
+from bumblebee.learning.ppo import CURVE
 from bumblebee.learning.trial import World
 from bumblebee.sim.effects import read_effects, runtime_hooks
 from bumblebee.sim.sensors import load_model
@@ -15,7 +19,7 @@ from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.observations import action_scale
 from tasks.experts import ExpertsConfig
 from tasks.sections import loop
-from tasks.stage import load, run_stage
+from tasks.stage import load, log_run, output_folder, run_stage
 from tasks.training import Job, cluster_clips, train_policy
 
 
@@ -32,21 +36,43 @@ class RefineConfig(ExpertsConfig):
 def main(round: int, cluster: str) -> None:
     """Fill models/experts/r<round>/<cluster>."""
     config = load("refine", RefineConfig)
+    parent, out = Path(f"models/experts/r{parent_of(round)}") / cluster, Path(f"models/experts/r{round}") / cluster
+    if not learned(round, cluster):
+        keep(parent, out, round)
+        print(f"round {round}, {cluster}: nothing was found that the model lacks: the expert stays what it is")
+        log_run("refine", cluster=cluster, round=round, params=config, artifacts=[out], tags={"kept": "parent"})
+        return
     clips, share, tried = cluster_clips(cluster, config.others)
     job = Job(
         stage="refine",
         name=f"expert-{cluster}-r{round}",
-        out=Path(f"models/experts/r{round}") / cluster,
+        out=out,
         clips=clips,
         tried=tried,
         world=corrected_world(round, cluster, config.env.physics_hz, config.env.threads),
         share=share,
-        parent=Path(f"models/experts/r{parent_of(round)}") / cluster,
+        parent=parent,
         cluster=cluster,
         round=round,
         model=Path(f"data/diagnosis/r{round}/model.xml"),
     )
     train_policy(job, config)
+
+
+def learned(round: int, cluster: str) -> bool:
+    """Whether the round changed the simulator: an effect was found, or the cluster's delta action was kept."""
+    effects = read_effects(Path(f"data/diagnosis/r{round}/effects.yaml"))
+    return bool(effects) or load_delta(Path(f"models/delta/r{round}/{cluster}")) is not None
+
+
+def keep(parent: Path, out: Path, round: int) -> None:
+    """The parent's policy as this round's; its card says that no step was taken."""
+    card = json.loads((parent / "card.json").read_text())
+    card |= {"stage": "refine", "round": round, "parent": str(parent), "kept": "parent"}
+    card |= {"iterations": 0, "frames": 0, "seconds": 0.0, "frames_per_second": 0, "before": card["after"]}
+    with output_folder(out) as folder:
+        shutil.copytree(parent, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(CURVE, "trials.csv"))
+        (folder / "card.json").write_text(json.dumps(card, indent=1) + "\n")
 
 
 def parent_of(round: int) -> int:

@@ -18,12 +18,13 @@ from bumblebee.deploy.stand_in_effects import SCHEMA, declared_g1, entry, seal
 from bumblebee.deploy.undeclared.faults import largest, peaks
 from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place, fits
 from bumblebee.evaluation.thinning import thin
+from bumblebee.learning.export import export_shipped
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library
 from bumblebee.ranges import Count, Few, Name, PartOf, Range, Ranged, Seed, Share
 from bumblebee.robot.facts import g1_bodies, joint_names
 from tasks.rollouts import FILTERED, RolloutsConfig, cut
-from tasks.seal_trial import Trial, export_shipped, followed, try_robot
+from tasks.seal_trial import Trial, followed, try_robot
 from tasks.stage import load, output_file, run_stage
 
 OUT = Path("data/sealed/robot.json")

@@ -19,22 +19,12 @@ from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.sensors import NO_NOISE
 from bumblebee.evaluation.episodes import rollout_metrics
 from bumblebee.evaluation.metrics import success_threshold
-from bumblebee.learning import pretrained
-from bumblebee.learning.export import export_policy
-from bumblebee.learning.policy import load_policy
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import write_library
 from tasks.rollouts import start_stand_in
 
 KEY = "shipped"
-
-
-def export_shipped(folder: Path) -> Path:
-    """Export the policy that comes with BumbleBee into a new folder, which is returned."""
-    folder.mkdir(parents=True)
-    export_policy(folder, load_policy(pretrained.FOLDER))
-    return folder
 
 
 @dataclass(frozen=True)

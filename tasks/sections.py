@@ -26,7 +26,7 @@ SECTIONS = {
     "compensate": "tasks.compensate:CompensateConfig",
     "delta": "bumblebee.learning.delta:DeltaConfig",
     "refine": "tasks.refine:RefineConfig",
-    "control": "tasks.control:ControlConfig",
+    "control": "tasks.control_config:ControlConfig",
     "distill": "bumblebee.learning.distill:DistillConfig",
     "evaluate": "tasks.evaluate:EvaluateConfig",
     "publish": "tasks.publish:PublishConfig",

@@ -10,7 +10,8 @@ import numpy as np
 import torch
 from torch import nn
 
-from bumblebee.learning.policy import Policy
+from bumblebee.learning import pretrained
+from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.robot.facts import joint_names, joints, stand_pose
 from bumblebee.robot.model import gains
 from bumblebee.tracking.config import ObservationConfig
@@ -25,6 +26,13 @@ def export_policy(folder: Path, policy: Policy, physics_hz: float = 200.0) -> No
     """Write `policy.onnx` (input "obs" (N, D), output "actions" (N, J), the mean) and `contract.json`."""
     shape = policy.shape
     write_export(folder, onnx_of(policy), shape.ahead, physics_hz, shape.seen, shape.action)
+
+
+def export_shipped(folder: Path) -> Path:
+    """Export the policy that comes with BumbleBee into a new folder, which is returned."""
+    folder.mkdir(parents=True)
+    export_policy(folder, load_policy(pretrained.FOLDER))
+    return folder
 
 
 def write_export(

@@ -13,7 +13,7 @@ from tasks import compensate
 def diagnosed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(compensate, "log_run", lambda *_, **__: None)
-    Path("params.yaml").write_text("compensate: {}\n")
+    Path("params.yaml").write_text("compensate: {}\nrounds: [{n: 1, parent: 0}, {n: 2, parent: 1}]\n")
     Path("data/diagnosis/r1").mkdir(parents=True)
     return tmp_path
 
@@ -36,3 +36,18 @@ def test_a_robot_that_lacks_nothing_is_sent_its_own_gains(diagnosed: Path) -> No
     compensate.main(1)
     made = read_compensation(Path("models/compensation/r1/compensation.json"))
     assert not made.plan and not made.encoder_offset.any() and not made.dry.any()
+
+
+def test_what_the_experts_were_trained_with_is_not_undone_a_second_time(diagnosed: Path) -> None:
+    old, new = single("encoder_offset", "left_knee_joint", 0.05), single("encoder_offset", "left_elbow_joint", 0.02)
+    write_effects(Path("data/diagnosis/r1/effects.yaml"), [old])
+    Path("data/diagnosis/r2").mkdir()
+    write_effects(Path("data/diagnosis/r2/effects.yaml"), [old, new])
+    compensate.main(2)
+    made = read_compensation(Path("models/compensation/r2/compensation.json"))
+    assert made.encoder_offset[made.joints.index("left_knee_joint")] == 0
+    assert made.encoder_offset[made.joints.index("left_elbow_joint")] == 0.02
+    assert [(step.where[0], bool(step.done)) for step in made.plan] == [
+        ("left_elbow_joint", True), ("left_knee_joint", False),
+    ]  # fmt: skip
+    assert "trained with it in round 1" in made.plan[1].why_not

@@ -1,4 +1,4 @@
-"""Controls: the refinement's settings and parent, without the diagnosis."""
+"""Refinement, and its controls: the same settings and parent, without the diagnosis."""
 
 import json
 from pathlib import Path
@@ -13,8 +13,9 @@ from bumblebee.learning.delta import DeltaAction, DeltaConfig, make_network
 from bumblebee.learning.delta_gain import Gain
 from bumblebee.motion.store import write_library
 from bumblebee.robot.model import write_xml
+from bumblebee.sim.effects import Effect, single, write_effects
 from bumblebee.sim.sensors import load_model
-from tasks import base, control, experts, training
+from tasks import base, control, experts, refine, training
 from tasks.delta import Trained
 from tasks.params import load
 from tasks.refine import RefineConfig
@@ -79,6 +80,40 @@ def test_delta_alone_is_used_though_it_beats_nothing(workspace: Path, monkeypatc
     assert seen[0].world.action_adapter is not None and seen[0].model is None
     card = json.loads(Path("models/control/r1/c0/delta/action/card.json").read_text())
     assert card["promoted"] is False
+
+
+def diagnosed(effects: list[Effect]) -> None:
+    """A round's diagnosis with these effects, and a delta action that was not kept."""
+    Path("data/diagnosis/r1").mkdir(parents=True)
+    Path("models/delta/r1/c0").mkdir(parents=True)
+    write_effects(Path("data/diagnosis/r1/effects.yaml"), effects)
+    write_xml(Path("data/diagnosis/r1/model.xml"))
+    Path("models/delta/r1/c0/card.json").write_text('{"promoted": false}')
+
+
+def test_where_nothing_was_found_the_expert_stays_to_the_byte_and_its_card_says_so(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    diagnosed([])
+    monkeypatch.setattr(refine, "log_run", lambda *_, **__: None)
+    monkeypatch.setattr(refine, "train_policy", lambda *_: pytest.fail("nothing is to be learned"))
+    refine.main(1, "c0")
+    before, after = Path("models/experts/r0/c0"), Path("models/experts/r1/c0")
+    for name in ("policy.onnx", "policy.pt", "contract.json"):
+        assert (after / name).read_bytes() == (before / name).read_bytes()
+    card = json.loads((after / "card.json").read_text())
+    assert (card["round"], card["kept"], card["iterations"], card["parent"]) == (1, "parent", 0, str(before))
+    assert not (after / "curve.csv").exists()
+
+
+def test_where_an_effect_was_found_the_expert_is_trained_in_the_corrected_model(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    diagnosed([single("encoder_offset", "left_knee_joint", 0.05)])
+    seen = []
+    monkeypatch.setattr(refine, "train_policy", lambda job, config: seen.append(job))
+    refine.main(1, "c0")
+    assert seen[0].model == Path("data/diagnosis/r1/model.xml") and seen[0].world.hooks.encoder_offset.any()
 
 
 def test_without_a_long_enough_rollout_the_control_has_no_delta_and_says_so(

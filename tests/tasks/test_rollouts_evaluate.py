@@ -21,6 +21,7 @@ clusters: [c0, c1]
 rounds: [{n: 1, parent: 0}]
 seal: {seed: 3, loses: 0, stands: 0, draws: 1, threads: 1}
 rollouts: {motions: 1, repeats: 2, threads: 1}
+control: {}
 evaluate: {threads: 1}
 """
 
