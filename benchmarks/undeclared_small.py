@@ -11,8 +11,8 @@ import time
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import diagnose
-from bumblebee.diagnosis.session import make_session
 from tests.diagnosis.arm import JOINTS, SMALL, XML, simulate
 
 # id -> smallest and largest value drawn; masses are factors on the declared mass, armature a factor likewise.

@@ -153,7 +153,9 @@ class Done:
 @pytest.fixture
 def at_once(data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """`diagnose` without its minutes of work: what is read, tried and written is the product's own."""
-    from bumblebee.diagnosis import diagnose, example, output, terminal
+    from bumblebee.diagnosis import diagnose, output
+    from bumblebee.diagnosis.report import example_windows as example
+    from bumblebee.diagnosis.report import terminal
 
     monkeypatch.setenv("TMPDIR", str(data / "elsewhere"))
     (data / "elsewhere").mkdir()
@@ -240,7 +242,7 @@ def test_the_output_is_tried_before_the_work(
     at_once: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
     """A full disk, and a folder under a file, end it at once and not after minutes."""
-    from bumblebee.diagnosis import session
+    from bumblebee.diagnosis.dataset import session
     from bumblebee.measured import importers
 
     def work(*_: object) -> None:
@@ -335,7 +337,7 @@ def test_an_unforeseen_error_is_one_line_with_a_log(
     data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Status 1; the traceback is in the file that the line names."""
-    from bumblebee.diagnosis import session
+    from bumblebee.diagnosis.dataset import session
 
     def broken_product(*_: object) -> None:
         raise ZeroDivisionError("surprise")

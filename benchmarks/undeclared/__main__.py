@@ -139,7 +139,7 @@ def _quiet() -> None:
         os.environ[name] = "1"
     import mujoco
 
-    from bumblebee.diagnosis import simulate
+    from bumblebee.diagnosis.simulation import simulate
 
     mujoco.set_mju_user_warning(lambda text: None)
     simulate.THREADS = 1

@@ -7,25 +7,24 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bumblebee.diagnosis.arrivals import loss_entries
 from bumblebee.diagnosis.budget import Budget
+from bumblebee.diagnosis.comparison.holdout import Holdout
+from bumblebee.diagnosis.comparison.paired_tests import standing
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.discover import Discovery, discover
-from bumblebee.diagnosis.document import document
-from bumblebee.diagnosis.entries import effect_entries
-from bumblebee.diagnosis.fit import gauss_newton
-from bumblebee.diagnosis.guard import standing
-from bumblebee.diagnosis.holdout import Holdout
-from bumblebee.diagnosis.instead import offers_of, with_named
-from bumblebee.diagnosis.material import Material, gather
-from bumblebee.diagnosis.problem import Problem, window_weights
-from bumblebee.diagnosis.quantised import entries as rounding_entries
-from bumblebee.diagnosis.quantised import grids
-from bumblebee.diagnosis.refine import Refined, half_widths, refine
-from bumblebee.diagnosis.remains import remains
-from bumblebee.diagnosis.search import Search, search
-from bumblebee.diagnosis.session import Session
-from bumblebee.diagnosis.unseen import unseen_notes
+from bumblebee.diagnosis.dataset.session import Session
+from bumblebee.diagnosis.discrepancy.catalogue_alternative import offers_of, with_named
+from bumblebee.diagnosis.discrepancy.discover import Discovery, discover
+from bumblebee.diagnosis.discrepancy.residual_tests import remains
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.prepare import Material, gather
+from bumblebee.diagnosis.report.document import document
+from bumblebee.diagnosis.report.effect_entries import effect_entries, loss_entries
+from bumblebee.diagnosis.report.notes import unseen_notes
+from bumblebee.diagnosis.residuals.problem import Problem, window_weights
+from bumblebee.diagnosis.selection.final_fit import Refined, half_widths, refine
+from bumblebee.diagnosis.selection.forward import Search, search
+from bumblebee.diagnosis.selection.proposals.encoder_resolution import entries as rounding_entries
+from bumblebee.diagnosis.selection.proposals.encoder_resolution import grids
 from bumblebee.sim.effects import Effect
 
 _SMALL = 12  # degrees of freedom

@@ -3,8 +3,8 @@
 import mujoco
 import pytest
 
+from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import Diagnosis, diagnose
-from bumblebee.diagnosis.session import make_session
 from tests.diagnosis.arm import SMALL, XML, simulate
 
 _made: dict[tuple, Diagnosis] = {}

@@ -5,8 +5,8 @@ import pytest
 
 from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import diagnose
-from bumblebee.diagnosis.session import make_session
 from tests.diagnosis import cart
 
 

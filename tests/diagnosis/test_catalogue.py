@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import diagnose
-from bumblebee.diagnosis.quantised import grids
-from bumblebee.diagnosis.session import make_session
+from bumblebee.diagnosis.selection.proposals.encoder_resolution import grids
 from bumblebee.sim.effects import CATALOGUE
 from tests.diagnosis import arm
 from tests.diagnosis.strange_arm import simulate

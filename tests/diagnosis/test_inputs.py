@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.dataset.session import Session, make_session
+from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
 from bumblebee.diagnosis.diagnose import diagnose
-from bumblebee.diagnosis.drives import drive_law
-from bumblebee.diagnosis.latency import latency_notes
+from bumblebee.diagnosis.gap.reported_torque import reported_torque
 from bumblebee.diagnosis.replay import replay
-from bumblebee.diagnosis.reported import reported_torque
-from bumblebee.diagnosis.session import Session, make_session
-from bumblebee.diagnosis.smooth import smooth_rollouts
-from bumblebee.diagnosis.windows import choose_starts, cut
+from bumblebee.diagnosis.report.notes import latency_notes
+from bumblebee.diagnosis.simulation.actuators import drive_law
+from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import cart

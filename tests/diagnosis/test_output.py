@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.example import examples
 from bumblebee.diagnosis.output import write_diagnosis
-from bumblebee.diagnosis.report import render_report
-from bumblebee.diagnosis.terminal import plot, summary
+from bumblebee.diagnosis.report.example_windows import examples
+from bumblebee.diagnosis.report.page import render_report
+from bumblebee.diagnosis.report.terminal import plot, summary
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import read_effects
 

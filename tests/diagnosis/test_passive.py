@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import diagnose
-from bumblebee.diagnosis.session import make_session
 from bumblebee.measured.rollout import Rollout
 
 _XML = """<mujoco><option timestep="0.002"/><worldbody><body name="a" pos="0 0 1"><joint name="j1" axis="0 1 0"/>

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from bumblebee.diagnosis.session import open_session
+from bumblebee.diagnosis.dataset.session import open_session
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
 from bumblebee.measured.asap_npz import import_asap

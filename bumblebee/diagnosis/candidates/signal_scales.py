@@ -1,0 +1,75 @@
+"""Typical sizes of a dataset's signals, from which the first steps of candidates follow."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.windows import command_inputs
+from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.servo import servos_of
+
+
+@dataclass(frozen=True, eq=False)
+class Scales:
+    """Typical sizes of the data, from which first steps follow; J joints."""
+
+    torque: np.ndarray
+    """(J,) RMS servo torque [N m], of a joint without a drive that of gravity and speeds."""
+    peak: np.ndarray
+    """(J,) largest servo torque [N m]."""
+    speed: np.ndarray
+    """(J,) RMS speed [rad/s]."""
+    fastest: np.ndarray
+    """(J,) largest speed [rad/s]."""
+    travel: np.ndarray
+    """(J,) range of positions [rad]."""
+    inertia: np.ndarray
+    """(J,) diagonal of the joint-space inertia [kg m^2]."""
+    duration: float
+    """Longest rollout [s]."""
+
+
+def scales_of(plant: Plant, rollouts: Sequence[Rollout], model: mujoco.MjModel | None = None) -> Scales:
+    """Typical sizes by `model`, or by the declared one; floored for joints that rest."""
+    servos = servos_of(model or plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
+    torques = [
+        servos.torque(r.joint_pos - plant.offset, r.joint_vel, servos.controls(command_inputs(plant, r)))
+        for r in rollouts
+    ]
+    rms = np.sqrt(np.mean([(t**2).mean(axis=0) for t in torques], axis=0))
+    if (plant.actuator < 0).any():
+        rms = np.where(plant.actuator < 0, np.maximum(rms, _bias(plant, rollouts)), rms)
+    torque = np.maximum(rms, 0.05 * rms.max() + 1e-9)
+    speeds = np.sqrt(np.mean([(r.joint_vel**2).mean(axis=0) for r in rollouts], axis=0))
+    return Scales(
+        torque=torque,
+        peak=np.max([np.quantile(np.abs(t), 0.995, axis=0) for t in torques], axis=0),
+        speed=np.maximum(speeds, 0.1 * speeds.max() + 1e-6),
+        fastest=np.max([np.quantile(np.abs(r.joint_vel), 0.995, axis=0) for r in rollouts], axis=0) + 1e-3,
+        travel=np.max([np.ptp(r.joint_pos, axis=0) for r in rollouts], axis=0),
+        inertia=_inertia(plant),
+        duration=float(max(r.time[-1] - r.time[0] for r in rollouts)),
+    )
+
+
+def _bias(plant: Plant, rollouts: Sequence[Rollout], rows: int = 50) -> np.ndarray:
+    """RMS torque (J,) [N m] of gravity and of speeds along the rollouts: what a joint without a drive moves under."""
+    data, found = mujoco.MjData(plant.model), []
+    for r in rollouts:
+        for k in np.linspace(0, r.frames - 1, rows).astype(int):
+            data.qpos[plant.qpos], data.qvel[plant.dof] = r.joint_pos[k], r.joint_vel[k]
+            mujoco.mj_forward(plant.model, data)
+            found.append(data.qfrc_bias[plant.dof])
+    return np.sqrt(np.mean(np.square(found), axis=0))
+
+
+def _inertia(plant: Plant) -> np.ndarray:
+    """Diagonal of the joint-space inertia at the reference pose (J,)."""
+    data = mujoco.MjData(plant.model)
+    mujoco.mj_forward(plant.model, data)
+    full = np.zeros((plant.model.nv, plant.model.nv))
+    mujoco.mj_fullM(plant.model, data, full)
+    return np.diag(full)[plant.dof]

@@ -1,0 +1,89 @@
+"""Which rollouts are fitted: one that shows what no fitted one does takes the place of one that shows least.
+
+A drive reaches its limit, or loses strength, in few moments of few runs. Where all of these lie in a run that was put
+aside, nothing that is fitted can tell of them, however plainly they show. So all rollouts are compared once with the
+declared model, restarted every 0.2 s; a run with windows that are far further off than any of a fitted run is exchanged
+for a fitted one. The runs that are put aside then lack such moments, too: what happens in few windows is judged by
+these (`limits.pays_where_felt`). Repeats of one motion stay together.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bumblebee.diagnosis.dataset.session import Session
+from bumblebee.diagnosis.dataset.split import motion_names
+from bumblebee.diagnosis.simulation.simulate import residuals
+from bumblebee.diagnosis.simulation.variation import vary
+from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.sim.effects import Effect
+
+_BUDGET = 300  # windows
+_FAR, _SEVERAL = 4.0, 2  # times as far off as the worst fitted window; windows that are
+_MOST = 2  # rollouts exchanged
+
+
+def informative(session: Session, horizon: float) -> Session:
+    """The session with the rollouts exchanged that show what no fitted one does, and a note of each."""
+    if len(session.rollouts) < 2:
+        return session
+    names = motion_names(session.rollouts)
+    errors = window_errors(session, [], horizon, session.steps[1])
+    worst = {i: some for i, some in errors.items() if _alone(names, i)}
+    for _ in range(_MOST):
+        fitted = [i for i in session.train if i not in session.accept and i in worst]
+        aside = [i for i in worst if i not in fitted]
+        if not fitted or not aside:
+            break
+        most = max(worst[i][0] for i in fitted)
+        shows = {i: worst[i][min(_SEVERAL, len(worst[i])) - 1] for i in aside if len(worst[i]) >= _SEVERAL}
+        one = max(shows, key=lambda i: shows[i], default=None)
+        if one is None or shows[one] < _FAR * most:
+            break
+        session = _exchanged(session, one, min(fitted, key=lambda i: worst[i][0]))
+    return session
+
+
+def _alone(names: Sequence[str], i: int) -> bool:
+    """Whether a rollout has no repeats, or all are of one motion, so that these are parted anyway."""
+    return names.count(names[i]) == 1 or len(set(names)) == 1
+
+
+def _exchanged(session: Session, one: int, other: int) -> Session:
+    """The session with two rollouts in each other's place."""
+
+    def swapped(ids: Sequence[int]) -> list[int]:
+        return sorted({one: other, other: one}.get(i, i) for i in ids)
+
+    name, old = session.ids([one, other])
+    note = f"{name} shows what no fitted rollout does: it is fitted in the place of {old}"
+    return replace(
+        session,
+        train=swapped(session.train),
+        holdout=swapped(session.holdout),
+        accept=swapped(session.accept),
+        notes=[*session.notes, note],
+    )
+
+
+def window_errors(session: Session, effects: Sequence[Effect], horizon: float, step: float) -> dict[int, np.ndarray]:
+    """Of each rollout its windows' squared errors with `effects`, in steps of `step` [s]; largest first, 1 is usual.
+
+    Every signal is compared with its usual error at the same time after the start; a window that diverged is left out.
+    """
+    ids = range(len(session.rollouts))
+    starts = choose_starts(session.rollouts, ids, horizon, _BUDGET)
+    if not starts:
+        return {}
+    windows = cut(session.plant, session.layout, session.rollouts, starts)
+    raw = residuals(session.plant, session.layout, windows, [vary(session.plant, effects)], step)[0]
+    raw = raw[:, 1:] if raw.shape[1] > 1 else raw
+    good = np.isfinite(raw).all(axis=(1, 2))
+    if not good.any():
+        return {}
+    raw, rollout = raw[good], windows.rollout[good]
+    usual = np.median(np.abs(raw), axis=0) + session.sigma
+    error = np.mean((raw / usual) ** 2, axis=(1, 2))
+    parts = {i: np.sort(error[rollout == i])[::-1] for i in ids}
+    return {i: part for i, part in parts.items() if len(part)}

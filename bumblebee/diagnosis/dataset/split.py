@@ -1,0 +1,81 @@
+"""Which rollouts are repeats: the same commands again, whatever they are called.
+
+A repeat of a fitted motion on the held-out side would be no test. Loggers name files by date, so names say little.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bumblebee.measured.rollout import Rollout
+
+_SAMPLES = 200
+_SAME = 0.1  # mean difference of the commands over their mean size
+_LENGTH = 0.1  # relative difference of durations
+# From so many rollouts to fit on, some are put aside to decide which effects are accepted.
+_ENOUGH_TO_SPLIT = 4
+
+
+def motion_names(rollouts: Sequence[Rollout]) -> list[str]:
+    """A name for each rollout's motion: its own, or that of an earlier rollout with the same commands."""
+    names = [str(r.meta.get("motion")) for r in rollouts]
+    paths = [_path(r) for r in rollouts]
+    for i, mine in enumerate(paths):
+        for k in range(i):
+            if mine is not None and paths[k] is not None and _same(rollouts[i], rollouts[k], mine, paths[k]):
+                names[i] = names[k]
+                break
+    return names
+
+
+def _path(rollout: Rollout) -> np.ndarray | None:
+    """Commands at equally spaced times (J, 200), about their mean; None where nothing is commanded."""
+    command = rollout.joint_target if rollout.joint_target is not None else rollout.joint_torque_cmd
+    if command is None or rollout.frames < 10:
+        return None
+    at = np.linspace(rollout.time[0], rollout.time[-1], _SAMPLES)
+    path = np.stack([np.interp(at, rollout.time, column) for column in command.T])
+    path -= path.mean(axis=1, keepdims=True)
+    return path if np.abs(path).mean() > 1e-9 else None
+
+
+def _same(a: Rollout, b: Rollout, mine: np.ndarray, other: np.ndarray | None) -> bool:
+    if other is None or mine.shape != other.shape or abs(a.duration - b.duration) > _LENGTH * a.duration:
+        return False
+    return bool(np.abs(mine - other).mean() < _SAME * np.abs(mine).mean())
+
+
+def accepting(rollouts: Sequence[Rollout], train: Sequence[int], holdout: Sequence[int]) -> list[int]:
+    """Rollouts to decide on: of four and more to fit every fourth (by motion), else those that are held out."""
+    if len(train) < _ENOUGH_TO_SPLIT:
+        return list(holdout)
+    _, some = split([rollouts[i] for i in train])
+    return [train[k] for k in some]
+
+
+def split(rollouts: Sequence[Rollout]) -> tuple[list[int], list[int]]:
+    """Indices to fit and to hold out: of each cluster's motions every fourth, with all their repeats.
+
+    A repeat of a fitted motion would be no test: the same policy goes the same way again. Where a cluster, or a dataset
+    that names no motions, has one motion only, every fourth of its rollouts is held out (the second of two).
+    """
+    clusters: dict[str, dict[str, list[int]]] = {}
+    names = motion_names(rollouts)
+    for i in sorted(range(len(rollouts)), key=lambda i: rollouts[i].rollout_id):
+        meta = rollouts[i].meta
+        motions = clusters.setdefault(str(meta.get("cluster")), {})
+        motions.setdefault(names[i], []).append(i)
+    holdout: list[int] = []
+    for _, motions in sorted(clusters.items()):
+        groups = [group for _, group in sorted(motions.items())]
+        if len(groups) == 1:
+            groups = [[i] for i in groups[0]]
+        every = min(4, len(groups))
+        if len(groups) > 1:
+            # Rounded up: 6 motions hold out 2, so that a delta action, too, has something to be judged by.
+            count = -(-len(groups) // every)
+            picked = np.unique(np.linspace(every - 1, len(groups) - 1, count).round().astype(int))
+            holdout += [i for k in picked for i in groups[k]]
+    if len(holdout) == len(rollouts):
+        holdout = holdout[:1]
+    return [i for i in range(len(rollouts)) if i not in holdout], sorted(holdout)

@@ -1,0 +1,155 @@
+"""The catalogue in a form's place: before a form is kept, effects that have a name are tried for what it explains.
+
+A form has more freedom than any effect of the catalogue and is sought among thousands: where the true effect was
+refused by a hair, some form explains nearly as much of the fitted windows. A name says more than a formula, so a form
+must be clearly better than the best that names can do, on windows that took no part in either fit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates.candidate import Candidate, shortlisted
+from bumblebee.diagnosis.candidates.exclusion import is_chosen
+from bumblebee.diagnosis.candidates.formula import Formula
+from bumblebee.diagnosis.comparison.backward_elimination import SURE, without_needless
+from bumblebee.diagnosis.comparison.holdout import Holdout
+from bumblebee.diagnosis.comparison.information_criterion import criterion, parameters
+from bumblebee.diagnosis.comparison.paired_tests import lead
+from bumblebee.diagnosis.comparison.submodel import refitted
+from bumblebee.diagnosis.comparison.wald import costs_more_than, evidence, wald
+from bumblebee.diagnosis.estimation.fit import Fit
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton, resolved
+from bumblebee.diagnosis.residuals.problem import Problem, window_weights
+from bumblebee.diagnosis.selection.forward import Search
+from bumblebee.diagnosis.selection.score_tests import score_tests
+from bumblebee.diagnosis.selection.trial import try_one
+from bumblebee.diagnosis.sensitivities.columns import Columns
+from bumblebee.diagnosis.simulation.plant import Plant
+
+_OFFERS, _SHAPES = 5, 2  # effects whose sensitivities are simulated, and shapes of each
+_ANYWHERE = 2  # of these the most promising may be on other joints
+_TRIALS, _FITS = 4, 2  # of these tried at their size, and refitted jointly
+_ROUNDS = 2  # effects of the catalogue that together may take a form's place
+_HOPELESS = 0.5  # share of what a form gains, above which no second name is tried
+_SHARE = 0.1  # of what a form gains; less is what laws differ by whose torques correlate by 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Offers:
+    """The catalogue's candidates with what the search's screening promised of each."""
+
+    candidates: Sequence[Candidate] = ()
+    """The most promising first."""
+
+    def on(self, plant: Plant, joint: str) -> list[Candidate]:
+        """Those that could act on a joint, a few shapes of each; and the most promising wherever they are.
+
+        What sits on another joint or on a body that the joint does not carry is left out.
+        """
+        elsewhere = (set(plant.joints) | set(plant.bodies)) - {joint, *_carried(plant, joint)}
+        best = list(dict.fromkeys((c.effect, c.where) for c in self.candidates))[:_ANYWHERE]
+        kept: list[Candidate] = []
+        for c in self.candidates:
+            if c.where in elsewhere and (c.effect, c.where) not in best:
+                continue
+            if sum((c.effect, c.where) == (o.effect, o.where) for o in kept) < _SHAPES:
+                kept.append(c)
+        return kept
+
+
+def offers_of(found: Search, candidates: Sequence[Candidate]) -> Offers:
+    """The search's candidates by their gain beside what was found, and those that are never screened."""
+    order = np.argsort(-found.tests.gain)
+    screened = [found.columns.candidates[k] for k in order if found.tests.gain[k] > 0]
+    return Offers([*screened, *(c for c in candidates if shortlisted(c, len(found.problem.plant.joints)))])
+
+
+def with_named(found: Search, fit: Fit) -> Search:
+    """The search as if it had found what the catalogue's effects of `fit` are, with evidence for those that are new."""
+    chosen = [c for c in fit.chosen if not isinstance(c, Formula)]
+    if set(chosen) <= set(found.fit.chosen):
+        return found
+    values = np.concatenate([fit.of(c) for c in chosen])
+    joint = gauss_newton(found.problem, chosen, values, found.weights, iterations=0, coarse=True)
+    known = {s.candidate: s for s in found.steps}
+    steps = [
+        known.get(c) or evidence(c, wald(found.problem, joint, found.weights, i), found.count)
+        for i, c in enumerate(chosen)
+    ]
+    return replace(found, fit=joint, steps=steps)
+
+
+def named_instead(problem: Problem, holdout: Holdout, fit: Fit, form: Fit, joint: str, offers: Offers) -> Fit | None:
+    """`fit` with one or two more effects of the catalogue that do what a form on `joint` does; None where none can.
+
+    Args:
+        problem: the fitted windows.
+        holdout: the windows that judge.
+        fit: without the form.
+        form: the fit with it.
+        joint: where it is.
+        offers: the catalogue's candidates beside `fit`.
+    """
+    named = fit
+    for _ in range(_ROUNDS):
+        new = _one_more(problem, named, joint, offers)
+        if new is None:
+            return None
+        named = new
+        short = lead(problem, holdout, form, named)
+        if short <= (_SHARE if parameters(named) <= parameters(form) else 0.0):
+            return named
+        # A table has a height for everything: names that explain the fit better for their numbers go before it.
+        if criterion(problem, named) >= criterion(problem, form):
+            return named
+        if short > _HOPELESS:
+            return None
+    return None
+
+
+def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers) -> Fit | None:
+    """The best of the catalogue's effects beside `fit`, if any is worth its parameters."""
+    open_ = [c for c in offers.on(problem.plant, joint) if not is_chosen(c, fit.chosen)]
+    many = len(problem.plant.joints)
+    names = list(dict.fromkeys((c.effect, c.where) for c in open_ if not shortlisted(c, many)))[:_OFFERS]
+    looked = [c for c in open_ if (c.effect, c.where) in names or (shortlisted(c, many) and c.where == joint)]
+    if not looked:
+        return None
+    columns = Columns(looked, problem.sensitivities(looked, fit.effects))
+    weights = window_weights(fit.clean(problem))
+    tests = score_tests(problem, columns, fit, weights)
+    order = [k for k in np.argsort(-tests.gain) if tests.gain[k] > 0][:_TRIALS]
+    trials = [try_one(problem, fit, looked[k], tests.steps[k], weights) for k in order]
+    tried = sorted((t for t in trials if t is not None), key=lambda t: t.cost + 2 * len(t.candidate.free))[:_FITS]
+    fits = []
+    for t in tried:
+        new = refitted(problem, (*fit.chosen, t.candidate), np.concatenate((fit.values, t.values)), fit)
+        new = without_needless(problem, new, t.candidate)
+        if _is_sure(problem, fit, new, t.candidate):
+            fits.append(new)
+    best = max(fits, key=lambda f: criterion(problem, f), default=None)
+    return best if best is not None and criterion(problem, best) > criterion(problem, fit) else None
+
+
+def _is_sure(problem: Problem, fit: Fit, new: Fit, candidate: Candidate) -> bool:
+    """Whether an effect that `new` has beside `fit` is beyond doubt, by its slopes or by what its loss costs."""
+    weights = window_weights(new.clean(problem))
+    if wald(problem, new, weights, new.chosen.index(candidate)) >= SURE:
+        return True
+    return costs_more_than(problem, resolved(problem, new, weights), resolved(problem, fit, weights), SURE)
+
+
+def _carried(plant: Plant, joint: str) -> list[str]:
+    """Names of the bodies that a joint moves."""
+    model = plant.model
+    own = int(model.jnt_bodyid[model.joint(joint).id])
+    found = []
+    for name in plant.bodies:
+        body = model.body(name).id
+        while body and body != own:
+            body = int(model.body_parentid[body])
+        if body == own:
+            found.append(name)
+    return found

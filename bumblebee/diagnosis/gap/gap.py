@@ -1,0 +1,118 @@
+"""The gap report: where a model errs before anything is fitted, by horizon, joint, motion, and in torque."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates.enumerate import still_joints
+from bumblebee.diagnosis.dataset.session import JUDGED_TWICE, Session
+from bumblebee.diagnosis.gap.dependence_test import JointStructure
+from bumblebee.diagnosis.gap.reported_torque import reported_torque
+from bumblebee.diagnosis.gap.sparse_regression import examine
+from bumblebee.diagnosis.gap.torque_residual import TorqueResidual, missing_torques
+from bumblebee.diagnosis.report.example_windows import examples
+from bumblebee.diagnosis.report.notes import ALONE
+from bumblebee.diagnosis.report.prediction_error import error_block, floor_block, horizon_whiteners, horizon_windows
+from bumblebee.diagnosis.simulation.simulate import residuals
+from bumblebee.diagnosis.simulation.units import joint_units, members, mixed_notes
+from bumblebee.diagnosis.simulation.variation import vary
+from bumblebee.diagnosis.simulation.windows import Windows
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """The report's numbers, and what its pictures are drawn from."""
+
+    document: dict[str, Any]
+    examples: list[dict[str, Any]]
+    torque: TorqueResidual | None
+
+
+def gap(session: Session, budget: int = 120, seed: int = 0) -> Gap:
+    """Compare the declared model of `session` with all its rollouts; nothing is fitted."""
+    ids, model = list(range(len(session.rollouts))), vary(session.plant, [])
+    windows = horizon_windows(session.plant, session.layout, session.rollouts, ids, budget)
+    common = (session.plant, session.layout, windows)
+    whiteners = horizon_whiteners(*common, model, session.sigma, session.steps[1], seed)
+    still = still_joints(session.plant, session.rollouts, session.sigma)
+    train, held = missing_torques(session, [], np.zeros(1))
+    found = []
+    if train is not None and held is not None:
+        found = [examine(train, held, j)[0] for j, n in enumerate(train.joints) if n not in still]
+    units = joint_units(session.plant)
+    document = {
+        "schema": 1,
+        "rollouts": session.ids(ids),
+        "seconds": float(sum(r.time[-1] - r.time[0] for r in session.rollouts)),
+        "commands": "torques" if session.plant.torque_input else "position targets",
+        "units": units,
+        "error": error_block(*common, whiteners, model, session.steps[0], seed),
+        "floor": floor_block(*common, whiteners, session.sigma, seed),
+        "missing_torque": _torques(found, train, held, units),
+        "reported_torque": reported_torque(session.plant, session.rollouts),
+        "motions": _by_motion(session, windows),
+        "unidentifiable": [
+            {"where": [name], "why": "the joint moves no more than its sensor's noise"} for name in still
+        ],
+        "warnings": [*session.warnings, *([] if session.accept else [ALONE])],
+        "notes": [*(n for n in session.notes if n != JUDGED_TWICE), *mixed_notes(session.plant)],
+        "set_aside": session.set_aside,
+        "noise": dict(zip(session.layout.labels(session.plant.joints), session.sigma.tolist(), strict=True)),
+    }
+    return Gap(document, examples(session), train)
+
+
+def _torques(
+    found: Sequence[JointStructure],
+    train: TorqueResidual | None,
+    held: TorqueResidual | None,
+    units: dict[str, dict[str, str]],
+) -> dict[str, Any]:
+    """Joint -> mean and structured part of the torque that it lacks, and what that goes with; largest share first."""
+    if train is None or held is None:
+        return {}
+    out = {}
+    for s in sorted(found, key=lambda s: -(s.rms / s.typical if s.significant else 0.0)):
+        j = train.joints.index(s.joint)
+        lacks = np.concatenate((train.missing[:, j], held.missing[:, j]))
+        out[s.joint] = {
+            "unit": units[s.joint]["torque"],
+            "mean": float(np.mean(lacks)),
+            "structured_rms": s.rms,
+            "drive_rms": s.typical,
+            "significant": s.significant,
+            "p": s.p,
+            "depends_on": list(s.depends_on),
+        }
+    return out
+
+
+def _by_motion(session: Session, windows: dict[str, Windows]) -> list[dict[str, Any]]:
+    """Joint error after 0.2 s by motion and cluster, worst first."""
+    name = "0.2" if "0.2" in windows else next(iter(windows), None)
+    if name is None:
+        return []
+    part = windows[name]
+    left = residuals(session.plant, session.layout, part, [vary(session.plant, [])], session.steps[0])[0, :, -1]
+    squares = left[:, session.layout.slices["joint_pos"]] ** 2
+    kinds = members(session.plant)
+    groups: dict[tuple[str, str], list[np.ndarray]] = {}
+    for i, values in zip(part.rollout, squares, strict=True):
+        meta = session.rollouts[i].meta
+        key = str(meta.get("cluster") or ""), str(meta.get("motion") or session.rollouts[i].rollout_id)
+        groups.setdefault(key, []).append(values)
+    found = []
+    for (cluster, motion), windows_of in groups.items():
+        entry = {"cluster": cluster, "motion": motion, "horizon": name, "windows": len(windows_of)}
+        entry |= {"joint_pos_rmse": _rms(windows_of, slice(None))}
+        entry |= {"by_kind": {kind: _rms(windows_of, columns) for kind, columns in kinds.items()}}
+        found.append(entry)
+    return sorted(found, key=lambda row: -(row["joint_pos_rmse"] or np.inf))
+
+
+def _rms(squares: Sequence[np.ndarray], columns: list[int] | slice) -> float | None:
+    """Root mean square over the windows that stayed finite; None where none did."""
+    good = [value for row in squares if np.isfinite(value := float(row[columns].mean()))]
+    return float(np.sqrt(np.mean(good))) if good else None

@@ -1,0 +1,66 @@
+"""The drive's own torque against what the model's drive would give: gain, bias and how late, joint by joint.
+
+Where a log has `joint_torque`, the drive and the mechanics behind it can be told apart: what is wrong in the reported
+torque is the drive's (gain, delay, limit); what is wrong although the torque is right is friction, inertia or load.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.windows import command_inputs
+from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.servo import servos_of
+
+_LATEST = 0.05  # [s]
+_LEAST = 50  # rows
+
+
+def reported_torque(plant: Plant, rollouts: Sequence[Rollout]) -> dict[str, dict[str, float]]:
+    """Joint -> gain, bias [N m], delay [s] and correlation of the reported torque on the declared drive's.
+
+    Empty where no rollout has `joint_torque`. The delay is the shift, up to 50 ms, at which both agree best.
+    """
+    some = [r for r in rollouts if r.joint_torque is not None and r.frames >= _LEAST]
+    if not some:
+        return {}
+    servos = servos_of(plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
+    period = float(np.median([np.median(np.diff(r.time)) for r in some]))
+    shifts = np.arange(0, max(1, int(_LATEST / period)) + 1)
+    out = {}
+    for j, name in enumerate(plant.joints):
+        if plant.actuator[j] < 0:
+            continue
+        best = max(
+            (_fit(_pairs(plant, servos, some, j, int(k))) | {"delay": float(k * period)} for k in shifts), key=_tie
+        )
+        if np.isfinite(best["correlation"]):
+            out[name] = best
+    return out
+
+
+def _tie(entry: dict[str, float]) -> float:
+    return entry["correlation"] if np.isfinite(entry["correlation"]) else -2.0
+
+
+def _pairs(plant: Plant, servos: Any, rollouts: Sequence[Rollout], joint: int, shift: int) -> tuple[np.ndarray, ...]:
+    """The model's torque, `shift` rows earlier, and the reported one."""
+    model, reported = [], []
+    for r in rollouts:
+        control = servos.controls(command_inputs(plant, r))
+        torque = servos.torque(r.joint_pos - plant.offset, r.joint_vel, control)[:, joint]
+        model.append(torque[: len(torque) - shift])
+        reported.append(np.asarray(r.joint_torque)[shift:, joint])
+    return np.concatenate(model), np.concatenate(reported)
+
+
+def _fit(pair: tuple[np.ndarray, ...]) -> dict[str, float]:
+    x, y = pair
+    spread = x.std()
+    if spread < 1e-9 or y.std() < 1e-9:
+        return {"gain": float("nan"), "bias": float(y.mean()), "correlation": float("nan")}
+    correlation = float(np.corrcoef(x, y)[0, 1])
+    gain = correlation * y.std() / spread
+    return {"gain": float(gain), "bias": float(y.mean() - gain * x.mean()), "correlation": correlation}

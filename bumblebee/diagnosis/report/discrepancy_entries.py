@@ -1,0 +1,140 @@
+"""The document's part on what lies beyond the catalogue: entries of discovered effects, and what is unexplained.
+
+Measured curves: the mean of a joint's missing torque over one quantity, in equally filled bins, with intervals.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from bumblebee.diagnosis.candidates.formula import Formula
+from bumblebee.diagnosis.discrepancy.catalogue_terms import quantities_of
+from bumblebee.diagnosis.discrepancy.discover import Discovery
+from bumblebee.diagnosis.discrepancy.residual_tests import JointRemains
+from bumblebee.diagnosis.discrepancy.term_library import Law
+from bumblebee.diagnosis.simulation.units import joint_units
+
+NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
+_NAMED = 3  # joints that get a sentence
+_NOWHERE = "no joint's torque stands out, but the windows' chi-square is {:.2f} of what sensor noise gives"
+_TABLE = re.compile(r"(curve)\(([^,()]+),[^()]*\)")  # its points are for diagnosis.json
+_BINS, _FEWEST = 15, 8
+
+
+def discovered_entry(
+    c: Formula, values: np.ndarray, half: np.ndarray, explains: float, z: float, kind: str
+) -> dict[str, Any]:
+    """The contract's entry of a form with `values` (P,) and half-widths (P,) of its intervals.
+
+    `z` is that of Wald's test in the joint fit, `kind` "formula" or "curve".
+    """
+    terms = [
+        {"term": text, "coefficient": float(v), "ci95": [float(v - h), float(v + h)] if np.isfinite(h) else None}
+        for text, v, h in zip(c.texts, values, half, strict=True)
+    ]
+    p = float(2 * norm.sf(z))
+    test = f"{kind} sought among thousands in the whitened windows; Wald test in the joint fit, z = {z:.1f}; better on "
+    return {
+        "effect": c.effect,
+        "where": [c.where],
+        "parameters": {"terms": terms},
+        "equivalent": [],
+        "explains": explains,
+        "evidence": {"p": p, "test": test + "windows that took no part"},
+        "native": False,
+    }
+
+
+def unexplained(found: Discovery) -> dict[str, Any]:
+    """The contract's `unexplained`: what is left with all effects in force."""
+    left, whole = sorted((j for j in found.left.joints if j.significant), key=lambda j: -j.excess), found.left.whole
+    p = min((j.p for j in found.left.joints), default=1.0)
+    said = _described(left, found.unconfirmed, joint_units(found.problem.plant))
+    if whole.significant and not left:
+        said = _NOWHERE.format(whole.power)
+    return {
+        "significant": bool(left) or whole.significant,
+        "p": min(p, float(norm.sf(whole.z))) if whole.significant else p,
+        "where": [j.joint for j in left],
+        "depends_on": list(dict.fromkeys(on for j in left for on in _depends_on(j, found.unconfirmed))),
+        "description": said,
+    }
+
+
+def _depends_on(left: JointRemains, forms: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
+    """Quantities of a form that was not kept (it was sought without the joint's names, too), and of what is left."""
+    return tuple(dict.fromkeys((*quantities_of(tuple(forms.get(left.joint, ()))), *left.depends_on)))
+
+
+def _described(
+    left: Sequence[JointRemains], forms: Mapping[str, Mapping[str, float]], units: Mapping[str, Mapping[str, str]]
+) -> str:
+    """One sentence a joint: how much is left, on what it depends, and a form that was not kept."""
+    lines = []
+    for j in left[:_NAMED]:
+        on = ", ".join(_depends_on(j, forms)) or "no single quantity"
+        line = f"{j.joint}: torques that depend on {on}"
+        if j.laws:
+            share = 100 * j.rms / max(j.typical, 1e-12)
+            unit = units[j.joint]["torque"]
+            what = "force" if unit == "N" else "torque"
+            line = f"{j.joint}: a {what} of {j.rms:.2g} {unit} RMS ({share:.0f} % of its drive's) depends on {on}"
+        if j.joint in forms:
+            terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in forms[j.joint].items())
+            terms = _TABLE.sub(r"\1(\2, ...)", terms)
+            line += f"; near {terms}, which was not confirmed"
+        lines.append(line)
+    if len(left) > _NAMED:
+        lines.append(f"and {len(left) - _NAMED} joints more")
+    return "; ".join(lines)
+
+
+def structure_table(found: Discovery) -> dict[str, dict[str, Any]]:
+    """Joint -> what its tests said, with measured curves where there is structure, for `diagnosis.json`."""
+    return {
+        j.joint: {
+            "p": j.p,
+            "significant": j.significant,
+            "excess": j.excess,
+            "torque_rms": j.rms,
+            "typical_torque": j.typical,
+            "depends_on": list(j.depends_on),
+            "laws": [_law(law, size) for law, size in j.laws],
+        }
+        | ({"curves": _curves(found, index)} if j.significant else {})
+        for index, j in enumerate(found.left.joints)
+    }
+
+
+def _law(law: Law, size: np.ndarray) -> list[dict[str, Any]]:
+    return [{"term": t, "coefficient": float(s)} for t, s in zip(law.texts, size, strict=True)]
+
+
+def _curves(found: Discovery, joint: int) -> dict[str, list[list[float]]]:
+    """Measured curves of what a joint lacks over its own quantities, by their name and unit."""
+    scene = found.left.scene
+    data, path, lacks = scene.data, scene.data.path, scene.evidence.lacking(joint)
+    block = np.repeat(np.arange(len(lacks)), lacks.shape[1])
+    over = {"velocity": data.v, "position": data.q, "torque": data.tau}
+    units = joint_units(found.problem.plant)[found.left.joints[joint].joint]
+    means = {f"{name} [{units[name]}]": path.mean(x[..., joint]).ravel() for name, x in over.items()} | {
+        "time [s]": path.mean(data.t).ravel()
+    }
+    return {name: measured_curve(x, lacks.ravel(), block) for name, x in means.items() if np.ptp(x) > 0}
+
+
+def measured_curve(x: np.ndarray, y: np.ndarray, block: np.ndarray) -> list[list[float]]:
+    """Rows [x, mean, half-width of its 95 % interval] of `y` (N,) over `x` (N,); what lies in one block counts once."""
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)))
+    which = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
+    rows = []
+    for b in range(len(edges) - 1):
+        mine = which == b
+        blocks = len(np.unique(block[mine]))
+        if mine.sum() >= _FEWEST and blocks > 1:
+            half = 1.96 * float(y[mine].std()) / np.sqrt(blocks)
+            rows.append([float(np.median(x[mine])), float(y[mine].mean()), float(half)])
+    return rows

@@ -1,0 +1,151 @@
+"""The contract's list of effects: name, place, sizes with intervals, share of the error, evidence."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from bumblebee.diagnosis.candidates.candidate import INVERSE, SHAPED, Candidate, without
+from bumblebee.diagnosis.candidates.formula import Formula
+from bumblebee.diagnosis.candidates.traits import EXPERIMENTS, label
+from bumblebee.diagnosis.comparison.holdout import Holdout
+from bumblebee.diagnosis.comparison.wald import wald
+from bumblebee.diagnosis.discrepancy.discover import Discovery
+from bumblebee.diagnosis.estimation.fit import Fit
+from bumblebee.diagnosis.report.discrepancy_entries import discovered_entry
+from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.selection.confounding import alike, rivals
+from bumblebee.diagnosis.selection.final_fit import Refined
+from bumblebee.diagnosis.selection.forward import Search
+from bumblebee.diagnosis.selection.state import Loss
+from bumblebee.diagnosis.simulation.declared import declared_values
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.units import unit_on
+from bumblebee.sim.effect_catalogue import is_native
+from bumblebee.sim.effects import CATALOGUE, Effect
+
+_COMPARABLE = 0.25
+
+
+def effect_entries(found: Search, last: Refined, holdout: Holdout, beyond: Discovery | None) -> list[dict[str, Any]]:
+    """The list of `diagnosis.json`, most explaining first.
+
+    Dry friction that changes with direction or speed is one entry with the level that it sits on, `frictionloss`.
+    """
+    chosen = last.fit.chosen
+    if not chosen:
+        return []
+    levels = _levels(last.fit)
+    groups = [[c, *([levels[c]] if c in levels else [])] for c in chosen if c not in levels.values()]
+    shares = _explained(holdout.problem or last.problem, last.fit, groups)
+    classes = dict(zip(found.fit.chosen, rivals(found, holdout, alike(found.columns, found)), strict=True))
+    entries = []
+    for group, share in zip(groups, shares, strict=True):
+        c = group[0]
+        if isinstance(c, Formula):
+            i, kind = chosen.index(c), beyond.kinds[c.where] if beyond else ""
+            values, half = last.fit.of(c), last.half[last.fit.slices[i]]
+            z = wald(last.problem, last.fit, last.weights, i)
+            entries.append(discovered_entry(c, values, half, float(share), z, kind))
+        else:
+            entries.append(_entry(found, last, group, float(share), [classes[each] for each in group]))
+    return sorted(entries, key=lambda e: -e["explains"])
+
+
+def _entry(
+    found: Search, last: Refined, group: Sequence[Candidate], share: float, classes: Sequence[list[Candidate]]
+) -> dict[str, Any]:
+    """The entry of a group's first, with the parameters of all."""
+    first, step = group[0], {s.candidate: s for s in found.steps}[group[0]]
+    others = [o for same in classes for o in same if o not in group]
+    parameters: dict[str, Any] = {}
+    for c in reversed(group):
+        half = last.half[last.fit.slices[last.fit.chosen.index(c)]]
+        parameters |= _parameters(last.problem.plant, c, last.fit.of(c), half)
+    entry = label(first) | {
+        "parameters": parameters,
+        "equivalent": [label(o) for o in dict.fromkeys(others)],
+        "explains": share,
+        "evidence": {
+            "p": float(step.p),
+            "test": f"Wald test in the joint fit, variance clustered by window, z = {step.z:.1f}, bound "
+            f"{found.bound:.1f} for {found.count} candidates",
+        },
+        "native": all(is_native(c.at(last.fit.of(c))) for c in group),
+    }
+    if others:
+        kinds = dict.fromkeys([first.effect, *(o.effect for o in others)])
+        entry["separate_by"] = [EXPERIMENTS[k] for k in kinds if k in EXPERIMENTS][:3]
+    return entry
+
+
+def _levels(fit: Fit) -> dict[Candidate, Candidate]:
+    """Friction that changes -> the change of the same joint's dry friction that it sits on, if of comparable size.
+
+    The largest, where a joint has two that change.
+    """
+    dry = {c.where: c for c in fit.chosen if c.effect == "coulomb_friction"}
+    shaped = [c for c in fit.chosen if c.effect in SHAPED and c.where in dry]
+    largest = {c.where: c for c in sorted(shaped, key=lambda c: abs(fit.of(c)[0]))}
+    return {
+        c: dry[where]
+        for where, c in largest.items()
+        if abs(fit.of(c)[0]) > _COMPARABLE * abs(fit.of(dry[where])[0] - dry[where].nominal[0])
+    }
+
+
+def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray) -> dict[str, Any]:
+    """The contract's parameters of one effect, in its own units; `nominal` is null where the model knows no bound."""
+    out = {}
+    # A limit is tried from the largest torque in the data on, which is not where the model has it.
+    declared = declared_values(plant, c.effect, c.where) if c.effect == "torque_limit" else c.nominal
+    for p, value, nominal, wide in zip(CATALOGUE[c.effect].parameters, values, declared, half, strict=True):
+        if p.default is not None and value == p.default:
+            continue
+        ends = [float(value - wide), float(value + wide)]
+        unit = unit_on(plant, c.effect, c.where, p.unit)
+        if c.effect in INVERSE and not out:
+            # The fit moves the inverse; an interval that reaches zero has no upper end.
+            low, high = 1.0 / max(ends[1], 1e-12), None if ends[0] <= 0 else 1.0 / ends[0]
+            out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": unit}
+        else:
+            inside = max(p.lower, ends[0]), min(p.upper, ends[1])
+            ends = [end if np.isfinite(end) else None for end in inside]
+            known = float(nominal) + 0.0 if np.isfinite(nominal) else None  # no -0
+            out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": unit}
+    return out
+
+
+def _explained(problem: Problem, fit: Fit, groups: Sequence[Sequence[Candidate]]) -> np.ndarray:
+    """Share of the excess of chi-square over its best value that comes back when a group alone is taken out."""
+    sets = [fit.effects]
+    for group in groups:
+        kept = fit.effects
+        for c in group:
+            kept = without(kept, c)
+        sets.append(kept)
+    left = problem.residual([*sets, []]) - np.tensordot(fit.nuisance, problem.nuisance, axes=1)
+    power = (left**2).mean(axis=(1, 2))
+    excess = max(power[-1] - power[0], 1e-12)
+    return np.clip((power[1:-1] - power[0]) / excess, 0.0, 1.0)
+
+
+def loss_entries(loss: Loss | None) -> tuple[list[dict[str, Any]], list[Effect]]:
+    """The contract's entry of lost commands, and the effect; empty for none."""
+    if loss is None:
+        return [], []
+    entry = {
+        "effect": "dropped_commands",
+        "where": [loss.where] if loss.where else [],
+        "parameters": {"share": {"value": loss.share, "ci95": list(loss.ci95), "nominal": 0.0, "unit": ""}},
+        "equivalent": [],
+        "explains": loss.explains,
+        "evidence": {
+            "p": float(chi2.sf(2.0 * loss.gain, 1)),
+            "test": f"log-likelihood over all patterns of losses: {loss.gain:.1f} more on the fitted windows, "
+            + (f"{loss.paid:.1f} on the held-out ones" if np.isfinite(loss.paid) else "nothing held out"),
+        },
+        "native": False,
+    }
+    return [entry], [loss.effect]

@@ -1,0 +1,71 @@
+"""Windows to look at: measured against the model before and after, in the joints and seconds where it matters."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bumblebee.diagnosis.dataset.session import Session
+from bumblebee.diagnosis.simulation.simulate import residuals
+from bumblebee.diagnosis.simulation.variation import vary
+from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.sim.effects import Effect
+
+_LENGTHS = (1.0, 0.6, 0.2)  # [s]
+_TYPICAL = 0.9  # of a joint's windows the one at this quantile of the gain: telling, and no freak
+
+
+def examples(session: Session, effects: Sequence[Effect] = (), count: int = 3) -> list[dict[str, Any]]:
+    """One window each of the `count` joints where the effects matter most (without effects: where the model errs most).
+
+    Each has rollout, start [s], joint, unit, time [s], measured, target (position targets only), before and, with
+    effects, after, all as lists over the window's ticks.
+    """
+    plant, layout, ids = session.plant, session.layout, session.holdout or session.train
+    starts: list[tuple[int, int, int]] = []
+    for length in _LENGTHS:
+        starts = starts or choose_starts(session.rollouts, ids, length, 60)
+    windows = cut(plant, layout, session.rollouts, starts, outputs=120)
+    models = [vary(plant, [])] + ([vary(plant, effects)] if effects else [])
+    left = residuals(plant, layout, windows, models, session.steps[0])[..., layout.slices["joint_pos"]]
+    power = np.nan_to_num((left**2).mean(axis=2), nan=0.0, posinf=0.0)
+    gain = power[0] - power[1] if effects else power[0]
+    importance = np.sqrt(np.abs(np.median(gain, axis=0))) * np.sign(np.median(gain, axis=0))
+    found = []
+    for j in np.argsort(-importance)[:count]:
+        order = np.argsort(gain[:, j])
+        found.append(_example(session, windows, left, int(order[int(_TYPICAL * (len(order) - 1))]), int(j)))
+    return found
+
+
+def _example(session: Session, windows: Any, left: np.ndarray, w: int, j: int) -> dict[str, Any]:
+    plant = session.plant
+    rollout = session.rollouts[windows.rollout[w]]
+    start, time = int(windows.start[w]), windows.out_time[w]
+    measured = windows.measured[w, :, session.layout.slices["joint_pos"]][..., j]
+    ticks = np.searchsorted(rollout.time, rollout.time[start] + time + 1e-9) - 1
+    entry = {
+        "rollout": rollout.rollout_id,
+        "start": float(rollout.time[start]),
+        "joint": plant.joints[j],
+        "unit": unit_of(session, j),
+        "time": time.tolist(),
+        "measured": measured.tolist(),
+        "before": _plain(measured - left[0, w, :, j]),
+    }
+    if not plant.torque_input and rollout.joint_target is not None:
+        entry["target"] = rollout.joint_target[ticks, j].tolist()
+    if len(left) > 1:
+        entry["after"] = _plain(measured - left[1, w, :, j])
+    return entry
+
+
+def unit_of(session: Session, joint: int) -> str:
+    """The unit of a joint's position: "m" for a slide."""
+    kind = int(session.plant.model.jnt_type[session.plant.model.joint(session.plant.joints[joint]).id])
+    return "m" if kind == 2 else "rad"
+
+
+def _plain(values: np.ndarray) -> list[float | None]:
+    """As a list whose values that are no numbers are None."""
+    return [float(v) if np.isfinite(v) else None for v in values]

@@ -1,0 +1,193 @@
+"""A delay of all joints at once: the robot's, or the logger's, whose states came late by as much.
+
+With states late by e, row k holds the state of `time[k] - e` beside the command of `time[k]`. A simulation restarted
+from it sees commands that come e too late: the same as a robot with a command delay e. Commands that do not follow from
+the states cannot separate the two.
+
+One factor on everything that is a force: motion alone cannot tell it.
+
+Masses, inertias, friction, springs and torques times the same number move the same way. As long as one drive
+keeps its declared strength that drive sets the factor; where every drive's was fitted the declared masses do.
+
+What only rollouts show that were not fitted: it can be neither named nor ruled out, and a note says so.
+
+A target that is limited in rate, a hit, a slip may happen once, in a run that was put aside. Nothing that is fitted
+tells of it, and no test of what is left sees it; the error after is then large, and nothing else says why.
+
+What must not be overlooked: a correction that is worse, a large error that nothing explains, what was not tested.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from bumblebee.diagnosis.dataset.informative_split import window_errors
+from bumblebee.diagnosis.dataset.session import Session
+from bumblebee.diagnosis.report.html import number
+from bumblebee.diagnosis.simulation.units import pick, position_rows, rows
+from bumblebee.sim.effects import Effect
+
+_LATE = ("command_delay", "encoder_delay")
+_ALIKE = 0.004  # [s]: delays of single joints closer than that are one delay
+_STRENGTH = ("motor_strength", "kp")
+_FAR = 10.0  # times as far off as the worst fitted window
+_MORE = 1.02  # by so much the error has to be larger to be called worse
+FAR = 3.0  # times what sensor noise leaves, from which on an error is called large
+_TRACE = 1e-3  # p of what is not called significant for being small, yet is no accident
+LONE = (
+    "a single rollout: nothing could be held out; errors are those of the fitted data, and no effect was tested on "
+    "data that it was not fitted to. Record another run"
+)
+ALONE = (
+    "a single rollout: what the model lacks in its first two thirds was looked for in the rest; whether another run "
+    "lacks the same could not be tested. Record another run"
+)
+
+
+def latency_notes(effects: Sequence[dict[str, Any]], driven: Sequence[str]) -> list[str]:
+    """A note where the found delays are of one size on every driven joint.
+
+    Args:
+        effects: the contract's list.
+        driven: names of the joints with an actuator.
+    """
+    delays: dict[str, float] = {}
+    for entry in effects:
+        if entry["effect"] in _LATE:
+            for name in entry["where"] or driven:
+                delays[name] = entry["parameters"]["delay"]["value"]
+    values = [delays.get(name, 0.0) for name in driven]
+    if len(driven) < 2 or not values or min(values) <= 0 or max(values) - min(values) > _ALIKE:
+        return []
+    size = 1e3 * sum(values) / len(values)
+    return [
+        f"all joints are {size:.1f} ms late: a delay of the robot, or a logger whose states are that old; commands "
+        "that do not follow from the states cannot tell. To separate: log a step with the drive's torque"
+    ]
+
+
+def factor_notes(effects: Sequence[dict[str, Any]], driven: Sequence[str]) -> list[str]:
+    """A note where the strength of every driven joint was found to differ.
+
+    Args:
+        effects: the contract's list.
+        driven: names of the joints with an actuator.
+    """
+    found = {name for entry in effects if entry["effect"] in _STRENGTH for name in entry["where"]}
+    if not driven or not set(driven) <= found:
+        return []
+    return [
+        "the strength of every drive was fitted: strengths, friction and inertias are known up to one common factor, "
+        "which the declared masses set; their intervals hold for these. To separate: weigh a link, or log the torque"
+    ]
+
+
+def unseen_notes(session: Session, effects: Sequence[Effect], horizon: float) -> list[str]:
+    """A note for each rollout that was not fitted with windows of `horizon` [s] far further off than any fitted one."""
+    errors = window_errors(session, effects, horizon, session.steps[0])
+    fitted = [i for i in session.train if i not in session.accept and i in errors]
+    if not fitted:
+        return []
+    bound = _FAR * max(errors[i][0] for i in fitted)
+    notes = []
+    for i in sorted(set(errors) - set(fitted)):
+        far = int((errors[i] > bound).sum())
+        if far:
+            times = errors[i][0] / bound * _FAR
+            notes.append(
+                f"{session.ids([i])[0]}: {far} of {len(errors[i])} windows up to {times:.0f} times further off "
+                "than any fitted one. Something acts there that no fitted rollout shows: it is neither named nor ruled "
+                "out. Record more of such motion."
+            )
+    return notes
+
+
+def worse_horizons(error: dict[str, Any]) -> list[str]:
+    """A line for every horizon and measure at which the corrected model errs more than the declared one."""
+    lines = []
+    for horizon, measures in error["before"].items():
+        for _, unit, scale, key in rows(measures):
+            if key[0] not in ("joint_pos_rmse", "base_pos_rmse"):
+                continue
+            before, after = (pick(error[part].get(horizon, {}), key).get("value") for part in ("before", "after"))
+            if before is not None and after is not None and after > _MORE * before:
+                what = "base" if key[0].startswith("base") else f"{key[1] or 'joint'}s"
+                lines.append(
+                    f"WORSE after {horizon} s: the {what} were {scale * before:.3g} {unit} off with the declared model "
+                    f"and are {scale * after:.3g} {unit} off with the correction. Do not use it for motions that long."
+                )
+    return lines
+
+
+def told_horizon(block: Mapping[str, Any]) -> str | None:
+    """The horizon that the first sentences are about: 0.2 s, else the first that the data reach."""
+    return "0.2" if "0.2" in block else next(iter(block), None)
+
+
+def unexplained_error(document: Mapping[str, Any]) -> list[str]:
+    """Lines on joint errors far above the noise that the effects, if any were found, do not explain."""
+    after, floor = document["error"]["after"], document["error"]["floor"]
+    horizon = told_horizon(after)
+    if horizon is None:
+        return []
+    lines = []
+    for what, unit, scale, key in position_rows(after[horizon]):
+        value, noise = (pick(block.get(horizon, {}), key).get("value") for block in (after, floor))
+        if value is None or not noise or value <= FAR * noise:
+            continue
+        times = number(value / noise, 2)
+        size = f"{number(scale * value)} {unit} in its {what} after {horizon} s, {times} times what noise leaves"
+        if document["effects"]:
+            lines.append(f"The corrected model still errs by {size}: what was found does not explain that.")
+        else:
+            lines.append(f"The model errs by {size}, and no effect of the catalogue explains it.")
+    return lines
+
+
+def what_is_left(document: Mapping[str, Any]) -> str:
+    """The sentence on what the tests of the residual saw; no comfort where the error itself is large."""
+    left = document["unexplained"]
+    if left["description"]:
+        return left["description"]
+    if unexplained_error(document):
+        return "no structure that these tests can see, yet the error is far above the noise"
+    if left["p"] < _TRACE:
+        return "traces too slight to count"
+    return "nothing that these tests can see"
+
+
+def beside_noise(after: Mapping[str, Any], noise: Mapping[str, Any], unit: str, scale: float) -> str:
+    """How an error compares with what sensor noise alone leaves, in words; empty where that is not known.
+
+    Noise alone leaves an error that is drawn anew with every window: a complete model's lies at the expected value, now
+    above it and now below. An error below it is therefore no better than one at it.
+
+    Args:
+        after: `value` and `ci95` of the error.
+        noise: the same of the block `floor`.
+        unit: of what is printed.
+        scale: from SI to it.
+    """
+    value, floor = after.get("value"), noise.get("value")
+    if value is None or not floor:
+        return ""
+    ends = f" [{scale * noise['ci95'][0]:.3g}, {scale * noise['ci95'][1]:.3g}]" if noise.get("ci95") else ""
+    expected = f"{scale * floor:.3g}{ends} {unit}"
+    if value <= floor:
+        return f"no more than sensor noise leaves of a complete model: {expected}, now more, now less"
+    return f"sensor noise alone leaves {expected}"
+
+
+def nothing_seen(document: Mapping[str, Any], joint: str) -> str:
+    """What to say of a joint whose missing torque has no structure: no comfort where it errs by much."""
+    horizon = told_horizon(document["error"])
+    if horizon is None:
+        return "nothing that these tests can see"
+    value, noise = (
+        document[part].get(horizon, {}).get("joint_pos_rmse", {}).get("per_joint", {}).get(joint, {}).get("value")
+        for part in ("error", "floor")
+    )
+    if value is None or not noise or value <= FAR * noise:
+        return "nothing that these tests can see"
+    return (
+        f"no structure that these tests can see, yet {number(value / noise, 2)} times the noise off after {horizon} s"
+    )

@@ -1,0 +1,230 @@
+"""The diagnosis as one self-contained page: pictures are SVG, all text that came from files is escaped."""
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+from bumblebee.diagnosis.report.html import error_rows, figure, items, number, page, probability, table, warning
+from bumblebee.diagnosis.report.notes import beside_noise, told_horizon, unexplained_error, what_is_left, worse_horizons
+from bumblebee.diagnosis.report.svg import curve_picture, line_picture
+from bumblebee.diagnosis.simulation.units import named, of_joint, pick, position_rows
+
+_DETECTABLE = 60
+
+
+def render_report(document: dict[str, Any], examples: Sequence[dict[str, Any]]) -> str:
+    """HTML of the document and of windows to look at."""
+    held = bool(document["holdout"])
+    parts = [
+        "<h1>What the model lacks</h1>",
+        f"<p class='lead'>{_lead(document)}</p>",
+        *[warning(text) for text in [*document.get("warnings", []), *worse_horizons(document["error"])]],
+        *[warning(f"{a['rollout']} was set aside: {a['reason']}") for a in document.get("set_aside", [])],
+        *_pictures(examples),
+        "<h2>Effects</h2>",
+        _effects(document["effects"]),
+        "<h2>Error on rollouts that took no part in the fit</h2>" if held else "<h2>Error on the fitted rollout</h2>",
+        error_rows({k: document["error"][k] for k in ("before", "after", "oracle", "floor") if k in document["error"]}),
+        "<h2>Joint by joint</h2>",
+        _joints(document),
+        "<h2>What is left</h2>",
+        _left(document),
+        _small(document.get("smallest_detectable", [])),
+        "<h2>Notes</h2>",
+        items(_notes(document)),
+    ]
+    return page("Diagnosis", parts)
+
+
+def _lead(document: dict[str, Any]) -> str:
+    effects, error = document["effects"], document["error"]
+    if effects:
+        names = [
+            f"<b>{escape(e['effect'])}</b> on {escape(', '.join(e['where']) or 'the whole robot')}" for e in effects
+        ]
+        more = f" and {len(names) - 6} more" if len(names) > 6 else ""
+        text = f"{len(effects)} effect{'s' if len(effects) > 1 else ''}: {'; '.join(names[:6])}{more}."
+    elif far := unexplained_error(document):
+        return escape(" ".join(far))
+    else:
+        return "No effect of the catalogue is missing, as far as these data can tell."
+    horizon = told_horizon(error["before"])
+    if horizon is None:
+        return text
+    where = "held-out error" if document["holdout"] else "error on the fitted rollout"
+    said = []
+    for what, unit, scale, key in position_rows(error["before"][horizon]):
+        before, after, floor = (pick(error[k].get(horizon, {}), key) for k in ("before", "after", "floor"))
+        if before.get("value") and after.get("value"):
+            noise = beside_noise(after, floor, unit, scale)
+            goes = "falls" if after["value"] < before["value"] else "goes"
+            said.append(
+                f" After {horizon} s the {where} of the {what} {goes} from {number(scale * before['value'])} to "
+                f"{number(scale * after['value'])} {unit}{f' ({noise})' if noise else ''}."
+            )
+    return text + "".join(said)
+
+
+def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
+    parts = []
+    for n, e in enumerate(examples):
+        series: dict[str, Any] = {name: e[name] for name in ("target", "before", "after", "measured") if name in e}
+        axis = f"{e['joint']} [{e['unit']}]"
+        picture = line_picture(
+            e["time"],
+            series,
+            "s after the restart",
+            axis,
+            f"{e['joint']}: measured, before, after",
+            240 if n == 0 else 130,
+        )
+        text = f"{e['joint']}, restarted from the measured state in {e['rollout']} at {e['start']:.2f} s"
+        parts.append(figure(picture, escape(text)))
+    return parts
+
+
+def _effects(effects: Sequence[dict[str, Any]]) -> str:
+    if not effects:
+        return "<p>None.</p>"
+    rows = []
+    for e in effects:
+        place = escape(", ".join(e["where"]) or "whole robot")
+        share = 100 * e["explains"]
+        bar = f"<span class='share'><span class='bar' style='width:{0.04 * share:.2f}rem'></span>{share:.0f} %</span>"
+        values, declared = _values(e)
+        rows.append(
+            [
+                f"<b>{escape(e['effect'])}</b>",
+                place,
+                f"<span class='values'>{values}</span>",
+                declared,
+                bar,
+                probability(e["evidence"]["p"]),
+                _same(e),
+            ]
+        )
+    head = ["effect", "where", "value [95 % interval]", "declared", "explains", "p", "cannot be told from"]
+    text = (
+        "<p class='note'>explains: share of the excess over the best fit that comes back when this effect alone is "
+        "taken out. p: see diagnosis.json for the test.</p>"
+    )
+    return table(head, rows, (5,)) + text
+
+
+def _values(effect: dict[str, Any]) -> tuple[str, str]:
+    """Values with intervals, and the declared ones."""
+    parameters = effect["parameters"]
+    if effect["effect"] == "discovered":
+        terms = [
+            f"{_with_ends(t['coefficient'], t['ci95'])} &middot; <code>{escape(_short(t['term']))}</code>"
+            for t in parameters["terms"]
+        ]
+        return "<br>".join(terms), "-"
+    lines = [
+        f"{escape(name)} {_with_ends(p['value'], p['ci95'])} {escape(p['unit'])}" for name, p in parameters.items()
+    ]
+    return "<br>".join(lines), "<br>".join(number(p["nominal"]) for p in parameters.values())
+
+
+def _short(term: str) -> str:
+    return term if len(term) <= 60 else f"{term[:40]} ... (see effects.yaml)"
+
+
+def _with_ends(value: float, ends: Sequence[float | None] | None) -> str:
+    if not ends:
+        return f"{value:.4g}"
+    low, high = ("" if x is None else f"{x:.4g}" for x in ends)
+    return f"{value:.4g} <span class='note'>[{low}, {high}]</span>"
+
+
+def _same(effect: dict[str, Any]) -> str:
+    same = [f"{s['effect']} ({', '.join(s['where']) or 'whole'})" for s in effect["equivalent"]]
+    text = escape(", ".join(same)) or "-"
+    advice = "; ".join(effect.get("separate_by", []))
+    return text + (f"<br><span class='note'>to separate: {escape(advice)}</span>" if advice else "")
+
+
+def _joints(document: dict[str, Any]) -> str:
+    """Before and after by joint and horizon, coloured where they differ."""
+    error = document["error"]
+    if not error["before"]:
+        return ""
+    rows = []
+    for joint in next(iter(error["before"].values()))["joint_pos_rmse"]["per_joint"]:
+        cells = [escape(named(document, joint))]
+        for horizon in error["before"]:
+            pair = [error[k][horizon]["joint_pos_rmse"]["per_joint"][joint]["value"] for k in ("before", "after")]
+            if None in pair:
+                cells.append("-")
+                continue
+            kind = "good" if pair[1] < 0.95 * pair[0] else "bad" if pair[1] > 1.05 * pair[0] else "note"
+            cells.append(f"{number(1e3 * pair[0])} <span class='{kind}'>&rarr; {number(1e3 * pair[1])}</span>")
+        rows.append(cells)
+    text = "<p class='note'>RMS position error before and after, in mrad or mm, as beside the joint.</p>"
+    return text + table(["joint", *[f"{h} s" for h in error["before"]]], rows, range(1, 1 + len(error["before"])))
+
+
+def _left(document: dict[str, Any]) -> str:
+    left, structure = document["unexplained"], document.get("structure", {})
+    if not left["significant"]:
+        said = what_is_left(document)
+        return f"<p>{escape(said[:1].upper() + said[1:])} (p = {left['p']:.2g}).</p>"
+    rows = [
+        [
+            escape(joint),
+            f"{e['torque_rms']:.3g} {of_joint(document, joint, 'torque')}",
+            f"{100 * e['torque_rms'] / e['typical_torque']:.0f} %",
+            escape(", ".join(e["depends_on"])) or "-",
+            probability(e["p"]),
+        ]
+        for joint, e in structure.items()
+        if joint in left["where"]
+    ]
+    text = (
+        "<p>Structure remains that no effect above explains. It is described, not forced into a catalogue's name.</p>"
+    )
+    head = ["joint", "RMS", "of the drive's", "goes with", "p"]
+    said = f"<p>{escape(left['description'])}.</p>"
+    listed = table(head, rows, (1, 2, 4)) if rows else ""
+    return text + listed + said + "".join(_curves(document, left["where"][:3]))
+
+
+def _curves(document: dict[str, Any], joints: Sequence[str]) -> list[str]:
+    """What is left over velocity, position and so on, a row of pictures a joint."""
+    parts = []
+    for joint in joints:
+        known = document.get("structure", {}).get(joint, {}).get("curves", {})
+        lacks = f"missing [{of_joint(document, joint, 'torque')}]"
+        drawn = [
+            figure(curve_picture(rows, quantity, lacks, f"{joint} over {quantity}"), escape(joint))
+            for quantity, rows in known.items()
+        ]
+        parts.append(f"<div class='row'>{''.join(drawn)}</div>")
+    return parts
+
+
+def _small(entries: Sequence[dict[str, Any]]) -> str:
+    known = [e for e in entries if e.get("change") is not None]
+    if not known:
+        return ""
+    rows = [
+        [
+            escape(e["effect"]),
+            escape(", ".join(e["where"]) or "whole robot"),
+            escape(e.get("parameter", "")),
+            f"{e['change']:.2g} {escape(e.get('unit', ''))}",
+        ]
+        for e in known[:_DETECTABLE]
+    ]
+    more = (
+        f"<p class='note'>and {len(known) - _DETECTABLE} more in diagnosis.json</p>" if len(known) > _DETECTABLE else ""
+    )
+    body = table(["effect", "where", "parameter", "change"], rows, (3,))
+    return f"<details><summary>The smallest effects that these data could have shown</summary>{body}{more}</details>"
+
+
+def _notes(document: dict[str, Any]) -> list[str]:
+    count = {k: len(document.get(k, [])) for k in ("train", "accept", "holdout")}
+    notes = [f"rollouts: {count['train']} to fit, of which {count['accept']} to accept by; {count['holdout']} held out"]
+    notes += document.get("notes", [])
+    return notes + [f"{', '.join(u['where'])}: {u['why']}" for u in document.get("unidentifiable", [])]

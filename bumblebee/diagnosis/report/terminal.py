@@ -1,0 +1,140 @@
+"""Both reports as plain text for a terminal."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bumblebee.diagnosis.report.notes import nothing_seen, what_is_left, worse_horizons
+from bumblebee.diagnosis.simulation.units import motion_error, named, of_joint, pick, rows
+
+_MARKS = {"target": ".", "before": "x", "after": "o", "measured": "#"}
+
+
+def summary(document: dict[str, Any]) -> str:
+    """Effects with intervals, error before, after and floor, what is left."""
+    lines = [line for e in document["effects"] for line in _effect(e)]
+    lines = ["effects:", *lines] if lines else ["no effect found"]
+    lines = [*(f"WARNING: {text}" for text in document.get("warnings", [])), *lines]
+    columns = {k: document["error"][k] for k in ("before", "after", "oracle", "floor") if k in document["error"]}
+    where = "held-out rollouts" if document["holdout"] else "the fitted rollout"
+    lines += ["", f"error on {where}:", *_errors(columns), *worse_horizons(document["error"]), ""]
+    left = document["unexplained"]
+    lines.append(f"unexplained: {what_is_left(document)} (p = {left['p']:.2g})")
+    lines += [f"note: {note}" for note in document.get("notes", [])]
+    lines += [f"unidentifiable: {', '.join(u['where'])}: {u['why']}" for u in document.get("unidentifiable", [])]
+    return "\n".join(lines)
+
+
+def _effect(effect: dict[str, Any]) -> list[str]:
+    place, lines = ", ".join(effect["where"]) or "whole robot", []
+    if effect["effect"] == "discovered":
+        values = [(t["term"][:48], t | {"value": t["coefficient"], "unit": "", "nominal": None})
+                  for t in effect["parameters"]["terms"]]  # fmt: skip
+    else:
+        values = list(effect["parameters"].items())
+    for name, p in values:
+        low, high = ("" if x is None else f"{x:.4g}" for x in p["ci95"])
+        declared = "" if p["nominal"] is None else f" (declared {p['nominal']:.4g})"
+        lines.append(
+            f"  {effect['effect']:<18} {place:<28} {name} = {p['value']:.4g} [{low}, {high}] {p['unit']}{declared},"
+            f" explains {100 * effect['explains']:.0f} %"
+        )
+    if effect["equivalent"]:
+        same = ", ".join(f"{s['effect']} on {', '.join(s['where']) or 'all'}" for s in effect["equivalent"][:4])
+        lines.append(f"  {'':<18} cannot be told from: {same}")
+        lines += [f"  {'':<18} to separate: {text}" for text in effect.get("separate_by", [])]
+    return lines
+
+
+def _errors(columns: dict[str, dict[str, Any]]) -> list[str]:
+    """Measures by horizon, a column for each error block."""
+    lines = [f"  {'after':<8}{'':<34}" + "".join(f"{name:>12}" for name in columns)]
+    for horizon, measures in next(iter(columns.values())).items():
+        for label, unit, scale, key in rows(measures):
+            cells = [pick(block.get(horizon, {}), key).get("value") for block in columns.values()]
+            title = label + (f" [{unit}]" if unit else "")
+            row = "".join(f"{'-':>12}" if v is None else f"{scale * v:>12.4g}" for v in cells)
+            lines.append(f"  {horizon + ' s':<8}{title:<34}{row}")
+    return lines
+
+
+def plot(example: dict[str, Any], width: int = 76, height: int = 14) -> str:
+    """A window as characters: # measured, x before (or the model), o after, . target."""
+    time = np.asarray(example["time"], dtype=float)
+    series = {n: np.asarray(example[n], dtype=float) for n in _MARKS if n in example}
+    known = np.concatenate([series[n] for n in ("measured", "target") if n in series])
+    known = known[np.isfinite(known)]
+    if len(time) < 2 or not len(known):
+        return ""
+    room = np.ptp(known) or 1e-3
+    every = np.concatenate(list(series.values()))
+    low = max(float(np.nanmin(every)), known.min() - room)
+    high = min(float(np.nanmax(every)), known.max() + room)
+    canvas = [[" "] * width for _ in range(height)]
+    for x in range(width):
+        at = time[0] + (time[-1] - time[0]) * x / (width - 1)
+        for name, values in series.items():
+            value = np.interp(at, time, values)
+            if np.isfinite(value) and low <= value <= high:
+                canvas[round((high - value) / max(high - low, 1e-12) * (height - 1))][x] = _MARKS[name]
+    head = f"{example['joint']} [{example['unit']}] in {example['rollout']} from {example['start']:.2f} s"
+    legend = "  ".join(f"{_MARKS[n]} {'model' if n == 'before' and 'after' not in series else n}" for n in series)
+    sides = [f"{high:>9.3g} |", *[f"{'':>9} |"] * (height - 2), f"{low:>9.3g} |"]
+    body = [side + "".join(row) for side, row in zip(sides, canvas, strict=True)]
+    return "\n".join([f"{head}   {legend}", *body, f"{'':>10} {time[0]:.2f} s{time[-1]:>{width - 8}.2f} s"])
+
+
+def gap_summary(document: dict[str, Any], examples: Sequence[dict[str, Any]]) -> str:
+    """The gap report: a picture, errors by horizon and joint, the torque that is missing, motions, notes."""
+    error = document["error"]
+    lines = [plot(examples[0]) if examples else "", ""]
+    lines += [f"WARNING: {text}" for text in document.get("warnings", [])]
+    lines += [
+        "error of windows restarted from measured states:",
+        *_errors({"model": error, "floor": document["floor"]}),
+    ]
+    if error:
+        lines += ["", f"  {'joint position, joint by joint':<34}" + "".join(f"{h + ' s':>12}" for h in error)]
+        joints = next(iter(error.values()))["joint_pos_rmse"]["per_joint"]
+        for joint in joints:
+            values = [m["joint_pos_rmse"]["per_joint"][joint]["value"] for m in error.values()]
+            lines.append(
+                f"  {named(document, joint):<34}"
+                + "".join(f"{'-':>12}" if v is None else f"{1e3 * v:>12.4g}" for v in values)
+            )
+    lines += ["", "torque that the model lacks:", *_missing(document)]
+    lines += _reported(document)
+    lines += ["", "worst motions:"]
+    for m in document["motions"][:5]:
+        lines.append(f"  {m['motion']:<40} {motion_error(m)} after {m['horizon']} s")
+    lines += [f"note: {note}" for note in document["notes"]]
+    lines += [f"unidentifiable: {', '.join(u['where'])}: {u['why']}" for u in document["unidentifiable"]]
+    return "\n".join(lines)
+
+
+def _reported(document: dict[str, Any]) -> list[str]:
+    if not document["reported_torque"]:
+        return []
+    lines = ["", "the drives' own torque against the declared drives':"]
+    for j, e in document["reported_torque"].items():
+        bias = f"{e['bias']:.3g} {of_joint(document, j, 'torque')}"
+        late, alike = f"{1e3 * e['delay']:.1f} ms late", f"correlation {e['correlation']:.3f}"
+        lines.append(f"  {j:<28} gain {e['gain']:.3f}, bias {bias}, {late}, {alike}")
+    return lines
+
+
+def _missing(document: dict[str, Any]) -> list[str]:
+    lacking = document["missing_torque"]
+    if not lacking:
+        return ["  too few windows to say"]
+    lines = []
+    for joint, e in lacking.items():
+        if e["significant"]:
+            share = 100 * e["structured_rms"] / e["drive_rms"]
+            on = ", ".join(e["depends_on"]) or "no single quantity"
+            size = f"{e['structured_rms']:.3g} {e['unit']} RMS ({share:.0f} % of its drive's)"
+            lines.append(f"  {joint:<28} {size}, goes with {on}")
+        else:
+            lines.append(f"  {joint:<28} {nothing_seen(document, joint)} (p = {e['p']:.2g})")
+    return lines

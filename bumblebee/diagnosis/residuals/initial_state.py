@@ -1,0 +1,61 @@
+"""Starts that the readings after them agree with.
+
+A measured start of a robot in contact has its feet a millimetre above the floor or inside it. What the simulation does
+from there is not what it does from the true start, and neither are its sensitivities: masses came out a quarter too
+small. Here each start is moved, within the noise, to where the readings of the next few ticks say that it was: one step
+of the iterated Kalman filter. The residual is taken back to the measured start to first order (`Whitener.offset`), so
+that nothing is gained or lost but the point around which everything is linear, and that is nearly the true one.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from bumblebee.diagnosis.residuals.whitening import displaced, factors_of, sample, start_noise
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.readings import Layout
+from bumblebee.diagnosis.simulation.simulate import residuals
+from bumblebee.diagnosis.simulation.variation import Variation
+from bumblebee.diagnosis.simulation.windows import Windows
+
+_OUTPUTS = 2  # compared ticks that say where a window started
+_MOST = 2.5  # standard deviations of its noise that a coordinate may move
+
+
+def start_moves(
+    plant: Plant,
+    layout: Layout,
+    windows: Windows,
+    variation: Variation,
+    sigma: np.ndarray,
+    step: float,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """Displacements (W, C) of measured starts, coordinates as `start_noise` has them; 0 where a simulation diverges."""
+    short = _first_ticks(windows, _OUTPUTS)
+    found = sample(plant, layout, short, variation, sigma, step, rng)
+    raw = residuals(plant, layout, short, [variation], step)[0].reshape(len(windows), -1)
+    factor = factors_of(found, sigma)
+    white = np.matmul(factor, np.nan_to_num(raw)[..., None])[..., 0]
+    slopes = np.matmul(found.slopes, factor.transpose(0, 2, 1))
+    move = -np.einsum("wcm,wm->wc", slopes, white)
+    good = found.valid & np.isfinite(raw).all(axis=1)
+    return np.clip(np.where(good[:, None], move, 0.0), -_MOST, _MOST) * start_noise(plant, layout, sigma)
+
+
+def restarted(plant: Plant, layout: Layout, windows: Windows, move: np.ndarray) -> Windows:
+    """The windows with their starts moved by `move` (W, C)."""
+    starts = displaced(plant, layout, windows, move[None])
+    return replace(windows, qpos=starts.qpos[0], qvel=starts.qvel[0])
+
+
+def _first_ticks(windows: Windows, count: int) -> Windows:
+    """The windows cut off after `count` compared ticks."""
+    count = min(count, windows.out_time.shape[1])
+    return replace(
+        windows,
+        out_time=windows.out_time[:, :count],
+        measured=windows.measured[:, :count],
+        quat=None if windows.quat is None else windows.quat[:, :count],
+        span=float(windows.out_time[:, count - 1].max()),
+    )

@@ -1,0 +1,83 @@
+"""Directions in which two correct simulators differ: a fit must be free to move along them without naming an effect.
+
+Truth comes from a robot, or from another integrator at another step. What such a difference does is of first order in
+the step and the same for every joint, so each kind is one column with one coefficient for the whole dataset:
+
+- integrator: this simulation at its step against itself at twice the step;
+- position loop and velocity loop: the servo acts on readings that are a little old, q(t - e) and qd(t - e);
+- velocity clock: velocities are read a little before positions;
+- height, only where the base's height is not measured but taken from stance: all heights shifted, 1 for a millimetre.
+
+A coefficient of 1 stands for one millisecond; that is also its prior's standard deviation. A problem has one nuisance
+more, the curvature of the start's noise (`whiten`).
+"""
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.readings import Layout
+from bumblebee.diagnosis.simulation.simulate import Starts, residuals
+from bumblebee.diagnosis.simulation.variation import Variation
+from bumblebee.diagnosis.simulation.windows import Windows
+
+NAMES = ("integrator", "position_loop", "velocity_loop", "velocity_clock", "height")
+_UNIT = 0.001  # [s]
+_HEIGHT = 0.001  # [m]
+
+
+def nuisance_columns(plant: Plant, layout: Layout, windows: Windows, variation: Variation, step: float) -> np.ndarray:
+    """Change of the prediction for coefficient 1 of each nuisance, (4 or 5, W, N, D); diverged windows are NaN."""
+    ticks = windows.out_time
+    # One simulation, read at the ticks, a little before them, and just after the start.
+    every = residuals(plant, layout, _read_thrice(windows, 2 * step), [variation], step)[0]
+    base, early, first = np.split(every, [ticks.shape[1], 2 * ticks.shape[1]], axis=1)
+    double = residuals(plant, layout, windows, [variation], 2 * step)[0]
+    # Of what is a small change of the model both sides are simulated in the longer steps.
+    late = residuals(plant, layout, windows, [_late_loop(plant, variation, part) for part in ("kp", "kd")], 2 * step)
+    start = _faster(plant, layout, windows, windows.measured[:, 0] - first[:, 0], 2 * step)
+    clock = double - residuals(plant, layout, windows, [variation], 2 * step, start)[0]
+    clock[..., layout.slices["joint_vel"]] += (base - early)[..., layout.slices["joint_vel"]]
+    columns = [(base - double) * (_UNIT / step), double - late[0], double - late[1], clock]
+    if plant.floating and "base_pos" not in layout.slices:
+        higher = windows.qpos.copy()
+        higher[:, plant.base_qpos + 2] += _HEIGHT
+        starts = Starts(higher[None], windows.qvel[None])
+        columns.append(double - residuals(plant, layout, windows, [variation], 2 * step, starts)[0])
+    return np.stack(columns)
+
+
+def _late_loop(plant: Plant, variation: Variation, part: str) -> Variation:
+    """Torque kp (u - q(t-e)) - kd qd(t-e), to first order in e: less damping by kp e, less inertia by kd e."""
+    model, own = copy.copy(variation.model), variation.plant or plant
+    for column, a in enumerate(own.actuator):
+        if a >= 0:
+            dof = own.dof[column]
+            kp, kd = -model.actuator_biasprm[a, 1], -model.actuator_biasprm[a, 2]
+            gear = model.actuator_gear[a, 0]
+            if part == "kp":
+                model.actuator_biasprm[a, 2] += kp * _UNIT
+            else:
+                lighter = model.dof_armature[dof] - kd * gear**2 * _UNIT
+                model.dof_armature[dof] = max(0.1 * model.dof_armature[dof], lighter)
+    return replace(variation, model=model)
+
+
+def _read_thrice(windows: Windows, after: float) -> Windows:
+    """The same windows (N ticks) compared at their ticks, a millisecond before each, and `after` s from the start."""
+    ticks = windows.out_time
+    times = np.concatenate((ticks, ticks - _UNIT, np.full((len(windows), 1), after)), axis=1)
+    measured, quat = (
+        None if x is None else np.concatenate((x, x, x[:, :1]), axis=1) for x in (windows.measured, windows.quat)
+    )
+    return replace(windows, out_time=times, measured=measured, quat=quat)
+
+
+def _faster(plant: Plant, layout: Layout, windows: Windows, readings: np.ndarray, after: float) -> Starts:
+    """Starts whose joints are faster by a millisecond of their acceleration, from simulated readings (W, D)."""
+    start = windows.qvel.copy()
+    gained = readings[:, layout.slices["joint_vel"]] - start[:, plant.dof]
+    start[:, plant.dof] += _UNIT * gained / after
+    return Starts(windows.qpos[None], start[None])

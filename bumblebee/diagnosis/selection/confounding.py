@@ -1,0 +1,158 @@
+"""Effects that these data cannot tell apart, what would separate them, and the smallest that they could have shown."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates.candidate import INVERSE, Candidate
+from bumblebee.diagnosis.candidates.exclusion import is_chosen
+from bumblebee.diagnosis.candidates.traits import label
+from bumblebee.diagnosis.comparison.holdout import Holdout
+from bumblebee.diagnosis.comparison.paired_tests import no_worse_within_errors
+from bumblebee.diagnosis.comparison.submodel import linearly_without
+from bumblebee.diagnosis.estimation.fit import Fit
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.estimation.least_squares import project, solve
+from bumblebee.diagnosis.selection.forward import Search
+from bumblebee.diagnosis.selection.score_tests import score_tests
+from bumblebee.diagnosis.selection.trial import Trial, try_one
+from bumblebee.diagnosis.sensitivities.columns import Columns
+from bumblebee.diagnosis.simulation.units import unit_on
+from bumblebee.sim.effects import CATALOGUE
+
+_SAME = 0.95
+_KIN = 0.7  # whitened sensitivities this parallel are worth trying in each other's place
+_RIVALS, _ALL_RIVALS = 4, 16  # tried in an effect's place; in all effects' places together, but one each
+_FAR_WORSE, _ENOUGH = 6.0, 20  # standard errors by which slopes make a rival hopeless; windows that can say so
+_POWER_Z = 4.0  # seen four times out of five at a bound of about three standard errors
+
+
+def alike(columns: Columns, found: Search) -> list[list[tuple[Candidate, float]]]:
+    """For each chosen effect the other candidates by how much of its whitened sensitivity theirs hold, most first.
+
+    Nuisances are taken out of both first: what they can imitate is no evidence for either.
+    """
+    fit, weights = found.fit, found.weights
+    keep = np.isin(_keys(found.problem), _keys(found.screened))
+    root = np.sqrt(weights[keep])[:, None]
+    nuisance = (found.screened.nuisance * root).reshape(len(found.screened.nuisance), -1)
+    basis = np.linalg.qr(nuisance.T.astype(np.float64))[0].astype(np.float32)
+    flat = (columns.values * root.astype(np.float32)).reshape(len(columns.values), -1)
+    flat = flat - (flat @ basis) @ basis.T
+    norms = np.maximum(np.linalg.norm(flat, axis=1), 1e-12)
+    unit = flat / norms[:, None]
+    out = []
+    moving = np.flatnonzero(fit.scales)
+    for c, part in zip(fit.chosen, fit.slices, strict=True):
+        away = (fit.values - np.concatenate([np.array(o.nominal) for o in fit.chosen]))[part] / np.maximum(
+            fit.scales[part], 1e-300
+        )
+        rows = [int(np.flatnonzero(moving == part.start + f)[0]) for f in c.free]
+        own = np.tensordot(away[list(c.free)], fit.columns[rows][:, keep], axes=1) * root
+        own = own.ravel() - basis @ (basis.T @ own.ravel())
+        own /= max(np.linalg.norm(own), 1e-12)
+        cosines = unit @ own.astype(np.float32)
+        shares = []
+        for other, span in zip(columns.candidates, columns.slices, strict=True):
+            if (other.effect, other.where) == (c.effect, c.where):
+                continue
+            shares.append((other, _share(unit[span], cosines[span])))
+        best: dict[tuple[str, str], tuple[Candidate, float]] = {}
+        for other, share in shares:
+            key = (other.effect, other.where)
+            if key not in best or share > best[key][1]:
+                best[key] = (other, share)
+        out.append(sorted(best.values(), key=lambda pair: -pair[1]))
+    return out
+
+
+def _share(unit: np.ndarray, cosines: np.ndarray) -> float:
+    """Length of the projection of a unit vector on the span of unit rows, from their products."""
+    if len(unit) == 1:
+        return float(abs(cosines[0]))
+    gram = (unit @ unit.T).astype(float)
+    return float(np.sqrt(max(cosines @ np.linalg.pinv(gram, rcond=1e-4, hermitian=True) @ cosines, 0.0)))
+
+
+def _keys(problem: Any) -> np.ndarray:
+    return problem.windows.rollout.astype(np.int64) * (1 << 32) + problem.windows.start
+
+
+def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, float]]]) -> list[list[Candidate]]:
+    """For each chosen effect those that fit the held-out windows no worse in its place.
+
+    Sensitivities that agree (> 0.95) are the same to these data. Of the next of kin the nearest are put in the effect's
+    place in the simulator; one stays a rival unless it is worse by two standard errors on the windows held out from the
+    fit (on the fitted ones where nothing is held out), or fits the fitted ones better. Not simulated are those that by
+    their slopes are worse by six on the windows of the screening.
+    """
+    fit, problem = found.fit, found.problem
+    most = min(_RIVALS, max(1, _ALL_RIVALS // max(1, len(fit.chosen))))
+    out = []
+    for i, kin in enumerate(ranked):
+        same = [c for c, share in kin if share > _SAME]
+        rest = linearly_without(fit, i)
+        near = [c for c, share in kin if _KIN < share <= _SAME and not is_chosen(c, rest.chosen)][:most]
+        for rival in near:
+            steps = _direction(found, rival, rest)
+            if steps is None:
+                continue
+            trial = try_one(problem, rest, rival, steps, found.weights)
+            if trial is not None and no_worse_within_errors(
+                found.problem, holdout, found.fit, _in_place(found, rest, trial)
+            ):
+                same.append(rival)
+        out.append(same)
+    return out
+
+
+def _direction(found: Search, rival: Candidate, rest: Fit) -> np.ndarray | None:
+    """The steps (F,) that the screened windows suggest for a rival beside `rest`; None where it is far worse there."""
+    small, keep = found.screened, np.isin(_keys(found.problem), _keys(found.screened))
+    weights = found.weights[keep]
+    columns = found.columns.only([found.columns.candidates.index(rival)])
+    beside = replace(rest, residual=rest.residual[keep], columns=rest.columns[:, keep])
+    basis, inverse = project(small, np.concatenate((beside.columns, columns.values)), weights)
+    swapped = beside.residual - np.tensordot(solve(basis, inverse, beside.residual, weights), basis, axes=1)
+    ours = found.fit.clean(found.problem)[keep]
+    loss = np.log1p((swapped**2).mean(axis=1)) - np.log1p((ours**2).mean(axis=1))
+    if len(loss) > _ENOUGH and loss.mean() > _FAR_WORSE * loss.std(ddof=1) / np.sqrt(len(loss)):
+        return None
+    return score_tests(small, columns, beside, weights).steps[0]
+
+
+def _in_place(found: Search, rest: Fit, trial: Trial) -> Fit:
+    """The fit with a rival; cogging is fitted in its periods, too, of which few over a short way look like a spring."""
+    rival = trial.candidate
+    chosen, values = (*rest.chosen, rival), np.concatenate((rest.values, trial.values))
+    if rival.effect == "cogging":
+        return gauss_newton(found.problem, chosen, values, found.weights, iterations=3, coarse=True, known=found.fit)
+    return replace(rest, chosen=chosen, values=values, cost=np.inf)
+
+
+def detectable(found: Search) -> list[dict[str, Any]]:
+    """The change of each effect not found that these data would have shown, in the parameter's unit."""
+    entries = []
+    seen: set[tuple[str, str, str]] = set()
+    chosen = {(c.effect, c.where) for c in found.fit.chosen}
+    share = np.sqrt(len(found.screened.windows) / len(found.problem.windows))
+    order = np.argsort([c.shape_scale for c in found.columns.candidates], kind="stable")
+    for k in order:
+        c = found.columns.candidates[k]
+        for f, error in zip(c.free, found.tests.errors[k], strict=True):
+            parameter = CATALOGUE[c.effect].parameters[f]
+            key = (c.effect, c.where, parameter.name)
+            if key in seen or (c.effect, c.where) in chosen or c.effect in INVERSE:
+                continue
+            seen.add(key)
+            size = _POWER_Z * share * error * abs(c.step[f])
+            entries.append(
+                label(c)
+                | {
+                    "parameter": parameter.name,
+                    "change": float(size) if np.isfinite(size) else None,
+                    "unit": unit_on(found.problem.plant, c.effect, c.where, parameter.unit),
+                }
+            )
+    return entries

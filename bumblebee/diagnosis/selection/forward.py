@@ -1,0 +1,162 @@
+"""Which effects: score tests of every candidate given those chosen, trials in the simulator, held-out gain, pruning."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bumblebee.diagnosis.budget import Budget
+from bumblebee.diagnosis.candidates.candidate import Candidate
+from bumblebee.diagnosis.candidates.traits import SATURATIONS
+from bumblebee.diagnosis.comparison.holdout import Holdout
+from bumblebee.diagnosis.comparison.wald import Step
+from bumblebee.diagnosis.config import SearchConfig
+from bumblebee.diagnosis.estimation.fit import Fit
+from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
+from bumblebee.diagnosis.selection.proposals.backlash import play_trials
+from bumblebee.diagnosis.selection.proposals.gain_grid import far_trials, start_with_gain_grid
+from bumblebee.diagnosis.selection.proposals.gain_parameters import merge_gain_parameters
+from bumblebee.diagnosis.selection.proposals.joint_elasticity import shaft_trials
+from bumblebee.diagnosis.selection.proposals.packet_loss import find_lost_commands
+from bumblebee.diagnosis.selection.proposals.saturation import limit_trials
+from bumblebee.diagnosis.selection.proposals.stribeck import creeping, levelled
+from bumblebee.diagnosis.selection.score_tests import Scores
+from bumblebee.diagnosis.selection.state import Loss, SearchState
+from bumblebee.diagnosis.selection.swap import exchange
+from bumblebee.diagnosis.selection.trial import Trial, simplest
+from bumblebee.diagnosis.sensitivities.columns import Columns
+from bumblebee.sim.effects import Effect
+
+_EXCHANGES = 3
+_MOST_OF_IT = 0.3  # share of the cost that a trial takes away, beside which limits elsewhere can wait
+
+
+@dataclass(eq=False)
+class Search:
+    """Outcome: the final fit and the way there."""
+
+    fit: Fit
+    problem: Problem
+    """The fitted windows, their nuisances around the fit."""
+    weights: np.ndarray
+    steps: list[Step]
+    screened: Problem
+    """The windows that the columns are of."""
+    columns: Columns
+    """Screening columns of all candidates."""
+    tests: Scores
+    """Of every candidate of `columns`, given the chosen ones."""
+    bound: float
+    """z that a candidate had to reach."""
+    count: int
+    """Candidates among which the false alarms are shared."""
+    rejected: list[str] = field(default_factory=list)
+    loss: Loss | None = None
+    """Commands that never arrived; the windows then have those that did."""
+
+
+def search(
+    problem: Problem,
+    holdout: Holdout,
+    remake: Callable[[Sequence[Effect]], tuple[list[Candidate], np.ndarray]],
+    config: SearchConfig,
+    say: Callable[[str], None] = lambda text: None,
+    budget: Budget | None = None,
+) -> Search:
+    """Forward selection with joint refits, then pruning.
+
+    `remake` gives the candidates with steps for a model with some effects, and its joints' typical torques (J,) [N m].
+    """
+    run, budget = begin(problem, holdout, remake, config, say), budget or Budget()
+    _select(run, config, budget)
+    if find_lost_commands(run):
+        _select(run, config, budget)
+    for _ in range(_EXCHANGES):
+        if not budget.has_time_for("other names in the place of those found"):
+            break
+        say("each name against its rivals")
+        if not (exchange(run) or creeping(run)):
+            break
+        _select(run, config, budget)
+    run.prune()
+    merge_gain_parameters(run)
+    levelled(run)
+    steps = [s for s in run.steps if s.candidate in run.fit.chosen]
+    return Search(
+        run.fit,
+        run.problem,
+        run.weights,
+        steps,
+        run.small,
+        run.columns,
+        run.tests(),
+        run.bound,
+        len(run.candidates),
+        run.rejected,
+        run.loss,
+    )
+
+
+def begin(
+    problem: Problem,
+    holdout: Holdout,
+    remake: Callable[[Sequence[Effect]], tuple[list[Candidate], np.ndarray]],
+    config: SearchConfig,
+    say: Callable[[str], None],
+) -> SearchState:
+    """A search at its beginning: with servos far from the declared ones if need be, and all candidates screened."""
+    run = SearchState(problem, holdout, remake, config, say)
+    start_with_gain_grid(run)
+    run.open()
+    return run
+
+
+def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
+    """Forward selection until nothing is worth a trial, too many in a row were in vain, or the time is over."""
+    vain, judged, limits = 0, None, []
+    while len(run.fit.chosen) < config.most + run.given and vain < run.patience:
+        if not budget.has_time_for("more effects"):
+            break
+        tried, looked = [], []
+        start_with_all_joints(run)
+        if not run.given:
+            tried = far_trials(run.problem, run.fit, run.candidates, run.weights, config.far)
+            tried = [t for t in tried if t.candidate not in run.closed]
+        if not tried:
+            tried, looked = run.trials()
+        some = _where_limits_matter(tried, run)
+        if judged != (run.fit, some):
+            judged = (run.fit, some)
+            limits = limit_trials(run.problem, run.fit, some, run.weights, run.hopeless, run.changes)
+        tried += [t for t in limits if t.candidate not in run.closed]
+        if not tried:
+            tried = play_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+            tried = [t for t in tried if t.candidate not in run.closed]
+        if not tried or vain == run.patience - 1:
+            tried += shaft_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+        if not tried and not looked:
+            break
+        if not tried:
+            run.closed |= set(looked)
+            vain += 1
+            continue
+        best = simplest(tried, run.fit.cost)
+        if best.candidate.effect in SATURATIONS and find_lost_commands(run):
+            continue  # a lost command, too, spoils a few windows
+        accepted, place = run.accept(best.candidate, best.values), best.candidate.where
+        vain = 0 if accepted else vain + 1
+        if accepted:
+            run.hopeless = {(kind, where) for kind, where in run.hopeless if place and where != place}
+
+
+def _where_limits_matter(tried: Sequence[Trial], run: SearchState) -> tuple[Candidate, ...]:
+    """The candidates among which limits are tried: all, or while one trial explains much the places of these trials.
+
+    What a limit does may pass for weakness or friction of its joint, and then the two are compared; a limit elsewhere
+    is judged when the large effects are known.
+    """
+    if min((t.cost for t in tried), default=np.inf) > (1 - _MOST_OF_IT) * run.fit.cost:
+        return tuple(run.candidates)
+    places = {t.candidate.where for t in tried}
+    return tuple(c for c in run.candidates if c.where in places)

@@ -1,0 +1,200 @@
+"""Servos far from the declared ones, found before anything else is looked for: gains, and dry friction beside them.
+
+Where a model's gains are off by factors, residuals are so far from linear that no slope and no test says anything, and
+every effect helps. Published gains are often another firmware's, and the joints of a robot often share one type of
+servo: so factors on kp and kd of all servos at once are tried first, over orders of magnitude, then every servo's own
+gains and dry friction. Friction is there because a joint that sticks looks like one of large damping as long as it may
+not stick.
+
+Windows of a second are compared, for in a short one gain, damping and friction can stand for each other. The score of a
+joint is the mean of log(error^2 + (3 noise)^2), so that no few windows decide alone; a servo pays a little for gains
+unlike the others' (log of the factor, squared), which only matters where its own data say next to nothing. Joints are
+scored one by one: each tries its options while the others try theirs, and what they chose together must be better.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates.candidate import Candidate, effects_at
+from bumblebee.diagnosis.comparison.wald import evidence, wald
+from bumblebee.diagnosis.estimation.fit import Fit, typical_power
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.estimation.least_squares import LeftOver
+from bumblebee.diagnosis.residuals.problem import Problem, window_weights
+from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.selection.trial import Trial
+from bumblebee.diagnosis.simulation.simulate import residuals
+from bumblebee.diagnosis.simulation.variation import vary
+from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, cut
+from bumblebee.sim.effects import Effect, single
+from bumblebee.sim.servo import servos_of
+
+KINDS = ("kp", "kd", "coulomb_friction")
+_SHARED = (1.0, 0.3, 0.1, 0.03, 0.01, 3.0)
+_LONG, _WINDOWS = 1.0, 36  # [s]; windows of it
+_SWEEPS = ((0.3, 0.6, 1.6, 3.0), (0.3, 0.6, 1.6, 3.0), (0.5, 0.8, 1.25, 2.0), (0.7, 0.9, 1.1, 1.4), (0.85, 1.15))
+_RUBS = (0.01, 0.03, 0.1)  # dry friction tried first, as shares of the servo's torque limit
+_UNLIKE = 0.02  # score of a gain that is e times the others'
+_BETTER = 0.1  # fall of the score
+_LEAST = 1e-3  # smallest factor tried
+_STEP = 0.1  # share of a value that matters
+Servo = tuple[float, float, float]
+"""Factors on kp and kd, dry friction [N m]."""
+# Factors on a servo's gains that are tried where the declared ones are far off.
+_FACTORS = (0.5, 0.2, 0.1, 0.03, 0.01, 2.0, 5.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """What servos are compared by."""
+
+    problem: Problem
+    windows: Windows
+    names: tuple[str, ...]
+    columns: np.ndarray
+    """(S,) of the servos' joints among the logged ones."""
+    limit: np.ndarray
+    """(S,) the servos' torque limit [N m]."""
+
+    def scores(self, several: Sequence[Sequence[Servo]]) -> np.ndarray:
+        """(V, S) score of every joint under each of V sets of servos; lower is better."""
+        p, part = self.problem, self.problem.layout.slices["joint_pos"]
+        models = [vary(p.plant, _effects(self.names, servos)) for servos in several]
+        error = residuals(p.plant, p.layout, self.windows, models, p.coarse)[..., part][..., self.columns]
+        noise = p.sigma[part][self.columns]
+        square = np.where(np.isfinite(error), error, 10.0) ** 2
+        score = np.log(square.mean(axis=2) + (3.0 * noise) ** 2).mean(axis=1)
+        logs = np.log(np.maximum(np.array(several)[..., :2], _LEAST))
+        return score + _UNLIKE * ((logs - np.median(logs, axis=1, keepdims=True)) ** 2).sum(axis=2)
+
+
+def far_servos(problem: Problem, candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
+    """Candidates of `KINDS` with values, all servos together.
+
+    Empty where none makes the model much better, or where fewer than half of the servos are far off.
+
+    Their steps are a tenth of the values: at a hundredth of the declared gain a tenth of it is no small change.
+    """
+    table = {(c.effect, c.where): c for c in candidates if c.effect in KINDS}
+    names = tuple(where for effect, where in table if effect == "kp" and ("kd", where) in table)
+    course = _course(problem, names) if names else None
+    if course is None:
+        return []
+    declared: list[Servo] = [(1.0, 1.0, table["coulomb_friction", where].nominal[0]) for where in names]
+    servos = _shared(course, declared)
+    for factors in _SWEEPS:
+        servos = _swept(course, servos, factors)
+    before, after = course.scores([declared, servos]).mean(axis=1)
+    if before - after < _BETTER or not _mostly_far(servos):
+        return []
+    found = []
+    for where, values, old in zip(names, servos, declared, strict=True):
+        for effect, value, was in zip(KINDS, values, old, strict=True):
+            if value != was:
+                step = float(np.sign(value - was)) * _STEP * value
+                found.append((replace(table[effect, where], step=(step,)), value))
+    return found
+
+
+def _mostly_far(servos: Sequence[Servo]) -> bool:
+    """Whether at least half of the servos have a kp that is wrong by a factor of two.
+
+    Else one effect may have carried the residuals that far away, and the search finds it better alone.
+    """
+    return float(np.mean([abs(np.log(max(kp, _LEAST))) >= np.log(2.0) for kp, _, _ in servos])) >= 0.5
+
+
+def _course(problem: Problem, names: tuple[str, ...]) -> _Course | None:
+    """Windows of a second of the fitted rollouts; None where these are shorter."""
+    windows, plant = problem.windows, problem.plant
+    ids = [int(i) for i in np.unique(windows.rollout)]
+    starts = choose_starts(windows.source, ids, _LONG, _WINDOWS)
+    if not starts:
+        return None
+    long = cut(plant, problem.layout, windows.source, starts, outputs=5)
+    limit = servos_of(plant.model, [int(plant.model.joint(name).id) for name in names]).limit
+    return _Course(problem, long, names, np.array([plant.joints.index(name) for name in names]), limit)
+
+
+def _shared(course: _Course, declared: list[Servo]) -> list[Servo]:
+    """The best of all factors on every servo's gains at once."""
+    options = [[(p, d, s[2]) for s in declared] for p, d in itertools.product(_SHARED, _SHARED)]
+    return options[int(np.argmin(course.scores(options).mean(axis=1)))]
+
+
+def _swept(course: _Course, servos: list[Servo], factors: Sequence[float]) -> list[Servo]:
+    """Every servo at its best option, if that is better for all of them together."""
+    options = [_options(s, factors, limit) for s, limit in zip(servos, course.limit, strict=True)]
+    sets = [servos, *([o[k] for o in options] for k in range(len(options[0])))]
+    best = np.argmin(course.scores(sets), axis=0)
+    chosen = [sets[k][j] for j, k in enumerate(best)]
+    old, new = course.scores([servos, chosen]).mean(axis=1)
+    return chosen if new < old else servos
+
+
+def _options(servo: Servo, factors: Sequence[float], limit: float) -> list[Servo]:
+    kp, kd, dry = servo
+    most = 0.5 * limit
+    rub = limit if np.isfinite(limit) else max(dry, 1.0)
+    out = [(max(kp * f, _LEAST), kd, dry) for f in factors]
+    out += [(kp, max(kd * f, _LEAST), dry) for f in factors]
+    out += [(max(kp * f, _LEAST), max(kd * f, _LEAST), dry) for f in factors]
+    out += [(kp, kd, min(dry * f, most)) for f in factors]
+    return out + [(kp, max(kd * f, _LEAST), min(dry + rub * r, most)) for f in (1.0, factors[0]) for r in _RUBS]
+
+
+def _effects(names: Sequence[str], servos: Sequence[Servo]) -> list[Effect]:
+    return [
+        single(kind, w, value) for w, s in zip(names, servos, strict=True) for kind, value in zip(KINDS, s, strict=True)
+    ]
+
+
+def start_with_gain_grid(run: SearchState) -> bool:
+    """Begin with servos far from the declared ones, where the data are that far from the model."""
+    if typical_power(run.fit.residual) < run.config.far:
+        return False
+    found = far_servos(run.problem, run.candidates)
+    if not found:
+        return False
+    chosen, values = [c for c, _ in found], np.array([v for _, v in found])
+    weights = window_weights(run.problem.residual([effects_at(chosen, values)])[0])
+    fit = gauss_newton(run.problem, chosen, values, weights, iterations=0, coarse=True)
+    if not run.holdout.gains(run.fit, fit, run.config.holdout_z, run.config.least_gain):
+        return False
+    for i, c in enumerate(fit.chosen):
+        z = wald(run.problem, fit, weights, i)
+        run.steps.append(evidence(c, z, len(run.candidates)))
+        run.say(f"found {c.effect} on {c.where}, far from the declared: {fit.of(c).round(5)}")
+    run.screened_cost = 0.0
+    run.renew(fit)
+    run.given = len(fit.chosen)
+    return True
+
+
+def far_trials(
+    problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, far: float
+) -> list[Trial]:
+    """Servo gains by factors far from one, where the data are so far from the model that slopes say nothing.
+
+    A saturated servo has no slope in its gain: only trying tells.
+    """
+    power = float(np.median((fit.residual**2).mean(axis=1)))
+    if power < far:
+        return []
+    chosen = {(c.effect, c.where) for c in fit.chosen}
+    kinds = [c for c in candidates if c.effect in ("motor_strength", "kp") and (c.effect, c.where) not in chosen]
+    beside = LeftOver(problem, fit, weights)
+    start = beside.cost(fit.residual)
+    declared = problem.residual([fit.effects], coarse=True)[0]
+    found = []
+    for c in kinds:
+        moved = problem.residual([[*fit.effects, c.at([f])] for f in _FACTORS], coarse=True)
+        costs = [beside.cost(fit.residual - (declared - m)) for m in moved]
+        best = int(np.argmin(costs))
+        if costs[best] < 0.9 * start:
+            change = beside.left(declared - moved[best])
+            found.append(Trial(c, np.array([_FACTORS[best]]), costs[best], change))
+    return found

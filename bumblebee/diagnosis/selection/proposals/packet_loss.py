@@ -1,0 +1,232 @@
+"""Which commands never arrived: a likelihood of each window's course over all ways in which its commands can be lost.
+
+A lost command leaves the one before in force for a tick. What that does to a window's readings is simulated for every
+tick and every length of a run of losses; to first order the effects of several add up, so that the residual of a window
+has a likelihood under each of the 2^T patterns of its T ticks. With commands lost at random with the share p the
+patterns' prior is p^k (1 - p)^(T - k). Summed over patterns this gives the likelihood of p, against p = 0 a test that
+needs no mean effect: a single lost command is as plain as a single kick. The most likely pattern says what the drives
+really got, and the rest of the diagnosis goes on with that.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from bumblebee.diagnosis.comparison.holdout import Holdout
+from bumblebee.diagnosis.estimation.fit import Fit
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.selection.state import Loss, SearchState
+from bumblebee.diagnosis.simulation.simulate import residuals
+from bumblebee.diagnosis.simulation.variation import vary
+from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.sim.effects import Effect
+
+_LONGEST = 3  # ticks in a row
+_MOST_TICKS = 11  # of a window; of more the patterns are too many, and single ticks too short to matter
+_ODD = 1.6  # whitened power of a window that a lost command may have spoilt
+_FEW_ODD, _HINT = 0.5, 4.0  # share of windows that are odd, below which these alone are asked first; what they must say
+_ALL_OFF = 10.0  # median power of a model that lacks something in every window: that comes first
+_WORTH = 8.0  # log-likelihood on the fitted windows
+_PAYS = 2.0  # log-likelihood on the held-out windows
+_SURE, _RARE = 30.0, -3.0  # of a fit so sure the held-out windows need only not contradict: few of them may have any
+_MOSTLY = 0.7  # share of the excess of log(1 + power) that must go in the windows said to have lost commands
+_MOST_OF = 0.5  # share of the held-out excess of chi-square that must go with a joint's own lost commands
+_HALF = 1.92  # fall of the log-likelihood at the ends of a 95 % interval
+_FEW_JOINTS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Losses:
+    """Likelihoods of W windows under the P patterns of their T ticks."""
+
+    patterns: np.ndarray
+    """(P, T) bool, the first without a loss."""
+    logs: np.ndarray
+    """(W, P) log-likelihood of each pattern, less that of none."""
+
+    def total(self, share: float) -> float:
+        """Log-likelihood of a share, summed over windows."""
+        return float(logsumexp(self.logs + self._prior(share), axis=1).sum())
+
+    def best(self) -> float:
+        """The share of largest likelihood, by expectation and maximisation."""
+        lost, share = self.patterns.sum(axis=1), 0.02
+        for _ in range(60):
+            weights = self._weights(share)
+            share = float(np.clip((weights @ lost).mean() / self.patterns.shape[1], 1e-6, 0.9))
+        return share
+
+    def interval(self, share: float) -> tuple[float, float]:
+        """Shares between which the log-likelihood is within 1.92 of its maximum."""
+        grid = np.unique(np.concatenate((np.geomspace(1e-5, 0.9, 160), [share])))
+        inside = grid[np.array([self.total(p) for p in grid]) > self.total(share) - _HALF]
+        return float(inside[0]), float(inside[-1])
+
+    def likely(self, share: float) -> np.ndarray:
+        """(W, T) bool: the most likely pattern of each window."""
+        return self.patterns[np.argmax(self.logs + self._prior(share), axis=1)]
+
+    def _prior(self, share: float) -> np.ndarray:
+        lost = self.patterns.sum(axis=1)
+        return lost * np.log(share) + (self.patterns.shape[1] - lost) * np.log1p(-share)
+
+    def _weights(self, share: float) -> np.ndarray:
+        posterior = self.logs + self._prior(share)
+        return np.exp(posterior - logsumexp(posterior, axis=1, keepdims=True))
+
+
+def find_loss(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, Problem, Holdout] | None:
+    """Commands lost beside what the fit explains, and the windows with the commands that arrived; None for none."""
+    clean = fit.clean(problem)
+    ticks = _ticks(problem.windows)
+    driven = [j for j, a in zip(problem.plant.joints, problem.plant.actuator, strict=True) if a >= 0]
+    power = (clean**2).mean(axis=1)
+    if not driven or not 1 <= ticks <= _MOST_TICKS or (power > _ODD).sum() < 2 or np.median(power) > _ALL_OFF:
+        return None
+    places = [""] + (driven if 1 < len(driven) <= _FEW_JOINTS else [])
+    if (odd := np.flatnonzero(power > _ODD)).size < _FEW_ODD * len(power):
+        some = problem.part(odd)  # what these do not show at all the others need not be simulated for
+        seen = [losses_of(some, fit.effects, clean[odd], place) for place in places]
+        if max(losses.total(losses.best()) for losses in seen) < _HINT:
+            return None
+    tried = [(losses_of(problem, fit.effects, clean, place), place) for place in places]
+    gains = [losses.total(losses.best()) for losses, _ in tried]
+    best = int(np.argmax(gains))
+    losses, place = tried[best]
+    share, gain = losses.best(), gains[best]
+    lost = losses.likely(share)
+    if gain < _WORTH + np.log(len(places)) or not lost.any():
+        return None
+    fitted, paid, explains = arrived(problem, lost, place), np.inf, 1.0
+    if _cleared(clean, _clean(fitted, fit), lost.any(axis=1)) < _MOSTLY:
+        return None
+    if holdout.problem is not None:
+        left = _clean(holdout.problem, fit)
+        seen = losses_of(holdout.problem, fit.effects, left, place)
+        paid = seen.total(share)
+        # A bus that loses whole rows is usual, a joint that loses its own is not: that must be seen again.
+        if paid < _PAYS and (place or gain < _SURE or paid < _RARE):
+            return None
+        kept = arrived(holdout.problem, seen.likely(share), place)
+        explains = _explained(left, _clean(kept, fit))
+        if place and explains < _MOST_OF:  # sticking, too, looks like a command that comes late, here and there
+            return None
+        holdout = replace(holdout, problem=kept)
+    elif place and gain < _SURE:
+        return None  # nor may it be believed as easily where it cannot be seen again
+    return Loss(place, share, losses.interval(share), gain, paid, explains), fitted, holdout
+
+
+def losses_of(problem: Problem, effects: Sequence[Effect], clean: np.ndarray, place: str) -> Losses:
+    """Likelihoods of the residuals `clean` (W, M) under all patterns of losses, on a joint or ("") on all at once."""
+    ticks = _ticks(problem.windows)
+    patterns = np.array(list(itertools.product([False, True], repeat=ticks)))
+    runs = _runs(patterns)
+    changes = _changes(problem, effects, place, ticks)
+    usual = max(float(np.median((clean**2).mean(axis=1))), 1.0)
+    table = np.stack([runs == length for length in range(1, _LONGEST + 1)], axis=1).reshape(len(patterns), -1)
+    table = table.astype(np.float32)  # (P, _LONGEST * T)
+    flat = changes.reshape(-1, *clean.shape).transpose(1, 0, 2)  # (W, _LONGEST * T, M)
+    linear = np.einsum("wkm,wm->wk", flat, clean, optimize=True)
+    square = np.matmul(flat, flat.transpose(0, 2, 1)).astype(np.float32)
+    logs = np.empty((len(clean), len(patterns)))
+    for w in range(len(clean)):
+        logs[w] = (table @ linear[w] - 0.5 * ((table @ square[w]) * table).sum(axis=1)) / usual
+    return Losses(patterns, logs)
+
+
+def arrived(problem: Problem, lost: np.ndarray, place: str) -> Problem:
+    """The problem with the commands that were in force: for a lost one (W, T) that of the tick before."""
+    windows = problem.windows
+    command, first = windows.command.copy(), _first(windows)
+    columns = _columns(problem, place)
+    for w in range(len(windows)):
+        for t in np.flatnonzero(lost[w]):
+            k = first[w] + t
+            command[w, k, columns] = command[w, k - 1, columns]
+    return replace(problem, windows=replace(windows, command=command), read=replace(problem.read, command=command))
+
+
+def _changes(problem: Problem, effects: Sequence[Effect], place: str, ticks: int) -> np.ndarray:
+    """(_LONGEST, T, W, M) whitened change of the prediction where tick t has the command of 1, 2, 3 ticks before."""
+    windows, columns = problem.windows, _columns(problem, place)
+    first, rows = _first(windows), np.arange(len(windows))
+    variation = [vary(problem.plant, effects)]
+    step = problem.coarse
+
+    def simulate(command: np.ndarray) -> np.ndarray:
+        raw = residuals(problem.plant, problem.layout, replace(windows, command=command), variation, step)[0]
+        return problem.whitener(raw, centre=False)
+
+    base = simulate(windows.command)
+    out = np.zeros((_LONGEST, ticks, *base.shape), dtype=np.float32)
+    for length, t in itertools.product(range(1, _LONGEST + 1), range(ticks)):
+        command = windows.command.copy()
+        at = (first + t)[:, None]
+        command[rows[:, None], at, columns] = windows.command[rows[:, None], np.maximum(at - length, 0), columns]
+        out[length - 1, t] = base - simulate(command)
+    return out
+
+
+def _columns(problem: Problem, place: str) -> np.ndarray:
+    plant = problem.plant
+    return plant.actuator[plant.actuator >= 0] if not place else plant.actuator[[plant.joints.index(place)]]
+
+
+def _first(windows: Windows) -> np.ndarray:
+    """(W,) row of the command issued at each window's start."""
+    return np.array([int(np.searchsorted(time, -1e-9)) for time in windows.command_time])
+
+
+def _ticks(windows: Windows) -> int:
+    """T: commands issued within the shortest window, from its start on."""
+    first = _first(windows)
+    counts = [int((time[k:] < last - 1e-9).sum()) for time, k, last in zip(
+        windows.command_time, first, windows.out_time[:, -1], strict=True)]  # fmt: skip
+    return min(counts)
+
+
+def _runs(patterns: np.ndarray) -> np.ndarray:
+    """(P, T) how many commands in a row were lost up to each tick, at most `_LONGEST`; 0 for one that arrived."""
+    out = np.zeros(patterns.shape, dtype=int)
+    for t in range(patterns.shape[1]):
+        before = out[:, t - 1] if t else 0
+        out[:, t] = np.where(patterns[:, t], np.minimum(before + 1, _LONGEST), 0)
+    return out
+
+
+def _clean(problem: Problem, fit: Fit) -> np.ndarray:
+    """Residual (W, M) of the fit's effects on a problem's windows, the fit's nuisances taken out."""
+    return problem.residual([fit.effects])[0] - np.tensordot(fit.nuisance, problem.nuisance, axes=1)
+
+
+def _cleared(before: np.ndarray, after: np.ndarray, some: np.ndarray) -> float:
+    """Share of the excess of log(1 + power) over noise that goes in some windows (W,)."""
+    logs = [np.log1p((x[some] ** 2).mean(axis=1)) for x in (before, after)]
+    return float((logs[0] - logs[1]).sum() / max((logs[0] - np.log(2.0)).sum(), 1e-12))
+
+
+def _explained(before: np.ndarray, after: np.ndarray) -> float:
+    """Share of the excess of chi-square."""
+    power = [float((x**2).mean()) for x in (before, after)]
+    return float(np.clip((power[0] - power[1]) / max(power[0] - 1.0, 1e-12), 0.0, 1.0))
+
+
+def find_lost_commands(run: SearchState) -> bool:
+    """Look for commands that never arrived; if some did not, go on with those that did."""
+    found = None if run.loss else find_loss(run.problem, run.holdout, run.fit)
+    if found is None:
+        return False
+    run.loss, run.problem, run.holdout = found
+    run.say(f"found lost commands on {run.loss.where or 'the whole robot'}: {run.loss.share:.4f}")
+    run.closed.clear()
+    run.hopeless.clear()
+    chosen, values = run.fit.chosen, run.fit.values
+    run.fit = gauss_newton(run.problem, chosen, values, run.weights, iterations=2, coarse=True)
+    run.renew(run.fit)
+    run.rescreen()
+    return True

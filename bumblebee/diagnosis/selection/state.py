@@ -1,0 +1,228 @@
+"""The state of one search: what is chosen, what is left to try, and the moves from one state to the next."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates.candidate import Candidate, effects_at, shortlisted
+from bumblebee.diagnosis.candidates.exclusion import is_chosen, is_like
+from bumblebee.diagnosis.candidates.traits import ABRUPT, SATURATIONS
+from bumblebee.diagnosis.comparison.backward_elimination import is_physical, pruned
+from bumblebee.diagnosis.comparison.holdout import Holdout
+from bumblebee.diagnosis.comparison.paired_tests import pays_where_felt, pays_where_rare
+from bumblebee.diagnosis.comparison.wald import Step, evidence, wald
+from bumblebee.diagnosis.config import SearchConfig
+from bumblebee.diagnosis.estimation.fit import Fit
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton, resolved
+from bumblebee.diagnosis.estimation.least_squares import cost_of
+from bumblebee.diagnosis.residuals.problem import Problem, screening_windows, window_weights
+from bumblebee.diagnosis.selection.score_tests import Scores, least_z, score_tests
+from bumblebee.diagnosis.selection.screening import Stages, is_promising, restless
+from bumblebee.diagnosis.selection.trial import Trial, try_one
+from bumblebee.diagnosis.sensitivities.columns import Answered, Columns, pulse_sizes, screen
+from bumblebee.diagnosis.simulation.cache import Changes
+from bumblebee.sim.effects import Effect
+
+_ANEW = 0.1  # share of the cost left, below which all candidates are screened anew
+SOME = 2  # effects after which a model that is still far off is taken to lack many
+LITTLE = 0.5  # share of the median chi-square that the last of them took at most
+PATIENCE = 2  # rounds that may fail once many were fitted together
+_FAINT = 0.15  # share of the best candidate's gain, below which another can wait for a later round
+_CHANGED = 0.8  # share of the cost that a fit must leave less of, to be worth linearising around
+
+
+class SearchState:
+    """The state of one search."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        holdout: Holdout,
+        remake: Callable[[Sequence[Effect]], tuple[list[Candidate], np.ndarray]],
+        config: SearchConfig,
+        say: Callable[[str], None],
+    ) -> None:
+        self.problem, self.holdout, self.remake, self.config, self.say = problem, holdout, remake, config, say
+        start = problem.residual([[]])[0]
+        self.weights = window_weights(start)
+        self.fit = gauss_newton(problem, (), (), self.weights)
+        self.keep = screening_windows(problem, config.screen_windows)
+        self.closed: set[Candidate] = set()
+        self.hopeless: set[tuple[str, str]] = set()  # limits, plays, shafts (effect, joint) that were tried in vain
+        self.changes, self.stages = Changes(), Stages(problem, self.keep)
+        self.answers: Answered | None = None
+        self.steps: list[Step] = []
+        self.rejected: list[str] = []
+        self.loss: Loss | None = None
+        self.given = 0
+        self.tried_many, self.patience = False, config.patience
+        self.fall = 1.0
+        self.candidates, _ = remake([])
+
+    def open(self) -> None:
+        """Screen all candidates for the first time, and set the z that each must reach."""
+        self.rescreen()
+        self.bound = least_z(self.small, self.columns, self.small_fit(), len(self.candidates), self.config.level)
+
+    def rescreen(self) -> None:
+        """Candidates with steps for the present fit, and the columns of all of them around it."""
+        self.small = self.problem.part(self.keep)
+        self.candidates, torque = self.remake(self.fit.effects)
+        known = None if self.answers is None else self.answers.on(self.problem)
+        sizes = pulse_sizes(self.problem, torque)
+        self.columns, white = screen(self.small, self.candidates, self.fit.effects, sizes, known)
+        self.answers = Answered(self.fit.effects, white, (self.problem.windows, self.problem.whitener))
+        self.screened_cost = self.fit.cost
+
+    def small_fit(self) -> Fit:
+        """The fit on the screening windows."""
+        return replace(self.fit, residual=self.fit.residual[self.keep], columns=self.fit.columns[:, self.keep])
+
+    def tests(self) -> Scores:
+        """Score tests of all candidates on the screening windows."""
+        return score_tests(self.small, self.columns, self.small_fit(), self.weights[self.keep])
+
+    def promising(self) -> list[Candidate]:
+        """The best of the screening, and play and shafts of the joints that are worst explained."""
+        tests = self.tests()
+        share = np.sqrt(len(self.keep) / len(self.problem.windows))
+        found = []
+        sure, least = 2.0 * max(self.fit.cost / self.fit.residual.size, 1.0) * (share * self.bound) ** 2, 0.0
+        for k in np.argsort(-tests.gain):
+            c = self.columns.candidates[k]
+            if len(found) >= self.config.simulated or tests.gain[k] <= least:
+                break
+            if self.is_open(c, tests, k, 0.7 * share * self.bound, share**2) and not is_like(c, found):
+                found.append(c)
+                if tests.gain[k] > sure and tests.z[k] > self.bound:
+                    least = max(least, _FAINT * tests.gain[k])
+        left = self.small_fit().clean(self.small)
+        poor = restless(self.small, self.answers.white, left, self.config.shortlist)
+        joints = len(self.problem.plant.joints)
+        listed = [c for c in self.candidates if c.where in poor and shortlisted(c, joints)]
+        listed = [c for c in listed if c not in self.closed and not is_chosen(c, self.fit.chosen)]
+        return found + self.seen(listed, 0.7 * share * self.bound, share**2)
+
+    def seen(self, listed: Sequence[Candidate], bound: float, share: float) -> list[Candidate]:
+        """Those of some candidates without screening columns that the screening windows, too, make worth a trial."""
+        if not listed:
+            return []
+        columns = Columns(listed, self.small.sensitivities(listed, self.fit.effects))
+        tests = score_tests(self.small, columns, self.small_fit(), self.weights[self.keep])
+        return [c for k, c in enumerate(listed) if self.is_open(c, tests, k, bound, share)]
+
+    def is_open(self, c: Candidate, tests: Scores, k: int, bound: float, share: float) -> bool:
+        """Whether a candidate, number `k` of `tests`, is worth a trial and was not chosen or tried in vain."""
+        if c in self.closed or is_chosen(c, self.fit.chosen):
+            return False
+        if c.effect in SATURATIONS and tests.z[k] < bound:  # those that few windows feel have trials of their own
+            return False
+        return is_promising(c, tests, k, bound, share, self.fit.cost, self.fit.cost / self.fit.residual.size)
+
+    def trials(self) -> tuple[list[Trial], list[Candidate]]:
+        """Candidates tried in the simulator with their costs; and those that were looked at."""
+        looked = self.promising()
+        if not looked:
+            return [], []
+        self.say(f"{len(looked)} of {len(self.candidates)} candidates simulated on all windows")
+        left = self.left_over(looked)
+        if not left:
+            return [], looked
+        tests = score_tests(self.problem, self.sensitivities(left), self.fit, self.weights)
+        order = [k for k in np.argsort(-tests.gain) if self.is_open(left[k], tests, k, self.bound, 1.0)]
+        joints, best = len(self.problem.plant.joints), max((tests.gain[k] for k in order), default=0.0)
+        faint = [k for k in order if tests.gain[k] < _FAINT * best and not shortlisted(left[k], joints)]
+        wait, order = [left[k] for k in faint], [k for k in order if k not in faint][: self.config.trials]
+        tried = [try_one(self.problem, self.fit, left[k], tests.steps[k], self.weights) for k in order]
+        tried = [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2]
+        return tried, [c for c in looked if c not in wait]
+
+    def left_over(self, looked: Sequence[Candidate]) -> list[Candidate]:
+        """Those of some candidates that as many windows as were screened do not speak against."""
+        self.stages = self.stages.on(self.problem, self.keep)
+        known, tests = self.stages.tests(self.problem, self.columns, looked, self.fit, self.weights)
+        share = len(self.stages.both) / len(self.problem.windows)
+        least = 0.7 * np.sqrt(share) * self.bound
+        gone = [c for k, c in enumerate(known) if not self.is_open(c, tests, k, least, share)]
+        return [c for c in looked if c not in gone]
+
+    def sensitivities(self, looked: Sequence[Candidate]) -> Columns:
+        """Columns of some candidates on all windows; of those near which nothing has changed, as they were."""
+        self.stages = self.stages.on(self.problem, self.keep)
+        every = [self.stages.columns(self.problem, c, self.fit.effects) for c in looked]
+        return Columns(looked, np.concatenate(every))
+
+    def accept(self, candidate: Candidate, values: np.ndarray) -> bool:
+        """Refit with the candidate; keep it if the joint fit and the held-out windows agree."""
+        chosen, start = (*self.fit.chosen, candidate), np.concatenate((self.fit.values, values))
+        # Windows that only this effect explains weighed little so far: weigh them as it leaves them.
+        residual = self.problem.residual([effects_at(chosen, start)])[0]
+        weights = window_weights(residual - np.tensordot(self.fit.nuisance, self.problem.nuisance, axes=1))
+        fit = gauss_newton(self.problem, chosen, start, weights, iterations=2, coarse=True, known=self.fit)
+        z = wald(self.problem, fit, weights, len(fit.chosen) - 1)
+        if z < self.bound:  # the windows that judge need not be simulated
+            return self.refuse(candidate)
+        pays = self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain) or (
+            pays_where_felt(self.problem, self.holdout, self.fit, fit)
+            if candidate.effect in (*SATURATIONS, *ABRUPT)
+            else pays_where_rare(self.problem, self.holdout, self.fit, fit)
+        )
+        if not pays or not is_physical(self.problem, self.fit, fit, candidate, weights):
+            return self.refuse(candidate)
+        self.steps.append(evidence(candidate, z, len(self.candidates)))
+        self.say(f"found {candidate.effect} on {candidate.where or 'the whole robot'}: {fit.of(candidate).round(5)}")
+        before = self.power()
+        self.renew(fit)
+        self.fall = 1.0 - self.power() / max(before, 1e-12)
+        return True
+
+    def power(self) -> float:
+        """Median chi-square of the windows, by value."""
+        return self.fit.power(self.problem)
+
+    def refuse(self, candidate: Candidate) -> bool:
+        """Leave a candidate out of all further trials; always False."""
+        self.closed.add(candidate)
+        self.rejected.append(f"{candidate.effect} on {candidate.where or 'the whole robot'}")
+        return False
+
+    def renew(self, fit: Fit) -> None:
+        """Nuisances around what was found, where it is more than a little; weights; candidates, where it is a lot."""
+        if cost_of(self.problem, fit.residual, self.weights)[0] < _CHANGED * self.fit.cost:
+            self.problem = self.problem.relinearised(fit.effects)
+            self.holdout = self.holdout.relinearised(fit.effects)
+        self.weights = window_weights(fit.clean(self.problem))
+        self.fit = resolved(self.problem, fit, self.weights)
+        self.small = self.problem.part(self.keep)
+        if self.fit.cost < _ANEW * self.screened_cost:
+            self.rescreen()
+
+    def prune(self) -> None:
+        """Drop effects that the others have made needless."""
+
+        def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
+            return gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True, known=self.fit)
+
+        self.fit = pruned(self.problem, self.fit, self.weights, self.bound, refit, self.holdout, self.say)
+
+
+@dataclass(frozen=True, eq=False)
+class Loss:
+    """Commands that were lost on all joints at once or on one."""
+
+    where: str
+    """Joint, "" for all at once."""
+    share: float
+    ci95: tuple[float, float]
+    gain: float
+    """Log-likelihood on the fitted windows, of this share against none."""
+    paid: float
+    """The same on the held-out windows; infinite where there are none."""
+    explains: float
+    """Share of the held-out excess of chi-square that goes with the commands that arrived."""
+
+    @property
+    def effect(self) -> Effect:
+        """As a value; without a place it is the whole robot's."""
+        return Effect("dropped_commands", (self.where,) if self.where else (), {"share": self.share})

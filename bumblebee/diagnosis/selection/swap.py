@@ -1,0 +1,146 @@
+"""Each name against its rivals, all others given: what came first need not be what fits best in the end.
+
+A forward search names what explains most of all that is lacking. A force that stands for a mass and another force is
+named before either, and stays, for beside it neither gains much. So once the search has ended, each effect, and each
+two, is taken out and everything is tested in their place; what promises as much is refitted jointly with the others.
+It takes the place if the fitted windows are clearly better with it for its parameters and those that judge no worse.
+The search then goes on, since what a wrong name had hidden can now be seen.
+
+What a shaft's swing passes for (a lag, an old reading, a rotor) is tried against shafts of many stiffnesses, which no
+test at one of them would show (`diagnosis/shafts.py`).
+
+Friction that grows at rest is felt by the few windows that creep through zero speed. Beside the dry friction that
+explains the rest, its score varies too much between windows to be significant; the joint fit tells. Where it was found
+first it takes the level that it sits on for its own: stiction of 0.40 N m came out as 0.66. As dry friction is then no
+further name but a parameter of the same, it needs three standard errors and not the bound of all candidates.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import chain, combinations
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates.candidate import Candidate
+from bumblebee.diagnosis.candidates.exclusion import is_chosen
+from bumblebee.diagnosis.candidates.traits import SATURATIONS
+from bumblebee.diagnosis.comparison.backward_elimination import is_physical
+from bumblebee.diagnosis.comparison.information_criterion import PARAMETER, criterion
+from bumblebee.diagnosis.comparison.paired_tests import no_worse_by_mean
+from bumblebee.diagnosis.comparison.submodel import linear_cost, with_columns_without
+from bumblebee.diagnosis.comparison.wald import evidence, wald, z_value
+from bumblebee.diagnosis.estimation.fit import Fit
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.estimation.least_squares import cost_of
+from bumblebee.diagnosis.residuals.problem import window_weights
+from bumblebee.diagnosis.selection.proposals.joint_elasticity import KIND as SHAFT
+from bumblebee.diagnosis.selection.proposals.joint_elasticity import LIKE as SHAFT_LIKE
+from bumblebee.diagnosis.selection.proposals.joint_elasticity import best_shaft, is_of_series
+from bumblebee.diagnosis.selection.score_tests import Scores, score_tests
+from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.selection.trial import Trial, try_one
+from bumblebee.diagnosis.sensitivities.columns import Columns
+
+_AS_MUCH = 0.95  # share of what the names gain that a rival must promise
+_PART = 0.6  # the same of a shaft, whose loss has not been fitted yet
+_RIVALS = 2  # tried in the place of the same names
+_FEW = 4  # effects up to which two are taken out together
+_CLEARLY = 2 * PARAMETER  # log-likelihood by which a rival with as many parameters must be better
+_Tried = tuple[Sequence[Candidate], Fit, float]
+"""Names that are gone, the fit without them and with their rival last, and the rival's z."""
+
+
+def exchange(run: SearchState) -> bool:
+    """Put one better name in the place of one or two of the search's; whether there was one."""
+    free = [c for c in run.fit.chosen[run.given :] if c.effect not in SATURATIONS]
+    taken = [(c,) for c in free] + (list(combinations(free, 2)) if len(free) <= _FEW else [])
+    best: tuple[float, Fit, float] | None = None
+    start = criterion(run.problem, run.fit)
+    for gone, new, z in chain(*(_tried(run, gone) for gone in taken), _twisted(run, free)):
+        gain = criterion(run.problem, new) - start
+        margin = _CLEARLY if len(gone) == 1 else 0.0
+        if gain > max(margin, best[0] if best else margin) and no_worse_by_mean(run.holdout, run.fit, new):
+            best = gain, new, z
+    if best is None:
+        return False
+    _, new, z = best
+    rival = new.chosen[-1]
+    run.steps.append(evidence(rival, z, len(run.candidates)))
+    gone = ", ".join(f"{c.effect} on {c.where}" for c in run.fit.chosen if c not in new.chosen)
+    run.say(f"{rival.effect} on {rival.where or 'the whole robot'} in the place of {gone}")
+    run.renew(new)
+    run.closed.clear()
+    return True
+
+
+def _tried(run: SearchState, gone: Sequence[Candidate]) -> Iterator[_Tried]:
+    """Fits with one rival in the place of some names, those that promise most."""
+    weights, all_of = run.weights[run.keep], run.small_fit()
+    small = with_columns_without(run.small, all_of, gone)
+    own = linear_cost(run.small, small, weights) - linear_cost(run.small, all_of, weights)
+    tests = score_tests(run.small, run.columns, small, weights)
+    promising = _promising(run.columns, tests, small, gone, _AS_MUCH * own)
+    if not promising:
+        return
+    rest = with_columns_without(run.problem, run.fit, gone)
+    for k in promising:
+        rival = run.columns.candidates[k]
+        trial = try_one(run.problem, rest, rival, tests.steps[k], run.weights)
+        new = _refitted(run, rest, trial) if trial else None
+        if new:
+            yield gone, *new
+
+
+def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[_Tried]:
+    """Fits with a shaft in the place of what its swing passes for, on each joint that has such a name."""
+    for where in dict.fromkeys(c.where for c in free if c.where and c.effect in SHAFT_LIKE):
+        if (SHAFT, where) in run.hopeless:
+            continue
+        gone = [c for c in free if c.where == where and c.effect in SHAFT_LIKE]
+        if len(gone) == 1 and is_of_series(gone[0], run.fit.of(gone[0])):
+            continue
+        rest = with_columns_without(run.problem, run.fit, gone)
+        own = linear_cost(run.problem, rest, run.weights) - linear_cost(run.problem, run.fit, run.weights)
+        run.hopeless.add((SHAFT, where))
+        trial = best_shaft(run.problem, rest, run.candidates, run.weights, where, _PART * own)
+        new = _refitted(run, rest, trial) if trial else None
+        if new:
+            yield gone, *new
+
+
+def _refitted(run: SearchState, rest: Fit, trial: Trial) -> tuple[Fit, float] | None:
+    """The joint fit with a rival and the rival's z, if it is sure of it."""
+    rival = trial.candidate
+    chosen, start = (*rest.chosen, rival), np.concatenate((rest.values, trial.values))
+    new = gauss_newton(run.problem, chosen, start, run.weights, iterations=3, coarse=True, known=run.fit)
+    weights = window_weights(new.clean(run.problem))
+    z = _certainty(run, rest, new, weights)
+    if z < run.bound or not is_physical(run.problem, rest, new, rival, weights):
+        return None
+    return new, z
+
+
+def _certainty(run: SearchState, rest: Fit, new: Fit, weights: np.ndarray) -> float:
+    """The z of a rival; of a shaft, half of which swings out of step, by what the fit loses without it if more."""
+    z = wald(run.problem, new, weights, len(new.chosen) - 1)
+    if new.chosen[-1].effect != SHAFT:
+        return z
+    fall = cost_of(run.problem, rest.residual, weights)[0] - new.cost
+    numbers = int(np.count_nonzero(new.chosen[-1].scales))
+    return max(z, z_value(max(fall, 0.0) / max(new.power(run.problem), 1.0), numbers, len(weights)))
+
+
+def _promising(columns: Columns, tests: Scores, rest: Fit, gone: Sequence[Candidate], least: float) -> list[int]:
+    """Numbers of the best rivals of other names than those that are gone, one of each name."""
+    found: list[int] = []
+    names = {(c.effect, c.where) for c in gone}
+    for k in np.argsort(-tests.gain):
+        c = columns.candidates[k]
+        if len(found) >= _RIVALS or tests.gain[k] < least:
+            break
+        if (c.effect, c.where) in names or c.effect in SATURATIONS or is_chosen(c, rest.chosen):
+            continue
+        if c.effect == SHAFT and any(g.where == c.where and g.effect in SHAFT_LIKE for g in gone):
+            continue  # of many stiffnesses, see `_twisted`
+        names.add((c.effect, c.where))
+        found.append(int(k))
+    return found

@@ -1,0 +1,111 @@
+"""How the readings of a window answer to a torque on each degree of freedom in each fifth of it.
+
+Whatever acts as a torque along the path (friction, gains, delays, springs, masses ...) is to first order a sum of these
+answers, weighted with its mean torque in each fifth. A few dozen simulations so stand for any number of candidates, and
+the answers go through contacts and servos as the simulation does.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from mujoco.batch import Batch
+
+from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.readings import Layout, difference, simulated_readings
+from bumblebee.diagnosis.simulation.simulate import at_ticks, inputs_of, threads, with_step
+from bumblebee.diagnosis.simulation.variation import Variation
+from bumblebee.diagnosis.simulation.windows import Windows
+
+SEGMENTS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Simulated windows: W windows, K steps, S segments of them."""
+
+    step: float
+    """[s]"""
+    qpos: np.ndarray
+    """(W, K + 1, nq), the start first."""
+    qvel: np.ndarray
+    """(W, K + 1, nv)."""
+    control: np.ndarray
+    """(W, K, nu)."""
+    edges: np.ndarray
+    """(S + 1,) steps at which the segments begin and end."""
+
+    def mean(self, values: np.ndarray) -> np.ndarray:
+        """Means over the segments, (W, S, ...), of values at the steps (W, K, ...)."""
+        return np.add.reduceat(values, self.edges[:-1], axis=1) / np.diff(self.edges).reshape(
+            1, -1, *[1] * (values.ndim - 2)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """Path of the windows and the change of their readings for a unit of torque."""
+
+    path: Path
+    torque: np.ndarray
+    """(nv, S, W, N, D) change of the readings for 1 N m (or N) on a degree of freedom during a segment."""
+
+
+def answers_of(
+    plant: Plant,
+    layout: Layout,
+    windows: Windows,
+    variation: Variation,
+    step: float,
+    sizes: np.ndarray,
+    only: np.ndarray | None = None,
+) -> Answers:
+    """Simulate pulses of `sizes` (nv,) [N m, N] on every degree of freedom of a plain variation.
+
+    With `only` on these alone, (some of nv,); the others' answers are left at zero.
+    """
+    pushed = np.arange(plant.model.nv) if only is None else only
+    count = max(1, int(np.ceil(windows.span / step - 1e-6)))
+    control = inputs_of(windows, variation, step, count, {})
+    edges = np.unique(np.linspace(0, count, min(SEGMENTS, count) + 1).round().astype(int))
+    model, size, many = with_step(variation.model, step), len(windows), len(pushed)
+    qpos = windows.qpos.copy()
+    qpos[:, plant.qpos] -= variation.offset
+    with without([model], out_of_reach(plant, windows)):  # a batch runs on a copy
+        plain, batch = Batch(model, size, threads()), Batch(model, many * size, threads())
+    plain.bind("qpos")[:], plain.bind("qvel")[:] = qpos, windows.qvel
+    out = plain.rollout(count, control, record=("qpos", "qvel"))
+    path = Path(
+        step=step,
+        qpos=np.concatenate((qpos[:, None], out["qpos"]), axis=1),
+        qvel=np.concatenate((windows.qvel[:, None], out["qvel"]), axis=1),
+        control=control,
+        edges=edges,
+    )
+    offset = variation.offset
+
+    def readings(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        """(copies, W, N, D) from states at all steps (copies * W, K + 1, .)."""
+        copies = len(q) // size
+        parts = (at_ticks(windows, x[:, 0].reshape(copies, size, -1), x[:, 1:], step, copies) for x in (q, v))
+        return simulated_readings(plant, layout, *parts, offset)
+
+    base, base_quat = readings(path.qpos, path.qvel)
+    change = np.zeros((plant.model.nv, len(edges) - 1, size, *base.shape[2:]))
+    for s, (first, last) in enumerate(itertools.pairwise(edges)):
+        batch.reset(stage=0)
+        batch.bind("qpos")[:] = np.tile(path.qpos[:, first], (many, 1))
+        batch.bind("qvel")[:] = np.tile(path.qvel[:, first], (many, 1))
+        push = np.repeat(np.diag(sizes)[pushed], size, axis=0)
+        q, v = (np.tile(x[:, : first + 1], (many, 1, 1)) for x in (path.qpos, path.qvel))
+        for a, b, torque in ((first, last, push), (last, count, np.zeros_like(push))):
+            if b > a:
+                batch.bind("qfrc_applied")[:] = torque
+                part = batch.rollout(b - a, np.tile(control[:, a:b], (many, 1, 1)), record=("qpos", "qvel"))
+                q, v = np.concatenate((q, part["qpos"]), axis=1), np.concatenate((v, part["qvel"]), axis=1)
+        moved, moved_quat = readings(q, v)
+        same = None if base_quat is None else np.broadcast_to(base_quat, moved_quat.shape)
+        change[pushed, s] = difference(layout, moved, moved_quat, np.broadcast_to(base, moved.shape), same)
+    change /= sizes[:, None, None, None, None]
+    return Answers(path, np.nan_to_num(change))

@@ -1,0 +1,230 @@
+"""What the drives remember when a window starts, from the log before it: clocks, heat, filters, play.
+
+A window restarts a simulation in the middle of a rollout. Position and velocity are read; what is not read follows from
+the readings and commands since the rollout began.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.windows import Windows, command_inputs
+from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effect_forces import Memory, bent, history_length
+from bumblebee.sim.effect_hooks import RuntimeHooks
+from bumblebee.sim.effect_states import State, states_of
+from bumblebee.sim.servo import Servos, servos_of
+
+_SMOOTH = 3  # ticks to either side
+_PASSES = 60  # at most, until the heat and the strength that it leaves agree
+_FORGOTTEN = 20.0  # time constants after which a lag knows nothing of its start
+
+
+def plant_servos(plant: Plant) -> Servos:
+    """The servos of the plant's joints, in the log's column order."""
+    return servos_of(plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
+
+
+@lru_cache(maxsize=256)
+def logged_torques(plant: Plant, rollout: Rollout) -> tuple[np.ndarray, np.ndarray]:
+    """Servo torque (T, J) [N m] by the declared gains just before each tick and just after it."""
+    servos = plant_servos(plant)
+    command = servos.controls(command_inputs(plant, rollout))
+    held = np.concatenate((command[:1], command[:-1]))
+    place = rollout.joint_pos - plant.offset
+    return (
+        servos.torque(place, rollout.joint_vel, held),
+        servos.torque(place, rollout.joint_vel, command),
+    )
+
+
+@lru_cache(maxsize=256)
+def mean_squares(plant: Plant, rollout: Rollout) -> np.ndarray:
+    """Mean square (T - 1, J) of the servo torques [N^2 m^2] between ticks, by Gauss's rule of four points.
+
+    A command that arrives makes a torque that is gone before the next tick: the mean of the squares at both ends is a
+    tenth too much. Between ticks the joint is on the cubic that has the readings' positions and speeds.
+    """
+    servos, dt = plant_servos(plant), np.diff(rollout.time)[:, None]
+    place, speed = rollout.joint_pos - plant.offset, rollout.joint_vel
+    gone, command = np.diff(place, axis=0), servos.controls(command_inputs(plant, rollout))[:-1]
+    ends = speed[:-1] - gone / dt, gone / dt - speed[1:]
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    total = np.zeros_like(gone)
+    for s, weight in zip(0.5 * (1 + nodes), 0.5 * weights, strict=True):
+        bow = s * (1 - s) * ((1 - s) * ends[0] + s * ends[1])
+        slope = (1 - s) * (1 - 3 * s) * ends[0] + s * (2 - 3 * s) * ends[1]
+        at = place[:-1] + s * gone + dt * bow
+        total += weight * servos.torque(at, gone / dt + slope, command) ** 2
+    return total
+
+
+def at_starts(windows: Windows, of: Callable[[Rollout], np.ndarray]) -> np.ndarray:
+    """Rows (W, ...) of the tables `of` the windows' rollouts (T, ...) at their starts."""
+    tables = {i: of(windows.source[i]) for i in np.unique(windows.rollout)}
+    return np.stack([tables[i][k] for i, k in zip(windows.rollout, windows.start, strict=True)])
+
+
+def remember(plant: Plant, windows: Windows, hooks: RuntimeHooks, step: float) -> Memory:
+    """The memory of every window; its columns are the hooks' joints."""
+    order = [plant.joints.index(name) for name in hooks.joints]
+    limit = plant_servos(plant).limit
+    scale = np.where(np.isfinite(limit), limit, 1.0)
+    thermal, drift = np.zeros(len(order)), np.zeros(len(order))
+    thermal[order], drift[order] = hooks.thermal, hooks.drift
+
+    def heat(rollout: Rollout) -> np.ndarray:
+        time = rollout.time - rollout.time[0]
+        return heated(time, mean_squares(plant, rollout) / scale**2, thermal, drift)
+
+    back = history_length(hooks, step)
+    late = bool(hooks.torque_lag.any())
+    past = _past(windows, back, step, hooks.encoder_delay, order) if back else None
+    return Memory(
+        time=at_starts(windows, lambda r: r.time - r.time[0]),
+        heat=at_starts(windows, heat)[:, order],
+        torque=at_starts(windows, lambda r: lagged(plant, r, order, hooks.torque_lag)) if late else None,
+        position=None if past is None else past[0] - hooks.encoder_offset,
+        velocity=None if past is None else past[1],
+        states=_states(plant, windows, hooks, order),
+        bent=_bent(windows, [(order[column], width) for column, _, width in hooks.hysteresis]),
+    )
+
+
+def _bent(windows: Windows, columns: Sequence[tuple[int, float]]) -> np.ndarray | None:
+    """Dahl's z (W, H) of joints (columns in the log) and widths [rad]."""
+    if not columns:
+        return None
+    return np.stack([bent_before(windows, column, width) for column, width in columns], axis=1)
+
+
+def bent_before(windows: Windows, column: int, width: float) -> np.ndarray:
+    """Dahl's z (W,) of one joint (a column in the log) at the windows' starts, its path followed from the first tick.
+
+    Positions are means over a few ticks: what a sensor's noise would wind back is no motion.
+    """
+
+    def place(rollout: Rollout) -> np.ndarray:
+        wide = np.ones(2 * _SMOOTH + 1)
+        known = np.convolve(np.ones(len(rollout.time)), wide, mode="same")
+        return np.convolve(rollout.joint_pos[:, column], wide, mode="same") / known
+
+    rows, paths = _together(windows, place)
+    out = np.zeros(paths.shape)
+    for k in range(1, paths.shape[1]):
+        out[:, k] = bent(out[:, k - 1], paths[:, k] - paths[:, k - 1], width)
+    return out[rows, windows.start]
+
+
+def _together(windows: Windows, of: Callable[[Rollout], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """What the windows' rollouts `of` (T,) give, (R, T) up to the last start, a shorter one kept at its last value.
+
+    And which of the rows (W,) each window is of.
+    """
+    some, rows = np.unique(windows.rollout, return_inverse=True)
+    last = int(windows.start.max()) + 1
+    values = [of(windows.source[i])[:last] for i in some]
+    return rows, np.stack([np.concatenate((v, np.full(last - len(v), v[-1]))) for v in values])
+
+
+def _states(plant: Plant, windows: Windows, hooks: RuntimeHooks, order: Sequence[int]) -> np.ndarray | None:
+    """What discovered terms remember (W, C)."""
+    kept = states_of(hooks.terms)
+    if not kept:
+        return None
+    return np.stack([state_before(plant, windows, replace(s, column=order[s.column])) for s in kept], axis=1)
+
+
+def state_before(plant: Plant, windows: Windows, state: State) -> np.ndarray:
+    """A state (W,) of a joint (the column in the log) at the windows' starts, followed since the rollout began.
+
+    Speeds are means over a few ticks: what a sensor's noise would wear off is no motion.
+    """
+    servos = plant_servos(plant)
+
+    def of(rollout: Rollout) -> np.ndarray:
+        wide = np.ones(2 * _SMOOTH + 1)
+        known = np.convolve(np.ones(len(rollout.time)), wide, mode="same")
+        speed = np.convolve(rollout.joint_vel[:, state.column], wide, mode="same") / known
+        target = servos.given(servos.controls(command_inputs(plant, rollout)))[:, state.column]
+        clock, steps = rollout.time - rollout.time[0], np.diff(rollout.time, append=rollout.time[-1])
+        return state.followed(clock, steps, speed, target)
+
+    return at_starts(windows, of)
+
+
+def heated(time: np.ndarray, squares: np.ndarray, thermal: np.ndarray, drift: np.ndarray) -> np.ndarray:
+    """Heat (T, J) [s] at the ticks `time` (T,) of a rollout: the integral of the square of what the drives gave.
+
+    `squares` (T - 1, J) are mean squares between ticks of torques at full strength, as shares of the limit. A drive of
+    strength 1 - thermal (J,) heat - drift (J,) time, here at most 1, gives less than is asked for and heats the less.
+    """
+    power = squares * np.diff(time)[:, None]
+    out = np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)))
+    some = np.flatnonzero((thermal != 0) | (drift != 0))
+    for _ in range(_PASSES if len(some) else 0):
+        strength = np.clip(1.0 - thermal[some] * out[:-1, some] - drift[some] * time[:-1, None], 0.0, 1.0)
+        new = np.cumsum(strength**2 * power[:, some], axis=0)
+        settled = np.abs(new - out[1:, some]).max(initial=0.0) < 1e-9
+        out[1:, some] = new
+        if settled:
+            break
+    return out
+
+
+def lagged(plant: Plant, rollout: Rollout, order: Sequence[int], time: np.ndarray) -> np.ndarray:
+    """State (T, J) of a first-order lag of the logged torque, whose course between ticks is linear.
+
+    Every tick's state follows from that of the tick before; so many passes over all ticks are made as it takes the
+    start to be forgotten.
+    """
+    before, after = (x[:, order] for x in logged_torques(plant, rollout))
+    dt, safe = np.diff(rollout.time)[:, None], np.maximum(time, 1e-6)
+    keep = np.exp(-dt / safe)
+    fed = (1 - keep) * after[:-1] + (before[1:] - after[:-1]) / dt * (dt - safe * (1 - keep))
+    out = before.copy()
+    passes = int(np.ceil(_FORGOTTEN * float(safe.max()) / float(np.median(dt))))
+    for _ in range(min(passes, len(out))):
+        out[1:] = keep * out[:-1] + fed
+    return out
+
+
+def _past(
+    windows: Windows, back: int, step: float, delay: np.ndarray, order: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and velocities (W, back, J) at the `back` steps before each start, the newest last."""
+    parts = [read_at(windows, -step * k, delay, order) for k in range(back, 0, -1)]
+    return np.stack([p for p, _ in parts], axis=1), np.stack([v for _, v in parts], axis=1)
+
+
+def read_at(windows: Windows, shift: float, delay: np.ndarray, order: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and velocities (W, J) that the joints `order` had `shift` s after the starts, by their late readings.
+
+    What an encoder reads `delay` (J,) s later is where the joint is now. Between ticks a position is on the cubic that
+    has the readings' positions and speeds, a speed on a line: the cubic's would have three times the noise.
+    """
+    place, speed = np.empty((len(windows), len(order))), np.empty((len(windows), len(order)))
+    for w, (i, k) in enumerate(zip(windows.rollout, windows.start, strict=True)):
+        rollout = windows.source[i]
+        at = np.clip(rollout.time[k] + shift + delay, rollout.time[0], rollout.time[-1])
+        high = np.clip(np.searchsorted(rollout.time, at), 1, len(rollout.time) - 1)
+        dt = rollout.time[high] - rollout.time[high - 1]
+        share = (at - rollout.time[high - 1]) / dt
+        first, gone = rollout.joint_pos[high - 1, order], np.subtract(*rollout.joint_pos[[high, high - 1], order])
+        speeds = rollout.joint_vel[[high - 1, high], order]
+        bow = (1 - share) * (dt * speeds[0] - gone) + share * (gone - dt * speeds[1])
+        place[w] = first + share * gone + share * (1 - share) * bow
+        speed[w] = speeds[0] + share * (speeds[1] - speeds[0])
+    return place, speed
+
+
+def yielded(windows: Windows, column: int, width: float) -> np.ndarray:
+    """Reference (W,) [rad] of an elasto-plastic spring of `width` on a joint, its path followed from the first tick."""
+    rows, paths = _together(windows, lambda rollout: rollout.joint_pos[:, column])
+    out = paths.copy()
+    for k in range(1, paths.shape[1]):
+        out[:, k] = np.clip(out[:, k - 1], paths[:, k] - width, paths[:, k] + width)
+    return out[rows, windows.start]

@@ -1,0 +1,127 @@
+"""What drives a joint: the force law of any MuJoCo actuator by probing it, and drives made to take what was logged.
+
+`motor`, `position`, `general`, `pid` and `dcmotor` keep their gains in different places. A force for a small change of
+input, position and velocity is the same question for all of them.
+
+A joint's position servo and its velocity servo as one: the declared kd then stands where every effect looks for it.
+
+MJCF files of before `position kv=` give a joint a `position` and a `velocity` actuator. A log has one command a joint,
+so the velocity servo is told to stand still and only damps.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from bumblebee.errors import BadInput
+from bumblebee.sim.servo import ON_JOINT
+
+_STEP = 1e-4
+_AFFINE = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
+_AFFINE_BIAS = mujoco.mjtBias.mjBIAS_AFFINE
+
+
+@dataclass(frozen=True, eq=False)
+class DriveLaw:
+    """First derivatives of the actuators' forces at rest in the reference pose; nu actuators of one input each."""
+
+    gain: np.ndarray
+    """(nu,) force for a unit of input, the input held long enough for filters to settle."""
+    stiffness: np.ndarray
+    """(nu,) force against a unit of the actuator's length; 0 where no position is fed back."""
+    simple: np.ndarray
+    """(nu,) bool: force = gain * input + affine bias, so that gains can be scaled in gainprm and biasprm."""
+
+    @property
+    def servo(self) -> np.ndarray:
+        """(nu,) whether the actuator takes a position target."""
+        return np.abs(self.stiffness) > 1e-9
+
+
+def drive_law(model: mujoco.MjModel, where: object) -> DriveLaw:
+    """Probe every actuator of `model`; `where` names it in the error for actuators of several inputs."""
+    count = len(model.actuator_trntype)
+    if model.nu != count:
+        raise BadInput(where, "actuators of one input each", f"{count} actuators with {model.nu} inputs")
+    data = mujoco.MjData(model)
+    gain, stiffness = np.zeros(count), np.zeros(count)
+    fed = [int(model.actuator_actadr[a]) for a in range(count)]
+    base = _force(model, data, fed, np.zeros(count))
+    for a in range(count):
+        control = np.zeros(count)
+        control[a] = _STEP
+        gain[a] = (_force(model, data, fed, control)[a] - base[a]) / _STEP
+        joint = int(model.actuator_trnid[a, 0])
+        if int(model.actuator_trntype[a]) == int(mujoco.mjtTrn.mjTRN_JOINT) and model.jnt_type[joint] > 1:
+            mujoco.mj_resetData(model, data)
+            data.qpos[model.jnt_qposadr[joint]] += _STEP
+            gear = model.actuator_gear[a, 0]
+            stiffness[a] = -(_force(model, data, fed, np.zeros(count), reset=False)[a] - base[a]) / (_STEP * gear)
+    simple = np.isin(model.actuator_gaintype, _AFFINE) & (model.actuator_gainprm[:, 1:3] == 0).all(axis=1)
+    return DriveLaw(gain, stiffness, simple)
+
+
+def _force(
+    model: mujoco.MjModel, data: mujoco.MjData, fed: Sequence[int], control: np.ndarray, reset: bool = True
+) -> np.ndarray:
+    """Forces (nu,) for a held control; a filter's activation has settled at its input."""
+    if reset:
+        mujoco.mj_resetData(model, data)
+    data.ctrl[:] = control
+    filters = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
+    for a, address in enumerate(fed):
+        if address >= 0 and int(model.actuator_dyntype[a]) in filters:
+            data.act[address] = control[a]
+    mujoco.mj_forward(model, data)
+    return data.actuator_force.copy()
+
+
+def take_torque(actuator: mujoco.MjsActuator) -> None:
+    """Turn a servo or a dcmotor into a motor that takes the logged torque; its force limit stays.
+
+    A drive that is commanded in torque closes a current loop: its back-EMF and its position gains are not felt.
+    """
+    actuator.set_to_motor()
+    actuator.ctrllimited = int(mujoco.mjtLimited.mjLIMITED_FALSE)
+
+
+def take_target(actuator: mujoco.MjsActuator, kp: float, kd: float, gain: float) -> None:
+    """Turn a motor of force `gain` a unit of input into a servo of kp [N m/rad], kd [N m s/rad] at the joint."""
+    gear = actuator.gear[0]
+    low, high = (float(x) for x in actuator.ctrlrange)
+    if low < high and int(actuator.forcelimited) != int(mujoco.mjtLimited.mjLIMITED_TRUE):
+        actuator.forcerange, actuator.forcelimited = [gain * low, gain * high], int(mujoco.mjtLimited.mjLIMITED_TRUE)
+    actuator.set_to_position(kp=kp / gear**2, kv=kd / gear**2)
+    actuator.ctrllimited = int(mujoco.mjtLimited.mjLIMITED_FALSE)
+
+
+def fold_dampers(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, list[str]]:
+    """A copy in which each position servo has the gain of the velocity servos on its joint, and these have none.
+
+    Also the names of the joints; where there are none the spec itself comes back. Actuators keep their number and
+    order. A force limit of the position servo now holds for the sum, as a drive's current limit does; the velocity
+    servo's own is dropped.
+    """
+    pairs = [(i, k) for i, a in enumerate(spec.actuators) if _follows_position(a) for k in _dampers_on(spec, a.target)]
+    if not pairs:
+        return spec, []
+    spec = spec.copy()
+    for i, k in pairs:
+        servo, damper = spec.actuators[i], spec.actuators[k]
+        bias = servo.biasprm.copy()
+        bias[2] += damper.biasprm[2] * (damper.gear[0] / servo.gear[0]) ** 2
+        servo.biasprm = bias
+        damper.gainprm, damper.biasprm = 0 * damper.gainprm, 0 * damper.biasprm
+    return spec, sorted({spec.actuators[i].target for i, _ in pairs})
+
+
+def _follows_position(a: mujoco.MjsActuator) -> bool:
+    return a.trntype in ON_JOINT and a.biastype == _AFFINE_BIAS and a.biasprm[1] != 0
+
+
+def _dampers_on(spec: mujoco.MjSpec, joint: str) -> list[int]:
+    """Actuators on a joint that feed back its velocity alone."""
+    there = [(k, a) for k, a in enumerate(spec.actuators) if a.trntype in ON_JOINT and a.target == joint]
+    return [k for k, a in there if a.biastype == _AFFINE_BIAS and a.biasprm[1] == 0 and a.biasprm[2] != 0]

@@ -1,0 +1,51 @@
+"""Height of a floating base without motion capture: the lowest collision geometry touches the floor."""
+
+from collections.abc import Iterable, Sequence
+
+import mujoco
+import numpy as np
+
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.measured.rollout import Rollout
+
+# Depth at which a standing robot rests in MuJoCo's soft floor with default contact parameters [m].
+_REST_DEPTH = 0.001
+
+
+def stance_heights(plant: Plant, rollouts: Sequence[Rollout], ids: Iterable[int]) -> dict[int, np.ndarray]:
+    """Height of the base (T,) [m] at every tick of the rollouts `ids`, as if the lowest point always touched z = 0."""
+    return {i: _heights(plant, rollouts[i]) for i in ids}
+
+
+def _heights(plant: Plant, rollout: Rollout) -> np.ndarray:
+    model, data = plant.model, mujoco.MjData(plant.model)
+    geoms = [g for g in range(model.ngeom) if touches(model, g)]
+    out = np.zeros(rollout.frames)
+    for k in range(rollout.frames):
+        data.qpos[:] = model.qpos0
+        data.qpos[plant.base_qpos : plant.base_qpos + 3] = 0.0
+        data.qpos[plant.base_qpos + 3 : plant.base_qpos + 7] = rollout.base_quat[k]
+        data.qpos[plant.qpos] = rollout.joint_pos[k]
+        mujoco.mj_kinematics(model, data)
+        out[k] = -min((lowest(model, data, g) for g in geoms), default=0.0) - _REST_DEPTH
+    return out
+
+
+def touches(model: mujoco.MjModel, geom: int) -> bool:
+    """Whether a geometry moves and collides."""
+    return (
+        bool(model.geom_contype[geom] | model.geom_conaffinity[geom])
+        and model.body_weldid[model.geom_bodyid[geom]] != 0
+    )
+
+
+def lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
+    """Lowest point of a geometry [m]: exact for spheres, capsules and boxes, from the bounding box else."""
+    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
+    up, z = data.geom_xmat[geom].reshape(3, 3)[2], data.geom_xpos[geom, 2]
+    if kind == int(mujoco.mjtGeom.mjGEOM_SPHERE):
+        return z - size[0]
+    if kind == int(mujoco.mjtGeom.mjGEOM_CAPSULE):
+        return z - size[0] - abs(up[2]) * size[1]
+    centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+    return float(z + up @ centre - np.abs(up) @ half)

@@ -1,0 +1,279 @@
+"""Many windows under many variations at once, on `mujoco.batch`."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from weakref import WeakKeyDictionary
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from bumblebee.diagnosis.simulation.actuator_history import read_at, remember
+from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
+from bumblebee.diagnosis.simulation.hidden_states import Known, earlier, restructured, set_plastic, step_share
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.readings import (
+    Layout,
+    conjugate,
+    difference,
+    from_rotation_vector,
+    multiply,
+    rotate,
+    simulated_readings,
+)
+from bumblebee.diagnosis.simulation.variation import Variation
+from bumblebee.diagnosis.simulation.windows import Windows, controls
+from bumblebee.sim.effect_forces import Memory, StepHooks
+
+THREADS: int | None = None
+"""Threads of every simulation; None: see `threads`."""
+_MOST_THREADS = 32
+_CHUNK_BYTES = 48e6
+_KEPT = 3  # controls of a set of windows that are kept: in most models the same ones arrive
+_known: WeakKeyDictionary[Windows, dict[bytes, np.ndarray]] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Start states that replace the measured ones: qpos (K, W, nq), qvel (K, W, nv)."""
+
+    qpos: np.ndarray
+    qvel: np.ndarray
+
+
+def threads() -> int:
+    """Threads for simulations: `THREADS`, or as many as the processors that this process may use."""
+    if THREADS is not None:
+        return THREADS
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(allowed, _MOST_THREADS)
+
+
+def residuals(
+    plant: Plant,
+    layout: Layout,
+    windows: Windows,
+    variations: Sequence[Variation],
+    step: float,
+    starts: Starts | None = None,
+) -> np.ndarray:
+    """Return measured - simulated, (V, W, N, D); NaN where a simulation diverged.
+
+    With `starts` of K start states, `variations` has one entry and the first axis is K.
+    """
+    copies = len(variations) if starts is None else len(starts.qpos)
+    width = plant.model.nq + plant.model.nv + plant.model.nu
+    chunk = max(1, int(_CHUNK_BYTES / (8.0 * np.ceil(windows.span / step - 1e-6) * width * len(windows))))
+    out = np.empty((copies, *windows.measured.shape))
+    cache: dict[bytes, np.ndarray] = {}
+    far = out_of_reach(plant, windows)
+    first = 0
+    while first < copies:
+        part = _together(variations, first, chunk) if starts is None else range(first, min(first + chunk, copies))
+        chosen = [variations[0] if starts is not None else variations[v] for v in part]
+        short = step * step_share(chosen[0].hidden)
+        count = int(np.ceil(windows.span / short - 1e-6))
+        inputs = [inputs_of(windows, variation, short, count, cache) for variation in chosen]
+        models = [] if chosen[0].plant is not None else list({id(v.model): v.model for v in chosen}.values())
+        with without(models, far):
+            out[part.start : part.stop] = _run(plant, layout, windows, chosen, inputs, short, count, starts, part)
+        first = part.stop
+    return out
+
+
+def _together(variations: Sequence[Variation], first: int, chunk: int) -> range:
+    """Plain variations from `first` on run in one batch; one that is more than a model runs alone."""
+    last = first
+    while last < min(first + chunk, len(variations)) and variations[last].plain:
+        last += 1
+    return range(first, max(last, first + 1))
+
+
+def inputs_of(
+    windows: Windows, variation: Variation, step: float, count: int, cache: dict[bytes, np.ndarray]
+) -> np.ndarray:
+    """Controls (W, count, nu) of a variation: late, and on the mean as held as dropped commands leave them."""
+    share = variation.dropped
+    key = variation.delay.tobytes() + (b"" if share is None else share.tobytes()) + bytes(f"{count} {step!r}", "ascii")
+    known = _known.setdefault(windows, {})
+    if key in known:
+        cache[key] = known[key]
+    if key not in cache:
+        sent = windows
+        if share is not None:
+            command = windows.command.copy()
+            for k in range(1, command.shape[1]):
+                command[:, k] = (1 - share) * command[:, k] + share * command[:, k - 1]
+            sent = replace(windows, command=command)
+        known[key] = cache[key] = controls(sent, variation.delay, step, count)
+        if len(known) > _KEPT:
+            known.pop(next(iter(known)))
+    return cache[key]
+
+
+def _run(
+    plant: Plant,
+    layout: Layout,
+    windows: Windows,
+    chosen: list[Variation],
+    inputs: list[np.ndarray],
+    step: float,
+    count: int,
+    starts: Starts | None,
+    part: range,
+) -> np.ndarray:
+    """One chunk: residuals (len(chosen), W, N, D)."""
+    copies, size = len(chosen), len(windows)
+    lead = chosen[0]
+    models = {id(v.model): with_step(v.model, step) for v in chosen}
+    own = lead.plant or plant
+    batch = Batch(lead.model, copies * size, threads())
+    if lead.plain:
+        batch.set_models([models[id(v.model)] for v in chosen for _ in range(size)])
+    offset = np.stack([v.offset for v in chosen])[:, None, :]
+    if starts is None:
+        qpos = np.repeat(windows.qpos[None], copies, axis=0)
+        qvel = np.repeat(windows.qvel[None], copies, axis=0)
+    else:
+        qpos, qvel = starts.qpos[part.start : part.stop].copy(), starts.qvel[part.start : part.stop]
+    qpos[..., plant.qpos] -= offset
+    late = _late(plant, lead)
+    if late.any():
+        qpos, qvel = _caught_up(plant, windows, qpos, qvel, late)
+    if lead.tilt is not None:
+        qpos, qvel = _righted(plant, qpos, qvel, lead.tilt)
+    if lead.plant is not None:
+        qpos, qvel = restructured(plant, windows, lead, qpos, qvel, _led_in(plant, windows, lead, step))
+    batch.bind("qpos")[:] = qpos.reshape(copies * size, -1)
+    batch.bind("qvel")[:] = qvel.reshape(copies * size, -1)
+    control = np.stack(inputs).reshape(copies * size, count, -1)
+    if own.model.na:
+        batch.bind("act")[:] = _activation(own.model, control[:, 0])
+    set_plastic(batch, plant, windows, lead, copies)
+    path_q, path_v = _roll(batch, plant, windows, lead, control, step, copies)
+    failed = batch.warning.reshape(copies * size, -1).any(axis=1)
+    at_q = at_ticks(windows, qpos, path_q, step, copies)
+    at_v = at_ticks(windows, qvel, path_v, step, copies)
+    for delay in np.unique(late[late > 0]):
+        old = replace(windows, out_time=np.maximum(windows.out_time - delay, 0.0))
+        for at, start, path, where in ((at_q, qpos, path_q, own.qpos), (at_v, qvel, path_v, own.dof)):
+            columns = where[late == delay]
+            at[..., columns] = at_ticks(old, start, path, step, copies)[..., columns]
+    simulated, quat = simulated_readings(own, layout, at_q, at_v, offset[:, :, None, :])
+    if quat is not None and lead.tilt is not None:
+        quat = multiply(quat, from_rotation_vector(lead.tilt))
+    measured = np.broadcast_to(windows.measured, simulated.shape)
+    target = None if windows.quat is None else np.broadcast_to(windows.quat, quat.shape)
+    result = difference(layout, measured, target, simulated, quat)
+    result[failed.reshape(copies, size)] = np.nan
+    return result
+
+
+def _led_in(plant: Plant, windows: Windows, lead: Variation, step: float) -> Known | None:
+    """What a model with shafts has come to at the windows' starts."""
+    if not any(kind == "series_elasticity" for kind, _, _ in lead.hidden):
+        return None
+    early, span, whole = earlier(plant, windows)
+    early.qpos[:, plant.qpos] -= lead.offset
+    qpos, qvel = restructured(plant, early, lead, early.qpos, early.qvel)
+    batch = Batch(lead.model, len(early), threads())
+    batch.bind("qpos")[:], batch.bind("qvel")[:] = qpos, qvel
+    set_plastic(batch, plant, early, lead, 1)
+    control = inputs_of(early, lead, step, max(1, round(span / step)), {})
+    path_q, path_v = _roll(batch, plant, early, lead, control, step, 1)
+    return path_q[:, -1], path_v[:, -1], whole & ~batch.warning.reshape(len(early), -1).any(axis=1)
+
+
+def _late(plant: Plant, lead: Variation) -> np.ndarray:
+    """How old readings are when they are logged, (J,) [s]."""
+    out = np.zeros(len(plant.joints))
+    if lead.hooks is not None:
+        out[[plant.joints.index(name) for name in lead.hooks.joints]] = lead.hooks.encoder_delay
+    return out
+
+
+def _caught_up(
+    plant: Plant, windows: Windows, qpos: np.ndarray, qvel: np.ndarray, late: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Starts in which joints with late encoders are where a later reading puts them."""
+    every = range(len(plant.joints))
+    moved, still = read_at(windows, 0.0, late, every), read_at(windows, 0.0, 0.0 * late, every)
+    qpos, qvel = qpos.copy(), qvel.copy()
+    qpos[..., plant.qpos] += moved[0] - still[0]
+    qvel[..., plant.dof] += moved[1] - still[1]
+    return qpos, qvel
+
+
+def _roll(
+    batch: Batch, plant: Plant, windows: Windows, lead: Variation, control: np.ndarray, step: float, copies: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """States (n, count, nq) and (n, count, nv) after every step."""
+    hooks = lead.hooks
+    if hooks is not None:
+        running = StepHooks(hooks, lead.model, batch)
+        running.reset(np.arange(len(control)), _repeated(remember(plant, windows, hooks, step), copies))
+    if hooks is None or not hooks.each_step:
+        out = batch.rollout(control.shape[1], control, record=("qpos", "qvel"))
+        return out["qpos"], out["qvel"]
+    q, v, ctrl = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
+    path_q = np.empty((len(q), control.shape[1], q.shape[1]))
+    path_v = np.empty((len(v), control.shape[1], v.shape[1]))
+    for k in range(control.shape[1]):
+        ctrl[:] = control[:, k]
+        running.apply()
+        batch.step()
+        path_q[:, k], path_v[:, k] = q, v
+    return path_q, path_v
+
+
+def _repeated(memory: Memory, copies: int) -> Memory:
+    """The memory of every window, once for each copy of the windows."""
+    values = {f.name: getattr(memory, f.name) for f in fields(memory)}
+    return Memory(**{k: None if v is None else np.concatenate([v] * copies) for k, v in values.items()})
+
+
+def _righted(plant: Plant, qpos: np.ndarray, qvel: np.ndarray, tilt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Starts whose base stands as it is, not as a tilted sensor says; velocities in the base's frame stay."""
+    qpos, qvel = qpos.copy(), qvel.copy()
+    at, dof = slice(plant.base_qpos + 3, plant.base_qpos + 7), slice(plant.base_dof, plant.base_dof + 3)
+    speed_b = rotate(conjugate(qpos[..., at]), qvel[..., dof])
+    qpos[..., at] = multiply(qpos[..., at], conjugate(from_rotation_vector(tilt)))
+    qvel[..., dof] = rotate(qpos[..., at], speed_b)
+    return qpos, qvel
+
+
+def with_step(model: mujoco.MjModel, step: float) -> mujoco.MjModel:
+    """The model itself, its step set: variations are never stepped from two places at once.
+
+    A robot is one island of constraints: looking for others costs a tenth of a step and changes nothing.
+    """
+    model.opt.timestep = step
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    return model
+
+
+def _activation(model: mujoco.MjModel, control: np.ndarray) -> np.ndarray:
+    """Filters start at rest with their input: (n, na) from (n, nu)."""
+    act = np.zeros((len(control), model.na))
+    for a in range(model.nu):
+        if model.actuator_actnum[a]:
+            act[:, model.actuator_actadr[a]] = control[:, a]
+    return act
+
+
+def at_ticks(windows: Windows, start: np.ndarray, path: np.ndarray, step: float, copies: int) -> np.ndarray:
+    """States (copies, W, N, .) at the compared ticks, linear between simulation steps."""
+    size = len(windows)
+    path = path.reshape(copies, size, *path.shape[1:])
+    at = windows.out_time / step
+    low = np.clip(np.floor(at + 1e-6).astype(int), 0, path.shape[2])
+    share = np.clip(at - low, 0.0, 1.0)
+    share[share < 1e-5] = 0.0
+    full = np.concatenate((start.reshape(copies, size, 1, -1), path), axis=2)
+    rows = np.arange(size)[:, None]
+    lower = full[:, rows, low]
+    if not share.any():
+        return lower
+    upper = full[:, rows, np.minimum(low + 1, path.shape[2])]
+    return lower + share[None, :, :, None] * (upper - lower)

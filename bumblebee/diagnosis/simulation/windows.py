@@ -1,0 +1,221 @@
+"""Windows: short stretches of the logs, each restarted from its measured state and fed the logged commands."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bumblebee.diagnosis.simulation.base_height import stance_heights
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.readings import Layout, measured_readings, rotate
+from bumblebee.errors import BadInput
+from bumblebee.measured.rollout import Rollout
+
+# A window starts this long after its rollout, so that a delayed command is known from the start [s].
+LEAD = 0.1
+# Nothing is compared sooner after a start [s]: at 500 Hz the next reading says only that the start was read.
+_FIRST = 0.02
+# Periods between two rows from which on a tick is missing between them.
+_GAP = 1.8
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """W windows of N compared ticks each."""
+
+    rollout: np.ndarray
+    """(W,) index of the rollout."""
+    start: np.ndarray
+    """(W,) tick of the start."""
+    span: float
+    """Length that is simulated [s]: the longest of the windows."""
+    out_time: np.ndarray
+    """(W, N) time of the compared ticks after the start [s]."""
+    qpos: np.ndarray
+    """(W, nq) measured start, with the encoders' readings as they are."""
+    qvel: np.ndarray
+    """(W, nv)."""
+    measured: np.ndarray
+    """(W, N, D) readings."""
+    quat: np.ndarray | None
+    """(W, N, 4) base orientation."""
+    command: np.ndarray
+    """(W, C, nu) logged commands around the window, in the actuators' own input."""
+    command_time: np.ndarray
+    """(W, C) times at which they were issued, after the start [s]."""
+    source: Sequence[Rollout] = ()
+    """The rollouts that `rollout` counts, for what drives remember from before the start."""
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+def choose_starts(
+    rollouts: Sequence[Rollout], ids: Sequence[int], horizon: float, budget: int
+) -> list[tuple[int, int, int]]:
+    """At most `budget` windows (rollout, first tick, last tick), apart from each other and spread over the rollouts.
+
+    Every rollout has the same share of the budget, as far as it is long enough: one long run must not decide alone.
+    A window is `horizon` s long by its time stamps, to the nearest tick, whatever the rate; none holds a gap in the
+    log, for nobody knows what was commanded there.
+    """
+    every = [[(i, first, last) for first, last in _stretches(rollouts[i].time, horizon)] for i in ids]
+    quota = _shares([len(part) for part in every], budget)
+    picked = []
+    for part, count in zip(every, quota, strict=True):
+        some = np.linspace(0, len(part) - 1, count + 2)[1:-1] if count < len(part) else np.arange(len(part))
+        picked += [part[k] for k in np.unique(np.round(some).astype(int))]
+    return picked
+
+
+def _shares(lengths: Sequence[int], budget: int) -> list[int]:
+    """How many of each one's windows to take, equal as far as they go; together at most `budget`."""
+    shares, left = [0] * len(lengths), min(budget, sum(lengths))
+    while left > 0:
+        open_ = [k for k, n in enumerate(lengths) if shares[k] < n]
+        each = left // len(open_)
+        if each == 0:
+            for k in np.linspace(0, len(open_) - 1, left).round().astype(int):
+                shares[open_[k]] += 1
+            break
+        for k in open_:
+            more = min(each, lengths[k] - shares[k])
+            shares[k] += more
+            left -= more
+    return shares
+
+
+def _stretches(time: np.ndarray, horizon: float) -> list[tuple[int, int]]:
+    """Consecutive stretches (first, last) of `horizon` s within the stamps `time` (T,)."""
+    period = float(np.median(np.diff(time)))
+    gaps = np.concatenate(([0], np.cumsum(np.diff(time) > _GAP * period)))
+    last = np.searchsorted(time, time + horizon + 0.5 * period - 1e-9) - 1
+    last = np.maximum(last, np.minimum(np.arange(len(time)) + 1, len(time) - 1))
+    off = np.abs(time[last] - time - horizon)
+    good = (off <= 0.51 * period + 1e-9) & (gaps[last] == gaps)
+    found = []
+    k = int(np.searchsorted(time, time[0] + min(LEAD, 0.25 * (time[-1] - time[0]))))
+    while k < len(time) - 1:
+        if good[k]:
+            found.append((k, int(last[k])))
+            k = int(last[k])
+        else:
+            k += 1
+    return found
+
+
+def cut(
+    plant: Plant, layout: Layout, rollouts: Sequence[Rollout], starts: list[tuple[int, int, int]], outputs: int = 6
+) -> Windows:
+    """Cut the windows; at most `outputs` ticks of each are compared, the last among them."""
+    firsts = {i: max(1, round(_FIRST / float(np.median(np.diff(rollouts[i].time))))) for i in {s[0] for s in starts}}
+    count = min(outputs, *(max(1, last - k - firsts[i] + 1) for i, k, last in starts))
+    cache = {i: measured_readings(rollouts[i], layout) for i in {s[0] for s in starts}}
+    commands = {i: command_inputs(plant, rollouts[i]) for i in cache}
+    heights = stance_heights(plant, rollouts, {s[0] for s in starts}) if _needs_height(plant, layout) else {}
+    rows = []
+    for i, k, last in starts:
+        picks = np.linspace(last - k, min(firsts[i], last - k), count)[::-1]  # one output: the last tick
+        picks = np.floor(picks + 0.5).astype(int)
+        rows.append(_one(plant, rollouts[i], cache[i], commands[i], heights.get(i), k, picks))
+    size = max(len(row["command_time"]) for row in rows)
+    quats = [row["quat"] for row in rows]
+    return Windows(
+        rollout=np.array([s[0] for s in starts]),
+        start=np.array([s[1] for s in starts]),
+        span=max(float(row["out_time"][-1]) for row in rows),
+        out_time=np.stack([row["out_time"] for row in rows]),
+        qpos=np.stack([row["qpos"] for row in rows]),
+        qvel=np.stack([row["qvel"] for row in rows]),
+        measured=np.stack([row["measured"] for row in rows]),
+        quat=None if quats[0] is None else np.stack(quats),
+        command=np.stack([_pad(row["command"], size) for row in rows]),
+        command_time=np.stack([_pad(row["command_time"], size) for row in rows]),
+        source=rollouts,
+    )
+
+
+def select(windows: Windows, keep: np.ndarray) -> Windows:
+    """The windows at the indices or mask `keep`."""
+    parts = {name: getattr(windows, name) for name in windows.__dataclass_fields__}
+    kept = {name: value[keep] if isinstance(value, np.ndarray) else value for name, value in parts.items()}
+    return Windows(**kept)
+
+
+def controls(windows: Windows, delay: np.ndarray, step: float, count: int) -> np.ndarray:
+    """Commands (W, count, nu) for steps of `step` s: the mean over each step of the held, delayed command."""
+    time, command = windows.command_time, windows.command
+    area = np.zeros_like(command)
+    np.cumsum(np.diff(time, axis=1)[..., None] * command[:, :-1], axis=1, out=area[:, 1:])
+    out = np.empty((len(windows), count, len(delay)))
+    for value in np.unique(delay):
+        columns = np.flatnonzero(delay == value)
+        at = np.arange(count + 1) * step - value
+        k = np.maximum((time[:, None, :] <= at[:, None]).sum(axis=-1) - 1, 0)  # (W, count + 1)
+        since = at - np.take_along_axis(time, k, axis=1)
+        rows = np.arange(len(windows))[:, None, None]
+        integral = area[rows, k[..., None], columns] + since[..., None] * command[rows, k[..., None], columns]
+        out[..., columns] = np.diff(integral, axis=1) / step
+    return out
+
+
+def _needs_height(plant: Plant, layout: Layout) -> bool:
+    return plant.floating and "base_pos" not in layout.slices
+
+
+def _pad(values: np.ndarray, size: int) -> np.ndarray:
+    """Repeat the last row; padded commands change nothing, for their times never pass."""
+    return np.concatenate((values, np.repeat(values[-1:], size - len(values), axis=0)))
+
+
+def _one(
+    plant: Plant,
+    rollout: Rollout,
+    readings: tuple[np.ndarray, np.ndarray | None],
+    command: np.ndarray,
+    heights: np.ndarray | None,
+    k: int,
+    picks: np.ndarray,
+) -> dict[str, np.ndarray | None]:
+    signals, quat = readings
+    t0 = rollout.time[k]
+    first = max(0, int(np.searchsorted(rollout.time, t0 - 2 * LEAD)))
+    stop = k + int(picks[-1]) + 1
+    qpos, qvel = start_state(plant, rollout, k, None if heights is None else heights[k])
+    return {
+        "out_time": rollout.time[k + picks] - t0,
+        "qpos": qpos,
+        "qvel": qvel,
+        "measured": signals[k + picks],
+        "quat": None if quat is None else quat[k + picks],
+        "command": command[first:stop],
+        "command_time": rollout.time[first:stop] - t0,
+    }
+
+
+def start_state(plant: Plant, rollout: Rollout, k: int, height: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """The measured state of tick k as qpos (nq,) and qvel (nv,)."""
+    qpos, qvel = plant.model.qpos0.copy(), np.zeros(plant.model.nv)
+    qpos[plant.qpos], qvel[plant.dof] = rollout.joint_pos[k], rollout.joint_vel[k]
+    if plant.floating:
+        q, v = plant.base_qpos, plant.base_dof
+        quat = rollout.base_quat[k] / np.linalg.norm(rollout.base_quat[k])
+        qpos[q : q + 3] = rollout.base_pos[k] if height is None else [0.0, 0.0, height]
+        qpos[q + 3 : q + 7] = quat
+        qvel[v : v + 3] = rotate(quat, rollout.base_lin_vel[k])
+        qvel[v + 3 : v + 6] = rollout.base_ang_vel[k]
+    return qpos, qvel
+
+
+def command_inputs(plant: Plant, rollout: Rollout) -> np.ndarray:
+    """Logged commands as the actuators' inputs, (T, nu)."""
+    values = rollout.joint_torque_cmd if plant.torque_input else rollout.joint_target
+    if values is None:
+        raise BadInput(f"{rollout.rollout_id}: column joint_target", "the column that the other rollouts have", "none")
+    out = np.zeros((rollout.frames, plant.model.nu))
+    for column, a in enumerate(plant.actuator):
+        if a >= 0:
+            gear = plant.model.actuator_gear[a, 0]
+            scale = 1.0 / (gear * plant.model.actuator_gainprm[a, 0]) if plant.torque_input else gear
+            out[:, a] = values[:, column] * scale
+    return out

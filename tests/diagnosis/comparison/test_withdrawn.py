@@ -1,0 +1,61 @@
+"""A correction that makes windows worse that took no part in the fit is withdrawn, one that helps stays."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis import diagnose as diagnosis
+from bumblebee.diagnosis.comparison.paired_tests import is_worse_than, standing
+from bumblebee.diagnosis.dataset.session import make_session
+from bumblebee.diagnosis.residuals.problem import Problem, make_problem
+from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.sim.effects import single
+from tests.diagnosis import arm
+
+TRUE = single("coulomb_friction", "j2", 1.0)
+WRONG = single("coulomb_friction", "j3", 1.0)
+
+
+@pytest.fixture(scope="module")
+def rubbing() -> Problem:
+    """Windows of an arm whose second joint has 1 N m of dry friction."""
+    rollouts = arm.simulate({("coulomb_friction", "j2"): 1.0}, count=2)
+    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, [0, 1], 0.2, 24))
+    rng = np.random.default_rng(0)
+    return make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
+
+
+def test_the_true_effect_stands(rubbing: Problem) -> None:
+    assert standing(rubbing, [TRUE], []) == ([TRUE], [], [])
+
+
+def test_a_wrong_effect_is_withdrawn_with_a_note(rubbing: Problem) -> None:
+    fitted, read, notes = standing(rubbing, [WRONG], [])
+    assert fitted == read == []
+    assert len(notes) == 1
+    assert "coulomb_friction on j3" in notes[0]
+
+
+def test_what_was_read_off_the_logs_falls_alone(rubbing: Problem) -> None:
+    coarse = single("encoder_quantisation", "j2", 0.3)
+    fitted, read, notes = standing(rubbing, [TRUE], [coarse])
+    assert fitted == [TRUE]
+    assert read == []
+    assert "encoder_quantisation on j2" in notes[0]
+
+
+def test_the_same_model_is_not_worse(rubbing: Problem) -> None:
+    assert not is_worse_than(rubbing, [TRUE], [TRUE])
+
+
+def test_structure_is_that_of_the_model_that_stands(monkeypatch) -> None:
+    """A withdrawn fit is no longer what `structure` and `settings` describe: the joint that lacks friction is named."""
+    monkeypatch.setattr(diagnosis, "standing", lambda problem, fitted, read: ([], [], ["withdrawn: all"]))
+    rollouts = arm.simulate({("coulomb_friction", "j2"): 1.0}, count=3, seed=3)
+    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    document = diagnosis.diagnose(session, arm.SMALL).document
+    assert document["effects"] == []
+    assert "withdrawn: all" in document["notes"]
+    assert document["structure"]["j2"]["significant"]
+    assert "j2" in document["unexplained"]["where"]

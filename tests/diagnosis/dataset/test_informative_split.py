@@ -1,0 +1,54 @@
+"""Which rollouts are fitted: one that alone shows an effect is, however the rollouts had been divided."""
+
+from dataclasses import replace
+from functools import cache
+
+import mujoco
+
+from bumblebee.diagnosis.dataset.informative_split import informative
+from bumblebee.diagnosis.dataset.session import Session, make_session
+from bumblebee.measured.rollout import Rollout
+from tests.diagnosis import arm
+from tests.diagnosis.strange_arm import simulate
+
+LIMIT = 8.0
+
+
+def _session(rollouts: list[Rollout]) -> Session:
+    return make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+
+
+@cache
+def _four(limited: bool) -> list[Rollout]:
+    return simulate({("torque_limit", "j2"): (LIMIT,)} if limited else {}, count=4, seed=3)
+
+
+def _mixed(limited: int) -> list[Rollout]:
+    """Three rollouts without an effect and one, number `limited`, in which the second joint's drive has a limit."""
+    return [_four(i == limited)[i] for i in range(4)]
+
+
+def test_a_rollout_that_alone_shows_an_effect_is_fitted() -> None:
+    (aside,) = _session(_mixed(0)).holdout
+    session = _session(_mixed(aside))
+    moved = informative(session, 0.2)
+    assert session.holdout == session.accept == [aside]
+    assert aside in moved.train and aside not in moved.accept
+    assert len(moved.train) == len(session.train) and len(moved.holdout) == 1 and moved.holdout == moved.accept
+    assert session.rollouts[aside].rollout_id in moved.notes[-1]
+
+
+def test_rollouts_keep_their_places_where_none_shows_more_or_a_fitted_one_does() -> None:
+    fitted = next(i for i in range(4) if i not in _session(_four(False)).holdout)
+    for session in (_session(_four(True)), _session(_four(False)), _session(_mixed(fitted))):
+        assert informative(session, 0.2) is session
+
+
+def test_a_repeat_stays_on_its_side() -> None:
+    """Of motions that have names: what was put aside and its repeat are not parted."""
+    rollouts = [replace(r, meta=r.meta | {"motion": f"m{i}"}) for i, r in enumerate(_four(False))]
+    (aside,) = _session(rollouts).holdout
+    rollouts[aside] = replace(_mixed(aside)[aside], meta=rollouts[aside].meta)
+    rollouts.append(replace(rollouts[aside], rollout_id="r99"))
+    moved = informative(_session(rollouts), 0.2)
+    assert (aside in moved.train) == (4 in moved.train)

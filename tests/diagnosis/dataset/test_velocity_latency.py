@@ -1,0 +1,103 @@
+"""Velocities that are logged late: their age is found on each joint, and none is found where they are in step."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.dataset.session import make_session
+from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages
+from bumblebee.diagnosis.replay import replay as errors
+from bumblebee.measured.rollout import Rollout
+from tests.diagnosis import cart
+
+FREQUENCIES = np.array([0.4, 0.9, 1.7])
+
+
+def log(seed: int, hz: float, ages: tuple[float, ...], jitter: float = 0.0, step: float = 0.0) -> Rollout:
+    """20 s of sines on every joint, each velocity `ages` [s] old; positions in steps of `step` [rad]."""
+    rng = np.random.default_rng(seed)
+    time = cart.stamps(hz, 20.0, jitter, rng)
+    size, phase = rng.uniform(0.1, 0.4, (3, len(ages))), rng.uniform(0, 6.28, (3, len(ages)))
+    turn = 2 * np.pi * FREQUENCIES[:, None]
+    angle = turn * time[:, None, None] + phase
+    place = (size * np.sin(angle)).sum(axis=1) + 1e-4 * rng.standard_normal((len(time), len(ages)))
+    speed = (size * turn * np.cos(angle - turn * np.array(ages))).sum(axis=1)
+    place = np.round(place / step) * step if step else place
+    speed = speed + 0.02 * rng.standard_normal(speed.shape)
+    return Rollout(f"r{seed}", tuple(f"j{k}" for k in range(len(ages))), hz, time, place, speed, joint_torque_cmd=place)
+
+
+@pytest.mark.parametrize(("hz", "jitter"), [(50.0, 0.0), (500.0, 0.3)])
+def test_the_age_of_each_joint_is_found_and_taken_out(hz: float, jitter: float) -> None:
+    """One is a whole period of the slow log old; one is in step."""
+    ages = (0.019, 0.004 if hz > 50 else 0.017, 0.0)
+    logs = [log(seed, hz, ages, jitter, step=0.0015) for seed in range(3)]
+    found = velocity_ages(logs)
+    np.testing.assert_allclose(found, ages, atol=6e-4)
+    assert found[2] == 0
+    after = [in_step(one, found) for one in logs]
+    assert all(one.frames < was.frames for one, was in zip(after, logs, strict=True))
+    np.testing.assert_allclose(velocity_ages(after), 0.0, atol=5e-4)
+    assert age_note(logs[0].joints, found).count("ms") == 2
+
+
+def test_logs_of_targets_are_left_as_they_are() -> None:
+    logs = [log(seed, 50.0, (0.019, 0.017, 0.0)) for seed in range(3)]
+    aimed = [replace(one, joint_torque_cmd=None, joint_target=one.joint_pos) for one in logs]
+    assert velocity_ages(logs).any() and not velocity_ages(aimed).any()
+
+
+def test_velocities_in_step_stay_as_logged() -> None:
+    logs = [log(seed, 100.0, (0.0, 0.0)) for seed in range(3)]
+    assert not velocity_ages(logs).any()
+    assert in_step(logs[0], velocity_ages(logs)) is logs[0]
+    assert age_note(logs[0].joints, np.zeros(2)) == ""
+
+
+@pytest.mark.parametrize("step", [0.0005, 0.001])
+def test_half_a_step_of_a_simulation_is_no_age(step: float) -> None:
+    """Positions moved by the new velocities lie half a step off; so do simulated logs, which are in step."""
+    rng = np.random.default_rng(0)
+    fine = np.arange(round(20 / step)) * step
+    turn, phase = 2 * np.pi * FREQUENCIES, rng.uniform(0, 6.28, 3)
+    speed = (0.2 * turn * np.cos(turn * fine[:, None] + phase)).sum(axis=1)
+    place = np.cumsum(speed) * step
+    every = round(0.01 / step)
+    one = Rollout("a", ("j",), 100.0, fine[::every], place[::every, None], speed[::every, None],
+                  joint_torque_cmd=place[::every, None])  # fmt: skip
+    assert not velocity_ages([one, one, one]).any()
+
+
+def test_short_or_still_logs_say_nothing() -> None:
+    short = log(0, 50.0, (0.02,))
+    few = replace(short, **{k: getattr(short, k)[:30] for k in ("time", "joint_pos", "joint_vel", "joint_torque_cmd")})
+    assert not velocity_ages([few]).any()
+    still = replace(short, joint_pos=np.zeros_like(short.joint_pos), joint_vel=np.zeros_like(short.joint_vel))
+    assert not velocity_ages([still, still, still]).any()
+
+
+def test_a_right_model_with_late_velocities_comes_near_the_noise() -> None:
+    """The session moves filtered velocities by the mean age of the filter, 4.2 ms, and half a step; and says so."""
+    logs = cart.record(count=3, hz=250.0, seconds=6.0)
+    late = [replace(one, joint_vel=_filtered(one, 0.006)) for one in logs]
+
+    def after(rollouts: list[Rollout]) -> tuple[float, list[str]]:
+        made = make_session(mujoco.MjSpec.from_string(cart.xml()), rollouts, "cart", "memory")
+        return errors(made, budget=20)["0.2"]["joint_pos_rmse"]["value"], made.notes
+
+    right, notes = after(logs)
+    assert not any("older" in note for note in notes)
+    moved, notes = after(late)
+    assert any("older than the positions" in note and "cart 4.4 ms" in note for note in notes)
+    assert moved < 2 * right  # 13 mrad as logged, 1.4 with velocities in step
+
+
+def _filtered(one: Rollout, constant: float) -> np.ndarray:
+    """Velocities through a first-order filter; their mean age is period * (1 - share) / share."""
+    out = one.joint_vel.copy()
+    for k in range(1, len(out)):
+        share = 1 - np.exp(-(one.time[k] - one.time[k - 1]) / constant)
+        out[k] = out[k - 1] + share * (one.joint_vel[k] - out[k - 1])
+    return out

@@ -1,0 +1,99 @@
+"""What must not be overlooked stands in the document, the terminal and the page, and no comfort beside it."""
+
+import copy
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.dataset.session import make_session
+from bumblebee.diagnosis.dataset.undriven import commanded_undriven
+from bumblebee.diagnosis.gap.gap import gap
+from bumblebee.diagnosis.report.notes import beside_noise, unexplained_error, what_is_left
+from bumblebee.diagnosis.report.page import render_report
+from bumblebee.diagnosis.report.terminal import gap_summary, summary
+from bumblebee.errors import BadInput
+from tests.diagnosis import cart
+
+
+def document(after: float, effects: bool = False) -> dict:
+    """A robot of one hinge whose error after 0.2 s is `after` times the noise; nothing significant is left."""
+
+    def block(value: float) -> dict:
+        entry = {"value": value, "ci95": None, "unit": "rad"}
+        return {"0.2": {"joint_pos_rmse": entry | {"per_joint": {"j": entry}}}}
+
+    effect = {"effect": "armature", "where": ["j"], "parameters": {}, "equivalent": [], "explains": 0.5,
+              "evidence": {"p": 0.0}}  # fmt: skip
+    return {
+        "effects": [effect] if effects else [],
+        "unexplained": {"significant": False, "p": 0.4, "where": [], "depends_on": [], "description": ""},
+        "error": {"before": block(0.002 * after), "after": block(0.002 * after), "floor": block(0.002)},
+        "holdout": ["a"],
+        "units": {"j": {"position": "rad", "velocity": "rad/s", "torque": "N m"}},
+    }
+
+
+def test_a_large_error_without_an_effect_is_said_and_nothing_comforts():
+    made = document(80.0)
+    made["warnings"] = unexplained_error(made)
+    assert "160 mrad" in made["warnings"][0] and "no effect of the catalogue explains it" in made["warnings"][0]
+    for text in (summary(made), render_report(made, [])):
+        assert "no effect of the catalogue explains it" in text
+        assert "nothing that these tests can see" not in text and "No effect of the catalogue is missing" not in text
+
+
+def test_a_large_error_beside_effects_is_said_too():
+    assert "what was found does not explain that" in unexplained_error(document(5.0, effects=True))[0]
+
+
+def test_an_error_at_the_noise_warns_of_nothing():
+    made = document(1.1)
+    assert unexplained_error(made) == []
+    assert what_is_left(made) == "nothing that these tests can see"
+    assert "No effect of the catalogue is missing" in render_report(made, [])
+
+
+def test_an_error_below_the_expected_noise_is_explained():
+    floor = {"value": 4.39e-3, "ci95": [2.5e-3, 6e-3]}
+    below = beside_noise({"value": 3.25e-3}, floor, "mrad", 1e3)
+    assert "no more than sensor noise leaves of a complete model" in below and "[2.5, 6]" in below
+    assert beside_noise({"value": 9e-3}, floor, "mrad", 1e3) == "sensor noise alone leaves 4.39 [2.5, 6] mrad"
+
+
+def test_one_rollout_says_what_could_not_be_tested(diagnosed):
+    made = diagnosed({("motor_strength", "j3"): 0.85}, 5, count=1).document
+    assert any("single rollout" in text for text in made["warnings"])
+    assert "WARNING: a single rollout" in summary(made)
+    assert "single rollout" in render_report(made, []).split("<h2>")[0]
+
+
+def test_a_gap_report_of_one_rollout_says_what_could_not_be_tested():
+    report = gap(make_session(mujoco.MjSpec.from_string(cart.xml()), cart.record(count=1), "cart", "memory"))
+    assert any("could not be tested" in text for text in report.document["warnings"])
+    assert "WARNING: a single rollout" in gap_summary(report.document, report.examples)
+
+
+def undriven(*names: str) -> str:
+    text = cart.xml("position")
+    for name in names:
+        begin = text.index(f'<position name="{name}"')
+        text = text[:begin] + text[text.index("/>", begin) + 2 :]
+    return text
+
+
+def test_commands_that_nothing_takes_are_said_or_refused():
+    rollouts = cart.record(count=2, torque=False, seconds=1.0)
+    some = make_session(mujoco.MjSpec.from_string(undriven("pole")), rollouts, "cart", "memory")
+    assert commanded_undriven(some.plant, rollouts) == ["pole"]
+    assert "pole" in some.warnings[0] and any("pole" in text for text in gap(some).document["warnings"])
+    with pytest.raises(BadInput, match="without actuators"):
+        make_session(mujoco.MjSpec.from_string(undriven("pole", "cart")), rollouts, "cart", "memory")
+
+
+def test_a_joint_that_is_told_nothing_needs_no_actuator():
+    rollouts = [copy.copy(r) for r in cart.record(count=2, torque=False, seconds=1.0)]
+    for rollout in rollouts:
+        object.__setattr__(rollout, "joint_target", np.zeros_like(rollout.joint_target))
+    made = make_session(mujoco.MjSpec.from_string(undriven("pole", "cart")), rollouts, "cart", "memory")
+    assert made.warnings == ()

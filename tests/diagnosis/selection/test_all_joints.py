@@ -1,0 +1,89 @@
+"""Parameters that are wrong on all joints at once are found together and by name."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.candidates.enumerate import all_candidates
+from bumblebee.diagnosis.comparison.backward_elimination import certainty
+from bumblebee.diagnosis.comparison.holdout import Holdout
+from bumblebee.diagnosis.comparison.paired_tests import pays_together
+from bumblebee.diagnosis.comparison.submodel import without_some
+from bumblebee.diagnosis.dataset.session import Session, make_session
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
+from bumblebee.diagnosis.selection.proposals.all_joints import fit_many
+from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from tests.diagnosis import arm
+
+TRUTH = {
+    **{("coulomb_friction", j): v for j, v in zip(arm.JOINTS, (1.2, 2.0, 0.8), strict=True)},
+    **{("viscous_friction", j): v for j, v in zip(arm.JOINTS, (0.8, 1.0, 0.5), strict=True)},
+    **{("armature", j): v for j, v in zip(arm.JOINTS, (0.05, 0.06, 0.03), strict=True)},
+}
+
+
+def _opened(effects: dict[tuple[str, str], float]) -> tuple[Session, Problem, Problem]:
+    rollouts = arm.simulate(effects, count=3, seconds=5.0)
+    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+
+    def of(ids: list[int], budget: int) -> Problem:
+        windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, ids, 0.2, budget))
+        rng = np.random.default_rng(0)
+        return make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
+
+    return session, of([0, 1], 40), of([2], 20)
+
+
+def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None:
+    session, problem, other = _opened(TRUTH)
+    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+    fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
+    assert fit is not None
+    found = {(c.effect, c.where): float(fit.of(c)[0]) for c in fit.chosen}
+    for place, value in TRUTH.items():
+        assert found[place] == pytest.approx(value, rel=0.25), place
+    assert set(found) - set(TRUTH) <= {(kind, j) for kind in ("motor_strength", "encoder_offset") for j in arm.JOINTS}
+    assert certainty(problem, fit, window_weights(fit.clean(problem))).min() >= 4.0
+    assert pays_together(problem, Holdout(other), declared, fit)
+    assert not pays_together(problem, Holdout(other), fit, declared)
+    assert pays_together(problem, Holdout(), declared, fit) and not pays_together(problem, Holdout(), fit, declared)
+
+
+def test_without_candidates_there_is_no_fit() -> None:
+    _, problem, _ = _opened({})
+    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+    assert fit_many(problem, [], declared, lambda text: None) is None
+
+
+def test_a_load_that_was_found_stays_and_the_drives_are_not_weak() -> None:
+    """A heavier last link weakens all drives as far as these alone can tell."""
+    session, problem, _ = _opened({("link_mass", "l3"): 0.9})
+    candidates = all_candidates(session.plant, session.rollouts, [])
+    mass = next(c for c in candidates if (c.effect, c.where) == ("link_mass", "l3"))
+    start = gauss_newton(problem, (mass,), mass.start, np.ones(len(problem.windows)))
+    fit = fit_many(problem, candidates, start, lambda text: None)
+    assert fit is not None and fit.of(mass)[0] == pytest.approx(0.9, rel=0.02)
+    assert not [c for c in fit.chosen if c.effect == "motor_strength"]
+
+
+def test_what_is_found_on_a_robot_like_its_model_does_not_pay() -> None:
+    """Another integrator looks like a little inertia on every joint."""
+    session, problem, other = _opened({})
+    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+    fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
+    assert fit is None or not pays_together(problem, Holdout(other), declared, fit)
+
+
+def test_an_effect_taken_out_by_slopes_leaves_what_a_refit_in_the_simulator_leaves() -> None:
+    session, problem, _ = _opened({("viscous_friction", "j1"): 0.1, ("viscous_friction", "j2"): 0.1})
+    three = [c for c in all_candidates(session.plant, session.rollouts, []) if c.effect == "viscous_friction"]
+    weights = window_weights(problem.residual([[]])[0])
+    full = gauss_newton(problem, three, [c.nominal[0] for c in three], weights, iterations=3)
+    less = without_some(problem, full, weights, {2})
+    again = gauss_newton(problem, less.chosen, less.values, weights, iterations=3)
+    assert less.chosen == tuple(three[:2])
+    assert less.values == pytest.approx(again.values, abs=0.002)
+    assert less.cost == pytest.approx(again.cost, rel=0.01)
+    declared = gauss_newton(problem, (), (), weights)
+    assert without_some(problem, full, weights, {0, 1, 2}).cost == pytest.approx(declared.cost, rel=0.05)

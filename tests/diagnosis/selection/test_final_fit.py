@@ -1,0 +1,59 @@
+"""The last fit is whitened anew as long as its model changes what a window shows, and not once more."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.candidates.enumerate import all_candidates
+from bumblebee.diagnosis.dataset.session import make_session
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
+from bumblebee.diagnosis.selection import final_fit as refining
+from bumblebee.diagnosis.selection.final_fit import refine
+from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from tests.diagnosis import arm
+
+LIMIT = 4.0
+
+
+@pytest.fixture(scope="module")
+def limited() -> tuple[Problem, list]:
+    """The arm with a torque limit on one joint, which decides everything in the windows that reach it."""
+    rollouts = arm.simulate({("torque_limit", "j2"): LIMIT}, count=2, seconds=4.0, seed=100)
+    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    windows = cut(session.plant, session.layout, session.rollouts, choose_starts(session.rollouts, [0, 1], 0.2, 24))
+    rng = np.random.default_rng(0)
+    problem = make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
+    every = all_candidates(session.plant, session.rollouts, [])
+    return problem, [next(c for c in every if (c.effect, c.where) == ("torque_limit", "j2"))]
+
+
+@pytest.mark.parametrize(("start", "least", "most"), [(LIMIT, 1, 1), (1.25 * LIMIT, 2, 4)])
+def test_whitened_as_often_as_the_model_changes(
+    limited: tuple[Problem, list], monkeypatch: pytest.MonkeyPatch, start: float, least: int, most: int
+) -> None:
+    problem, chosen = limited
+    begun = gauss_newton(problem, chosen, [start], window_weights(problem.residual([[]])[0]), iterations=0)
+    whitened: list[int] = []
+
+    def counted(*args: object) -> Problem:
+        whitened.append(1)
+        return make_problem(*args)
+
+    monkeypatch.setattr(refining, "make_problem", counted)
+    last = refine(problem, begun, np.random.default_rng(0))
+    assert least <= len(whitened) <= most
+    assert last.fit.values[0] == pytest.approx(LIMIT, rel=0.02)
+
+
+def test_a_limit_whose_interval_holds_the_declared_one_is_not_named(
+    limited: tuple[Problem, list], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, chosen = limited
+    begun = gauss_newton(problem, chosen, [LIMIT], window_weights(problem.residual([[]])[0]), iterations=0)
+    declared = chosen[0].nominal[0]
+    for half, named in ((0.9 * (declared - LIMIT), True), (1.1 * (declared - LIMIT), False)):
+        monkeypatch.setattr(refining, "half_widths", lambda *_, half=half: np.array([half]))
+        last = refine(problem, begun, np.random.default_rng(0))
+        assert [c.effect for c in last.fit.chosen] == (["torque_limit"] if named else [])
+        assert len(last.half) == len(last.fit.chosen)
