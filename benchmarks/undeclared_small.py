@@ -11,7 +11,7 @@ import time
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.dataset.session import make_session
+from bumblebee.diagnosis.dataset import make_session
 from bumblebee.diagnosis.diagnose import diagnose
 from tests.diagnosis.arm import JOINTS, SMALL, XML, simulate
 

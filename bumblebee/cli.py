@@ -51,12 +51,11 @@ def diagnose(
 ) -> None:
     """Find which effect the model lacks, add it, and report the error before and after."""
     from bumblebee.diagnosis.config import DiagnosisConfig
-    from bumblebee.diagnosis.dataset.session import open_session
+    from bumblebee.diagnosis.dataset import open_session
     from bumblebee.diagnosis.diagnose import diagnose
     from bumblebee.diagnosis.output import write_diagnosis
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
-    from bumblebee.diagnosis.report.example_windows import examples
-    from bumblebee.diagnosis.report.terminal import plot, summary
+    from bumblebee.diagnosis.report import examples, plot, summary
 
     claim_folder(out, DIAGNOSIS, overwrite, inputs_of(model, dataset))
     session = open_session(model, dataset)
@@ -77,7 +76,7 @@ def replay(
     overwrite: Overwrite = False,
 ) -> None:
     """The error of any model on any rollouts, by horizon."""
-    from bumblebee.diagnosis.dataset.session import open_session
+    from bumblebee.diagnosis.dataset import open_session
     from bumblebee.diagnosis.output import write_errors
     from bumblebee.diagnosis.places import claim_file, inputs_of
     from bumblebee.diagnosis.replay import replay
@@ -97,11 +96,11 @@ def gap(
     overwrite: Overwrite = False,
 ) -> None:
     """Where the model errs before anything is fitted."""
-    from bumblebee.diagnosis.dataset.session import open_session
-    from bumblebee.diagnosis.gap.gap import gap as compare
+    from bumblebee.diagnosis.dataset import open_session
+    from bumblebee.diagnosis.gap import gap as compare
     from bumblebee.diagnosis.output import write_gap
     from bumblebee.diagnosis.places import GAP, claim_folder, inputs_of
-    from bumblebee.diagnosis.report.terminal import gap_summary
+    from bumblebee.diagnosis.report import gap_summary
 
     if out:
         claim_folder(out, GAP, overwrite, inputs_of(model, dataset))

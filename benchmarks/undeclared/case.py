@@ -14,9 +14,9 @@ from benchmarks.undeclared.lottery import Case
 from benchmarks.undeclared.rivals import delta, fit_everything, oracle, pace, ridge
 from benchmarks.undeclared.rivals.common import error_of
 from benchmarks.undeclared.sight import problem_of
-from bumblebee.diagnosis.dataset.session import Session, make_session
+from bumblebee.diagnosis.dataset import Session, make_session
 from bumblebee.diagnosis.diagnose import diagnose
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.errors import BadInput
 
 _JUDGED, _FITTED = 60, 40  # windows

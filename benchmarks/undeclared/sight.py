@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bumblebee.diagnosis.dataset.session import Session
-from bumblebee.diagnosis.residuals.problem import Problem, make_problem
-from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.residuals import Problem, make_problem
+from bumblebee.diagnosis.simulation import choose_starts, cut
 
 HORIZON = 0.2  # [s]
 

@@ -8,23 +8,16 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from bumblebee.diagnosis.budget import Budget
-from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.paired_tests import standing
+from bumblebee.diagnosis.comparison import Holdout, standing
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.dataset.session import Session
-from bumblebee.diagnosis.discrepancy.catalogue_alternative import offers_of, with_named
-from bumblebee.diagnosis.discrepancy.discover import Discovery, discover
-from bumblebee.diagnosis.discrepancy.residual_tests import remains
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.discrepancy import Discovery, discover, offers_of, remains, with_named
+from bumblebee.diagnosis.estimation import gauss_newton
 from bumblebee.diagnosis.prepare import Material, gather
-from bumblebee.diagnosis.report.document import document
-from bumblebee.diagnosis.report.effect_entries import effect_entries, loss_entries
-from bumblebee.diagnosis.report.notes import unseen_notes
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
-from bumblebee.diagnosis.selection.final_fit import Refined, half_widths, refine
-from bumblebee.diagnosis.selection.forward import Search, search
-from bumblebee.diagnosis.selection.proposals.encoder_resolution import entries as rounding_entries
-from bumblebee.diagnosis.selection.proposals.encoder_resolution import grids
+from bumblebee.diagnosis.report import document, effect_entries, loss_entries, unseen_notes
+from bumblebee.diagnosis.residuals import Problem, window_weights
+from bumblebee.diagnosis.selection import Refined, Search, grids, half_widths, refine, search
+from bumblebee.diagnosis.selection import entries as rounding_entries
 from bumblebee.sim.effects import Effect
 
 _SMALL = 12  # degrees of freedom

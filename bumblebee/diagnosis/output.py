@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from bumblebee.diagnosis.diagnose import Diagnosis
-from bumblebee.diagnosis.gap.gap import Gap
-from bumblebee.diagnosis.gap.page import gap_page
+from bumblebee.diagnosis.gap import Gap, gap_page
 from bumblebee.diagnosis.places import DIAGNOSIS, GAP, Result, refuse_file, refuse_folder
-from bumblebee.diagnosis.report.example_windows import examples
-from bumblebee.diagnosis.report.page import render_report
+from bumblebee.diagnosis.report import examples, render_report
 from bumblebee.errors import BadInput
 from bumblebee.io.write import kept, write_file, write_folder
 from bumblebee.measured.model_file import name_assets_in_full

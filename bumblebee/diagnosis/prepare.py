@@ -5,16 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.enumerate import all_candidates, still_joints
-from bumblebee.diagnosis.candidates.signal_scales import scales_of
-from bumblebee.diagnosis.comparison.holdout import Holdout
+from bumblebee.diagnosis.candidates import Candidate, all_candidates, scales_of, still_joints
+from bumblebee.diagnosis.comparison import Holdout
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.dataset.informative_split import informative
-from bumblebee.diagnosis.dataset.session import Session
-from bumblebee.diagnosis.residuals.problem import Problem, make_problem
-from bumblebee.diagnosis.simulation.variation import vary
-from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.diagnosis.dataset import Session, informative
+from bumblebee.diagnosis.residuals import Problem, make_problem
+from bumblebee.diagnosis.simulation import choose_starts, cut, vary
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from bumblebee.diagnosis.dataset.session import Session
-from bumblebee.diagnosis.report.prediction_error import error_block, horizon_whiteners, horizon_windows
-from bumblebee.diagnosis.simulation.variation import vary
+from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.report import error_block, horizon_whiteners, horizon_windows
+from bumblebee.diagnosis.simulation import vary
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import CATALOGUE, Effect
 

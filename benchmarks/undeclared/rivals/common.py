@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.undeclared.sight import error_of as residual_error
 from bumblebee.deploy.undeclared.declared import Declared
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.sim.effects import Effect
 
 _SHARE, _LEAST = 0.05, 0.01

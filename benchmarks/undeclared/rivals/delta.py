@@ -12,8 +12,8 @@ from benchmarks.undeclared.rivals.common import Answer
 from benchmarks.undeclared.rivals.ridge import cross_validated
 from benchmarks.undeclared.sight import error_of
 from bumblebee.deploy.undeclared.declared import Declared
-from bumblebee.diagnosis.residuals.problem import Problem
-from bumblebee.diagnosis.simulation.readings import difference, simulated_readings
+from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.simulation import difference, simulated_readings
 
 _TICK = 0.02  # [s]
 _FEATURES = 7

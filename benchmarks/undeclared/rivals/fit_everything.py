@@ -13,7 +13,7 @@ from benchmarks.undeclared.rivals.common import (
     residuals_of,
 )
 from bumblebee.deploy.undeclared.declared import Declared
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 
 _ROUNDS = 3
 

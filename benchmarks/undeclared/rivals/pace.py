@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.undeclared.rivals.common import Answer, Parameter, error_of, joint_parameters, named, residuals_of
 from bumblebee.deploy.undeclared.declared import Declared
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.sim.effects import Effect
 
 _KINDS = ("armature", "viscous_friction", "coulomb_friction", "encoder_offset")

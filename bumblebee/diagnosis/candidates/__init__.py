@@ -1,1 +1,56 @@
-"""TODO."""
+"""Which effects the model may lack: every effect of the catalogue in every place, with its size and traits."""
+
+from bumblebee.diagnosis.candidates.candidate import (
+    INVERSE,
+    SHAPED,
+    Candidate,
+    clipped,
+    effects_at,
+    is_simulated,
+    shortlisted,
+    without,
+)
+from bumblebee.diagnosis.candidates.enumerate import all_candidates, still_joints
+from bumblebee.diagnosis.candidates.exclusion import is_chosen, is_like
+from bumblebee.diagnosis.candidates.formula import Formula, formula
+from bumblebee.diagnosis.candidates.signal_scales import scales_of
+from bumblebee.diagnosis.candidates.traits import (
+    ABRUPT,
+    EXPERIMENTS,
+    IMU_TILT,
+    SATURATIONS,
+    USUAL,
+    USUAL_OF_BODIES,
+    USUAL_OF_ROBOT,
+    USUAL_OF_TORQUE,
+    label,
+    rough,
+)
+
+__all__ = [
+    "ABRUPT",
+    "EXPERIMENTS",
+    "IMU_TILT",
+    "INVERSE",
+    "SATURATIONS",
+    "SHAPED",
+    "USUAL",
+    "USUAL_OF_BODIES",
+    "USUAL_OF_ROBOT",
+    "USUAL_OF_TORQUE",
+    "Candidate",
+    "Formula",
+    "all_candidates",
+    "clipped",
+    "effects_at",
+    "formula",
+    "is_chosen",
+    "is_like",
+    "is_simulated",
+    "label",
+    "rough",
+    "scales_of",
+    "shortlisted",
+    "still_joints",
+    "without",
+]

@@ -7,8 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.candidates.signal_scales import Scales, scales_of
-from bumblebee.diagnosis.simulation.declared import declared_values, touching
-from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation import Plant, declared_values, touching
 from bumblebee.measured.rollout import Rollout
 
 _STIFF = 0.03  # of a servo's own compliance

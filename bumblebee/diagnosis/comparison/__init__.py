@@ -1,1 +1,77 @@
-"""TODO."""
+"""Whether one model is better than another: held-out windows, standard errors, the number of parameters."""
+
+from bumblebee.diagnosis.comparison.backward_elimination import (
+    SURE,
+    certainty,
+    is_physical,
+    pruned,
+    still_paying,
+    surest,
+    without_idle,
+    without_needless,
+    without_spent,
+)
+from bumblebee.diagnosis.comparison.holdout import Holdout
+from bumblebee.diagnosis.comparison.information_criterion import PARAMETER, criterion, numbers_of, parameters
+from bumblebee.diagnosis.comparison.paired_tests import (
+    MUCH,
+    better,
+    is_better,
+    lead,
+    no_worse_by_mean,
+    no_worse_within_errors,
+    pays_together,
+    pays_where_felt,
+    pays_where_rare,
+    plausible,
+    standing,
+)
+from bumblebee.diagnosis.comparison.submodel import (
+    less,
+    linear_cost,
+    linearly_without,
+    refitted,
+    with_columns_without,
+    without_one,
+)
+from bumblebee.diagnosis.comparison.wald import Step, costs_more_than, evidence, wald, z_value, z_values
+
+__all__ = [
+    "MUCH",
+    "PARAMETER",
+    "SURE",
+    "Holdout",
+    "Step",
+    "better",
+    "certainty",
+    "costs_more_than",
+    "criterion",
+    "evidence",
+    "is_better",
+    "is_physical",
+    "lead",
+    "less",
+    "linear_cost",
+    "linearly_without",
+    "no_worse_by_mean",
+    "no_worse_within_errors",
+    "numbers_of",
+    "parameters",
+    "pays_together",
+    "pays_where_felt",
+    "pays_where_rare",
+    "plausible",
+    "pruned",
+    "refitted",
+    "standing",
+    "still_paying",
+    "surest",
+    "wald",
+    "with_columns_without",
+    "without_idle",
+    "without_needless",
+    "without_one",
+    "without_spent",
+    "z_value",
+    "z_values",
+]

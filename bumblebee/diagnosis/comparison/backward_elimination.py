@@ -20,19 +20,20 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.formula import Formula
-from bumblebee.diagnosis.candidates.traits import SATURATIONS, USUAL_OF_BODIES
+from bumblebee.diagnosis.candidates import SATURATIONS, USUAL_OF_BODIES, Candidate, Formula
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.paired_tests import pays_where_felt, pays_where_rare
 from bumblebee.diagnosis.comparison.submodel import refitted, without_one, without_some
 from bumblebee.diagnosis.comparison.wald import costs_more_than, wald
-from bumblebee.diagnosis.estimation.covariance import standard_covariance
-from bumblebee.diagnosis.estimation.fit import Fit, typical_power
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.estimation.integrator_error import beyond_numerics
-from bumblebee.diagnosis.estimation.least_squares import cost_of
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
+from bumblebee.diagnosis.estimation import (
+    Fit,
+    beyond_numerics,
+    cost_of,
+    gauss_newton,
+    standard_covariance,
+    typical_power,
+)
+from bumblebee.diagnosis.residuals import Problem, window_weights
 
 # Where the model restarts a late encoder's joint follows from the mean of two noisy readings: that alone gains a
 # little of the chi-square of the joint's own signals, on all joints at once more.

@@ -13,14 +13,9 @@ import numpy as np
 from scipy.stats import norm, wilcoxon
 from scipy.stats import t as student
 
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.least_squares import cost_of
-from bumblebee.diagnosis.residuals.nuisances import nuisance_columns
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
-from bumblebee.diagnosis.simulation.cache import Recall
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.variation import vary
-from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.diagnosis.estimation import Fit, cost_of
+from bumblebee.diagnosis.residuals import Problem, nuisance_columns, window_weights
+from bumblebee.diagnosis.simulation import Recall, Windows, residuals, vary
 from bumblebee.sim.effects import Effect
 
 _FEW = 8  # windows that ranks can be trusted with

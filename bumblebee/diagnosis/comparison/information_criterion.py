@@ -4,10 +4,9 @@ import re
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.formula import Formula
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.candidates import Candidate, Formula
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.residuals import Problem
 
 PARAMETER = 4.0  # log-likelihood that a parameter must bring
 

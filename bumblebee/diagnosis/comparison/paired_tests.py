@@ -15,9 +15,8 @@ from scipy.stats import t as student
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.information_criterion import criterion, parameters
 from bumblebee.diagnosis.comparison.submodel import less
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.least_squares import cost_of
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
+from bumblebee.diagnosis.estimation import Fit, cost_of
+from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.sim.effects import Effect
 
 _SURER = 3.0  # standard errors, where windows count to which the fits have bent

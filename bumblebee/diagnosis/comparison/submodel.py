@@ -5,11 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, clipped, effects_at
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.estimation.least_squares import cost_of, project, solve
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
+from bumblebee.diagnosis.candidates import Candidate, clipped, effects_at
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, project, solve
+from bumblebee.diagnosis.residuals import Problem, window_weights
 
 
 def refitted(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, known: Fit | None = None) -> Fit:

@@ -6,12 +6,9 @@ import numpy as np
 from scipy.stats import chi2, norm
 from scipy.stats import f as fisher
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.traits import ABRUPT, SATURATIONS
-from bumblebee.diagnosis.estimation.covariance import expected_covariance, standard_covariance
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.least_squares import cost_of
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate
+from bumblebee.diagnosis.estimation import Fit, cost_of, expected_covariance, standard_covariance
+from bumblebee.diagnosis.residuals import Problem
 
 
 @dataclass(eq=False)

@@ -14,9 +14,7 @@ import numpy as np
 
 from bumblebee.diagnosis.dataset.session import Session
 from bumblebee.diagnosis.dataset.split import motion_names
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.variation import vary
-from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.diagnosis.simulation import choose_starts, cut, residuals, vary
 from bumblebee.sim.effects import Effect
 
 _BUDGET = 300  # windows

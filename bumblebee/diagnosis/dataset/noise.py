@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from bumblebee.diagnosis.simulation.readings import Layout, conjugate, measured_readings, multiply, rotation_vector
+from bumblebee.diagnosis.simulation import Layout, conjugate, measured_readings, multiply, rotation_vector
 from bumblebee.measured.rollout import Rollout
 
 _BLOCK = 24

@@ -13,9 +13,15 @@ from bumblebee.diagnosis.dataset.split import accepting, split
 from bumblebee.diagnosis.dataset.time_steps import longest_step, step_for
 from bumblebee.diagnosis.dataset.undriven import undriven_warnings
 from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages
-from bumblebee.diagnosis.simulation.actuators import fold_dampers
-from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, refuse_unlogged
-from bumblebee.diagnosis.simulation.readings import Layout, layout_of
+from bumblebee.diagnosis.simulation import (
+    Layout,
+    Plant,
+    fold_dampers,
+    layout_of,
+    load_spec,
+    make_plant,
+    refuse_unlogged,
+)
 from bumblebee.errors import BadInput
 from bumblebee.measured.checks_magnitude import beyond
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.simulation.readings import Layout
+from bumblebee.diagnosis.simulation import Layout
 from bumblebee.measured.rollout import Rollout
 
 HALF_SPAN = 0.01  # [s]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation import Plant
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 

@@ -10,23 +10,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, shortlisted
-from bumblebee.diagnosis.candidates.exclusion import is_chosen
-from bumblebee.diagnosis.candidates.formula import Formula
-from bumblebee.diagnosis.comparison.backward_elimination import SURE, without_needless
-from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.information_criterion import criterion, parameters
-from bumblebee.diagnosis.comparison.paired_tests import lead
-from bumblebee.diagnosis.comparison.submodel import refitted
-from bumblebee.diagnosis.comparison.wald import costs_more_than, evidence, wald
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton, resolved
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
-from bumblebee.diagnosis.selection.forward import Search
-from bumblebee.diagnosis.selection.score_tests import score_tests
-from bumblebee.diagnosis.selection.trial import try_one
-from bumblebee.diagnosis.sensitivities.columns import Columns
-from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.candidates import Candidate, Formula, is_chosen, shortlisted
+from bumblebee.diagnosis.comparison import (
+    SURE,
+    Holdout,
+    costs_more_than,
+    criterion,
+    evidence,
+    lead,
+    parameters,
+    refitted,
+    wald,
+    without_needless,
+)
+from bumblebee.diagnosis.estimation import Fit, gauss_newton, resolved
+from bumblebee.diagnosis.residuals import Problem, window_weights
+from bumblebee.diagnosis.selection import Search, score_tests, try_one
+from bumblebee.diagnosis.sensitivities import Columns
+from bumblebee.diagnosis.simulation import Plant
 
 _OFFERS, _SHAPES = 5, 2  # effects whose sensitivities are simulated, and shapes of each
 _ANYWHERE = 2  # of these the most promising may be on other joints

@@ -4,11 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.formula import Formula
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.simulation.declared import declared_values
-from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.candidates import Candidate, Formula
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.simulation import Plant, declared_values
 from bumblebee.sim.effect_terms import read_term
 from bumblebee.sim.servo import servos_of
 

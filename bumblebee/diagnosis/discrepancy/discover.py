@@ -15,19 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from bumblebee.diagnosis.budget import Budget
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.comparison.backward_elimination import SURE, without_idle, without_spent
-from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.paired_tests import is_better
-from bumblebee.diagnosis.comparison.submodel import less
-from bumblebee.diagnosis.comparison.wald import wald
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.comparison import SURE, Holdout, is_better, less, wald, without_idle, without_spent
 from bumblebee.diagnosis.discrepancy.catalogue_alternative import Offers, named_instead
 from bumblebee.diagnosis.discrepancy.form import MANY, Form, best_form, form_of
 from bumblebee.diagnosis.discrepancy.residual_tests import JointRemains, Remains, remains
 from bumblebee.diagnosis.discrepancy.single_law import single_laws
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import resolved
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
+from bumblebee.diagnosis.estimation import Fit, resolved
+from bumblebee.diagnosis.residuals import Problem, window_weights
 
 _JOINTS = 3  # joints at most that get a form
 _Z, _LEAST = 2.0, 0.01  # of the judging windows' gain, and its least share

@@ -6,17 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bumblebee.diagnosis.budget import Budget
-from bumblebee.diagnosis.candidates.formula import formula
-from bumblebee.diagnosis.comparison.backward_elimination import without_needless
-from bumblebee.diagnosis.comparison.information_criterion import PARAMETER, criterion
-from bumblebee.diagnosis.comparison.submodel import less, refitted, without_one
+from bumblebee.diagnosis.candidates import formula
+from bumblebee.diagnosis.comparison import PARAMETER, criterion, less, refitted, without_needless, without_one
 from bumblebee.diagnosis.discrepancy.catalogue_terms import in_terms, related, stiffer_than_the_drive
 from bumblebee.diagnosis.discrepancy.missing_torque import fitted_scene
 from bumblebee.diagnosis.discrepancy.residual_tests import Remains
 from bumblebee.diagnosis.discrepancy.stepwise_regression import Found, library, seek
 from bumblebee.diagnosis.discrepancy.term_library import beside, joined
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.residuals import Problem
 
 MANY = (
     8  # effects in a fit beyond which one joint gets a form, names stay, inner numbers too: every trial refits them all

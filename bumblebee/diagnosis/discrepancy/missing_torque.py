@@ -8,12 +8,10 @@ import numpy as np
 
 from bumblebee.diagnosis.discrepancy.regressors import Quantities, quantities
 from bumblebee.diagnosis.discrepancy.torque_scores import Evidence, joint_answers, make_evidence
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.least_squares import project, solve
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
-from bumblebee.diagnosis.sensitivities.columns import pulse_sizes
-from bumblebee.diagnosis.sensitivities.impulse_responses import answers_of
-from bumblebee.diagnosis.simulation.variation import Variation, vary
+from bumblebee.diagnosis.estimation import Fit, project, solve
+from bumblebee.diagnosis.residuals import Problem, window_weights
+from bumblebee.diagnosis.sensitivities import answers_of, pulse_sizes
+from bumblebee.diagnosis.simulation import Variation, vary
 from bumblebee.sim.effects import Effect
 
 

@@ -11,10 +11,8 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.sensitivities.impulse_responses import Path
-from bumblebee.diagnosis.simulation.actuator_history import at_starts, state_before
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.diagnosis.sensitivities import Path
+from bumblebee.diagnosis.simulation import Plant, Windows, at_starts, state_before
 from bumblebee.sim.effect_states import State
 from bumblebee.sim.effect_terms import Term
 from bumblebee.sim.servo import servos_of

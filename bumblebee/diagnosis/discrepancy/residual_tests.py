@@ -12,13 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from bumblebee.diagnosis.comparison.paired_tests import better
+from bumblebee.diagnosis.comparison import better
 from bumblebee.diagnosis.discrepancy.missing_torque import Scene, fitted_scene, judged_scene
 from bumblebee.diagnosis.discrepancy.stepwise_regression import Found, Library, Sought, closest, library, seek
 from bumblebee.diagnosis.discrepancy.term_library import Law
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.least_squares import solve
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.estimation import Fit, solve
+from bumblebee.diagnosis.residuals import Problem
 
 _LEAST = 0.01  # share of a joint's typical torque below which structure is not worth a word
 _POWER, _AGAIN, _ALONE = 4.0, 1.5, 6.0  # standard errors of a joint's power: fitted, judged, fitted without judges

@@ -10,15 +10,14 @@ from itertools import combinations
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, effects_at
-from bumblebee.diagnosis.candidates.formula import Formula
-from bumblebee.diagnosis.comparison.information_criterion import numbers_of
+from bumblebee.diagnosis.candidates import Candidate, Formula, effects_at
+from bumblebee.diagnosis.comparison import numbers_of
 from bumblebee.diagnosis.discrepancy.missing_torque import Scene
 from bumblebee.diagnosis.discrepancy.stepwise_regression import Found, Library, closer, library
 from bumblebee.diagnosis.discrepancy.term_library import Law
 from bumblebee.diagnosis.discrepancy.torque_scores import Evidence
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.residuals import Problem
 
 _LOOK = 3  # best laws whose inner numbers are refined
 _NEAR = 0.9  # share of what the names gain that a law at a guess of its inner number must

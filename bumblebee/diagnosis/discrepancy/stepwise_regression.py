@@ -9,7 +9,7 @@ from scipy.stats import norm
 from bumblebee.diagnosis.discrepancy.regressors import Quantities
 from bumblebee.diagnosis.discrepancy.term_library import Law, all_laws
 from bumblebee.diagnosis.discrepancy.torque_scores import Evidence, Verdict
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 
 LEVEL = 0.002  # of a false law in a whole dataset, shared among all that are looked at
 _LEAST = 0.005  # share of the cost that a law must take away to be worth a word

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2, norm
 
-from bumblebee.diagnosis.comparison.wald import z_value
-from bumblebee.diagnosis.estimation.least_squares import project, solve
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
-from bumblebee.diagnosis.sensitivities.impulse_responses import Answers
+from bumblebee.diagnosis.comparison import z_value
+from bumblebee.diagnosis.estimation import project, solve
+from bumblebee.diagnosis.residuals import Problem, window_weights
+from bumblebee.diagnosis.sensitivities import Answers
 
 _SEEN = 1e-3  # share of a column's power that must be left beside what is already explained
 _LEAST_SPREAD = 0.25  # of the curvature: a variance over few windows may come out far too small

@@ -5,7 +5,7 @@ from scipy.stats import t as student
 
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.least_squares import project
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 
 _ENOUGH_ROLLOUTS = 6  # fewer say little about how much rollouts differ
 _GAP_ERROR = 0.35  # of a gap: five came out at 57 to 93 % of their size

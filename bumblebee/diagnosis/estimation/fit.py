@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, effects_at
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.candidates import Candidate, effects_at
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.sim.effects import Effect
 
 

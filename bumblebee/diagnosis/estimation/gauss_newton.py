@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, clipped, effects_at
+from bumblebee.diagnosis.candidates import Candidate, clipped, effects_at
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.jacobian import columns_at, taken_over
 from bumblebee.diagnosis.estimation.least_squares import cost_of, project, solve
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 
 
 def resolved(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:

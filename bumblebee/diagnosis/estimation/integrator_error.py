@@ -15,9 +15,8 @@ import numpy as np
 
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.least_squares import project, solve
-from bumblebee.diagnosis.residuals.problem import Problem
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.variation import Variation, vary
+from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.simulation import Variation, residuals, vary
 
 _FEIGNED = 0.4  # share of an effect that another integrator may feign
 _FINITE = 0.8  # share of the windows that it must get through

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, clipped, effects_at
-from bumblebee.diagnosis.candidates.traits import rough
+from bumblebee.diagnosis.candidates import Candidate, clipped, effects_at, rough
 from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 
 _FAR = 0.2  # of a change that matters: so far a parameter may move before sensitivities near it are simulated again
 

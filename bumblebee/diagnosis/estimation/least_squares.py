@@ -3,7 +3,7 @@
 import numpy as np
 
 from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 
 
 def project(

@@ -15,12 +15,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, clipped, effects_at
-from bumblebee.diagnosis.candidates.traits import ABRUPT, SATURATIONS
+from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate, clipped, effects_at
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.estimation.least_squares import cost_of, project, solve
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 
 _STEP = 0.2  # of a change that matters, to either side: what smooths the jumps and is still linear
 _ROUNDS = 2  # the second around where the first leads; with many parameters only if they leave the points

@@ -14,7 +14,7 @@ from scipy.stats import t as student
 from sklearn.ensemble import HistGradientBoostingRegressor
 
 from bumblebee.diagnosis.gap.torque_residual import TorqueResidual
-from bumblebee.diagnosis.report.discrepancy_entries import measured_curve
+from bumblebee.diagnosis.report import measured_curve
 
 LEVEL = 0.01
 _LEAST = 0.01  # share of a joint's typical torque below which structure is not worth a word

@@ -6,19 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.enumerate import still_joints
-from bumblebee.diagnosis.dataset.session import JUDGED_TWICE, Session
+from bumblebee.diagnosis.candidates import still_joints
+from bumblebee.diagnosis.dataset import JUDGED_TWICE, Session
 from bumblebee.diagnosis.gap.dependence_test import JointStructure
 from bumblebee.diagnosis.gap.reported_torque import reported_torque
 from bumblebee.diagnosis.gap.sparse_regression import examine
 from bumblebee.diagnosis.gap.torque_residual import TorqueResidual, missing_torques
-from bumblebee.diagnosis.report.example_windows import examples
-from bumblebee.diagnosis.report.notes import ALONE
-from bumblebee.diagnosis.report.prediction_error import error_block, floor_block, horizon_whiteners, horizon_windows
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.units import joint_units, members, mixed_notes
-from bumblebee.diagnosis.simulation.variation import vary
-from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.diagnosis.report import ALONE, error_block, examples, floor_block, horizon_whiteners, horizon_windows
+from bumblebee.diagnosis.simulation import Windows, joint_units, members, mixed_notes, residuals, vary
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,10 +4,21 @@ from html import escape
 from typing import Any
 
 from bumblebee.diagnosis.gap.gap import Gap
-from bumblebee.diagnosis.report.html import error_rows, figure, items, number, page, probability, shade, table, warning
-from bumblebee.diagnosis.report.notes import nothing_seen
-from bumblebee.diagnosis.report.svg import cloud_picture, line_picture
-from bumblebee.diagnosis.simulation.units import motion_error, named, of_joint, pick, position_rows
+from bumblebee.diagnosis.report import (
+    cloud_picture,
+    error_rows,
+    figure,
+    items,
+    line_picture,
+    nothing_seen,
+    number,
+    page,
+    probability,
+    shade,
+    table,
+    warning,
+)
+from bumblebee.diagnosis.simulation import motion_error, named, of_joint, pick, position_rows
 
 _MOTIONS = 15
 

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.windows import command_inputs
+from bumblebee.diagnosis.simulation import Plant, command_inputs
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.servo import servos_of
 

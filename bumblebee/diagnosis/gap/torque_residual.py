@@ -11,14 +11,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bumblebee.diagnosis.dataset.session import Session
-from bumblebee.diagnosis.residuals.nuisances import nuisance_columns
-from bumblebee.diagnosis.simulation.declared import declared_values
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.readings import Layout
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.variation import vary
-from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, command_inputs, cut
+from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.residuals import nuisance_columns
+from bumblebee.diagnosis.simulation import (
+    Layout,
+    Plant,
+    Windows,
+    choose_starts,
+    command_inputs,
+    cut,
+    declared_values,
+    residuals,
+    vary,
+)
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect, single
 from bumblebee.sim.servo import servos_of

@@ -10,12 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from bumblebee.diagnosis.candidates.formula import Formula
-from bumblebee.diagnosis.discrepancy.catalogue_terms import quantities_of
-from bumblebee.diagnosis.discrepancy.discover import Discovery
-from bumblebee.diagnosis.discrepancy.residual_tests import JointRemains
-from bumblebee.diagnosis.discrepancy.term_library import Law
-from bumblebee.diagnosis.simulation.units import joint_units
+from bumblebee.diagnosis.candidates import Formula
+from bumblebee.diagnosis.discrepancy import Discovery, JointRemains, Law, quantities_of
+from bumblebee.diagnosis.simulation import joint_units
 
 NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
 _NAMED = 3  # joints that get a sentence

@@ -4,18 +4,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.dataset.session import Session
-from bumblebee.diagnosis.discrepancy.discover import Discovery
+from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.discrepancy import Discovery
 from bumblebee.diagnosis.prepare import Material
 from bumblebee.diagnosis.report.discrepancy_entries import NOT_TESTED, structure_table, unexplained
 from bumblebee.diagnosis.report.notes import LONE, factor_notes, latency_notes, unexplained_error
 from bumblebee.diagnosis.report.prediction_error import error_block, floor_block, horizon_whiteners, horizon_windows
-from bumblebee.diagnosis.residuals.nuisances import NAMES
-from bumblebee.diagnosis.selection.confounding import detectable
-from bumblebee.diagnosis.selection.final_fit import Refined
-from bumblebee.diagnosis.selection.forward import Search
-from bumblebee.diagnosis.simulation.units import joint_units, mixed_notes
-from bumblebee.diagnosis.simulation.variation import vary
+from bumblebee.diagnosis.residuals import NAMES
+from bumblebee.diagnosis.selection import Refined, Search, detectable
+from bumblebee.diagnosis.simulation import joint_units, mixed_notes, vary
 from bumblebee.sim.effects import Effect
 
 _STILL = "the joint moves no more than its sensor's noise"

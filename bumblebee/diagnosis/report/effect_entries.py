@@ -6,22 +6,14 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from bumblebee.diagnosis.candidates.candidate import INVERSE, SHAPED, Candidate, without
-from bumblebee.diagnosis.candidates.formula import Formula
-from bumblebee.diagnosis.candidates.traits import EXPERIMENTS, label
-from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.wald import wald
-from bumblebee.diagnosis.discrepancy.discover import Discovery
-from bumblebee.diagnosis.estimation.fit import Fit
+from bumblebee.diagnosis.candidates import EXPERIMENTS, INVERSE, SHAPED, Candidate, Formula, label, without
+from bumblebee.diagnosis.comparison import Holdout, wald
+from bumblebee.diagnosis.discrepancy import Discovery
+from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.report.discrepancy_entries import discovered_entry
-from bumblebee.diagnosis.residuals.problem import Problem
-from bumblebee.diagnosis.selection.confounding import alike, rivals
-from bumblebee.diagnosis.selection.final_fit import Refined
-from bumblebee.diagnosis.selection.forward import Search
-from bumblebee.diagnosis.selection.state import Loss
-from bumblebee.diagnosis.simulation.declared import declared_values
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.units import unit_on
+from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection import Loss, Refined, Search, alike, rivals
+from bumblebee.diagnosis.simulation import Plant, declared_values, unit_on
 from bumblebee.sim.effect_catalogue import is_native
 from bumblebee.sim.effects import CATALOGUE, Effect
 

@@ -5,10 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.diagnosis.dataset.session import Session
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.variation import vary
-from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.simulation import choose_starts, cut, residuals, vary
 from bumblebee.sim.effects import Effect
 
 _LENGTHS = (1.0, 0.6, 0.2)  # [s]

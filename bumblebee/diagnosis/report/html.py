@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from bumblebee.diagnosis.simulation.units import pick
-from bumblebee.diagnosis.simulation.units import rows as rows_of
+from bumblebee.diagnosis.simulation import pick
+from bumblebee.diagnosis.simulation import rows as rows_of
 
 _STYLE = """:root{color-scheme:light}body{font:15px/1.55 system-ui,-apple-system,'Segoe UI',sans-serif;max-width:62rem;
 margin:2.2rem auto;padding:0 1.2rem;color:#1d2430;background:#fff}h1{font-size:1.7rem;margin:0 0 .3rem}

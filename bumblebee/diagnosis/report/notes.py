@@ -20,10 +20,9 @@ What must not be overlooked: a correction that is worse, a large error that noth
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bumblebee.diagnosis.dataset.informative_split import window_errors
-from bumblebee.diagnosis.dataset.session import Session
+from bumblebee.diagnosis.dataset import Session, window_errors
 from bumblebee.diagnosis.report.html import number
-from bumblebee.diagnosis.simulation.units import pick, position_rows, rows
+from bumblebee.diagnosis.simulation import pick, position_rows, rows
 from bumblebee.sim.effects import Effect
 
 _LATE = ("command_delay", "encoder_delay")

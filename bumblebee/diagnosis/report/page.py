@@ -7,7 +7,7 @@ from typing import Any
 from bumblebee.diagnosis.report.html import error_rows, figure, items, number, page, probability, table, warning
 from bumblebee.diagnosis.report.notes import beside_noise, told_horizon, unexplained_error, what_is_left, worse_horizons
 from bumblebee.diagnosis.report.svg import curve_picture, line_picture
-from bumblebee.diagnosis.simulation.units import named, of_joint, pick, position_rows
+from bumblebee.diagnosis.simulation import named, of_joint, pick, position_rows
 
 _DETECTABLE = 60
 

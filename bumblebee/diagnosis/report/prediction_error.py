@@ -10,13 +10,19 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from bumblebee.diagnosis.residuals.whitening import Whitener, fit_whitener
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.readings import Layout
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.units import KINDS, members
-from bumblebee.diagnosis.simulation.variation import Variation
-from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, cut, select
+from bumblebee.diagnosis.residuals import Whitener, fit_whitener
+from bumblebee.diagnosis.simulation import (
+    KINDS,
+    Layout,
+    Plant,
+    Variation,
+    Windows,
+    choose_starts,
+    cut,
+    members,
+    residuals,
+    select,
+)
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.units import joint_unit
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from bumblebee.diagnosis.report.notes import nothing_seen, what_is_left, worse_horizons
-from bumblebee.diagnosis.simulation.units import motion_error, named, of_joint, pick, rows
+from bumblebee.diagnosis.simulation import motion_error, named, of_joint, pick, rows
 
 _MARKS = {"target": ".", "before": "x", "after": "o", "measured": "#"}
 

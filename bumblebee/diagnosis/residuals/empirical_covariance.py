@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from bumblebee.diagnosis.residuals.problem import Problem
-from bumblebee.diagnosis.simulation.cache import Recall
+from bumblebee.diagnosis.simulation import Recall
 
 _ROUNDS = 4  # of covariance and weights
 _FEWEST = 2  # windows for each value of a window, below which a covariance says too little

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.traits import IMU_TILT
+from bumblebee.diagnosis.candidates import IMU_TILT
 from bumblebee.diagnosis.residuals.whitening import Whitener
-from bumblebee.diagnosis.simulation.readings import Layout
+from bumblebee.diagnosis.simulation import Layout
 from bumblebee.sim.effects import Effect
 
 

@@ -12,11 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from bumblebee.diagnosis.residuals.whitening import displaced, factors_of, sample, start_noise
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.readings import Layout
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.variation import Variation
-from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.diagnosis.simulation import Layout, Plant, Variation, Windows, residuals
 
 _OUTPUTS = 2  # compared ticks that say where a window started
 _MOST = 2.5  # standard deviations of its noise that a coordinate may move

@@ -17,11 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.readings import Layout
-from bumblebee.diagnosis.simulation.simulate import Starts, residuals
-from bumblebee.diagnosis.simulation.variation import Variation
-from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.diagnosis.simulation import Layout, Plant, Starts, Variation, Windows, residuals
 
 NAMES = ("integrator", "position_loop", "velocity_loop", "velocity_clock", "height")
 _UNIT = 0.001  # [s]

@@ -6,18 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, without
-from bumblebee.diagnosis.candidates.traits import rough
+from bumblebee.diagnosis.candidates import Candidate, rough, without
 from bumblebee.diagnosis.residuals.imu_tilt import angles, retilted, tilt_columns, tilt_of
 from bumblebee.diagnosis.residuals.initial_state import restarted, start_moves
 from bumblebee.diagnosis.residuals.nuisances import nuisance_columns
 from bumblebee.diagnosis.residuals.whitening import Whitener, fit_whitener
-from bumblebee.diagnosis.simulation.cache import Recall
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.readings import Layout
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.variation import vary
-from bumblebee.diagnosis.simulation.windows import Windows, select
+from bumblebee.diagnosis.simulation import Layout, Plant, Recall, Windows, residuals, select, vary
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 

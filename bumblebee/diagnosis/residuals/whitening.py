@@ -19,11 +19,18 @@ import numpy as np
 from scipy.linalg import hadamard
 from scipy.linalg.lapack import dtrtri
 
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.readings import Layout, conjugate, from_rotation_vector, multiply, rotate
-from bumblebee.diagnosis.simulation.simulate import Starts, residuals
-from bumblebee.diagnosis.simulation.variation import Variation
-from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.diagnosis.simulation import (
+    Layout,
+    Plant,
+    Starts,
+    Variation,
+    Windows,
+    conjugate,
+    from_rotation_vector,
+    multiply,
+    residuals,
+    rotate,
+)
 
 # Share of the variance that is not linear in the starts that counts. It grows with their variance squared, and what the
 # next readings leave of that is 0.6 to 0.7 on a standing G1.

@@ -1,1 +1,25 @@
-"""TODO."""
+"""Which effects: tests, trials, proposals and swaps, one after the other until nothing pays."""
+
+from bumblebee.diagnosis.selection.confounding import alike, detectable, rivals
+from bumblebee.diagnosis.selection.final_fit import Refined, half_widths, refine
+from bumblebee.diagnosis.selection.forward import Search, search
+from bumblebee.diagnosis.selection.proposals.encoder_resolution import entries, grids
+from bumblebee.diagnosis.selection.score_tests import score_tests
+from bumblebee.diagnosis.selection.state import Loss
+from bumblebee.diagnosis.selection.trial import try_one
+
+__all__ = [
+    "Loss",
+    "Refined",
+    "Search",
+    "alike",
+    "detectable",
+    "entries",
+    "grids",
+    "half_widths",
+    "refine",
+    "rivals",
+    "score_tests",
+    "search",
+    "try_one",
+]

@@ -5,20 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import INVERSE, Candidate
-from bumblebee.diagnosis.candidates.exclusion import is_chosen
-from bumblebee.diagnosis.candidates.traits import label
-from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.paired_tests import no_worse_within_errors
-from bumblebee.diagnosis.comparison.submodel import linearly_without
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.estimation.least_squares import project, solve
+from bumblebee.diagnosis.candidates import INVERSE, Candidate, is_chosen, label
+from bumblebee.diagnosis.comparison import Holdout, linearly_without, no_worse_within_errors
+from bumblebee.diagnosis.estimation import Fit, gauss_newton, project, solve
 from bumblebee.diagnosis.selection.forward import Search
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.trial import Trial, try_one
-from bumblebee.diagnosis.sensitivities.columns import Columns
-from bumblebee.diagnosis.simulation.units import unit_on
+from bumblebee.diagnosis.sensitivities import Columns
+from bumblebee.diagnosis.simulation import unit_on
 from bumblebee.sim.effects import CATALOGUE
 
 _SAME = 0.95

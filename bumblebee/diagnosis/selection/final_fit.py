@@ -5,17 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, effects_at
-from bumblebee.diagnosis.candidates.traits import ABRUPT, SATURATIONS
-from bumblebee.diagnosis.comparison.backward_elimination import pruned, still_paying
-from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.estimation.covariance import interval
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.estimation.integrator_error import moves
-from bumblebee.diagnosis.estimation.least_squares import cost_of
-from bumblebee.diagnosis.estimation.response_surface import last_step
-from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
+from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate, effects_at
+from bumblebee.diagnosis.comparison import Holdout, pruned, still_paying
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, interval, last_step, moves
+from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
 from bumblebee.errors import BadInput
 
 _SURE = 3.0  # standard errors

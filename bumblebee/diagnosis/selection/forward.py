@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bumblebee.diagnosis.budget import Budget
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.traits import SATURATIONS
-from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.wald import Step
+from bumblebee.diagnosis.candidates import SATURATIONS, Candidate
+from bumblebee.diagnosis.comparison import Holdout, Step
 from bumblebee.diagnosis.config import SearchConfig
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
 from bumblebee.diagnosis.selection.proposals.backlash import play_trials
 from bumblebee.diagnosis.selection.proposals.gain_grid import far_trials, start_with_gain_grid
@@ -25,7 +23,7 @@ from bumblebee.diagnosis.selection.score_tests import Scores
 from bumblebee.diagnosis.selection.state import Loss, SearchState
 from bumblebee.diagnosis.selection.swap import exchange
 from bumblebee.diagnosis.selection.trial import Trial, simplest
-from bumblebee.diagnosis.sensitivities.columns import Columns
+from bumblebee.diagnosis.sensitivities import Columns
 from bumblebee.sim.effects import Effect
 
 _EXCHANGES = 3

@@ -14,12 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from bumblebee.diagnosis.comparison.wald import z_values
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.least_squares import project, solve
-from bumblebee.diagnosis.residuals.problem import Problem
-from bumblebee.diagnosis.residuals.whitening import null_draws
-from bumblebee.diagnosis.sensitivities.columns import Columns
+from bumblebee.diagnosis.comparison import z_values
+from bumblebee.diagnosis.estimation import Fit, project, solve
+from bumblebee.diagnosis.residuals import Problem, null_draws
+from bumblebee.diagnosis.sensitivities import Columns
 
 _SEEN = 1e-3  # share of a column's power that must be left beside the chosen ones
 _LEAST_POWER = 1e-6

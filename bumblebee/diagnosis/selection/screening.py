@@ -11,13 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.traits import rough
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.candidates import Candidate, rough
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.score_tests import Scores, score_tests
-from bumblebee.diagnosis.sensitivities.columns import Columns
-from bumblebee.diagnosis.simulation.cache import Changes
+from bumblebee.diagnosis.sensitivities import Columns
+from bumblebee.diagnosis.simulation import Changes
 from bumblebee.sim.effects import Effect
 
 _WORTH = 2.5  # times as many windows as are screened, from which on a second look is worth it

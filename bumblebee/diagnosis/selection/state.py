@@ -5,23 +5,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, effects_at, shortlisted
-from bumblebee.diagnosis.candidates.exclusion import is_chosen, is_like
-from bumblebee.diagnosis.candidates.traits import ABRUPT, SATURATIONS
-from bumblebee.diagnosis.comparison.backward_elimination import is_physical, pruned
-from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.paired_tests import pays_where_felt, pays_where_rare
-from bumblebee.diagnosis.comparison.wald import Step, evidence, wald
+from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate, effects_at, is_chosen, is_like, shortlisted
+from bumblebee.diagnosis.comparison import (
+    Holdout,
+    Step,
+    evidence,
+    is_physical,
+    pays_where_felt,
+    pays_where_rare,
+    pruned,
+    wald,
+)
 from bumblebee.diagnosis.config import SearchConfig
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton, resolved
-from bumblebee.diagnosis.estimation.least_squares import cost_of
-from bumblebee.diagnosis.residuals.problem import Problem, screening_windows, window_weights
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, resolved
+from bumblebee.diagnosis.residuals import Problem, screening_windows, window_weights
 from bumblebee.diagnosis.selection.score_tests import Scores, least_z, score_tests
 from bumblebee.diagnosis.selection.screening import Stages, is_promising, restless
 from bumblebee.diagnosis.selection.trial import Trial, try_one
-from bumblebee.diagnosis.sensitivities.columns import Answered, Columns, pulse_sizes, screen
-from bumblebee.diagnosis.simulation.cache import Changes
+from bumblebee.diagnosis.sensitivities import Answered, Columns, pulse_sizes, screen
+from bumblebee.diagnosis.simulation import Changes
 from bumblebee.sim.effects import Effect
 
 _ANEW = 0.1  # share of the cost left, below which all candidates are screened anew

@@ -20,25 +20,27 @@ from itertools import chain, combinations
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.exclusion import is_chosen
-from bumblebee.diagnosis.candidates.traits import SATURATIONS
-from bumblebee.diagnosis.comparison.backward_elimination import is_physical
-from bumblebee.diagnosis.comparison.information_criterion import PARAMETER, criterion
-from bumblebee.diagnosis.comparison.paired_tests import no_worse_by_mean
-from bumblebee.diagnosis.comparison.submodel import linear_cost, with_columns_without
-from bumblebee.diagnosis.comparison.wald import evidence, wald, z_value
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.estimation.least_squares import cost_of
-from bumblebee.diagnosis.residuals.problem import window_weights
+from bumblebee.diagnosis.candidates import SATURATIONS, Candidate, is_chosen
+from bumblebee.diagnosis.comparison import (
+    PARAMETER,
+    criterion,
+    evidence,
+    is_physical,
+    linear_cost,
+    no_worse_by_mean,
+    wald,
+    with_columns_without,
+    z_value,
+)
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
+from bumblebee.diagnosis.residuals import window_weights
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import KIND as SHAFT
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import LIKE as SHAFT_LIKE
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import best_shaft, is_of_series
 from bumblebee.diagnosis.selection.score_tests import Scores, score_tests
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial, try_one
-from bumblebee.diagnosis.sensitivities.columns import Columns
+from bumblebee.diagnosis.sensitivities import Columns
 
 _AS_MUCH = 0.95  # share of what the names gain that a rival must promise
 _PART = 0.6  # the same of a shaft, whose loss has not been fitted yet

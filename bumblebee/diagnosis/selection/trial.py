@@ -5,11 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.traits import rough
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.least_squares import LeftOver
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.candidates import Candidate, rough
+from bumblebee.diagnosis.estimation import Fit, LeftOver
+from bumblebee.diagnosis.residuals import Problem
 
 _SECANTS = 3
 # Of effects that fit the same the one that is met most often is named; the others are its class.

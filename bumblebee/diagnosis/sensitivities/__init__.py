@@ -1,1 +1,14 @@
-"""TODO."""
+"""What a small change of each candidate does to the residuals."""
+
+from bumblebee.diagnosis.sensitivities.columns import Answered, Columns, pulse_sizes, screen
+from bumblebee.diagnosis.sensitivities.impulse_responses import Answers, Path, answers_of
+
+__all__ = [
+    "Answered",
+    "Answers",
+    "Columns",
+    "Path",
+    "answers_of",
+    "pulse_sizes",
+    "screen",
+]

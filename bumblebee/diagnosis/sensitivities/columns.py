@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, is_simulated, shortlisted
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.candidates import Candidate, is_simulated, shortlisted
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.sensitivities.impulse_responses import Answers, answers_of
 from bumblebee.diagnosis.sensitivities.torque_signatures import Signatures
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.variation import Variation, vary
+from bumblebee.diagnosis.simulation import Plant, Variation, vary
 from bumblebee.sim.effects import Effect
 
 

@@ -11,12 +11,20 @@ from dataclasses import dataclass
 import numpy as np
 from mujoco.batch import Batch
 
-from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.readings import Layout, difference, simulated_readings
-from bumblebee.diagnosis.simulation.simulate import at_ticks, inputs_of, threads, with_step
-from bumblebee.diagnosis.simulation.variation import Variation
-from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.diagnosis.simulation import (
+    Layout,
+    Plant,
+    Variation,
+    Windows,
+    at_ticks,
+    difference,
+    inputs_of,
+    out_of_reach,
+    simulated_readings,
+    threads,
+    with_step,
+    without,
+)
 
 SEGMENTS = 5
 

@@ -9,12 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.sensitivities.impulse_responses import Path
-from bumblebee.diagnosis.simulation.actuator_history import at_starts, lagged, read_at
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.simulate import at_ticks
-from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.diagnosis.simulation import Plant, Windows, at_starts, at_ticks, lagged, read_at
 from bumblebee.sim.servo import Servos
 
 LATE = ("torque_lag", "encoder_delay")

@@ -10,14 +10,10 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
+from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.sensitivities.impulse_responses import Path
 from bumblebee.diagnosis.sensitivities.latency_signatures import LATE, Late
-from bumblebee.diagnosis.simulation.actuator_history import bent_before, remember, yielded
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.simulate import inputs_of
-from bumblebee.diagnosis.simulation.variation import Variation
-from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.diagnosis.simulation import Plant, Variation, Windows, bent_before, inputs_of, remember, yielded
 from bumblebee.sim.effect_forces import bent
 from bumblebee.sim.effect_hooks import runtime_hooks
 from bumblebee.sim.effect_native import sloped, spread_inertia

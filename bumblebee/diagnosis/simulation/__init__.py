@@ -1,1 +1,99 @@
-"""TODO."""
+"""What a robot with given effects would have shown: the declared model varied, simulated on windows of the logs."""
+
+from bumblebee.diagnosis.simulation.actuator_history import (
+    at_starts,
+    bent_before,
+    lagged,
+    read_at,
+    remember,
+    state_before,
+    yielded,
+)
+from bumblebee.diagnosis.simulation.actuators import fold_dampers
+from bumblebee.diagnosis.simulation.cache import Changes, Recall
+from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
+from bumblebee.diagnosis.simulation.declared import declared_values, touching
+from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, refuse_unlogged
+from bumblebee.diagnosis.simulation.readings import (
+    Layout,
+    conjugate,
+    difference,
+    from_rotation_vector,
+    layout_of,
+    measured_readings,
+    multiply,
+    rotate,
+    rotation_vector,
+    simulated_readings,
+)
+from bumblebee.diagnosis.simulation.simulate import Starts, at_ticks, inputs_of, residuals, threads, with_step
+from bumblebee.diagnosis.simulation.units import (
+    KINDS,
+    joint_units,
+    members,
+    mixed_notes,
+    motion_error,
+    named,
+    of_joint,
+    pick,
+    position_rows,
+    rows,
+    unit_on,
+)
+from bumblebee.diagnosis.simulation.variation import Variation, vary
+from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, command_inputs, cut, select
+
+__all__ = [
+    "KINDS",
+    "Changes",
+    "Layout",
+    "Plant",
+    "Recall",
+    "Starts",
+    "Variation",
+    "Windows",
+    "at_starts",
+    "at_ticks",
+    "bent_before",
+    "choose_starts",
+    "command_inputs",
+    "conjugate",
+    "cut",
+    "declared_values",
+    "difference",
+    "fold_dampers",
+    "from_rotation_vector",
+    "inputs_of",
+    "joint_units",
+    "lagged",
+    "layout_of",
+    "load_spec",
+    "make_plant",
+    "measured_readings",
+    "members",
+    "mixed_notes",
+    "motion_error",
+    "multiply",
+    "named",
+    "of_joint",
+    "out_of_reach",
+    "pick",
+    "position_rows",
+    "read_at",
+    "refuse_unlogged",
+    "remember",
+    "residuals",
+    "rotate",
+    "rotation_vector",
+    "rows",
+    "select",
+    "simulated_readings",
+    "state_before",
+    "threads",
+    "touching",
+    "unit_on",
+    "vary",
+    "with_step",
+    "without",
+    "yielded",
+]

@@ -14,19 +14,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, clipped, effects_at
-from bumblebee.diagnosis.candidates.exclusion import is_chosen
-from bumblebee.diagnosis.candidates.traits import USUAL, USUAL_OF_BODIES, USUAL_OF_ROBOT, USUAL_OF_TORQUE
-from bumblebee.diagnosis.comparison.backward_elimination import certainty, surest
-from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.paired_tests import MUCH, pays_together
-from bumblebee.diagnosis.comparison.wald import evidence
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.estimation.jacobian import columns_at
-from bumblebee.diagnosis.estimation.least_squares import cost_of, project
-from bumblebee.diagnosis.residuals.empirical_covariance import by_misfit
-from bumblebee.diagnosis.residuals.problem import Problem, make_problem, screening_windows, window_weights
+from bumblebee.diagnosis.candidates import (
+    USUAL,
+    USUAL_OF_BODIES,
+    USUAL_OF_ROBOT,
+    USUAL_OF_TORQUE,
+    Candidate,
+    clipped,
+    effects_at,
+    is_chosen,
+)
+from bumblebee.diagnosis.comparison import MUCH, Holdout, certainty, evidence, pays_together, surest
+from bumblebee.diagnosis.estimation import Fit, columns_at, cost_of, gauss_newton, project
+from bumblebee.diagnosis.residuals import Problem, by_misfit, make_problem, screening_windows, window_weights
 from bumblebee.diagnosis.selection.state import LITTLE, PATIENCE, SOME, SearchState
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.residuals.problem import Problem
-from bumblebee.diagnosis.simulation.units import unit_on
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.simulation import unit_on
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect, single
 

@@ -18,17 +18,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate, effects_at
-from bumblebee.diagnosis.comparison.wald import evidence, wald
-from bumblebee.diagnosis.estimation.fit import Fit, typical_power
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.estimation.least_squares import LeftOver
-from bumblebee.diagnosis.residuals.problem import Problem, window_weights
+from bumblebee.diagnosis.candidates import Candidate, effects_at
+from bumblebee.diagnosis.comparison import evidence, wald
+from bumblebee.diagnosis.estimation import Fit, LeftOver, gauss_newton, typical_power
+from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.variation import vary
-from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, cut
+from bumblebee.diagnosis.simulation import Windows, choose_starts, cut, residuals, vary
 from bumblebee.sim.effects import Effect, single
 from bumblebee.sim.servo import servos_of
 

@@ -10,11 +10,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.comparison.wald import evidence, wald
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.comparison import evidence, wald
+from bumblebee.diagnosis.estimation import Fit, gauss_newton
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.state import SearchState
 
 KINDS = ("motor_strength", "kp", "kd")

@@ -12,14 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.exclusion import is_chosen
-from bumblebee.diagnosis.estimation.fit import Fit, typical_power
-from bumblebee.diagnosis.estimation.least_squares import LeftOver
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.candidates import Candidate, is_chosen
+from bumblebee.diagnosis.estimation import Fit, LeftOver, typical_power
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, joint_chi_squares
 from bumblebee.diagnosis.selection.trial import Trial
-from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation import Plant
 
 KIND = "series_elasticity"
 # What a shaft's swing passes for.

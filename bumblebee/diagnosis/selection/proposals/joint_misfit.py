@@ -4,9 +4,8 @@ import numpy as np
 from scipy.linalg.lapack import dtrtri
 from scipy.stats import chi2
 
-from bumblebee.diagnosis.estimation.fit import typical_power
-from bumblebee.diagnosis.estimation.least_squares import cost_of
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.estimation import cost_of, typical_power
+from bumblebee.diagnosis.residuals import Problem
 
 _ODD = 0.05  # chance of noise to put any window of a joint so far off
 _MOST_JOINTS, _WINDOWS = 2, 16

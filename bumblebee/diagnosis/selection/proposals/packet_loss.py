@@ -15,14 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.comparison import Holdout
+from bumblebee.diagnosis.estimation import Fit, gauss_newton
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.state import Loss, SearchState
-from bumblebee.diagnosis.simulation.simulate import residuals
-from bumblebee.diagnosis.simulation.variation import vary
-from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.diagnosis.simulation import Windows, residuals, vary
 from bumblebee.sim.effects import Effect
 
 _LONGEST = 3  # ticks in a row

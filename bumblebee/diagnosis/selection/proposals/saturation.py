@@ -14,18 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.candidates.traits import SATURATIONS
-from bumblebee.diagnosis.comparison.paired_tests import plausible
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.least_squares import LeftOver
-from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.candidates import SATURATIONS, Candidate
+from bumblebee.diagnosis.comparison import plausible
+from bumblebee.diagnosis.estimation import Fit, LeftOver
+from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.joint_misfit import joint_chi_squares
 from bumblebee.diagnosis.selection.trial import Trial
-from bumblebee.diagnosis.simulation.cache import Changes
-from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.variation import vary
-from bumblebee.diagnosis.simulation.windows import Windows, command_inputs
+from bumblebee.diagnosis.simulation import Changes, Plant, Windows, command_inputs, vary
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect
 from bumblebee.sim.servo import Servos, servos_of

@@ -4,12 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates.candidate import SHAPED, Candidate
-from bumblebee.diagnosis.candidates.exclusion import is_chosen
-from bumblebee.diagnosis.comparison.paired_tests import no_worse_by_mean
-from bumblebee.diagnosis.comparison.wald import evidence, wald
-from bumblebee.diagnosis.estimation.fit import Fit
-from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.candidates import SHAPED, Candidate, is_chosen
+from bumblebee.diagnosis.comparison import evidence, no_worse_by_mean, wald
+from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.state import SearchState
 
