@@ -7,10 +7,10 @@ from typing import Annotated
 import mujoco
 
 from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.dataset import open_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import fill
-from bumblebee.diagnosis.session import open_session
-from bumblebee.diagnosis.terminal import summary
+from bumblebee.diagnosis.report import summary
 from bumblebee.ranges import Range, Ranged, Seed
 from tasks.stage import load, log_run, output_folder, run_stage
 

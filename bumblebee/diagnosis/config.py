@@ -1,9 +1,8 @@
-"""How much work a diagnosis does, and how strict it is.
-
-How strict and how long a search is.
-"""
+"""How much work a diagnosis does, and how strict it is."""
 
 from dataclasses import dataclass, field
+
+from bumblebee.diagnosis.thresholds import Thresholds
 
 
 @dataclass(frozen=True)
@@ -65,3 +64,5 @@ class DiagnosisConfig:
     """The same for the search among the catalogue's effects; what was found by then is fitted and reported."""
     search: SearchConfig = field(default_factory=SearchConfig)
     """How strict the search is."""
+    thresholds: Thresholds = field(default_factory=Thresholds)
+    """Every number that single decisions go by, by room and concept."""

@@ -53,7 +53,7 @@ def gather(session: Session, config: DiagnosisConfig, rng: np.random.Generator, 
     # A small model costs little to simulate: more windows.
     more = float(np.clip(12 / session.plant.model.nv, 1.0, _MORE)) if config.grow else 1.0
     say("what noise in the starts becomes, by simulation")
-    problem = _problem(session, fitted, round(more * config.max_windows), config.horizon, rng)
+    problem = _problem(session, fitted, round(more * config.max_windows), config, rng)
     holdout = _holdout(session, config, more, rng)
     say(f"{len(problem.windows)} windows of {config.horizon:g} s")
     typical = scales_of(session.plant, session.rollouts).torque
@@ -64,13 +64,16 @@ def _holdout(session: Session, config: DiagnosisConfig, more: float, rng: np.ran
     """Windows of 0.2 s and of 1 s of the rollouts that acceptance is decided on."""
     if not session.accept:
         return Holdout()
-    problem = _problem(session, session.accept, round(more * config.max_holdout_windows), config.horizon, rng)
+    problem = _problem(session, session.accept, round(more * config.max_holdout_windows), config, rng)
     starts = choose_starts(session.rollouts, session.accept, _LONG, config.max_long_windows)
     long = cut(session.plant, session.layout, session.rollouts, starts, outputs=1) if starts else None
     return Holdout(problem, long)
 
 
-def _problem(session: Session, ids: Sequence[int], budget: int, horizon: float, rng: np.random.Generator) -> Problem:
+def _problem(
+    session: Session, ids: Sequence[int], budget: int, config: DiagnosisConfig, rng: np.random.Generator
+) -> Problem:
+    horizon = config.horizon
     starts = choose_starts(session.rollouts, ids, horizon, budget)
     if not starts:
         names = ", ".join(session.ids(ids)[:3])
@@ -78,4 +81,5 @@ def _problem(session: Session, ids: Sequence[int], budget: int, horizon: float, 
     windows = cut(session.plant, session.layout, session.rollouts, starts)
     finest, coarse = session.steps
     steps = (session.search_step, coarse)
-    return make_problem(session.plant, session.layout, windows, session.sigma, steps, [], rng, finest)
+    plant, layout, thresholds = session.plant, session.layout, config.thresholds
+    return make_problem(plant, layout, windows, session.sigma, steps, [], rng, finest, thresholds)

@@ -7,10 +7,6 @@ from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.least_squares import project
 from bumblebee.diagnosis.residuals import Problem
 
-_ENOUGH_ROLLOUTS = 6  # fewer say little about how much rollouts differ
-_GAP_ERROR = 0.35  # of a gap: five came out at 57 to 93 % of their size
-_TOLD = 1e-6  # chi-square of a change that matters, below which the windows say nothing of a parameter
-
 
 def covariance(problem: Problem, fit: Fit, weights: np.ndarray, clusters: np.ndarray) -> np.ndarray:
     """Covariance (P, P) of the values by leaving out one cluster (W,) after the other; 0 for what is not fitted.
@@ -78,7 +74,7 @@ def standard_covariance(problem: Problem, fit: Fit, weights: np.ndarray) -> np.n
     least = np.diag(windows)
     wider = np.diag(expected_covariance(problem, fit, weights))
     groups = problem.windows.rollout
-    if len(np.unique(groups)) >= _ENOUGH_ROLLOUTS:
+    if len(np.unique(groups)) >= problem.thresholds.estimation.covariance.enough_rollouts:
         wider = np.maximum(wider, np.diag(covariance(problem, fit, weights, groups)))
     ratio = np.sqrt(np.maximum(wider / np.maximum(least, 1e-300), 1.0))
     return windows * np.outer(ratio, ratio)
@@ -93,20 +89,20 @@ def interval(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
     half = student.ppf(0.975, freedom(problem, fit, weights, each)) * _errors(problem, fit, weights, each)
     half = np.maximum(half, 1.96 * np.sqrt(np.diag(expected_covariance(problem, fit, weights))))
     groups = problem.windows.rollout
-    if len(np.unique(groups)) >= _ENOUGH_ROLLOUTS:
+    if len(np.unique(groups)) >= problem.thresholds.estimation.covariance.enough_rollouts:
         wide = student.ppf(0.975, freedom(problem, fit, weights, groups)) * _errors(problem, fit, weights, groups)
         half = np.maximum(half, wide)
     told = (weights[:, None] * fit.columns**2).sum(axis=(1, 2))
-    half[np.flatnonzero(fit.scales)[told < _TOLD]] = np.inf
-    return np.maximum(half, _unmodelled(fit))
+    half[np.flatnonzero(fit.scales)[told < problem.thresholds.estimation.covariance.told]] = np.inf
+    return np.maximum(half, _unmodelled(fit, problem.thresholds.estimation.covariance.backlash_error))
 
 
-def _unmodelled(fit: Fit) -> np.ndarray:
+def _unmodelled(fit: Fit, share: float) -> np.ndarray:
     """Half-widths (P,) that no data make up for: where a rotor is in its gap when a window starts is a guess."""
     out = np.zeros(len(fit.values))
     for candidate, part in zip(fit.chosen, fit.slices, strict=True):
         if candidate.effect == "backlash":
-            out[part.start] = _GAP_ERROR * abs(fit.values[part.start])
+            out[part.start] = share * abs(fit.values[part.start])
     return out
 
 

@@ -18,11 +18,8 @@ from bumblebee.diagnosis.estimation.least_squares import project, solve
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.simulation import Variation, residuals, vary
 
-_FEIGNED = 0.4  # share of an effect that another integrator may feign
-_FINITE = 0.8  # share of the windows that it must get through
 
-
-def feigned(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> float:
+def explained_share(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> float:
     """Share of the change from `before` to `after` that other integrators would make, the largest of those tried.
 
     Both are compared beside the nuisances and the columns of `before`; 0 where no other integrator runs.
@@ -56,7 +53,7 @@ def moves(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
 
 def beyond_numerics(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> bool:
     """Whether the change from `before` to `after` is clearly more than another integrator's."""
-    return feigned(problem, before, after, weights) < _FEIGNED
+    return explained_share(problem, before, after, weights) < problem.thresholds.estimation.integrator_error.explained
 
 
 def _differences(problem: Problem, fit: Fit) -> Iterator[np.ndarray]:
@@ -66,7 +63,7 @@ def _differences(problem: Problem, fit: Fit) -> Iterator[np.ndarray]:
     for other in _others(vary(problem.plant, problem.as_whitened(fit.effects))):
         raw = residuals(problem.plant, problem.layout, problem.windows, [other], problem.fine)[0]
         good = np.isfinite(raw).all(axis=(1, 2))
-        if good.mean() >= _FINITE:
+        if good.mean() >= problem.thresholds.estimation.integrator_error.finite:
             yield np.where(good[:, None], problem.whitener(raw) - residual, 0.0)
 
 

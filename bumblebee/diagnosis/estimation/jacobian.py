@@ -8,8 +8,6 @@ from bumblebee.diagnosis.candidates import Candidate, clipped, effects_at, rough
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.residuals import Problem
 
-_FAR = 0.2  # of a change that matters: so far a parameter may move before sensitivities near it are simulated again
-
 
 def columns_at(
     problem: Problem,
@@ -29,7 +27,7 @@ def columns_at(
     if not len(moving):
         return np.empty((0, *problem.nuisance.shape[1:]))
     near = _near(problem, chosen)
-    moved = np.abs(values - at) <= _FAR * np.where(scales > 0, scales, np.inf)
+    moved = np.abs(values - at) <= problem.thresholds.estimation.jacobian.moved * np.where(scales > 0, scales, np.inf)
     stale = np.flatnonzero([not moved[k, near[i]].all() for k, i in enumerate(moving)])
     if not len(stale):
         return known

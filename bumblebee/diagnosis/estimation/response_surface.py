@@ -21,20 +21,17 @@ from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.estimation.least_squares import cost_of, project, solve
 from bumblebee.diagnosis.residuals import Problem
 
-_STEP = 0.2  # of a change that matters, to either side: what smooths the jumps and is still linear
-_ROUNDS = 2  # the second around where the first leads; with many parameters only if they leave the points
-_FEW = 4  # parameters
-
 
 def last_step(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, weights: np.ndarray) -> Fit:
     """The fit near `values` (P,), with columns around it; on a fixed base, or with a limit, by Gauss and Newton."""
     if not problem.plant.floating or any(c.effect in (*SATURATIONS, *ABRUPT) for c in chosen):
         return gauss_newton(problem, chosen, values, weights, iterations=1)
+    rule = problem.thresholds.estimation.response_surface
     start = found = clipped(chosen, np.asarray(values, dtype=float))
     scales = np.concatenate([c.scales for c in chosen])
     moving, points, residuals = np.flatnonzero(scales), [], []
-    for _ in range(_ROUNDS):
-        before, new = found, _around(chosen, found, scales)
+    for _ in range(rule.rounds):
+        before, new = found, _around(chosen, found, rule.step * scales)
         points += new
         residuals += list(problem.residual([effects_at(chosen, there) for there in new]))
         columns, here = _plane((np.stack(points) - before)[:, moving] / scales[moving], np.stack(residuals))
@@ -42,7 +39,7 @@ def last_step(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray,
         move = np.zeros(len(scales))
         move[moving] = solve(basis, inverse, here, weights)[len(problem.nuisance) :] * scales[moving]
         found = clipped(chosen, before + move)
-        if len(moving) > _FEW and (np.abs(found - before) <= _STEP * scales).all():
+        if len(moving) > rule.few and (np.abs(found - before) <= rule.step * scales).all():
             break
     residual = problem.residual([effects_at(chosen, found)])[0]
     cost, nuisance = cost_of(problem, residual, weights)
@@ -51,13 +48,13 @@ def last_step(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray,
     return Fit(tuple(chosen), found, nuisance, residual, columns, cost)
 
 
-def _around(chosen: Sequence[Candidate], values: np.ndarray, scales: np.ndarray) -> list[np.ndarray]:
-    """Values (P,) and those a step to either side of each that is fitted, as far as the bounds let them."""
+def _around(chosen: Sequence[Candidate], values: np.ndarray, steps: np.ndarray) -> list[np.ndarray]:
+    """Values (P,) and those one of `steps` (P,) to either side of each fitted one, as far as the bounds let them."""
     points = [values]
-    for i in np.flatnonzero(scales):
+    for i in np.flatnonzero(steps):
         for sign in (1.0, -1.0):
             there = values.copy()
-            there[i] += sign * _STEP * scales[i]
+            there[i] += sign * steps[i]
             points.append(clipped(chosen, there))
     return points
 

@@ -12,6 +12,7 @@ from bumblebee.diagnosis.residuals.initial_state import restarted, start_moves
 from bumblebee.diagnosis.residuals.nuisances import nuisance_columns
 from bumblebee.diagnosis.residuals.whitening import Whitener, fit_whitener
 from bumblebee.diagnosis.simulation import Layout, Plant, Recall, Windows, residuals, select, vary
+from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
@@ -44,6 +45,8 @@ class Problem:
     tilt: Effect | None = None
     """Of the base's sensor, with which the windows were whitened; residuals are linear in it."""
     recall: Recall = field(default_factory=Recall, repr=False)
+    thresholds: Thresholds = field(default_factory=Thresholds, repr=False)
+    """What all that is asked of the problem is decided by."""
 
     def residual(self, effects: Sequence[Sequence[Effect]], coarse: bool = False) -> np.ndarray:
         """Whitened residuals of several models, (V, W, M)."""
@@ -166,6 +169,7 @@ def make_problem(
     effects: Sequence[Effect],
     rng: np.random.Generator,
     finest: float | None = None,
+    thresholds: Thresholds | None = None,
 ) -> Problem:
     """Whiten `windows` around the declared model with `effects`; windows that diverge are dropped.
 
@@ -191,8 +195,21 @@ def make_problem(
     windows, raw, whitener = select(windows, keep), raw[:, keep], whitener.part(keep)
     columns = _columns(whitener, raw)
     finest = fine if finest is None else finest
-    read, tilt = select(read, keep), tilt_of(effects)
-    return Problem(plant, layout, windows, sigma, fine, finest, fine, coarse, whitener, columns, read, tilt)
+    return Problem(
+        plant,
+        layout,
+        windows,
+        sigma,
+        fine,
+        finest,
+        fine,
+        coarse,
+        whitener,
+        columns,
+        select(read, keep),
+        tilt_of(effects),
+        thresholds=thresholds or Thresholds(),
+    )
 
 
 def _columns(whitener: Whitener, raw: np.ndarray) -> np.ndarray:

@@ -38,7 +38,9 @@ def _around(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
         plant, layout, windows = problem.plant, problem.layout, problem.read
         steps = (problem.finest, problem.coarse)
         try:
-            made = make_problem(plant, layout, windows, problem.sigma, steps, fit.effects, rng)
+            made = make_problem(
+                plant, layout, windows, problem.sigma, steps, fit.effects, rng, thresholds=problem.thresholds
+            )
             return replace(made, between=problem.between)
         except BadInput:  # stiff and coarsely stepped, it diverges in more than half of the windows
             pass

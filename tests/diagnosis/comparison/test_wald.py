@@ -9,7 +9,7 @@ from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.comparison.holdout import _there
 from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.estimation.integrator_error import feigned
+from bumblebee.diagnosis.estimation.integrator_error import explained_share
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.simulation.simulate import residuals
 from bumblebee.diagnosis.simulation.variation import vary
@@ -44,7 +44,7 @@ def _fits(effects: dict, kind: str, place: str, integrator: int | None = None) -
     before = gauss_newton(problem, (), (), weights)
     chosen = [c for c in all_candidates(session.plant, session.rollouts, []) if (c.effect, c.where) == (kind, place)]
     after = gauss_newton(problem, chosen, chosen[0].start, weights, coarse=True)
-    return feigned(problem, before, after, weights)
+    return explained_share(problem, before, after, weights)
 
 
 def _problem(session: Session) -> Problem:

@@ -36,9 +36,9 @@ def test_whitened_as_often_as_the_model_changes(
     begun = gauss_newton(problem, chosen, [start], window_weights(problem.residual([[]])[0]), iterations=0)
     whitened: list[int] = []
 
-    def counted(*args: object) -> Problem:
+    def counted(*args: object, **settings: object) -> Problem:
         whitened.append(1)
-        return make_problem(*args)
+        return make_problem(*args, **settings)
 
     monkeypatch.setattr(refining, "make_problem", counted)
     last = refine(problem, begun, np.random.default_rng(0))

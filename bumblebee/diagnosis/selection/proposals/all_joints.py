@@ -174,7 +174,7 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
     p = problem
     try:
         steps, rng = (p.fine, p.coarse), np.random.default_rng(0)
-        made = make_problem(p.plant, p.layout, p.read, p.sigma, steps, effects, rng, p.finest)
+        made = make_problem(p.plant, p.layout, p.read, p.sigma, steps, effects, rng, p.finest, p.thresholds)
     except BadInput:  # it diverges in more than half of the windows
         return problem.relinearised(effects)
     return replace(made, between=problem.between)
