@@ -36,11 +36,9 @@ def _around(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
     """
     if fit.cost < _CHANGED * cost_of(problem, problem.residual([[]])[0], window_weights(fit.clean(problem)))[0]:
         plant, layout, windows = problem.plant, problem.layout, problem.read
-        steps = (problem.finest, problem.coarse)
+        steps, rules = (problem.finest, problem.coarse), problem.thresholds
         try:
-            made = make_problem(
-                plant, layout, windows, problem.sigma, steps, fit.effects, rng, thresholds=problem.thresholds
-            )
+            made = make_problem(plant, layout, windows, problem.sigma, steps, fit.effects, rng, thresholds=rules)
             return replace(made, between=problem.between)
         except BadInput:  # stiff and coarsely stepped, it diverges in more than half of the windows
             pass

@@ -1,4 +1,4 @@
-"""Every number that the diagnosis decides by, with its reason: a file for each room, a frozen dataclass for each concept.
+"""Every number that the diagnosis decides by, with its reason: a file a room, a frozen dataclass a concept.
 
 They travel with what they decide on (`Problem.thresholds`, an argument elsewhere) and are set in
 `DiagnosisConfig.thresholds`. Those of the search as a whole (level, trials, patience) are in `SearchConfig`.

@@ -82,7 +82,7 @@ def test_a_fit_whose_noisy_starts_diverge_keeps_its_whitening(monkeypatch) -> No
     """What stays finite in the windows may diverge from starts moved by noise: the fit goes on as it was whitened."""
     problem, fit, rng = _fitted("coulomb_friction", "j2", 1.0, 100)
 
-    def diverging(*args: object) -> Problem:
+    def diverging(*args: object, **settings: object) -> Problem:
         raise BadInput("declared model, 40 of 40 windows", "simulations that stay finite", "simulations that diverge")
 
     monkeypatch.setattr(refining, "make_problem", diverging)
