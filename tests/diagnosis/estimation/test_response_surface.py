@@ -9,6 +9,7 @@ from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.estimation.covariance import interval
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.estimation.response_surface import last_step
+from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.sim.effects import Effect
 
 FRICTION = 0.27
@@ -24,6 +25,7 @@ class Rough:
         self.plant = SimpleNamespace(floating=floating, joints=("j",), bodies=())
         self.windows = SimpleNamespace(rollout=np.arange(W) % 5)
         self.nuisance = np.zeros((1, W, M))
+        self.thresholds = Thresholds()
         self.column = 4.5 * rng.standard_normal((W, M))  # for a change of 0.18 N m
         self.noise = rng.standard_normal((W, M))
         self.jump = jump
