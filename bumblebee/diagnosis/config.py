@@ -23,10 +23,6 @@ class SearchConfig:
     """Effects at most, beside those that the search began with."""
     patience: int = 4
     """Rounds that may fail, one after the other, before the search ends."""
-    holdout_z: float = 2.0
-    """Held-out gain must exceed this many of its standard errors."""
-    least_gain: float = 0.01
-    """Held-out gain must exceed this share of what all effects gain together: no law is exactly the catalogue's."""
     far: float = 30.0
     """Median chi-square above which gains far from the declared ones are tried first."""
     many: float = 4.0

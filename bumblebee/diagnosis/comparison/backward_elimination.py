@@ -1,19 +1,7 @@
-"""When an effect is kept: the bound on its z, its Wald test in the joint fit, what else could gain as much, pruning.
+"""Backward elimination: effects that the others have made redundant or that do not pay, dropped one by one.
 
-Effects that take nothing off the error of the windows that judge: none of them is reported.
-
-They were accepted beside others and for the windows that were fitted; in the result the judging windows are no nearer
-with them. A robot that is still far from its model is left alone: there a few windows make up the mean square (two
-joints' damping on the SO-101 arm, needless by it, made 13.8 mrad after 1 s of 8.6).
-
-Limits are asked otherwise, for of the judging windows perhaps none feels them, and no slope leads back from one that
-nothing reaches: each must pay as when it was accepted, against a fit without it. One that stood for a part of a strange
-friction explains nothing once that has its form.
-
-Whether each effect still pays once all are fitted: what was a step of the search may be nothing of the result.
-
-An effect is accepted beside those that were found before it. What came later may do its work; the loss of such an
-effect is felt in the windows that it was fitted to, which it has bent to, and not in those that judge.
+One loop, `eliminate`; the functions below it say which effect goes first, how the others are fitted without it, and
+when it stays all the same. What an effect gained when it was accepted may be another's in the result.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,50 +9,53 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bumblebee.diagnosis.candidates import SATURATIONS, USUAL_OF_BODIES, Candidate, Formula
+from bumblebee.diagnosis.comparison.compare import compare
 from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.paired_tests import pays_where_felt, pays_where_rare
-from bumblebee.diagnosis.comparison.submodel import refitted, without_one, without_some
+from bumblebee.diagnosis.comparison.submodel import moved_without, refitted, refitted_without
 from bumblebee.diagnosis.comparison.wald import costs_more_than, wald
-from bumblebee.diagnosis.estimation import (
-    Fit,
-    beyond_numerics,
-    cost_of,
-    gauss_newton,
-    standard_covariance,
-    typical_power,
-)
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, standard_covariance, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
 
-# Where the model restarts a late encoder's joint follows from the mean of two noisy readings: that alone gains a
-# little of the chi-square of the joint's own signals, on all joints at once more.
-_NOISY, _NOISY_GAIN, _NOISY_ALL = ("encoder_delay",), 0.1, 0.05
 Refit = Callable[[Sequence[Candidate], np.ndarray], Fit]
 """Fits chosen candidates from their values (P,)."""
-_SURE, _SURE_OF_BODY = 4.0, 5.0  # standard errors
-_TRIFLE = 0.02  # share of a change that matters
-SURE = 4.0  # z below which an effect beside a new one is needless
-_NEAR = 4.0  # median chi-square of the judging windows up to which their mean square tells
-_IDLE_Z, _IDLE_LEAST = 2.0, 0.01  # as of acceptance
-_SMALL = 0.05  # share of what all effects gain, above which an effect need not be asked
-_Z, _LEAST = 2.0, 0.01  # as of acceptance
-_FEW = 4  # effects; of more, each may be a small share of the whole, and they were accepted together
-_FAR = 4.0  # median chi-square
 
 
-def is_physical(problem: Problem, fit: Fit, new: Fit, candidate: Candidate, weights: np.ndarray) -> bool:
-    """Whether neither another integrator nor the readings' noise would do what the new fit gains.
+def eliminate(
+    fit: Fit,
+    worst: Callable[[Fit, set[Candidate]], Candidate | None],
+    without: Callable[[Fit, Candidate], Fit],
+    stays: Callable[[Fit, Fit], bool] = lambda fit, less: False,
+    dropped: Callable[[Candidate], None] = lambda gone: None,
+) -> Fit:
+    """The fit less one effect after the other.
 
-    `fit` is the one without the candidate; `weights` (W,) are the new one's.
+    Args:
+        fit: with all effects.
+        worst: the effect of a fit that goes next, of those that were not kept; None: no more.
+        without: the fit without it.
+        stays: whether the fit must keep what the smaller one lacks; it is not asked again.
+        dropped: told of each that is gone.
     """
-    if candidate.effect in _NOISY:
-        before = cost_of(problem, fit.residual, weights)[0]
-        own = 2 / problem.layout.size  # position and speed
-        if before - new.cost < (_NOISY_GAIN * own if candidate.where else _NOISY_ALL) * before:
-            return False
-    return beyond_numerics(problem, fit, new, weights)
+    kept: set[Candidate] = set()
+    while (gone := worst(fit, kept)) is not None:
+        less = without(fit, gone)
+        if stays(fit, less):
+            kept.add(gone)
+        else:
+            dropped(gone)
+            fit = less
+    return fit
 
 
-def pruned(
+def _lowest(fit: Fit, marks: Sequence[float] | np.ndarray, bound: float) -> Candidate | None:
+    """The effect of the lowest mark, if that is below the bound."""
+    if not len(marks):
+        return None
+    k = int(np.argmin(marks))
+    return None if marks[k] >= bound else fit.chosen[k]
+
+
+def drop_insignificant(
     problem: Problem,
     fit: Fit,
     weights: np.ndarray,
@@ -73,96 +64,89 @@ def pruned(
     holdout: Holdout | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> Fit:
-    """The fit less effects that the others have made needless, worst first, refitting each time.
+    """Less what the others have made insignificant, of the lowest z first, refitting each time.
 
     One whose loss the others cannot make up for stays, however little the slopes at the fit say of it: far from
     the declared value they say nothing of the way back. `bound` is the z that an effect must reach. With `holdout`
-    an effect also stays if held-out windows would be worse after 1 s without it.
+    an effect also stays if validation windows would be worse after 1 s without it.
     """
-    kept: set[Candidate] = set()
-    while len(kept) < len(fit.chosen):
+
+    def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
         z = [np.inf if c in kept else wald(problem, fit, weights, i) for i, c in enumerate(fit.chosen)]
-        worst = int(np.argmin(z))
-        if z[worst] >= bound:
-            break
-        keep = [i for i in range(len(fit.chosen)) if i != worst]
-        values = [fit.values[fit.slices[i]] for i in keep]
-        less = refit([fit.chosen[i] for i in keep], np.concatenate(values) if values else np.empty(0))
-        if costs_more_than(problem, fit, less, bound) or (holdout is not None and holdout.worse_later(fit, less)):
-            kept.add(fit.chosen[worst])
-            continue
-        say(f"needless: {fit.chosen[worst].effect} on {fit.chosen[worst].where}")
-        fit = less
-    return fit
+        return _lowest(fit, z, bound)
+
+    def without(fit: Fit, gone: Candidate) -> Fit:
+        rest = fit.without([gone])
+        return refit(rest.chosen, rest.values)
+
+    def stays(fit: Fit, less: Fit) -> bool:
+        return costs_more_than(problem, fit, less, bound) or (holdout is not None and holdout.worse_later(fit, less))
+
+    return eliminate(fit, worst, without, stays, lambda c: say(f"needless: {c.effect} on {c.where}"))
 
 
-def surest(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
-    """The fit less what is not sure, the least sure first, the others moved by the slopes at `fit`."""
-    while fit.chosen:
-        z = certainty(problem, fit, weights) / [
-            _SURE_OF_BODY if c.effect in USUAL_OF_BODIES else _SURE for c in fit.chosen
-        ]
-        least = int(np.argmin(z))
-        if z[least] >= 1.0:
-            break
-        fit = without_some(problem, fit, weights, {least})
-    return fit
+def drop_unsure(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
+    """Less what is not sure, the least sure first, the others moved by the slopes at `fit`."""
+    rule = problem.thresholds.comparison.elimination
+
+    def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
+        if not fit.chosen:
+            return None
+        bounds = [rule.sure_z_of_body if c.effect in USUAL_OF_BODIES else rule.sure_z for c in fit.chosen]
+        return _lowest(fit, certainty(problem, fit, weights) / bounds, 1.0)
+
+    return eliminate(fit, worst, lambda fit, gone: moved_without(problem, fit, weights, [gone]))
 
 
 def certainty(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
     """How many standard errors each effect (C,) is from the declared value, by its surest parameter; 0 for a trifle."""
     errors = np.sqrt(np.diag(standard_covariance(problem, fit, weights)))
     away = np.abs(fit.values - np.concatenate([c.nominal for c in fit.chosen]))
-    counts = (fit.scales > 0) & (away >= _TRIFLE * fit.scales)
+    counts = (fit.scales > 0) & (away >= problem.thresholds.comparison.elimination.trifle * fit.scales)
     z = np.where(counts, away / np.maximum(errors, 1e-300), 0.0)
     return np.array([z[part].max() for part in fit.slices])
 
 
-def without_needless(problem: Problem, fit: Fit, kept: Candidate) -> Fit:
-    """Less the effects that `kept` has made needless, the least sure first; forms stay."""
-    while True:
+def drop_beside(problem: Problem, fit: Fit, new: Candidate) -> Fit:
+    """Less the effects that `new` has made redundant, of the lowest z first; basis functions stay."""
+    bound = problem.thresholds.comparison.elimination.redundant_z
+
+    def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
         weights = window_weights(fit.clean(problem))
-        spared = [c is kept or (isinstance(c, Formula) and not isinstance(kept, Formula)) for c in fit.chosen]
-        z = [np.inf if s else wald(problem, fit, weights, i) for i, s in enumerate(spared)]
-        worst = int(np.argmin(z))
-        if z[worst] >= SURE:
-            return fit
-        chosen, values = without_one(fit.chosen, fit.values, fit.chosen[worst])
-        fit = gauss_newton(problem, chosen, values, weights, iterations=2, coarse=True, known=fit)
+        spared = [c is new or (isinstance(c, Formula) and not isinstance(new, Formula)) for c in fit.chosen]
+        return _lowest(fit, [np.inf if s else wald(problem, fit, weights, i) for i, s in enumerate(spared)], bound)
+
+    def without(fit: Fit, gone: Candidate) -> Fit:
+        rest, weights = fit.without([gone]), window_weights(fit.clean(problem))
+        return gauss_newton(problem, rest.chosen, rest.values, weights, iterations=2, coarse=True, known=fit)
+
+    return eliminate(fit, worst, without)
 
 
-def without_idle(problem: Problem, holdout: Holdout, fit: Fit) -> Fit:
-    """The fit less such effects, the worst first, the others refitted without it; no worse after 1 s."""
-    if holdout.problem is None or typical_power(holdout.left([fit])[0]) > _NEAR:
+def drop_redundant(problem: Problem, holdout: Holdout, fit: Fit) -> Fit:
+    """Less what takes nothing off the validation windows' mean square, the worst first; no worse after 1 s.
+
+    A robot that is still far from its model is left alone: there a few windows make up the mean square. Saturations are
+    asked by `drop_unpaid_saturations`: of the validation windows perhaps none feels them, and no slope leads back from
+    one that nothing reaches.
+    """
+    near = problem.thresholds.comparison.elimination.near
+    if holdout.problem is None or typical_power(holdout.left([fit])[0]) > near:
         return fit
-    while fit.chosen:
+
+    def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
+        if kept or not fit.chosen:  # one that must stay ends it
+            return None
         growth = _growth(holdout.problem, fit)
         growth[[c.effect in SATURATIONS for c in fit.chosen]] = np.inf
-        worst = int(np.argmin(growth))
-        if growth[worst] > 0:
-            break
-        chosen, values = without_one(fit.chosen, fit.values, fit.chosen[worst])
-        less = refitted(problem, chosen, values, fit)
-        if holdout.worse_later(fit, less):
-            break
-        fit = less
-    return fit
+        k = int(np.argmin(growth))
+        return None if growth[k] > 0 else fit.chosen[k]
 
-
-def without_spent(problem: Problem, holdout: Holdout, fit: Fit) -> Fit:
-    """The fit less limits that pay no more beside the other effects, refitted without each."""
-    for c in [c for c in fit.chosen if c.effect in SATURATIONS]:
-        if len(fit.chosen) < 2:
-            break
-        less = refitted(problem, *without_one(fit.chosen, fit.values, c))
-        judged = holdout.problem is not None and holdout.gains(less, fit, _IDLE_Z, _IDLE_LEAST)
-        if not judged and not pays_where_felt(problem, holdout, less, fit):
-            fit = less
-    return fit
+    return eliminate(fit, worst, lambda fit, gone: refitted_without(problem, fit, [gone], fit), holdout.worse_later)
 
 
 def _growth(judge: Problem, fit: Fit) -> np.ndarray:
-    """(F,) by how much the mean square of the judging windows grows without each effect, the others as they are."""
+    """(F,) by how much the mean square of the validation windows grows without each effect, the others as they are."""
     effects = fit.effects
     sets = [effects, *([e for k, e in enumerate(effects) if k != i] for i in range(len(effects)))]
     left = judge.residual(sets) - np.tensordot(fit.nuisance, judge.nuisance, axes=1)
@@ -170,37 +154,64 @@ def _growth(judge: Problem, fit: Fit) -> np.ndarray:
     return power[1:] - power[0]
 
 
-def still_paying(fit: Fit, refit: Refit, holdout: Holdout, problem: Problem | None = None) -> Fit:
-    """The fit less effects that do not pay on the judging windows, the others refitted without them, the least first.
+def drop_unpaid_saturations(problem: Problem, holdout: Holdout, fit: Fit) -> Fit:
+    """Less saturations that pay no more beside the other effects, refitted without each.
 
-    Limits are left alone: few windows feel them, of the judging ones perhaps none. Of other effects that these do not
-    feel the fitted windows of `problem`, if given, decide. More than four effects are left alone, too, and any where
-    the model is still far from the data: what it lacks there spoils the comparison.
+    One that stood for a part of a strange friction explains nothing once that has its form.
     """
-    kept: set[Candidate] = set()
-    if len(fit.chosen) > _FEW or (holdout.problem is not None and typical_power(holdout.left([fit])[0]) > _FAR):
+    rules, asked = problem.thresholds.comparison, [c for c in fit.chosen if c.effect in SATURATIONS]
+
+    def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
+        return next((c for c in asked if c in fit.chosen and c not in kept), None) if len(fit.chosen) > 1 else None
+
+    def stays(fit: Fit, less: Fit) -> bool:
+        against = compare(problem, holdout, less, fit)
+        judged = holdout.problem is not None and against.passes(rules.validation)
+        return judged or against.passes(rules.where_felt)
+
+    def without(fit: Fit, gone: Candidate) -> Fit:
+        rest = fit.without([gone])
+        return refitted(problem, rest.chosen, rest.values)
+
+    return eliminate(fit, worst, without, stays)
+
+
+def drop_unpaid(fit: Fit, refit: Refit, holdout: Holdout, problem: Problem | None = None) -> Fit:
+    """Less what does not pay on the validation windows, the others refitted without it, the least first.
+
+    Saturations are left alone: few windows feel them, of the validation windows perhaps none. Of other effects that
+    these do not feel the fitted windows of `problem`, if given, decide. More than a few effects are left alone, too,
+    and any where the model is still far from the data: what it lacks there spoils the comparison.
+    """
+    judge = holdout.problem
+    if judge is None:
         return fit
-    while holdout.problem is not None and fit.chosen:
+    rules = judge.thresholds.comparison
+    rule = rules.elimination
+    if len(fit.chosen) > rule.few or typical_power(holdout.left([fit])[0]) > rule.near:
+        return fit
+
+    def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
+        if not fit.chosen:
+            return None
         share = shares(holdout, fit)
-        asked = [
-            i for i, c in enumerate(fit.chosen) if share[i] < _SMALL and c.effect not in SATURATIONS and c not in kept
-        ]
-        if not asked:
-            break
-        least = min(asked, key=lambda i: share[i])
-        keep = [i for i in range(len(fit.chosen)) if i != least]
-        values = [fit.values[fit.slices[i]] for i in keep]
-        less = refit([fit.chosen[i] for i in keep], np.concatenate(values) if values else np.empty(0))
-        rare = problem is not None and pays_where_rare(problem, holdout, less, fit)
-        if rare or holdout.gains(less, fit, _Z, _LEAST):
-            kept.add(fit.chosen[least])
-        else:
-            fit = less
-    return fit
+        small = [i for i, c in enumerate(fit.chosen) if share[i] < rule.small_share and c not in kept]
+        asked = [i for i in small if fit.chosen[i].effect not in SATURATIONS]
+        return fit.chosen[min(asked, key=lambda i: share[i])] if asked else None
+
+    def without(fit: Fit, gone: Candidate) -> Fit:
+        rest = fit.without([gone])
+        return refit(rest.chosen, rest.values)
+
+    def stays(fit: Fit, less: Fit) -> bool:
+        against = compare(problem or judge, holdout, less, fit)
+        return (problem is not None and against.passes(rules.where_rare)) or against.passes(rules.validation)
+
+    return eliminate(fit, worst, without, stays)
 
 
 def shares(holdout: Holdout, fit: Fit) -> np.ndarray:
-    """(F,) of what all effects gain on the judging windows, what is lost without each, the others as they are."""
+    """(F,) of what all effects gain on the validation windows, what is lost without each, the others as they are."""
     problem = holdout.problem
     assert problem is not None
     sets = [fit.effects, *([e for k, e in enumerate(fit.effects) if k != i] for i in range(len(fit.chosen))), []]

@@ -8,13 +8,11 @@ from bumblebee.diagnosis.candidates import Candidate, Formula
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
 
-PARAMETER = 4.0  # log-likelihood that a parameter must bring
-
 
 def criterion(problem: Problem, fit: Fit) -> float:
     """Log-likelihood of the fitted windows, whose tails are long, less what the parameters cost."""
-    left = fit.clean(problem)
-    return -0.5 * left.shape[1] * float(np.log1p((left**2).mean(axis=1)).sum()) - PARAMETER * parameters(fit)
+    left, price = fit.clean(problem), problem.thresholds.comparison.criterion.parameter
+    return -0.5 * left.shape[1] * float(np.log1p((left**2).mean(axis=1)).sum()) - price * parameters(fit)
 
 
 def parameters(fit: Fit) -> int:

@@ -1,6 +1,7 @@
 """Joint fit of the chosen effects: Gauss-Newton on whitened residuals, with the nuisances as further parameters."""
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,6 +44,18 @@ class Fit:
     def of(self, candidate: Candidate) -> np.ndarray:
         """Parameters of one of the chosen."""
         return self.values[self.slices[self.chosen.index(candidate)]]
+
+    def without(self, gone: Collection[Candidate]) -> "Fit":
+        """The other effects where they are, with their columns; residual, nuisances and cost are of all still."""
+        stays = [c not in gone for c in self.chosen]
+        parameters = np.repeat(stays, [len(c.nominal) for c in self.chosen]).astype(bool)
+        columns = np.repeat(stays, [int(np.count_nonzero(c.scales)) for c in self.chosen]).astype(bool)
+        return replace(
+            self,
+            chosen=tuple(c for c, stay in zip(self.chosen, stays, strict=True) if stay),
+            values=self.values[parameters],
+            columns=self.columns[columns],
+        )
 
     def clean(self, problem: Problem) -> np.ndarray:
         """Residual without nuisances (W, M)."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from bumblebee.diagnosis.candidates import INVERSE, Candidate, is_chosen, label
-from bumblebee.diagnosis.comparison import Holdout, linearly_without, no_worse_within_errors
+from bumblebee.diagnosis.comparison import Holdout, compare, linearly_without
 from bumblebee.diagnosis.estimation import Fit, gauss_newton, project, solve
 from bumblebee.diagnosis.selection.forward import Search
 from bumblebee.diagnosis.selection.score_tests import score_tests
@@ -14,12 +14,6 @@ from bumblebee.diagnosis.selection.trial import Trial, try_one
 from bumblebee.diagnosis.sensitivities import Columns
 from bumblebee.diagnosis.simulation import unit_on
 from bumblebee.sim.effects import CATALOGUE
-
-_SAME = 0.95
-_KIN = 0.7  # whitened sensitivities this parallel are worth trying in each other's place
-_RIVALS, _ALL_RIVALS = 4, 16  # tried in an effect's place; in all effects' places together, but one each
-_FAR_WORSE, _ENOUGH = 6.0, 20  # standard errors by which slopes make a rival hopeless; windows that can say so
-_POWER_Z = 4.0  # seen four times out of five at a bound of about three standard errors
 
 
 def alike(columns: Columns, found: Search) -> list[list[tuple[Candidate, float]]]:
@@ -82,20 +76,19 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
     their slopes are worse by six on the windows of the screening.
     """
     fit, problem = found.fit, found.problem
-    most = min(_RIVALS, max(1, _ALL_RIVALS // max(1, len(fit.chosen))))
+    rule, judge = problem.thresholds.selection.confounding, problem.thresholds.comparison.no_worse_within_errors
+    most = min(rule.rivals, max(1, rule.all_rivals // max(1, len(fit.chosen))))
     out = []
     for i, kin in enumerate(ranked):
-        same = [c for c, share in kin if share > _SAME]
-        rest = linearly_without(fit, i)
-        near = [c for c, share in kin if _KIN < share <= _SAME and not is_chosen(c, rest.chosen)][:most]
+        same = [c for c, share in kin if share > rule.same]
+        rest = linearly_without(fit, fit.chosen[i])
+        near = [c for c, share in kin if rule.kin < share <= rule.same and not is_chosen(c, rest.chosen)][:most]
         for rival in near:
             steps = _direction(found, rival, rest)
             if steps is None:
                 continue
             trial = try_one(problem, rest, rival, steps, found.weights)
-            if trial is not None and no_worse_within_errors(
-                found.problem, holdout, found.fit, _in_place(found, rest, trial)
-            ):
+            if trial is not None and compare(problem, holdout, fit, _in_place(found, rest, trial)).passes(judge):
                 same.append(rival)
         out.append(same)
     return out
@@ -103,6 +96,7 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
 
 def _direction(found: Search, rival: Candidate, rest: Fit) -> np.ndarray | None:
     """The steps (F,) that the screened windows suggest for a rival beside `rest`; None where it is far worse there."""
+    rule = found.problem.thresholds.selection.confounding
     small, keep = found.screened, np.isin(_keys(found.problem), _keys(found.screened))
     weights = found.weights[keep]
     columns = found.columns.only([found.columns.candidates.index(rival)])
@@ -111,7 +105,7 @@ def _direction(found: Search, rival: Candidate, rest: Fit) -> np.ndarray | None:
     swapped = beside.residual - np.tensordot(solve(basis, inverse, beside.residual, weights), basis, axes=1)
     ours = found.fit.clean(found.problem)[keep]
     loss = np.log1p((swapped**2).mean(axis=1)) - np.log1p((ours**2).mean(axis=1))
-    if len(loss) > _ENOUGH and loss.mean() > _FAR_WORSE * loss.std(ddof=1) / np.sqrt(len(loss)):
+    if len(loss) > rule.enough and loss.mean() > rule.far_worse * loss.std(ddof=1) / np.sqrt(len(loss)):
         return None
     return score_tests(small, columns, beside, weights).steps[0]
 
@@ -140,7 +134,7 @@ def detectable(found: Search) -> list[dict[str, Any]]:
             if key in seen or (c.effect, c.where) in chosen or c.effect in INVERSE:
                 continue
             seen.add(key)
-            size = _POWER_Z * share * error * abs(c.step[f])
+            size = found.problem.thresholds.selection.confounding.detectable_z * share * error * abs(c.step[f])
             entries.append(
                 label(c)
                 | {

@@ -6,16 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate, effects_at
-from bumblebee.diagnosis.comparison import Holdout, pruned, still_paying
+from bumblebee.diagnosis.comparison import Holdout, drop_insignificant, drop_unpaid
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, interval, last_step, moves
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
 from bumblebee.errors import BadInput
-
-_SURE = 3.0  # standard errors
-_CHANGED = 0.85  # share of the cost that is left, below which the declared model was not nearly right
-_ROUNDS, _WEIGHED = 4, 6  # of whitening and fitting, of weighing and fitting: at most
-_STILL, _STEADY = 0.5, 0.1  # of an interval's half-width: a fit that moves less has settled
-_SAME = 0.1  # mean square change of a window's prediction, in the noise's, below which whitening anew changes nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +28,8 @@ def _around(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
 
     Else only its nuisances are computed anew.
     """
-    if fit.cost < _CHANGED * cost_of(problem, problem.residual([[]])[0], window_weights(fit.clean(problem)))[0]:
+    share = problem.thresholds.selection.final_fit.changed
+    if fit.cost < share * cost_of(problem, problem.residual([[]])[0], window_weights(fit.clean(problem)))[0]:
         plant, layout, windows = problem.plant, problem.layout, problem.read
         steps, rules = (problem.finest, problem.coarse), problem.thresholds
         try:
@@ -53,7 +48,8 @@ def _settled(problem: Problem, fit: Fit, rng: np.random.Generator) -> tuple[Prob
     window's prediction has moved, whitening it again gives the same again: another draw of signs moved three effects of
     a standing robot by 0.04 to 0.5 of their half-widths, for a fifth of the diagnosis's time.
     """
-    for _ in range(_ROUNDS):
+    rule = problem.thresholds.selection.final_fit
+    for _ in range(rule.rounds):
         before, last = fit.values, problem
         problem = _around(problem, fit, rng)
         residual = problem.residual([fit.effects])[0]
@@ -62,7 +58,7 @@ def _settled(problem: Problem, fit: Fit, rng: np.random.Generator) -> tuple[Prob
         fit = gauss_newton(problem, fit.chosen, before, weights, iterations=3, coarse=True)
         fit, weights = _weighed(problem, fit)
         anew = problem.whitener is not last.whitener
-        if not anew or _is_near(problem, fit, before) or _is_still(problem, fit, weights, before, _STILL):
+        if not anew or _is_near(problem, fit, before) or _is_still(problem, fit, weights, before, rule.still):
             break
     return problem, fit, weights
 
@@ -70,15 +66,16 @@ def _settled(problem: Problem, fit: Fit, rng: np.random.Generator) -> tuple[Prob
 def _is_near(problem: Problem, fit: Fit, before: np.ndarray) -> bool:
     """Whether no window tells the fit from its values `before` (P,), around which it was whitened."""
     change = problem.residual([effects_at(fit.chosen, before)])[0] - fit.residual
-    return bool((change**2).mean(axis=1).max() < _SAME)
+    return bool((change**2).mean(axis=1).max() < problem.thresholds.selection.final_fit.same)
 
 
 def _weighed(problem: Problem, fit: Fit) -> tuple[Fit, np.ndarray]:
     """The fit with its windows weighed (W,) by what it leaves of them itself, to where that changes little."""
-    for _ in range(_WEIGHED):
+    rule = problem.thresholds.selection.final_fit
+    for _ in range(rule.weighed):
         before, weights = fit.values, window_weights(fit.clean(problem))
         fit = gauss_newton(problem, fit.chosen, before, weights, iterations=2, coarse=True, known=fit)
-        if _is_still(problem, fit, weights, before, _STEADY):
+        if _is_still(problem, fit, weights, before, rule.steady):
             break
     return fit, weights
 
@@ -105,9 +102,9 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
     def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
         return gauss_newton(problem, chosen, values, weights, iterations=1, coarse=True, known=whole)
 
-    fit = pruned(problem, whole, weights, _SURE, refit)
+    fit = drop_insignificant(problem, whole, weights, problem.thresholds.selection.final_fit.sure, refit)
     if holdout is not None:
-        fit = still_paying(fit, refit, holdout, problem)
+        fit = drop_unpaid(fit, refit, holdout, problem)
     if fit.chosen != whole.chosen:
         fit = last_step(problem, fit.chosen, fit.values, weights)
     if holdout is not None and holdout.worse_later(_with_nuisance(problem, found, weights), fit):

@@ -21,13 +21,10 @@ from bumblebee.diagnosis.selection.proposals.saturation import limit_trials
 from bumblebee.diagnosis.selection.proposals.stribeck import creeping, levelled
 from bumblebee.diagnosis.selection.score_tests import Scores
 from bumblebee.diagnosis.selection.state import Loss, SearchState
-from bumblebee.diagnosis.selection.swap import exchange
+from bumblebee.diagnosis.selection.swap import swap
 from bumblebee.diagnosis.selection.trial import Trial, simplest
 from bumblebee.diagnosis.sensitivities import Columns
 from bumblebee.sim.effects import Effect
-
-_EXCHANGES = 3
-_MOST_OF_IT = 0.3  # share of the cost that a trial takes away, beside which limits elsewhere can wait
 
 
 @dataclass(eq=False)
@@ -70,11 +67,11 @@ def search(
     _select(run, config, budget)
     if find_lost_commands(run):
         _select(run, config, budget)
-    for _ in range(_EXCHANGES):
+    for _ in range(problem.thresholds.selection.forward.swaps):
         if not budget.has_time_for("other names in the place of those found"):
             break
         say("each name against its rivals")
-        if not (exchange(run) or creeping(run)):
+        if not (swap(run) or creeping(run)):
             break
         _select(run, config, budget)
     run.prune()
@@ -139,7 +136,7 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
             run.closed |= set(looked)
             vain += 1
             continue
-        best = simplest(tried, run.fit.cost)
+        best = simplest(tried, run.fit.cost, run.problem.thresholds.selection.trials)
         if best.candidate.effect in SATURATIONS and find_lost_commands(run):
             continue  # a lost command, too, spoils a few windows
         accepted, place = run.accept(best.candidate, best.values), best.candidate.where
@@ -154,7 +151,7 @@ def _where_limits_matter(tried: Sequence[Trial], run: SearchState) -> tuple[Cand
     What a limit does may pass for weakness or friction of its joint, and then the two are compared; a limit elsewhere
     is judged when the large effects are known.
     """
-    if min((t.cost for t in tried), default=np.inf) > (1 - _MOST_OF_IT) * run.fit.cost:
+    if min((t.cost for t in tried), default=np.inf) > (1 - run.rule.most_of_it) * run.fit.cost:
         return tuple(run.candidates)
     places = {t.candidate.where for t in tried}
     return tuple(c for c in run.candidates if c.where in places)

@@ -18,10 +18,7 @@ from bumblebee.diagnosis.comparison import z_values
 from bumblebee.diagnosis.estimation import Fit, project, solve
 from bumblebee.diagnosis.residuals import Problem, null_draws
 from bumblebee.diagnosis.sensitivities import Columns
-
-_SEEN = 1e-3  # share of a column's power that must be left beside the chosen ones
-_LEAST_POWER = 1e-6
-_LONE = 1e-6  # keeps the variance finite where one window holds all that is known of a candidate
+from bumblebee.diagnosis.thresholds.selection import ScoreTests
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +39,7 @@ def score_tests(problem: Problem, columns: Columns, fit: Fit, weights: np.ndarra
     """Test every candidate given the fit (on the same windows)."""
     basis, inverse = project(problem, fit.columns, weights)
     left = fit.residual - np.tensordot(solve(basis, inverse, fit.residual, weights), basis, axes=1)
-    parts = _Parts(columns.values, basis, inverse, weights)
+    parts, rule = _Parts(columns.values, basis, inverse, weights), problem.thresholds.selection.score_tests
     scores, slices = next(parts.scores(left[None])), columns.slices
     count = len(columns.candidates)
     steps, errors = [np.empty(0)] * count, [np.empty(0)] * count
@@ -52,7 +49,7 @@ def score_tests(problem: Problem, columns: Columns, fit: Fit, weights: np.ndarra
         which = np.flatnonzero(sizes == size)
         rows = np.stack([np.arange(slices[c].start, slices[c].stop) for c in which])
         own = parts.by_window(rows)
-        tested = _tests(scores[rows], parts.curvature(rows, own), parts.raw[rows], own)
+        tested = _tests(scores[rows], parts.curvature(rows, own), parts.raw[rows], own, rule)
         for c, estimate, error in zip(which, tested[0], tested[1], strict=True):
             steps[c], errors[c] = estimate, error
         z[which], gain[which] = tested[2:]
@@ -109,7 +106,7 @@ class _Parts:
 
 
 def _tests(
-    scores: np.ndarray, curvature: np.ndarray, raw: np.ndarray, own: np.ndarray
+    scores: np.ndarray, curvature: np.ndarray, raw: np.ndarray, own: np.ndarray, rule: ScoreTests
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Estimates and errors (C, F), z and gain (C,) of candidates from scores (C, F, W) and curvatures (C, F, F).
 
@@ -117,13 +114,13 @@ def _tests(
     """
     count, windows = scores.shape[1:]
     diagonal = np.einsum("cff->cf", curvature)
-    seen = (diagonal > _SEEN * raw) & (diagonal > _LEAST_POWER)
+    seen = (diagonal > rule.seen * raw) & (diagonal > rule.least_power)
     # Unseen rows become directions of their own, without a score: they change nothing.
     scores = scores * seen[..., None]
     curvature = np.where(seen[:, :, None] & seen[:, None, :], curvature, 0.0)
     inverse = np.linalg.pinv(curvature, rcond=1e-6, hermitian=True)
     total = scores.sum(axis=2)
-    spread = _spread(scores, own, inverse)
+    spread = _spread(scores, own, inverse, rule.lone)
     at = np.arange(count)
     spread[:, at, at] += np.maximum(0.25 * np.where(seen, diagonal, 0.0) - spread[:, at, at], 0.0)
     wald = np.einsum("cf,cfg,cg->c", total, np.linalg.pinv(spread, rcond=1e-9, hermitian=True), total)
@@ -137,7 +134,7 @@ def _tests(
     return estimate, errors, z, np.einsum("cf,cf->c", total, estimate)
 
 
-def _spread(scores: np.ndarray, own: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+def _spread(scores: np.ndarray, own: np.ndarray, inverse: np.ndarray, lone: float) -> np.ndarray:
     """Covariance (C, F, F) of summed scores (C, F, W) from how windows differ from what the estimate makes of them.
 
     `own` (C, W, F, F) are the windows' normal matrices, `inverse` (C, F, F) that of their sum. A window that alone
@@ -146,7 +143,7 @@ def _spread(scores: np.ndarray, own: np.ndarray, inverse: np.ndarray) -> np.ndar
     each = scores.transpose(0, 2, 1)[..., None]  # (C, W, F, 1)
     pull = np.matmul(own, inverse[:, None])
     left = each - np.matmul(pull, each.sum(axis=1, keepdims=True))
-    rest = np.eye(scores.shape[1]) * (1 + _LONE) - pull
+    rest = np.eye(scores.shape[1]) * (1 + lone) - pull
     left, doubt = np.linalg.solve(rest, left)[..., 0], np.matmul(pull, each)[..., 0]
     return np.matmul(left.transpose(0, 2, 1), left) + np.matmul(doubt.transpose(0, 2, 1), doubt)
 
@@ -154,16 +151,16 @@ def _spread(scores: np.ndarray, own: np.ndarray, inverse: np.ndarray) -> np.ndar
 def null_maxima(problem: Problem, columns: Columns, fit: Fit, weights: np.ndarray, draws: np.ndarray) -> np.ndarray:
     """Largest z (K,) over all columns, one by one, on residuals `draws` (K, W, M) of a complete model."""
     basis, inverse = project(problem, fit.columns, weights)
-    parts = _Parts(columns.values, basis, inverse, weights)
+    parts, rule = _Parts(columns.values, basis, inverse, weights), problem.thresholds.selection.score_tests
     curvature = np.maximum(parts.diagonal(), 0.0)
-    seen = (curvature > _SEEN * parts.raw) & (curvature > _LEAST_POWER)
+    seen = (curvature > rule.seen * parts.raw) & (curvature > rule.least_power)
     own = parts.by_window(np.flatnonzero(seen)[:, None])[..., 0, 0]
     pull = own / curvature[seen, None]
     out = np.zeros(len(draws))
     free = [draw - np.tensordot(solve(basis, inverse, draw, weights), basis, axes=1) for draw in draws]
     for k, drawn in enumerate(parts.scores(np.stack(free))):
         scores = drawn[seen]
-        left = (scores - pull * scores.sum(axis=1, keepdims=True)) / (1 + _LONE - pull)
+        left = (scores - pull * scores.sum(axis=1, keepdims=True)) / (1 + rule.lone - pull)
         spread = (left**2).sum(axis=1) + ((pull * scores) ** 2).sum(axis=1)
         z = np.abs(scores.sum(axis=1)) / np.sqrt(np.maximum(spread, 0.25 * curvature[seen]))
         out[k] = z.max(initial=0.0)

@@ -17,12 +17,8 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.score_tests import Scores, score_tests
 from bumblebee.diagnosis.sensitivities import Columns
 from bumblebee.diagnosis.simulation import Changes
+from bumblebee.diagnosis.thresholds.selection import Screening
 from bumblebee.sim.effects import Effect
-
-_WORTH = 2.5  # times as many windows as are screened, from which on a second look is worth it
-_RESTLESS = 1.5  # whitened power
-_MUCH = 0.15  # share of the cost
-_PLAIN = 2.0  # times the chi-square of the bound
 
 
 class Stages:
@@ -33,7 +29,7 @@ class Stages:
         every = np.arange(len(problem.windows))
         others = np.setdiff1d(every, keep)
         second = others[np.unique(np.linspace(0, len(others) - 1, min(len(keep), len(others))).round().astype(int))]
-        twice = len(every) >= _WORTH * len(keep)
+        twice = len(every) >= problem.thresholds.selection.screening.second_look * len(keep)
         self.both = np.concatenate((keep, second)) if twice else keep
         """Indices of the screening's windows and those of the second look, if there is one."""
         self._of = (problem.windows, problem.whitener)
@@ -85,7 +81,7 @@ def restless(problem: Problem, answers: np.ndarray, residual: np.ndarray, count:
     `answers` (W, nv, S, M) to pulses explain the whitened residual (W, M), all degrees of freedom together; a joint's
     power is the mean square of its torques in their own standard errors, 1 for noise.
     """
-    size = answers.shape[1] * answers.shape[2]
+    rule, size = problem.thresholds.selection.screening, answers.shape[1] * answers.shape[2]
     rows = answers.reshape(len(answers), size, -1).astype(float)
     scale = np.sqrt((rows**2).mean(axis=(0, 2), keepdims=True)) + 1e-12
     rows = rows / scale
@@ -95,10 +91,12 @@ def restless(problem: Problem, answers: np.ndarray, residual: np.ndarray, count:
     torque = np.matmul(inverse, np.matmul(rows, residual[:, :, None]))[..., 0]
     lacks = torque**2 / np.diagonal(inverse, axis1=1, axis2=2)
     power = lacks.reshape(len(answers), *answers.shape[1:3]).mean(axis=(0, 2))[problem.plant.dof]
-    return [problem.plant.joints[j] for j in np.argsort(-power)[:count] if power[j] > _RESTLESS]
+    return [problem.plant.joints[j] for j in np.argsort(-power)[:count] if power[j] > rule.restless]
 
 
-def is_promising(c: Candidate, tests: Scores, k: int, bound: float, share: float, cost: float, power: float) -> bool:
+def is_promising(
+    c: Candidate, tests: Scores, k: int, bound: float, share: float, cost: float, power: float, rule: Screening
+) -> bool:
     """Whether a candidate, number `k` of `tests`, is significant and can move the way it wants to.
 
     One that promises much of the whole cost is tried, too: where a few windows are very far off they decide its
@@ -106,13 +104,13 @@ def is_promising(c: Candidate, tests: Scores, k: int, bound: float, share: float
     than noise of the residual's `power` would give it, for the same reason. `bound` is the z to reach, `share` that of
     the windows the tests were made on, `cost` the fit's on all windows.
     """
-    much = tests.gain[k] > min(_MUCH * share * cost, _PLAIN * max(power, 1.0) * bound**2)
-    return bool(tests.z[k] >= bound or much) and any(_can_move(c, tests.steps[k]))
+    much = tests.gain[k] > min(rule.much * share * cost, rule.plain * max(power, 1.0) * bound**2)
+    return bool(tests.z[k] >= bound or much) and any(_can_move(c, tests.steps[k], rule.free))
 
 
-def _can_move(c: Candidate, steps: np.ndarray) -> list[bool]:
+def _can_move(c: Candidate, steps: np.ndarray, share: float) -> list[bool]:
     """For each free parameter, whether the wanted change is not stopped by a bound."""
     wanted = np.array(c.nominal)
     wanted[list(c.free)] += np.asarray(steps) * np.array(c.step)[list(c.free)]
     reached = np.abs(c.clip(wanted) - np.array(c.nominal))
-    return [bool(reached[i] > 1e-3 * abs(c.step[i])) for i in c.free]
+    return [bool(reached[i] > share * abs(c.step[i])) for i in c.free]

@@ -9,11 +9,10 @@ from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate, effec
 from bumblebee.diagnosis.comparison import (
     Holdout,
     Step,
+    compare,
+    drop_insignificant,
     evidence,
     is_physical,
-    pays_where_felt,
-    pays_where_rare,
-    pruned,
     wald,
 )
 from bumblebee.diagnosis.config import SearchConfig
@@ -24,14 +23,8 @@ from bumblebee.diagnosis.selection.screening import Stages, is_promising, restle
 from bumblebee.diagnosis.selection.trial import Trial, try_one
 from bumblebee.diagnosis.sensitivities import Answered, Columns, pulse_sizes, screen
 from bumblebee.diagnosis.simulation import Changes
+from bumblebee.diagnosis.thresholds.selection import Forward
 from bumblebee.sim.effects import Effect
-
-_ANEW = 0.1  # share of the cost left, below which all candidates are screened anew
-SOME = 2  # effects after which a model that is still far off is taken to lack many
-LITTLE = 0.5  # share of the median chi-square that the last of them took at most
-PATIENCE = 2  # rounds that may fail once many were fitted together
-_FAINT = 0.15  # share of the best candidate's gain, below which another can wait for a later round
-_CHANGED = 0.8  # share of the cost that a fit must leave less of, to be worth linearising around
 
 
 class SearchState:
@@ -87,24 +80,25 @@ class SearchState:
 
     def promising(self) -> list[Candidate]:
         """The best of the screening, and play and shafts of the joints that are worst explained."""
-        tests = self.tests()
+        tests, bound = self.tests(), self.rule.bound_share
         share = np.sqrt(len(self.keep) / len(self.problem.windows))
         found = []
-        sure, least = 2.0 * max(self.fit.cost / self.fit.residual.size, 1.0) * (share * self.bound) ** 2, 0.0
+        rule = self.rule
+        sure, least = rule.sure * max(self.fit.cost / self.fit.residual.size, 1.0) * (share * self.bound) ** 2, 0.0
         for k in np.argsort(-tests.gain):
             c = self.columns.candidates[k]
             if len(found) >= self.config.simulated or tests.gain[k] <= least:
                 break
-            if self.is_open(c, tests, k, 0.7 * share * self.bound, share**2) and not is_like(c, found):
+            if self.is_open(c, tests, k, bound * share * self.bound, share**2) and not is_like(c, found):
                 found.append(c)
                 if tests.gain[k] > sure and tests.z[k] > self.bound:
-                    least = max(least, _FAINT * tests.gain[k])
+                    least = max(least, rule.faint * tests.gain[k])
         left = self.small_fit().clean(self.small)
         poor = restless(self.small, self.answers.white, left, self.config.shortlist)
         joints = len(self.problem.plant.joints)
         listed = [c for c in self.candidates if c.where in poor and shortlisted(c, joints)]
         listed = [c for c in listed if c not in self.closed and not is_chosen(c, self.fit.chosen)]
-        return found + self.seen(listed, 0.7 * share * self.bound, share**2)
+        return found + self.seen(listed, bound * share * self.bound, share**2)
 
     def seen(self, listed: Sequence[Candidate], bound: float, share: float) -> list[Candidate]:
         """Those of some candidates without screening columns that the screening windows, too, make worth a trial."""
@@ -120,7 +114,8 @@ class SearchState:
             return False
         if c.effect in SATURATIONS and tests.z[k] < bound:  # those that few windows feel have trials of their own
             return False
-        return is_promising(c, tests, k, bound, share, self.fit.cost, self.fit.cost / self.fit.residual.size)
+        cost, rule = self.fit.cost, self.problem.thresholds.selection.screening
+        return is_promising(c, tests, k, bound, share, cost, cost / self.fit.residual.size, rule)
 
     def trials(self) -> tuple[list[Trial], list[Candidate]]:
         """Candidates tried in the simulator with their costs; and those that were looked at."""
@@ -134,7 +129,7 @@ class SearchState:
         tests = score_tests(self.problem, self.sensitivities(left), self.fit, self.weights)
         order = [k for k in np.argsort(-tests.gain) if self.is_open(left[k], tests, k, self.bound, 1.0)]
         joints, best = len(self.problem.plant.joints), max((tests.gain[k] for k in order), default=0.0)
-        faint = [k for k in order if tests.gain[k] < _FAINT * best and not shortlisted(left[k], joints)]
+        faint = [k for k in order if tests.gain[k] < self.rule.faint * best and not shortlisted(left[k], joints)]
         wait, order = [left[k] for k in faint], [k for k in order if k not in faint][: self.config.trials]
         tried = [try_one(self.problem, self.fit, left[k], tests.steps[k], self.weights) for k in order]
         tried = [t for t in tried if t is not None and t.cost < self.fit.cost - self.bound**2 / 2]
@@ -145,7 +140,7 @@ class SearchState:
         self.stages = self.stages.on(self.problem, self.keep)
         known, tests = self.stages.tests(self.problem, self.columns, looked, self.fit, self.weights)
         share = len(self.stages.both) / len(self.problem.windows)
-        least = 0.7 * np.sqrt(share) * self.bound
+        least = self.rule.bound_share * np.sqrt(share) * self.bound
         gone = [c for k, c in enumerate(known) if not self.is_open(c, tests, k, least, share)]
         return [c for c in looked if c not in gone]
 
@@ -165,12 +160,11 @@ class SearchState:
         z = wald(self.problem, fit, weights, len(fit.chosen) - 1)
         if z < self.bound:  # the windows that judge need not be simulated
             return self.refuse(candidate)
-        pays = self.holdout.gains(self.fit, fit, self.config.holdout_z, self.config.least_gain) or (
-            pays_where_felt(self.problem, self.holdout, self.fit, fit)
-            if candidate.effect in (*SATURATIONS, *ABRUPT)
-            else pays_where_rare(self.problem, self.holdout, self.fit, fit)
-        )
-        if not pays or not is_physical(self.problem, self.fit, fit, candidate, weights):
+        rules, gain = self.problem.thresholds.comparison, compare(self.problem, self.holdout, self.fit, fit)
+        few = rules.where_felt if candidate.effect in (*SATURATIONS, *ABRUPT) else rules.where_rare
+        if not (gain.passes(rules.validation) or gain.passes(few)):
+            return self.refuse(candidate)
+        if is_physical(self.problem, self.fit, fit, candidate, weights):
             return self.refuse(candidate)
         self.steps.append(evidence(candidate, z, len(self.candidates)))
         self.say(f"found {candidate.effect} on {candidate.where or 'the whole robot'}: {fit.of(candidate).round(5)}")
@@ -178,6 +172,11 @@ class SearchState:
         self.renew(fit)
         self.fall = 1.0 - self.power() / max(before, 1e-12)
         return True
+
+    @property
+    def rule(self) -> Forward:
+        """The numbers that this state goes by."""
+        return self.problem.thresholds.selection.forward
 
     def power(self) -> float:
         """Median chi-square of the windows, by value."""
@@ -191,13 +190,13 @@ class SearchState:
 
     def renew(self, fit: Fit) -> None:
         """Nuisances around what was found, where it is more than a little; weights; candidates, where it is a lot."""
-        if cost_of(self.problem, fit.residual, self.weights)[0] < _CHANGED * self.fit.cost:
+        if cost_of(self.problem, fit.residual, self.weights)[0] < self.rule.relinearise * self.fit.cost:
             self.problem = self.problem.relinearised(fit.effects)
             self.holdout = self.holdout.relinearised(fit.effects)
         self.weights = window_weights(fit.clean(self.problem))
         self.fit = resolved(self.problem, fit, self.weights)
         self.small = self.problem.part(self.keep)
-        if self.fit.cost < _ANEW * self.screened_cost:
+        if self.fit.cost < self.rule.anew * self.screened_cost:
             self.rescreen()
 
     def prune(self) -> None:
@@ -206,7 +205,7 @@ class SearchState:
         def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
             return gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True, known=self.fit)
 
-        self.fit = pruned(self.problem, self.fit, self.weights, self.bound, refit, self.holdout, self.say)
+        self.fit = drop_insignificant(self.problem, self.fit, self.weights, self.bound, refit, self.holdout, self.say)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,14 +22,13 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import SATURATIONS, Candidate, is_chosen
 from bumblebee.diagnosis.comparison import (
-    PARAMETER,
+    columns_without,
+    compare,
     criterion,
     evidence,
     is_physical,
     linear_cost,
-    no_worse_by_mean,
     wald,
-    with_columns_without,
     z_value,
 )
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
@@ -42,25 +41,23 @@ from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial, try_one
 from bumblebee.diagnosis.sensitivities import Columns
 
-_AS_MUCH = 0.95  # share of what the names gain that a rival must promise
-_PART = 0.6  # the same of a shaft, whose loss has not been fitted yet
-_RIVALS = 2  # tried in the place of the same names
-_FEW = 4  # effects up to which two are taken out together
-_CLEARLY = 2 * PARAMETER  # log-likelihood by which a rival with as many parameters must be better
 _Tried = tuple[Sequence[Candidate], Fit, float]
 """Names that are gone, the fit without them and with their rival last, and the rival's z."""
 
 
-def exchange(run: SearchState) -> bool:
+def swap(run: SearchState) -> bool:
     """Put one better name in the place of one or two of the search's; whether there was one."""
+    rule, rules = run.problem.thresholds.selection.swap, run.problem.thresholds.comparison
     free = [c for c in run.fit.chosen[run.given :] if c.effect not in SATURATIONS]
-    taken = [(c,) for c in free] + (list(combinations(free, 2)) if len(free) <= _FEW else [])
+    taken = [(c,) for c in free] + (list(combinations(free, 2)) if len(free) <= rule.few else [])
     best: tuple[float, Fit, float] | None = None
     start = criterion(run.problem, run.fit)
     for gone, new, z in chain(*(_tried(run, gone) for gone in taken), _twisted(run, free)):
         gain = criterion(run.problem, new) - start
-        margin = _CLEARLY if len(gone) == 1 else 0.0
-        if gain > max(margin, best[0] if best else margin) and no_worse_by_mean(run.holdout, run.fit, new):
+        margin = rule.clearly * rules.criterion.parameter if len(gone) == 1 else 0.0
+        if gain <= max(margin, best[0] if best else margin):
+            continue
+        if compare(run.problem, run.holdout, run.fit, new).passes(rules.no_worse_on_average):
             best = gain, new, z
     if best is None:
         return False
@@ -76,14 +73,15 @@ def exchange(run: SearchState) -> bool:
 
 def _tried(run: SearchState, gone: Sequence[Candidate]) -> Iterator[_Tried]:
     """Fits with one rival in the place of some names, those that promise most."""
+    rule = run.problem.thresholds.selection.swap
     weights, all_of = run.weights[run.keep], run.small_fit()
-    small = with_columns_without(run.small, all_of, gone)
+    small = columns_without(run.small, all_of, gone)
     own = linear_cost(run.small, small, weights) - linear_cost(run.small, all_of, weights)
     tests = score_tests(run.small, run.columns, small, weights)
-    promising = _promising(run.columns, tests, small, gone, _AS_MUCH * own)
+    promising = _promising(run.columns, tests, small, gone, rule.as_much * own, rule.rivals)
     if not promising:
         return
-    rest = with_columns_without(run.problem, run.fit, gone)
+    rest = columns_without(run.problem, run.fit, gone)
     for k in promising:
         rival = run.columns.candidates[k]
         trial = try_one(run.problem, rest, rival, tests.steps[k], run.weights)
@@ -100,10 +98,12 @@ def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[_Tried]:
         gone = [c for c in free if c.where == where and c.effect in SHAFT_LIKE]
         if len(gone) == 1 and is_of_series(gone[0], run.fit.of(gone[0])):
             continue
-        rest = with_columns_without(run.problem, run.fit, gone)
+        rest = columns_without(run.problem, run.fit, gone)
         own = linear_cost(run.problem, rest, run.weights) - linear_cost(run.problem, run.fit, run.weights)
         run.hopeless.add((SHAFT, where))
-        trial = best_shaft(run.problem, rest, run.candidates, run.weights, where, _PART * own)
+        trial = best_shaft(
+            run.problem, rest, run.candidates, run.weights, where, run.problem.thresholds.selection.swap.part * own
+        )
         new = _refitted(run, rest, trial) if trial else None
         if new:
             yield gone, *new
@@ -131,13 +131,15 @@ def _certainty(run: SearchState, rest: Fit, new: Fit, weights: np.ndarray) -> fl
     return max(z, z_value(max(fall, 0.0) / max(new.power(run.problem), 1.0), numbers, len(weights)))
 
 
-def _promising(columns: Columns, tests: Scores, rest: Fit, gone: Sequence[Candidate], least: float) -> list[int]:
+def _promising(
+    columns: Columns, tests: Scores, rest: Fit, gone: Sequence[Candidate], least: float, most: int
+) -> list[int]:
     """Numbers of the best rivals of other names than those that are gone, one of each name."""
     found: list[int] = []
     names = {(c.effect, c.where) for c in gone}
     for k in np.argsort(-tests.gain):
         c = columns.candidates[k]
-        if len(found) >= _RIVALS or tests.gain[k] < least:
+        if len(found) >= most or tests.gain[k] < least:
             break
         if (c.effect, c.where) in names or c.effect in SATURATIONS or is_chosen(c, rest.chosen):
             continue

@@ -8,14 +8,13 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate, rough
 from bumblebee.diagnosis.estimation import Fit, LeftOver
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.thresholds.selection import Trials
 
-_SECANTS = 3
 # Of effects that fit the same the one that is met most often is named; the others are its class.
 _USUAL = (
     "coulomb_friction", "viscous_friction", "armature", "motor_strength", "command_delay", "encoder_offset",
     "link_mass",
 )  # fmt: skip
-_ALIKE, _SHARE, _PARALLEL = 4.0, 0.03, 0.97
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +45,7 @@ def try_one(problem: Problem, fit: Fit, candidate: Candidate, steps: np.ndarray,
     values[free] = nominal[free] + np.asarray(steps) * np.array(candidate.step)[free]
     values = candidate.clip(values)
     best: Trial | None = None
-    for _ in range(_SECANTS):
+    for _ in range(problem.thresholds.selection.trials.secants):
         raw = declared - problem.residual([[*fit.effects, candidate.at(values)]], coarse=coarse)[0]
         raw = problem.tamed(raw) if coarse else raw
         change = beside.left(raw)
@@ -67,7 +66,7 @@ def try_one(problem: Problem, fit: Fit, candidate: Candidate, steps: np.ndarray,
     return best
 
 
-def simplest(tried: Sequence[Trial], before: float) -> Trial:
+def simplest(tried: Sequence[Trial], before: float, rule: Trials) -> Trial:
     """Of the trials that cost nearly the same as the best, the usual effect, or the one of fewest parameters.
 
     Costs that differ by a few say nothing; those of changes that are nearly parallel differ by more than that only
@@ -78,8 +77,8 @@ def simplest(tried: Sequence[Trial], before: float) -> Trial:
     def near(t: Trial) -> bool:
         worse = t.cost + 2 * len(t.candidate.free) - best.cost - 2 * len(best.candidate.free)
         product = (t.change * best.change).sum()
-        parallel = product > _PARALLEL * np.linalg.norm(t.change) * np.linalg.norm(best.change)
-        return worse < _ALIKE or bool(parallel and worse < _SHARE * (before - best.cost))
+        parallel = product > rule.parallel * np.linalg.norm(t.change) * np.linalg.norm(best.change)
+        return worse < rule.alike or bool(parallel and worse < rule.share * (before - best.cost))
 
     def rank(t: Trial) -> tuple[int, int, float]:
         kind = t.candidate.effect
