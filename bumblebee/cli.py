@@ -138,13 +138,19 @@ def compensate(
         Path | None, typer.Option("--model", help="MJCF that the policy was trained on; the declared G1 by default.")
     ] = None,
     leave_out: Annotated[bool, typer.Option("--leave-out", help="Go on without what cannot be undone.")] = False,
+    unproven: Annotated[
+        bool, typer.Option("--unproven", help="Go on where the diagnosis shows no better model on held-out rollouts.")
+    ] = False,
     overwrite: Overwrite = False,
 ) -> None:
     """What a policy's runner can undo at the joints, without training."""
+    from bumblebee.deploy.compensation_evidence import require_proven
     from bumblebee.deploy.compensation_file import claim_compensation, table_of, write_compensation
     from bumblebee.deploy.compensation_plan import compensate_file
 
     claim_compensation(out, overwrite, [path for path in (effects, model) if path])
+    if not unproven:
+        require_proven(effects)
     compensation = compensate_file(effects, model, leave_out=leave_out)
     print(table_of(compensation))
     write_compensation(out, compensation)

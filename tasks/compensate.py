@@ -8,12 +8,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bumblebee.deploy.compensation import Compensation, PlannedEffect
+from bumblebee.deploy.compensation_evidence import why_unproven
 from bumblebee.deploy.compensation_file import table_of, write_compensation
 from bumblebee.deploy.compensation_limits import CompensationLimits
 from bumblebee.deploy.compensation_plan import compensate
+from bumblebee.io.read import read_json
 from bumblebee.measured.intake import file_hash
 from bumblebee.ranges import Ranged
-from bumblebee.sim.effects import read_effects
+from bumblebee.sim.effects import Effect, read_effects
 from tasks.rollouts import parent_round
 from tasks.stage import load, log_run, output_folder, run_stage
 
@@ -44,16 +46,27 @@ def undone_after(parent: int, found: Path, limits: CompensationLimits) -> Compen
     """What undoes the effects `found` for experts of the round `parent`.
 
     What that round's own diagnosis found they were trained with, and to undo it again would be to do it twice. It is
-    left out also where a cluster's expert stayed what it was.
+    left out also where a cluster's expert stayed what it was. Nothing is undone where held-out rollouts show no
+    better model.
     """
     effects = read_effects(found)
+    document = found.parent / "diagnosis.json"
+    unproven = why_unproven(read_json(document)) if document.is_file() else ""
     trained = read_effects(Path(f"data/diagnosis/r{parent}/effects.yaml")) if parent else []
-    known = {(effect.effect, frozenset(effect.where)) for effect in trained}
-    new = [effect for effect in effects if (effect.effect, frozenset(effect.where)) not in known]
+    known = {_key(effect) for effect in trained}
+    why = {
+        index: f"the experts were trained with it in round {parent}" if _key(effect) in known else unproven
+        for index, effect in enumerate(effects)
+    }
+    new = [effect for index, effect in enumerate(effects) if not why[index]]
     made = compensate(new, None, limits, leave_out=True, where=found, effects_sha256=file_hash(found))
-    why = f"the experts were trained with it in round {parent}"
-    left = tuple(PlannedEffect(e.effect, e.where, "", "", why) for e in effects if e not in new)
+    left = tuple(PlannedEffect(e.effect, e.where, "", "", why[i]) for i, e in enumerate(effects) if why[i])
     return replace(made, plan=(*made.plan, *left))
+
+
+def _key(effect: Effect) -> tuple[str, frozenset[str]]:
+    """What makes it the same effect as another round's."""
+    return effect.effect, frozenset(effect.where)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 """The stage compensate: what a round's effects make of the runner's commands."""
 
+import json
 from pathlib import Path
 
 import pytest
 
+from bumblebee.cli import run
 from bumblebee.deploy.compensation_file import read_compensation
 from bumblebee.sim.effects import Effect, single, write_effects
 from tasks import compensate
@@ -36,6 +38,43 @@ def test_a_robot_that_lacks_nothing_is_sent_its_own_gains(diagnosed: Path) -> No
     compensate.main(1)
     made = read_compensation(Path("models/compensation/r1/compensation.json"))
     assert not made.plan and not made.encoder_offset.any() and not made.dry.any()
+
+
+def error(before: list[float] | None, after: list[float] | None) -> dict:
+    """A diagnosis's document with these intervals [rad]."""
+    part = {
+        name: {"0.2": {"joint_pos_rmse": {"value": 0.05, "ci95": ends}}}
+        for name, ends in (("before", before), ("after", after))
+    }
+    return {"effects": [{}], "error": part}
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "undone"),
+    [([0.048, 0.077], [0.016, 0.045], True), ([0.018, 0.098], [0.013, 0.088], False), (None, None, False)],
+)
+def test_nothing_is_undone_where_held_out_rollouts_show_no_better_model(
+    diagnosed: Path, before: list[float] | None, after: list[float] | None, undone: bool
+) -> None:
+    write_effects(Path("data/diagnosis/r1/effects.yaml"), [single("encoder_offset", "left_knee_joint", 0.05)])
+    Path("data/diagnosis/r1/diagnosis.json").write_text(json.dumps(error(before, after)))
+    compensate.main(1)
+    made = read_compensation(Path("models/compensation/r1/compensation.json"))
+    assert [bool(step.done) for step in made.plan] == [undone]
+    assert made.encoder_offset.any() == undone
+    assert undone or "held-out rollouts" in made.plan[0].why_not
+
+
+def test_the_command_refuses_them_in_one_line_unless_told_to(
+    diagnosed: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = Path("data/diagnosis/r1")
+    write_effects(folder / "effects.yaml", [single("encoder_offset", "left_knee_joint", 0.05)])
+    (folder / "diagnosis.json").write_text(json.dumps(error([0.018, 0.098], [0.013, 0.088])))
+    command = ["compensate", str(folder / "effects.yaml"), "--out", "c.json"]
+    assert run(command) == 2
+    assert capsys.readouterr().err.count("\n") == 1 and not Path("c.json").exists()
+    assert run([*command, "--unproven"]) == 0 and Path("c.json").exists()
 
 
 def test_what_the_experts_were_trained_with_is_not_undone_a_second_time(diagnosed: Path) -> None:
