@@ -8,19 +8,17 @@ from bumblebee.diagnosis.report import (
     cloud_picture,
     error_rows,
     figure,
+    html_page,
     items,
     line_picture,
     nothing_seen,
     number,
-    page,
     probability,
     shade,
     table,
     warning,
 )
 from bumblebee.diagnosis.simulation import motion_error, named, of_joint, pick, position_rows
-
-_MOTIONS = 15
 
 
 def gap_page(report: Gap) -> str:
@@ -37,15 +35,15 @@ def gap_page(report: Gap) -> str:
         "<h2>Joint by joint</h2>",
         _joints(document),
         "<h2>The torque that the model lacks</h2>",
-        _torque(document),
+        _torque(report),
         *_clouds(report),
         *_reported(document),
         "<h2>Motion by motion</h2>",
-        _motions(document["motions"]),
+        _motions(document["motions"], report.thresholds.page.motions),
         "<h2>Notes</h2>" if document["notes"] or document["unidentifiable"] else "",
         items(document["notes"] + [f"{', '.join(u['where'])}: {u['why']}" for u in document["unidentifiable"]]),
     ]
-    return page("Gap report", parts)
+    return html_page("Gap report", parts)
 
 
 def _lead(document: dict[str, Any]) -> str:
@@ -115,7 +113,8 @@ def _joints(document: dict[str, Any]) -> str:
     return text + table(["joint", *[f"{h} s" for h in error]], rows, range(1, 1 + len(error)))
 
 
-def _torque(document: dict[str, Any]) -> str:
+def _torque(report: Gap) -> str:
+    document, span = report.document, report.thresholds.missing_torque.span
     lacking = document["missing_torque"]
     if not lacking:
         return "<p>Too few windows to say.</p>"
@@ -123,21 +122,22 @@ def _torque(document: dict[str, Any]) -> str:
     for joint, entry in lacking.items():
         on = escape(", ".join(entry["depends_on"])) or "no single quantity"
         share = f"{100 * entry['structured_rms'] / entry['drive_rms']:.0f} %" if entry["drive_rms"] else "-"
+        quiet = f"<span class='note'>{escape(nothing_seen(document, joint, report.report.verdicts))}</span>"
         rows.append(
             [
                 f"{escape(joint)} [{entry['unit']}]",
                 number(entry["mean"]),
                 number(entry["structured_rms"]) if entry["significant"] else "-",
                 share if entry["significant"] else "-",
-                on if entry["significant"] else f"<span class='note'>{escape(nothing_seen(document, joint))}</span>",
+                on if entry["significant"] else quiet,
                 probability(entry["p"]),
             ]
         )
     head = ["joint", "mean", "predictable RMS", "of the drive's", "goes with", "p"]
     text = (
-        "<p class='note'>Torque that would make up for the missed velocities, over 0.04 s or a tick. The predictable "
-        "part is what boosted trees, trained on some rollouts, foresee on others; p is corrected for the number of "
-        "joints.</p>"
+        f"<p class='note'>Torque that would make up for the missed velocities, over {span:g} s or a tick. The "
+        "predictable part is what boosted trees, trained on some rollouts, foresee on others; p is corrected for the "
+        "number of joints.</p>"
     )
     return text + table(head, rows, (1, 2, 3, 5))
 
@@ -147,9 +147,9 @@ def _clouds(report: Gap) -> list[str]:
     data = report.torque
     if data is None:
         return []
-    worst = [j for j, e in report.document["missing_torque"].items() if e["significant"]][:3]
+    worst = [j for j, e in report.document["missing_torque"].items() if e["significant"]]
     parts = []
-    for joint in worst:
+    for joint in worst[: report.thresholds.page.pictures]:
         j, lacks = data.joints.index(joint), f"missing [{of_joint(report.document, joint, 'torque')}]"
         pair = [
             cloud_picture(
@@ -185,7 +185,7 @@ def _reported(document: dict[str, Any]) -> list[str]:
     return ["<h2>The drives' own torque</h2>", text, table(head, rows, (1, 2, 3, 4))]
 
 
-def _motions(motions: list[dict[str, Any]]) -> str:
+def _motions(motions: list[dict[str, Any]], most: int) -> str:
     rows = [
         [
             escape(m["cluster"]) or "-",
@@ -193,8 +193,8 @@ def _motions(motions: list[dict[str, Any]]) -> str:
             str(m["windows"]),
             motion_error(m),
         ]
-        for m in motions[:_MOTIONS]
+        for m in motions[:most]
     ]
-    more = f"<p class='note'>and {len(motions) - _MOTIONS} more</p>" if len(motions) > _MOTIONS else ""
+    more = f"<p class='note'>and {len(motions) - most} more</p>" if len(motions) > most else ""
     horizon = motions[0]["horizon"] if motions else "0.2"
     return table(["cluster", "motion", "windows", f"joints after {horizon} s"], rows, (2, 3)) + more

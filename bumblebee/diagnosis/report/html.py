@@ -25,7 +25,7 @@ details{margin:.6rem 0}summary{cursor:pointer;color:#6b7385}.good{color:#1b8a6b}
 .values{min-width:13rem;display:inline-block}"""
 
 
-def page(title: str, parts: Sequence[str]) -> str:
+def html_page(title: str, parts: Sequence[str]) -> str:
     """A whole page; it loads nothing from anywhere."""
     view = "<meta name='viewport' content='width=device-width,initial-scale=1'>"
     head = f"<meta charset='utf-8'>{view}<title>{escape(title)}</title>"

@@ -12,6 +12,7 @@ from bumblebee.diagnosis.gap.gap import gap
 from bumblebee.diagnosis.report.notes import beside_noise, unexplained_error, what_is_left
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.terminal import gap_summary, summary
+from bumblebee.diagnosis.thresholds.report import Verdicts
 from bumblebee.errors import BadInput
 from tests.diagnosis import cart
 
@@ -36,7 +37,7 @@ def document(after: float, effects: bool = False) -> dict:
 
 def test_a_large_error_without_an_effect_is_said_and_nothing_comforts():
     made = document(80.0)
-    made["warnings"] = unexplained_error(made)
+    made["warnings"] = unexplained_error(made, Verdicts())
     assert "160 mrad" in made["warnings"][0] and "no effect of the catalogue explains it" in made["warnings"][0]
     for text in (summary(made), render_report(made, [])):
         assert "no effect of the catalogue explains it" in text
@@ -44,13 +45,13 @@ def test_a_large_error_without_an_effect_is_said_and_nothing_comforts():
 
 
 def test_a_large_error_beside_effects_is_said_too():
-    assert "what was found does not explain that" in unexplained_error(document(5.0, effects=True))[0]
+    assert "what was found does not explain that" in unexplained_error(document(5.0, effects=True), Verdicts())[0]
 
 
 def test_an_error_at_the_noise_warns_of_nothing():
     made = document(1.1)
-    assert unexplained_error(made) == []
-    assert what_is_left(made) == "nothing that these tests can see"
+    assert unexplained_error(made, Verdicts()) == []
+    assert what_is_left(made, Verdicts()) == "nothing that these tests can see"
     assert "No effect of the catalogue is missing" in render_report(made, [])
 
 
