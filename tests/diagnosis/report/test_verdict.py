@@ -11,7 +11,7 @@ from bumblebee.diagnosis.dataset.undriven import commanded_undriven
 from bumblebee.diagnosis.gap.gap import gap
 from bumblebee.diagnosis.report.notes import beside_noise, unexplained_error, what_is_left
 from bumblebee.diagnosis.report.page import render_report
-from bumblebee.diagnosis.report.terminal import gap_summary, summary
+from bumblebee.diagnosis.report.terminal import summary
 from bumblebee.diagnosis.thresholds.report import Verdicts
 from bumblebee.errors import BadInput
 from tests.diagnosis import cart
@@ -67,12 +67,6 @@ def test_one_rollout_says_what_could_not_be_tested(diagnosed):
     assert any("single rollout" in text for text in made["warnings"])
     assert "WARNING: a single rollout" in summary(made)
     assert "single rollout" in render_report(made, []).split("<h2>")[0]
-
-
-def test_a_gap_report_of_one_rollout_says_what_could_not_be_tested():
-    report = gap(make_session(mujoco.MjSpec.from_string(cart.xml()), cart.record(count=1), "cart", "memory"))
-    assert any("could not be tested" in text for text in report.document["warnings"])
-    assert "WARNING: a single rollout" in gap_summary(report.document, report.examples)
 
 
 def undriven(*names: str) -> str:
