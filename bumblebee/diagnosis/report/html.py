@@ -96,4 +96,4 @@ def error_rows(columns: dict[str, dict[str, Any]]) -> str:
         lost = measures.get("windows", {}).get("diverged", 0)
         if lost:
             rows.append([f"{escape(horizon)} s", "windows that diverged", str(lost), *[""] * (len(columns) - 1)])
-    return table(["after", "", *columns], rows, range(2, 2 + len(columns)))
+    return table(["horizon", "quantity", *columns], rows, range(2, 2 + len(columns)))

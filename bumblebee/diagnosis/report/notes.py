@@ -112,8 +112,9 @@ def worse_horizons(error: dict[str, Any], rule: Verdicts) -> list[str]:
             if before is not None and after is not None and after > rule.worse * before:
                 what = "base" if key[0].startswith("base") else f"{key[1] or 'joint'}s"
                 lines.append(
-                    f"WORSE after {horizon} s: the {what} were {scale * before:.3g} {unit} off with the declared model "
-                    f"and are {scale * after:.3g} {unit} off with the correction. Do not use it for motions that long."
+                    f"WORSE after {horizon} s: the RMS error of the {what} is {scale * before:.3g} {unit} with the "
+                    f"declared model and {scale * after:.3g} {unit} with the corrected one. Do not predict over that "
+                    "horizon with it."
                 )
     return lines
 
@@ -149,10 +150,10 @@ def what_is_left(document: Mapping[str, Any], rule: Verdicts) -> str:
     if left["description"]:
         return left["description"]
     if unexplained_error(document, rule):
-        return "no structure that these tests can see, yet the error is far above the noise"
+        return "no significant structure in the residual, yet the error is far above the noise floor"
     if left["p"] < rule.trace:
-        return "traces too slight to count"
-    return "nothing that these tests can see"
+        return "significant structure in the residual, but too small to matter"
+    return "no significant structure in the residual"
 
 
 def beside_noise(after: Mapping[str, Any], noise: Mapping[str, Any], unit: str, scale: float) -> str:
@@ -173,21 +174,21 @@ def beside_noise(after: Mapping[str, Any], noise: Mapping[str, Any], unit: str, 
     ends = f" [{scale * noise['ci95'][0]:.3g}, {scale * noise['ci95'][1]:.3g}]" if noise.get("ci95") else ""
     expected = f"{scale * floor:.3g}{ends} {unit}"
     if value <= floor:
-        return f"no more than sensor noise leaves of a complete model: {expected}, now more, now less"
-    return f"sensor noise alone leaves {expected}"
+        return f"at the noise floor: the error of a complete model scatters about {expected}"
+    return f"noise floor {expected}"
 
 
 def nothing_seen(document: Mapping[str, Any], joint: str, rule: Verdicts) -> str:
     """What to say of a joint whose missing torque has no structure: no comfort where it errs by much."""
     horizon = told_horizon(document["error"])
     if horizon is None:
-        return "nothing that these tests can see"
+        return "no significant structure"
     value, noise = (
         document[part].get(horizon, {}).get("joint_pos_rmse", {}).get("per_joint", {}).get(joint, {}).get("value")
         for part in ("error", "floor")
     )
     if value is None or not noise or value <= rule.large * noise:
-        return "nothing that these tests can see"
+        return "no significant structure"
     return (
-        f"no structure that these tests can see, yet {number(value / noise, 2)} times the noise off after {horizon} s"
+        f"no significant structure, yet the error after {horizon} s is {number(value / noise, 2)} times the noise floor"
     )

@@ -6,7 +6,7 @@ from typing import Any
 
 from bumblebee.diagnosis.report.html import error_rows, figure, html_page, items, number, probability, table, warning
 from bumblebee.diagnosis.report.notes import beside_noise, told_horizon, unexplained_error, what_is_left, worse_horizons
-from bumblebee.diagnosis.report.svg import curve_picture, line_picture
+from bumblebee.diagnosis.report.svg import NAMES, curve_picture, line_picture
 from bumblebee.diagnosis.simulation import named, of_joint, pick, position_rows
 from bumblebee.diagnosis.thresholds.report import ReportThresholds, Verdicts
 
@@ -25,11 +25,11 @@ def render_report(
         *_pictures(examples),
         "<h2>Effects</h2>",
         _effects(document["effects"]),
-        "<h2>Error on rollouts that took no part in the fit</h2>" if held else "<h2>Error on the fitted rollout</h2>",
-        error_rows({k: document["error"][k] for k in ("before", "after", "oracle", "floor") if k in document["error"]}),
-        "<h2>Joint by joint</h2>",
+        f"<h2>Prediction error on {'held-out rollouts' if held else 'the fitted rollout'}</h2>",
+        error_rows({name: document["error"][k] for k, name in NAMES.items() if k in document["error"]}),
+        "<h2>Error by joint</h2>",
         _joints(document, rules.verdicts),
-        "<h2>What is left</h2>",
+        "<h2>Unexplained residual</h2>",
         _left(document, rules),
         _small(document.get("smallest_detectable", []), rules.listing.detectable),
         "<h2>Notes</h2>",
@@ -53,7 +53,7 @@ def _lead(document: dict[str, Any], rules: ReportThresholds) -> str:
     horizon = told_horizon(error["before"])
     if horizon is None:
         return text
-    where = "held-out error" if document["holdout"] else "error on the fitted rollout"
+    where = "held-out RMS error" if document["holdout"] else "RMS error on the fitted rollout"
     said = []
     for what, unit, scale, key in position_rows(error["before"][horizon]):
         before, after, floor = (pick(error[k].get(horizon, {}), key) for k in ("before", "after", "floor"))
@@ -75,12 +75,12 @@ def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
         picture = line_picture(
             e["time"],
             series,
-            "s after the restart",
+            "time since the measured initial state [s]",
             axis,
-            f"{e['joint']}: measured, before, after",
+            f"{e['joint']}: measured, declared model, corrected model",
             240 if n == 0 else 130,
         )
-        text = f"{e['joint']}, restarted from the measured state in {e['rollout']} at {e['start']:.2f} s"
+        text = f"{e['joint']}, simulated from the measured state in {e['rollout']} at {e['start']:.2f} s"
         parts.append(figure(picture, escape(text)))
     return parts
 
@@ -105,10 +105,10 @@ def _effects(effects: Sequence[dict[str, Any]]) -> str:
                 _same(e),
             ]
         )
-    head = ["effect", "where", "value [95 % interval]", "declared", "explains", "p", "cannot be told from"]
+    head = ["effect", "where", "value [95 % interval]", "declared", "explains", "p", "not distinguishable from"]
     text = (
-        "<p class='note'>explains: share of the excess over the best fit that comes back when this effect alone is "
-        "taken out. p: see diagnosis.json for the test.</p>"
+        "<p class='note'>explains: share of the excess chi-square over the best fit that returns when this effect "
+        "alone is removed. p: see diagnosis.json for the test.</p>"
     )
     return table(head, rows, (5,)) + text
 
@@ -143,7 +143,7 @@ def _same(effect: dict[str, Any]) -> str:
     same = [f"{s['effect']} ({', '.join(s['where']) or 'whole'})" for s in effect["equivalent"]]
     text = escape(", ".join(same)) or "-"
     advice = "; ".join(effect.get("separate_by", []))
-    return text + (f"<br><span class='note'>to separate: {escape(advice)}</span>" if advice else "")
+    return text + (f"<br><span class='note'>to distinguish them: {escape(advice)}</span>" if advice else "")
 
 
 def _joints(document: dict[str, Any], rule: Verdicts) -> str:
@@ -163,7 +163,7 @@ def _joints(document: dict[str, Any], rule: Verdicts) -> str:
             kind = "good" if better else "bad" if worse else "note"
             cells.append(f"{number(1e3 * pair[0])} <span class='{kind}'>&rarr; {number(1e3 * pair[1])}</span>")
         rows.append(cells)
-    text = "<p class='note'>RMS position error before and after, in mrad or mm, as beside the joint.</p>"
+    text = "<p class='note'>RMS position error, declared &rarr; corrected model, in mrad or mm as beside the joint.</p>"
     return text + table(["joint", *[f"{h} s" for h in error["before"]]], rows, range(1, 1 + len(error["before"])))
 
 
@@ -184,9 +184,10 @@ def _left(document: dict[str, Any], rules: ReportThresholds) -> str:
         if joint in left["where"]
     ]
     text = (
-        "<p>Structure remains that no effect above explains. It is described, not forced into a catalogue's name.</p>"
+        "<p>The residual has structure that no effect above explains (lack of fit). It is described, not attributed to "
+        "an effect of the catalogue.</p>"
     )
-    head = ["joint", "RMS", "of the drive's", "goes with", "p"]
+    head = ["joint", "RMS", "share of drive torque", "depends on", "p"]
     said = f"<p>{escape(left['description'])}.</p>"
     listed = table(head, rows, (1, 2, 4)) if rows else ""
     return text + listed + said + "".join(_curves(document, left["where"][: rules.unexplained.joints]))
@@ -197,7 +198,7 @@ def _curves(document: dict[str, Any], joints: Sequence[str]) -> list[str]:
     parts = []
     for joint in joints:
         known = document.get("structure", {}).get(joint, {}).get("curves", {})
-        lacks = f"missing [{of_joint(document, joint, 'torque')}]"
+        lacks = f"residual [{of_joint(document, joint, 'torque')}]"
         drawn = [
             figure(curve_picture(rows, quantity, lacks, f"{joint} over {quantity}"), escape(joint))
             for quantity, rows in known.items()
@@ -221,11 +222,12 @@ def _small(entries: Sequence[dict[str, Any]], most: int) -> str:
     ]
     more = f"<p class='note'>and {len(known) - most} more in diagnosis.json</p>" if len(known) > most else ""
     body = table(["effect", "where", "parameter", "change"], rows, (3,))
-    return f"<details><summary>The smallest effects that these data could have shown</summary>{body}{more}</details>"
+    return f"<details><summary>Smallest detectable changes with these data</summary>{body}{more}</details>"
 
 
 def _notes(document: dict[str, Any]) -> list[str]:
     count = {k: len(document.get(k, [])) for k in ("train", "accept", "holdout")}
-    notes = [f"rollouts: {count['train']} to fit, of which {count['accept']} to accept by; {count['holdout']} held out"]
+    parts = f"{count['train']} for identification, {count['accept']} of them for validation"
+    notes = [f"rollouts: {parts}; {count['holdout']} held out"]
     notes += document.get("notes", [])
     return notes + [f"{', '.join(u['where'])}: {u['why']}" for u in document.get("unidentifiable", [])]
