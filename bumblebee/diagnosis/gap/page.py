@@ -198,4 +198,4 @@ def _motions(motions: list[dict[str, Any]], most: int) -> str:
     ]
     more = f"<p class='note'>and {len(motions) - most} more</p>" if len(motions) > most else ""
     horizon = motions[0]["horizon"] if motions else "0.2"
-    return table(["cluster", "motion", "windows", f"joints after {horizon} s"], rows, (2, 3)) + more
+    return table(["cluster", "motion", "windows", f"RMS error after {horizon} s"], rows, (2, 3)) + more

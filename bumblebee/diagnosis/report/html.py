@@ -12,6 +12,7 @@ margin:2.2rem auto;padding:0 1.2rem;color:#1d2430;background:#fff}h1{font-size:1
 h2{font-size:1.15rem;margin:2rem 0 .4rem}p{margin:.4rem 0}.lead{font-size:1.08rem;max-width:52rem}
 .scroll{overflow-x:auto}table{border-collapse:collapse;margin:.5rem 0;font-size:.9rem}
 td,th{padding:.28rem .7rem .28rem 0;border-bottom:1px solid #e4e7ee;text-align:left;vertical-align:top}
+td:first-child{white-space:nowrap}
 th{color:#6b7385;font-weight:500}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .note{color:#6b7385;font-size:.86rem}.warn{border-left:4px solid #c8553d;background:#fbeeea;padding:.5rem .9rem;
 margin:.8rem 0}

@@ -226,8 +226,14 @@ def _small(entries: Sequence[dict[str, Any]], most: int) -> str:
 
 
 def _notes(document: dict[str, Any]) -> list[str]:
-    count = {k: len(document.get(k, [])) for k in ("train", "accept", "holdout")}
-    parts = f"{count['train']} for identification, {count['accept']} of them for validation"
-    notes = [f"rollouts: {parts}; {count['holdout']} held out"]
-    notes += document.get("notes", [])
+    notes = [_parts(document), *document.get("notes", [])]
     return notes + [f"{', '.join(u['where'])}: {u['why']}" for u in document.get("unidentifiable", [])]
+
+
+def _parts(document: dict[str, Any]) -> str:
+    """How many rollouts took which part; the held-out ones may be all that there is to validate on."""
+    train, accept, holdout = (set(document.get(k, [])) for k in ("train", "accept", "holdout"))
+    text = f"rollouts: {len(train - accept)} for identification, "
+    if accept & holdout:
+        return text + f"{len(holdout)} held out and used for validation"
+    return text + f"{len(accept)} for validation, {len(holdout)} held out"

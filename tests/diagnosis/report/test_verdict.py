@@ -92,3 +92,10 @@ def test_a_joint_that_is_told_nothing_needs_no_actuator():
         object.__setattr__(rollout, "joint_target", np.zeros_like(rollout.joint_target))
     made = make_session(mujoco.MjSpec.from_string(undriven("pole", "cart")), rollouts, "cart", "memory")
     assert made.warnings == ()
+
+
+def test_the_page_counts_every_rollout_once():
+    made = document(1.1) | {"train": ["a", "b", "c"], "accept": ["c"], "holdout": ["d"]}
+    assert "rollouts: 2 for identification, 1 for validation, 1 held out" in render_report(made, [])
+    made |= {"accept": ["d"]}
+    assert "rollouts: 3 for identification, 1 held out and used for validation" in render_report(made, [])
