@@ -60,7 +60,7 @@ def diagnose(
     claim_folder(out, DIAGNOSIS, overwrite, inputs_of(model, dataset))
     session = open_session(model, dataset)
     result = diagnose(session, DiagnosisConfig(max_windows=max_windows, seed=seed), _teller())
-    print(summary(result.document))  # said first: the disk may fail now
+    print(summary(result.document, result.problem.thresholds.report))  # said first: the disk may fail now
     shown = examples(result.session, result.effects, count=1)
     print(plot(shown[0]) if shown else "", flush=True)
     write_diagnosis(result, out, overwrite)
@@ -105,7 +105,7 @@ def gap(
     if out:
         claim_folder(out, GAP, overwrite, inputs_of(model, dataset))
     report = compare(open_session(model, dataset))
-    print(gap_summary(report.document, report.examples), flush=True)
+    print(gap_summary(report.document, report.examples, report.report), flush=True)
     if out:
         write_gap(report, out, overwrite)
         print(f"written: {out / 'gap.html'}, gap.json")

@@ -45,7 +45,7 @@ def main(round: int) -> None:
     result = diagnose(session, DiagnosisConfig(**vars(config)), say=lambda text: print(text, flush=True))
     with output_folder(f"data/diagnosis/r{round}") as folder:
         fill(result, folder)
-    print(summary(result.document))
+    print(summary(result.document, result.problem.thresholds.report))
     log_run("diagnose", round=round, params=config, metrics=_metrics(result.document))
 
 

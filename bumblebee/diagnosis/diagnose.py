@@ -14,7 +14,7 @@ from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.discrepancy import Discovery, discover, offers_of, remains, with_named
 from bumblebee.diagnosis.estimation import gauss_newton
 from bumblebee.diagnosis.prepare import Material, gather
-from bumblebee.diagnosis.report import document, effect_entries, loss_entries, unseen_notes
+from bumblebee.diagnosis.report import Findings, document, effect_entries, loss_entries, unseen_notes
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection import Refined, Search, grids, half_widths, refine, search
 from bumblebee.diagnosis.selection import entries as rounding_entries
@@ -83,9 +83,9 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
     notes = [
         *notes,
         *(n for b in found.budgets for n in b.notes()),
-        *unseen_notes(material.session, effects, config.horizon),
+        *unseen_notes(material.session, effects, config.horizon, config.thresholds.report.verdicts),
     ]
-    told = document(material, config, found.search, found.last, found.beyond, effects, entries, notes)
+    told = document(material, config, found.search, found.last, found.beyond, Findings(effects, entries, notes))
     return Diagnosis(told, effects, material.session, found.search, found.last.problem)
 
 

@@ -46,12 +46,13 @@ def fill(diagnosis: Diagnosis, folder: Path) -> None:
 
 def contents(diagnosis: Diagnosis) -> dict[str, str]:
     """The four files by name."""
-    shown = examples(diagnosis.session, diagnosis.effects)
+    rules = diagnosis.problem.thresholds.report
+    shown = examples(diagnosis.session, diagnosis.effects, rule=rules.example_windows)
     return {
         "diagnosis.json": as_json(diagnosis.document),
         "effects.yaml": effects_yaml(diagnosis.effects),
         "model.xml": corrected_xml(diagnosis),
-        "report.html": render_report(diagnosis.document, shown),
+        "report.html": render_report(diagnosis.document, shown, rules),
     }
 
 

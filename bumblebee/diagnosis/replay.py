@@ -6,20 +6,26 @@ from typing import Any
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.report import error_block, horizon_whiteners, horizon_windows
 from bumblebee.diagnosis.simulation import vary
+from bumblebee.diagnosis.thresholds.report import PredictionError
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import CATALOGUE, Effect
 
 
-def replay(session: Session, effects: Sequence[Effect] = (), budget: int = 120, seed: int = 0) -> dict[str, Any]:
+def replay(
+    session: Session,
+    effects: Sequence[Effect] = (),
+    budget: int = 120,
+    seed: int = 0,
+    rule: PredictionError | None = None,
+) -> dict[str, Any]:
     """Horizon -> errors of the session's model with `effects`, on all its rollouts."""
     for effect in effects:
         _known(session, effect)
     ids = list(range(len(session.rollouts)))
-    windows = horizon_windows(session.plant, session.layout, session.rollouts, ids, budget)
+    cuts = horizon_windows(session, ids, budget, rule)
     variation = vary(session.plant, effects)
-    common = (session.plant, session.layout, windows)
-    whiteners = horizon_whiteners(*common, variation, session.sigma, session.steps[1], seed)
-    return error_block(*common, whiteners, variation, session.steps[0], seed)
+    whiteners = horizon_whiteners(cuts, variation, session.sigma, session.steps[1], seed)
+    return error_block(cuts, whiteners, variation, session.steps[0], seed)
 
 
 def _known(session: Session, effect: Effect) -> None:

@@ -1,7 +1,7 @@
 """The gap report: where a model errs before anything is fitted, by horizon, joint, motion, and in torque."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,18 @@ from bumblebee.diagnosis.gap.dependence_test import JointStructure
 from bumblebee.diagnosis.gap.reported_torque import reported_torque
 from bumblebee.diagnosis.gap.sparse_regression import examine
 from bumblebee.diagnosis.gap.torque_residual import TorqueResidual, missing_torques
-from bumblebee.diagnosis.report import ALONE, error_block, examples, floor_block, horizon_whiteners, horizon_windows
+from bumblebee.diagnosis.report import (
+    ALONE,
+    HorizonWindows,
+    error_block,
+    examples,
+    floor_block,
+    horizon_whiteners,
+    horizon_windows,
+)
 from bumblebee.diagnosis.simulation import Windows, joint_units, members, mixed_notes, residuals, vary
+from bumblebee.diagnosis.thresholds.gap import GapThresholds
+from bumblebee.diagnosis.thresholds.report import ReportThresholds
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,31 +33,35 @@ class Gap:
     document: dict[str, Any]
     examples: list[dict[str, Any]]
     torque: TorqueResidual | None
+    thresholds: GapThresholds = field(default_factory=GapThresholds)
+    """What it was made with."""
+    report: ReportThresholds = field(default_factory=ReportThresholds)
+    """The same of what it shares with a diagnosis: errors, examples and verdicts."""
 
 
-def gap(session: Session, budget: int = 120, seed: int = 0) -> Gap:
+def gap(
+    session: Session,
+    budget: int = 120,
+    seed: int = 0,
+    thresholds: GapThresholds | None = None,
+    report: ReportThresholds | None = None,
+) -> Gap:
     """Compare the declared model of `session` with all its rollouts; nothing is fitted."""
-    ids, model = list(range(len(session.rollouts))), vary(session.plant, [])
-    windows = horizon_windows(session.plant, session.layout, session.rollouts, ids, budget)
-    common = (session.plant, session.layout, windows)
-    whiteners = horizon_whiteners(*common, model, session.sigma, session.steps[1], seed)
+    rules, shared = thresholds or GapThresholds(), report or ReportThresholds()
+    ids = list(range(len(session.rollouts)))
+    cuts = horizon_windows(session, ids, budget, shared.prediction_error)
     still = still_joints(session.plant, session.rollouts, session.sigma)
-    train, held = missing_torques(session, [], np.zeros(1))
+    train, held = missing_torques(session, [], np.zeros(1), rules.missing_torque)
     found = []
     if train is not None and held is not None:
-        found = [examine(train, held, j)[0] for j, n in enumerate(train.joints) if n not in still]
+        found = [examine(train, held, j, rules)[0] for j, n in enumerate(train.joints) if n not in still]
     units = joint_units(session.plant)
     document = {
-        "schema": 1,
-        "rollouts": session.ids(ids),
-        "seconds": float(sum(r.time[-1] - r.time[0] for r in session.rollouts)),
-        "commands": "torques" if session.plant.torque_input else "position targets",
-        "units": units,
-        "error": error_block(*common, whiteners, model, session.steps[0], seed),
-        "floor": floor_block(*common, whiteners, session.sigma, seed),
+        **_heading(session, units),
+        **_errors(session, cuts, seed),
         "missing_torque": _torques(found, train, held, units),
-        "reported_torque": reported_torque(session.plant, session.rollouts),
-        "motions": _by_motion(session, windows),
+        "reported_torque": reported_torque(session.plant, session.rollouts, rules.reported_torque),
+        "motions": _by_motion(session, cuts.windows),
         "unidentifiable": [
             {"where": [name], "why": "the joint moves no more than its sensor's noise"} for name in still
         ],
@@ -56,7 +70,28 @@ def gap(session: Session, budget: int = 120, seed: int = 0) -> Gap:
         "set_aside": session.set_aside,
         "noise": dict(zip(session.layout.labels(session.plant.joints), session.sigma.tolist(), strict=True)),
     }
-    return Gap(document, examples(session), train)
+    return Gap(document, examples(session, rule=shared.example_windows), train, rules, shared)
+
+
+def _heading(session: Session, units: dict[str, dict[str, str]]) -> dict[str, Any]:
+    """What was compared."""
+    return {
+        "schema": 1,
+        "rollouts": session.ids(range(len(session.rollouts))),
+        "seconds": float(sum(r.time[-1] - r.time[0] for r in session.rollouts)),
+        "commands": "torques" if session.plant.torque_input else "position targets",
+        "units": units,
+    }
+
+
+def _errors(session: Session, cuts: HorizonWindows, seed: int) -> dict[str, Any]:
+    """Errors of the declared model, and what sensor noise alone leaves."""
+    model = vary(session.plant, [])
+    whiteners = horizon_whiteners(cuts, model, session.sigma, session.steps[1], seed)
+    return {
+        "error": error_block(cuts, whiteners, model, session.steps[0], seed),
+        "floor": floor_block(cuts, whiteners, session.sigma, seed),
+    }
 
 
 def _torques(

@@ -8,11 +8,11 @@ from bumblebee.diagnosis.report import (
     cloud_picture,
     error_rows,
     figure,
+    html_page,
     items,
     line_picture,
     nothing_seen,
     number,
-    page,
     probability,
     shade,
     table,
@@ -20,32 +20,30 @@ from bumblebee.diagnosis.report import (
 )
 from bumblebee.diagnosis.simulation import motion_error, named, of_joint, pick, position_rows
 
-_MOTIONS = 15
-
 
 def gap_page(report: Gap) -> str:
     """HTML of the gap report."""
     document = report.document
     parts = [
-        "<h1>Where the model errs</h1>",
+        "<h1>Where the declared model errs</h1>",
         f"<p class='lead'>{_lead(document)}</p>",
         *[warning(text) for text in document.get("warnings", [])],
         *[warning(f"{entry['rollout']} was set aside: {entry['reason']}") for entry in document["set_aside"]],
         *_pictures(report),
-        "<h2>Error of windows restarted from measured states</h2>",
-        error_rows({"model": document["error"], "noise floor": document["floor"]}),
-        "<h2>Joint by joint</h2>",
+        "<h2>Prediction error of windows that start from measured states</h2>",
+        error_rows({"declared model": document["error"], "noise floor": document["floor"]}),
+        "<h2>Error by joint</h2>",
         _joints(document),
-        "<h2>The torque that the model lacks</h2>",
-        _torque(document),
+        "<h2>Residual torque, which the model lacks</h2>",
+        _torque(report),
         *_clouds(report),
         *_reported(document),
-        "<h2>Motion by motion</h2>",
-        _motions(document["motions"]),
+        "<h2>Error by motion</h2>",
+        _motions(document["motions"], report.thresholds.page.motions),
         "<h2>Notes</h2>" if document["notes"] or document["unidentifiable"] else "",
         items(document["notes"] + [f"{', '.join(u['where'])}: {u['why']}" for u in document["unidentifiable"]]),
     ]
-    return page("Gap report", parts)
+    return html_page("Gap report", parts)
 
 
 def _lead(document: dict[str, Any]) -> str:
@@ -60,11 +58,12 @@ def _lead(document: dict[str, Any]) -> str:
         value, noise = pick(error, key).get("value"), pick(floor, key).get("value")
         if value is not None and noise:
             said.append(
-                f"the {what} are {number(scale * value)} {unit} off, {number(value / noise, 2)} times what noise leaves"
+                f"the RMS error of the {what} is {number(scale * value)} {unit}, {number(value / noise, 2)} times the "
+                "noise floor"
             )
     if not said:
         return escape(text)
-    return escape(f"{text} After {horizon} s {'; '.join(said)}; most on {_worst(error, floor)}.")
+    return escape(f"{text} After {horizon} s {'; '.join(said)}; largest on {_worst(error, floor)}.")
 
 
 def _worst(error: dict[str, Any], floor: dict[str, Any]) -> str:
@@ -85,12 +84,12 @@ def _pictures(report: Gap) -> list[str]:
             line_picture(
                 e["time"],
                 {k: e[s] for k, s in (("target", "target"), ("model", "before"), ("measured", "measured")) if s in e},
-                "s after the restart",
+                "time since the measured initial state [s]",
                 f"{e['joint']} [{e['unit']}]",
                 f"{e['joint']}: measured and model",
                 height=220 if n == 0 else 130,
             ),
-            escape(f"{e['joint']}, restarted from the measured state in {e['rollout']} at {e['start']:.2f} s"),
+            escape(f"{e['joint']}, simulated from the measured state in {e['rollout']} at {e['start']:.2f} s"),
         )
         for n, e in enumerate(report.examples)
     ]
@@ -111,11 +110,12 @@ def _joints(document: dict[str, Any]) -> str:
             text = number(None if mine is None else 1e3 * mine)
             cells.append(f"<span style='padding:0 .4rem;{shade(ratio)}'>{text}</span>")
         rows.append(cells)
-    text = "<p class='note'>RMS position error, unit beside the joint; the redder, the further above the noise.</p>"
+    text = "<p class='note'>RMS position error in the joint's unit; the redder, the further above the noise floor.</p>"
     return text + table(["joint", *[f"{h} s" for h in error]], rows, range(1, 1 + len(error)))
 
 
-def _torque(document: dict[str, Any]) -> str:
+def _torque(report: Gap) -> str:
+    document, span = report.document, report.thresholds.missing_torque.span
     lacking = document["missing_torque"]
     if not lacking:
         return "<p>Too few windows to say.</p>"
@@ -123,21 +123,22 @@ def _torque(document: dict[str, Any]) -> str:
     for joint, entry in lacking.items():
         on = escape(", ".join(entry["depends_on"])) or "no single quantity"
         share = f"{100 * entry['structured_rms'] / entry['drive_rms']:.0f} %" if entry["drive_rms"] else "-"
+        quiet = f"<span class='note'>{escape(nothing_seen(document, joint, report.report.verdicts))}</span>"
         rows.append(
             [
                 f"{escape(joint)} [{entry['unit']}]",
                 number(entry["mean"]),
                 number(entry["structured_rms"]) if entry["significant"] else "-",
                 share if entry["significant"] else "-",
-                on if entry["significant"] else f"<span class='note'>{escape(nothing_seen(document, joint))}</span>",
+                on if entry["significant"] else quiet,
                 probability(entry["p"]),
             ]
         )
-    head = ["joint", "mean", "predictable RMS", "of the drive's", "goes with", "p"]
+    head = ["joint", "mean", "predictable RMS", "share of drive torque", "depends on", "p"]
     text = (
-        "<p class='note'>Torque that would make up for the missed velocities, over 0.04 s or a tick. The predictable "
-        "part is what boosted trees, trained on some rollouts, foresee on others; p is corrected for the number of "
-        "joints.</p>"
+        f"<p class='note'>Mean torque that would cancel the velocity error over {span:g} s or a tick. The predictable "
+        "part is what gradient-boosted trees, trained on some rollouts, predict on others; p is Bonferroni-corrected "
+        "for the number of joints.</p>"
     )
     return text + table(head, rows, (1, 2, 3, 5))
 
@@ -147,10 +148,10 @@ def _clouds(report: Gap) -> list[str]:
     data = report.torque
     if data is None:
         return []
-    worst = [j for j, e in report.document["missing_torque"].items() if e["significant"]][:3]
+    worst = [j for j, e in report.document["missing_torque"].items() if e["significant"]]
     parts = []
-    for joint in worst:
-        j, lacks = data.joints.index(joint), f"missing [{of_joint(report.document, joint, 'torque')}]"
+    for joint in worst[: report.thresholds.page.pictures]:
+        j, lacks = data.joints.index(joint), f"residual [{of_joint(report.document, joint, 'torque')}]"
         pair = [
             cloud_picture(
                 values[:, j], data.missing[:, j], f"{name} [{of_joint(report.document, joint, name)}]", lacks,
@@ -179,13 +180,13 @@ def _reported(document: dict[str, Any]) -> list[str]:
     ]
     text = (
         "<p class='note'>The drive's reported torque against what the declared drive would give at the measured state. "
-        "A gain or delay here is the drive's; what is wrong beyond it is friction, inertia or load.</p>"
+        "A gain or delay here is the drive's; the rest of the error is friction, inertia or load.</p>"
     )
     head = ["joint", "gain", "bias", "delay [ms]", "correlation"]
-    return ["<h2>The drives' own torque</h2>", text, table(head, rows, (1, 2, 3, 4))]
+    return ["<h2>Reported drive torque</h2>", text, table(head, rows, (1, 2, 3, 4))]
 
 
-def _motions(motions: list[dict[str, Any]]) -> str:
+def _motions(motions: list[dict[str, Any]], most: int) -> str:
     rows = [
         [
             escape(m["cluster"]) or "-",
@@ -193,8 +194,8 @@ def _motions(motions: list[dict[str, Any]]) -> str:
             str(m["windows"]),
             motion_error(m),
         ]
-        for m in motions[:_MOTIONS]
+        for m in motions[:most]
     ]
-    more = f"<p class='note'>and {len(motions) - _MOTIONS} more</p>" if len(motions) > _MOTIONS else ""
+    more = f"<p class='note'>and {len(motions) - most} more</p>" if len(motions) > most else ""
     horizon = motions[0]["horizon"] if motions else "0.2"
-    return table(["cluster", "motion", "windows", f"joints after {horizon} s"], rows, (2, 3)) + more
+    return table(["cluster", "motion", "windows", f"RMS error after {horizon} s"], rows, (2, 3)) + more

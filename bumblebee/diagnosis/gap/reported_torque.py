@@ -1,4 +1,4 @@
-"""The drive's own torque against what the model's drive would give: gain, bias and how late, joint by joint.
+"""The drive's own torque against what the model's drive would give: gain, bias and delay, joint by joint.
 
 Where a log has `joint_torque`, the drive and the mechanics behind it can be told apart: what is wrong in the reported
 torque is the drive's (gain, delay, limit); what is wrong although the torque is right is friction, inertia or load.
@@ -10,24 +10,25 @@ from typing import Any
 import numpy as np
 
 from bumblebee.diagnosis.simulation import Plant, command_inputs
+from bumblebee.diagnosis.thresholds.gap import ReportedTorque
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.servo import servos_of
 
-_LATEST = 0.05  # [s]
-_LEAST = 50  # rows
 
-
-def reported_torque(plant: Plant, rollouts: Sequence[Rollout]) -> dict[str, dict[str, float]]:
+def reported_torque(
+    plant: Plant, rollouts: Sequence[Rollout], rule: ReportedTorque | None = None
+) -> dict[str, dict[str, float]]:
     """Joint -> gain, bias [N m], delay [s] and correlation of the reported torque on the declared drive's.
 
-    Empty where no rollout has `joint_torque`. The delay is the shift, up to 50 ms, at which both agree best.
+    Empty where no rollout has `joint_torque`. The delay is the shift, up to `rule.latest`, at which both agree best.
     """
-    some = [r for r in rollouts if r.joint_torque is not None and r.frames >= _LEAST]
+    rule = rule or ReportedTorque()
+    some = [r for r in rollouts if r.joint_torque is not None and r.frames >= rule.fewest]
     if not some:
         return {}
     servos = servos_of(plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
     period = float(np.median([np.median(np.diff(r.time)) for r in some]))
-    shifts = np.arange(0, max(1, int(_LATEST / period)) + 1)
+    shifts = np.arange(0, max(1, int(rule.latest / period)) + 1)
     out = {}
     for j, name in enumerate(plant.joints):
         if plant.actuator[j] < 0:

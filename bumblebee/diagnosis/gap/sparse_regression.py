@@ -14,13 +14,8 @@ import numpy as np
 
 from bumblebee.diagnosis.gap.dependence_test import JointStructure, clipped, gain_test, joint_structure, other_joint
 from bumblebee.diagnosis.gap.torque_residual import TorqueResidual
+from bumblebee.diagnosis.thresholds.gap import GapThresholds, Library
 from bumblebee.sim.effect_terms import Term, read_term
-
-MOST_TERMS = 3
-_Z = 4.5  # of a term over blocks; a hundred terms are looked at
-_NEARLY = 0.95  # share of the best term's gain that a simpler one must reach
-_ENOUGH = 0.6  # share of the trees' held-out gain that counts as the form being found
-_KNOTS = 9
 
 
 def _uses(*names: str) -> Callable[[Term], bool]:
@@ -34,7 +29,6 @@ _QUANTITY = {
     "torque": _uses("tau"),
     "time": _uses("t"),
 }
-_HARMONICS = (2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 18, 20, 24, 28, 30, 32, 36, 40, 42, 48, 56, 60, 64, 72, 84, 96)
 
 
 @dataclass(frozen=True)
@@ -54,40 +48,6 @@ class Form:
     """RMS of the prediction [N m]."""
 
 
-def examine(train: TorqueResidual, held: TorqueResidual, joint: int) -> tuple[JointStructure, Form]:
-    """What is left in a joint, by boosted trees or by formulas, whichever sees more; and its form.
-
-    Trees see any shape but do not reach beyond the data that they learned on; formulas do.
-    """
-    seen = joint_structure(train, held, joint)
-    form = find_form(train, held, joint, seen.share)
-    p = min(1.0, 2.0 * min(seen.p, form.p))
-    if form.p >= seen.p and seen.share >= form.share:
-        return replace(seen, p=p), form
-    names = [name for name, used in _QUANTITY.items() if any(used(read_term(t)) for t in form.terms)]
-    names += [other_joint(other) for t in form.terms for other in read_term(t).others]
-    depends = seen.depends_on or tuple(dict.fromkeys(names))
-    return replace(seen, p=p, share=form.share, rms=form.rms, depends_on=depends), form
-
-
-def find_form(train: TorqueResidual, held: TorqueResidual, joint: int, reachable: float) -> Form:
-    """The form of what is missing on a joint; `reachable` is the held-out share that boosted trees predict."""
-    y, target = clipped(train.missing[:, joint]), clipped(held.missing[:, joint])
-    formula = _stepwise(train, held, joint, y, target)
-    share = _share(formula, train, held, joint, target, y)
-    terms, kind = _coefficients(formula, train, joint, y) if formula and share > 0 else {}, "formula"
-    if not terms or share < _ENOUGH * reachable:
-        curve = _curve(train, held, joint, y, target)
-        if curve and curve[1] > max(1.1 * share, 0.2 * reachable):
-            terms, kind, share = {curve[0]: 1.0}, "curve", curve[1]
-    if not terms:
-        return Form(held.joints[joint], {}, 0.0, "")
-    said = np.sum([c * torque_of(read_term(t), held, joint) for t, c in terms.items()], axis=0)
-    p, _ = gain_test(target - y.mean(), target - said, held.block)
-    rms = float(np.sqrt((said**2).mean()))
-    return Form(held.joints[joint], terms, share, kind, min(1.0, p * len(held.joints)), rms)
-
-
 @dataclass(frozen=True, eq=False)
 class Entry:
     """A term with its values on the data."""
@@ -98,26 +58,87 @@ class Entry:
     """Complexity: of two terms that explain the same the cheaper one is named."""
 
 
-def _stepwise(
-    train: TorqueResidual, held: TorqueResidual, joint: int, y: np.ndarray, target: np.ndarray
-) -> list[Entry]:
-    entries = dictionary(train, joint)
-    x = np.stack([torque_of(e.term, train, joint) for e in entries])
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """One joint's missing torque: what is fitted, what it is tested on, and what decides."""
+
+    train: TorqueResidual
+    held: TorqueResidual
+    joint: int
+    y: np.ndarray
+    """(N,) clipped, on the fitted windows [N m]."""
+    target: np.ndarray
+    """(M,) clipped, on the held-out windows [N m]."""
+    rules: GapThresholds
+
+    def share(self, said: np.ndarray) -> float:
+        """Share of the held-out variance that a prediction (M,) explains."""
+        left = self.target - said
+        return float(1.0 - (left**2).mean() / max(((self.target - self.y.mean()) ** 2).mean(), 1e-30))
+
+    def p(self, said: np.ndarray) -> float:
+        """One-sided p that a prediction (M,) says no more than the mean of the fitted windows."""
+        return gain_test(self.target - self.y.mean(), self.target - said, self.held.block, self.rules.gain_test)[0]
+
+
+def examine(
+    train: TorqueResidual, held: TorqueResidual, joint: int, rules: GapThresholds | None = None
+) -> tuple[JointStructure, Form]:
+    """What is left in a joint, by boosted trees or by formulas, whichever sees more; and its form.
+
+    Trees see any shape but do not reach beyond the data that they learned on; formulas do.
+    """
+    seen = joint_structure(train, held, joint, rules=rules)
+    form = find_form(train, held, joint, seen.share, rules)
+    p = min(1.0, 2.0 * min(seen.p, form.p))
+    if form.p >= seen.p and seen.share >= form.share:
+        return replace(seen, p=p), form
+    names = [name for name, used in _QUANTITY.items() if any(used(read_term(t)) for t in form.terms)]
+    names += [other_joint(other) for t in form.terms for other in read_term(t).others]
+    depends = seen.depends_on or tuple(dict.fromkeys(names))
+    return replace(seen, p=p, share=form.share, rms=form.rms, depends_on=depends), form
+
+
+def find_form(
+    train: TorqueResidual, held: TorqueResidual, joint: int, reachable: float, rules: GapThresholds | None = None
+) -> Form:
+    """The form of what is missing on a joint; `reachable` is the held-out share that boosted trees predict."""
+    rules = rules or GapThresholds()
+    y, target = (clipped(data.missing[:, joint], rules.dependence) for data in (train, held))
+    scene, rule = _Scene(train, held, joint, y, target, rules), rules.sparse_regression
+    formula = _stepwise(scene)
+    share = scene.share(_predicted(formula, scene)) if formula else 0.0
+    terms, kind = _coefficients(formula, scene) if formula and share > 0 else {}, "formula"
+    if not terms or share < rule.enough * reachable:
+        curve = _curve(scene)
+        if curve and curve[1] > max(rule.curve_better * share, rule.curve_enough * reachable):
+            terms, kind, share = {curve[0]: 1.0}, "curve", curve[1]
+    if not terms:
+        return Form(held.joints[joint], {}, 0.0, "")
+    said = np.sum([c * torque_of(read_term(t), held, joint) for t, c in terms.items()], axis=0)
+    rms = float(np.sqrt((said**2).mean()))
+    return Form(held.joints[joint], terms, share, kind, min(1.0, scene.p(said) * len(held.joints)), rms)
+
+
+def _stepwise(scene: _Scene) -> list[Entry]:
+    """Terms added one by one while the best is significant and the held-out windows agree."""
+    train, rule = scene.train, scene.rules.sparse_regression
+    entries = dictionary(train, scene.joint, scene.rules)
+    x = np.stack([torque_of(e.term, train, scene.joint) for e in entries])
     chosen: list[int] = []
-    before = target.copy()
-    while len(chosen) < MOST_TERMS:
-        left = y - _fitted(x[chosen], y)
+    before = scene.target.copy()
+    while len(chosen) < rule.terms:
+        left = scene.y - _fitted(x[chosen], scene.y)
         scores = _scores(x, x[chosen], left, train.block)
-        gains = np.where(np.abs(scores[:, 1]) > _Z, scores[:, 0], 0.0)
+        gains = np.where(np.abs(scores[:, 1]) > rule.z, scores[:, 0], 0.0)
         gains[chosen] = 0.0
         if gains.max() <= 0:
             break
-        near = np.flatnonzero(gains > _NEARLY * gains.max())
+        near = np.flatnonzero(gains > rule.nearly * gains.max())
         best = int(min(near, key=lambda k: (entries[k].cost, -gains[k])))
-        trial = [entries[k] for k in (*chosen, best)]
-        after = target - _predicted(trial, train, held, joint, y)
-        p, gain = gain_test(before, after, held.block)
-        if p > 0.01 or gain <= 0:
+        after = scene.target - _predicted([entries[k] for k in (*chosen, best)], scene)
+        p, gain = gain_test(before, after, scene.held.block, scene.rules.gain_test)
+        if p > rule.level or gain <= 0:
             break
         chosen.append(best)
         before = after
@@ -142,55 +163,37 @@ def _fitted(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.linalg.lstsq(x.T, y, rcond=None)[0] @ x if len(x) else np.zeros_like(y)
 
 
-def _coefficients(entries: list[Entry], train: TorqueResidual, joint: int, y: np.ndarray) -> dict[str, float]:
-    x = np.stack([torque_of(e.term, train, joint) for e in entries])
-    values = np.linalg.lstsq(x.T, y, rcond=None)[0]
+def _coefficients(entries: list[Entry], scene: _Scene) -> dict[str, float]:
+    """Term -> coefficient, by least squares on the fitted windows."""
+    x = np.stack([torque_of(e.term, scene.train, scene.joint) for e in entries])
+    values = np.linalg.lstsq(x.T, scene.y, rcond=None)[0]
     return {e.text: float(v) for e, v in zip(entries, values, strict=True)}
 
 
-def _predicted(
-    entries: list[Entry], train: TorqueResidual, held: TorqueResidual, joint: int, y: np.ndarray
-) -> np.ndarray:
-    values = _coefficients(entries, train, joint, y)
-    return np.sum([values[e.text] * torque_of(e.term, held, joint) for e in entries], axis=0)
+def _predicted(entries: list[Entry], scene: _Scene) -> np.ndarray:
+    """What the terms, fitted, say of the held-out windows (M,)."""
+    values = _coefficients(entries, scene)
+    return np.sum([values[e.text] * torque_of(e.term, scene.held, scene.joint) for e in entries], axis=0)
 
 
-def _share(
-    entries: list[Entry],
-    train: TorqueResidual,
-    held: TorqueResidual,
-    joint: int,
-    target: np.ndarray,
-    y: np.ndarray,
-) -> float:
-    if not entries:
-        return 0.0
-    left = target - _predicted(entries, train, held, joint, y)
-    return float(1.0 - (left**2).mean() / max(((target - y.mean()) ** 2).mean(), 1e-30))
-
-
-def _curve(
-    train: TorqueResidual, held: TorqueResidual, joint: int, y: np.ndarray, target: np.ndarray
-) -> tuple[str, float] | None:
+def _curve(scene: _Scene) -> tuple[str, float] | None:
     """The best curve over one quantity as a term of coefficient 1, and its held-out share; None if none holds."""
+    rule = scene.rules.sparse_regression
     best: tuple[str, float] | None = None
     names = ["q", "v", "u - q", "tau", "t"]
-    for name in train.joints:
-        if name != train.joints[joint]:
-            other = name if name.isidentifier() else repr(name)
-            names += [f"q[{other}]", f"v[{other}]"]
+    for other in _others(scene.train, scene.joint):
+        names += [f"q[{other}]", f"v[{other}]"]
     for name in names:
-        x = read_term(name)(train.values(joint))
-        knots = np.unique(np.quantile(x, np.linspace(0.02, 0.98, _KNOTS)))
+        x = read_term(name)(scene.train.values(scene.joint))
+        knots = np.unique(np.quantile(x, np.linspace(*rule.knot_ends, rule.knots)))
         if len(knots) < 3:
             continue
-        heights = np.linalg.lstsq(_hats(x, knots), y, rcond=None)[0]
+        heights = np.linalg.lstsq(_hats(x, knots), scene.y, rcond=None)[0]
         points = ", ".join(f"{k:.5g}, {h:.5g}" for k, h in zip(knots, heights, strict=True))
         text = f"curve({name}, {points})"
-        left = target - read_term(text)(held.values(joint))
-        share = float(1.0 - (left**2).mean() / max(((target - y.mean()) ** 2).mean(), 1e-30))
-        p, _ = gain_test(target - y.mean(), left, held.block)
-        if p < 0.01 / len(names) and (best is None or share > best[1]):
+        said = read_term(text)(scene.held.values(scene.joint))
+        share = scene.share(said)
+        if scene.p(said) < rule.level / len(names) and (best is None or share > best[1]):
             best = text, share
     return best
 
@@ -200,10 +203,17 @@ def _hats(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(x, knots, row) for row in np.eye(len(knots))], axis=1)
 
 
-def dictionary(data: TorqueResidual, joint: int) -> list[Entry]:
+def dictionary(data: TorqueResidual, joint: int, rules: GapThresholds | None = None) -> list[Entry]:
     """Terms for one joint (an index), whose scales come from the data."""
-    q, v, tau = data.q[:, joint], data.v[:, joint], data.tau[:, joint]
-    travel, speed = float(np.ptp(q)), float(np.sqrt((v**2).mean())) + 1e-9
+    rules = rules or GapThresholds()
+    found = [*_plain_terms(data, joint), *_scaled_terms(data, joint, rules), *_terms_of_others(data, joint)]
+    text = [t.replace("- -", "+ ") for t, _ in found]
+    entries = [Entry(t, read_term(t), cost) for t, (_, cost) in zip(text, found, strict=True)]
+    return [e for e in entries if np.isfinite(torque_of(e.term, data, joint)).all()]
+
+
+def _plain_terms(data: TorqueResidual, joint: int) -> list[tuple[str, int]]:
+    """Terms without a scale, and their complexity."""
     found: list[tuple[str, int]] = [("1", 1), ("q", 1), ("v", 1), ("friction(1)", 1), ("tau", 1), ("t", 1)]
     found += [
         ("q^2", 2),
@@ -219,28 +229,50 @@ def dictionary(data: TorqueResidual, joint: int) -> list[Entry]:
     found += [("t*tau", 3), ("t*v", 3), ("t*q", 4), ("abs(tau)", 3), ("tau*abs(tau)", 3), ("tau*abs(v)", 3)]
     if np.ptp(data.u[:, joint]) > 0:
         found += [("u - q", 2), ("(u - q)^3", 3)]
-    for share in (0.3, 1.0):
-        found.append((f"friction(exp(-(v/{share * speed:.3g})^2))", 3))
-    for n in _HARMONICS:
-        if n * travel > np.pi and n * speed * 0.04 < 2.0:  # several waves, and not blurred within a window
+    return found
+
+
+def _scaled_terms(data: TorqueResidual, joint: int, rules: GapThresholds) -> list[tuple[str, int]]:
+    """Terms with a scale that the data give, and their complexity: Stribeck friction, waves, one-sided springs."""
+    rule, q, v = rules.library, data.q[:, joint], data.v[:, joint]
+    travel, speed = float(np.ptp(q)), float(np.sqrt((v**2).mean())) + 1e-9
+    found = [(f"friction(exp(-(v/{share * speed:.3g})^2))", 3) for share in rule.stribeck]
+    for n in rule.harmonics:
+        # Several waves, and not blurred within a window.
+        if n * travel > np.pi and n * speed * rules.missing_torque.span < rule.blur:
             found += [(f"sin({n}*q)", 3), (f"cos({n}*q)", 3)]
-            if n <= 8:
+            if n <= rule.friction_harmonic:
                 found += [(f"friction(1 + sin({n}*q))", 4), (f"friction(1 + cos({n}*q))", 4)]
-    for share in (0.25, 0.5, 0.75):
+    return [*found, *_edge_terms(data, joint, rule)]
+
+
+def _edge_terms(data: TorqueResidual, joint: int, rule: Library) -> list[tuple[str, int]]:
+    """Terms that begin at a position or a torque, and their complexity."""
+    q, tau = data.q[:, joint], data.tau[:, joint]
+    found: list[tuple[str, int]] = []
+    for share in rule.stops:
         edge = float(np.quantile(q, share))
         found += [(f"relu(q - {edge:.3g})", 4), (f"friction(relu(q - {edge:.3g}))", 5)]
         found += [(f"relu({edge:.3g} - q)", 4), (f"friction(relu({edge:.3g} - q))", 5)]
-    for share in (0.5, 0.8):
+    for share in rule.torque_edges:
         edge = float(np.quantile(np.abs(tau), share))
         found.append((f"relu(tau - {edge:.3g}) - relu(-tau - {edge:.3g})", 4))
-    for name in data.joints:
-        if name != data.joints[joint]:
-            other = name if name.isidentifier() else repr(name)
-            found += [(f"q[{other}]", 2), (f"v[{other}]", 2), (f"sin(q[{other}])", 3), (f"q*q[{other}]", 4)]
-            found += [(f"v*abs(v[{other}])", 5), (f"friction(abs(v[{other}]))", 5), (f"v[{other}]*abs(v[{other}])", 4)]
-    text = [t.replace("- -", "+ ") for t, _ in found]
-    entries = [Entry(t, read_term(t), cost) for t, (_, cost) in zip(text, found, strict=True)]
-    return [e for e in entries if np.isfinite(torque_of(e.term, data, joint)).all()]
+    return found
+
+
+def _terms_of_others(data: TorqueResidual, joint: int) -> list[tuple[str, int]]:
+    """Terms of the other joints' motion, and their complexity."""
+    found: list[tuple[str, int]] = []
+    for other in _others(data, joint):
+        found += [(f"q[{other}]", 2), (f"v[{other}]", 2), (f"sin(q[{other}])", 3), (f"q*q[{other}]", 4)]
+        found += [(f"v*abs(v[{other}])", 5), (f"friction(abs(v[{other}]))", 5), (f"v[{other}]*abs(v[{other}])", 4)]
+    return found
+
+
+def _others(data: TorqueResidual, joint: int) -> list[str]:
+    """Names of the other joints as a term has them."""
+    names = [name for name in data.joints if name != data.joints[joint]]
+    return [name if name.isidentifier() else repr(name) for name in names]
 
 
 def torque_of(term: Term, data: TorqueResidual, joint: int) -> np.ndarray:

@@ -14,7 +14,6 @@ import numpy as np
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.residuals import nuisance_columns
 from bumblebee.diagnosis.simulation import (
-    Layout,
     Plant,
     Windows,
     choose_starts,
@@ -24,13 +23,10 @@ from bumblebee.diagnosis.simulation import (
     residuals,
     vary,
 )
+from bumblebee.diagnosis.thresholds.gap import MissingTorque
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect, single
-from bumblebee.sim.servo import servos_of
-
-SPAN = 0.04  # [s] of a window, or one tick where ticks are longer
-BLOCK = 0.5  # [s]: what lies closer in one rollout is not taken for independent
-_PULSES = 60_000  # simulations of one window for one joint that are affordable
+from bumblebee.sim.servo import Servos, servos_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +37,7 @@ class TorqueResidual:
     rollout: np.ndarray
     """(N,) index of the rollout."""
     block: np.ndarray
-    """(N,) number of the half second that the window lies in, distinct over rollouts."""
+    """(N,) number of the block of time, half a second, that the window lies in, distinct over rollouts."""
     missing: np.ndarray
     """(N, J) mean torque that the model lacks [N m]."""
     q: np.ndarray
@@ -57,7 +53,7 @@ class TorqueResidual:
     t: np.ndarray
     """(N,) time since the rollout began [s]."""
     history: np.ndarray
-    """(N, J, 3) place within a play of 1, 3 and 10 % of the joint's travel that its past motion has left, -1 to 1."""
+    """(N, J, B) place within a backlash of B widths that the joint's past motion has left, -1 to 1."""
     creep: np.ndarray
     """(J,) speed [rad/s] below which the direction of motion is not known."""
 
@@ -72,64 +68,61 @@ class TorqueResidual:
 
 
 def torque_residual(
-    plant: Plant,
-    layout: Layout,
-    rollouts: Sequence[Rollout],
+    session: Session,
     ids: Sequence[int],
     effects: Sequence[Effect],
     nuisance: np.ndarray,
-    sigma: np.ndarray,
-    steps: tuple[float, float],
-    most: int = 4000,
+    most: int,
+    rule: MissingTorque,
 ) -> TorqueResidual | None:
     """Torques that the declared model with `effects` lacks on the rollouts `ids`; None where none is long enough.
 
     Args:
-        plant: the declared model.
-        layout: its signals.
-        rollouts: all rollouts.
-        ids: those to use.
+        session: the declared model and all rollouts.
+        ids: rollouts to use.
         effects: what has been found.
         nuisance: (B,) coefficients of the numerical differences that a fit has found; they are taken out.
-        sigma: (D,) noise of the readings.
-        steps: simulation step [s] for residuals and for sensitivities.
         most: windows at most.
+        rule: lengths and numbers of the windows.
     """
-    period = float(np.median([np.median(np.diff(rollouts[i].time)) for i in ids]))
-    count = len(plant.joints)
-    starts = choose_starts(rollouts, ids, max(SPAN, period), min(most, _PULSES // count))
-    starts = [(i, k, last) for i, k, last in starts if k >= 2 and last + 2 < rollouts[i].frames]
-    if len(starts) < 60:
+    plant, layout, steps = session.plant, session.layout, session.steps
+    starts = _starts(session, ids, most, rule)
+    if len(starts) < rule.fewest:
         return None
-    windows = cut(plant, layout, rollouts, starts, outputs=1)
+    windows = cut(plant, layout, session.rollouts, starts, outputs=1)
     variation = vary(plant, effects)
     left = residuals(plant, layout, windows, [variation], steps[0])[0]
     if np.any(nuisance):
         columns = nuisance_columns(plant, layout, windows, variation, steps[0])
         left = left - np.tensordot(nuisance[: len(columns)], columns, axes=1)
-    change = _answers(plant, layout, windows, effects, steps[1])
+    change = _impulse_responses(session, windows, effects, rule)
     part = layout.slices["joint_vel"]
     good = np.isfinite(left).all(axis=(1, 2)) & np.isfinite(change).all(axis=(1, 2))
-    missing = _solve(change[good], left[good, 0, part])
+    missing = _solve(change[good], left[good, 0, part], rule.ridge)
     kept = [s for s, g in zip(starts, good, strict=True) if g]
-    return _described(plant, rollouts, kept, missing, sigma[layout.slices["joint_pos"]])
+    return _described(session, kept, missing, rule)
+
+
+def _starts(session: Session, ids: Sequence[int], most: int, rule: MissingTorque) -> list[tuple[int, int, int]]:
+    """Rollout, first and last row of every window; with rows to spare before and after for position and velocity."""
+    rollouts = session.rollouts
+    period = float(np.median([np.median(np.diff(rollouts[i].time)) for i in ids]))
+    count = min(most, rule.simulations // len(session.plant.joints))
+    starts = choose_starts(rollouts, ids, max(rule.span, period), count)
+    return [(i, k, last) for i, k, last in starts if k >= 2 and last + 2 < rollouts[i].frames]
 
 
 def missing_torques(
-    session: Session, effects: Sequence[Effect], nuisance: np.ndarray
+    session: Session, effects: Sequence[Effect], nuisance: np.ndarray, rule: MissingTorque
 ) -> tuple[TorqueResidual | None, TorqueResidual | None]:
     """Missing torques of the fitted and of the accepting rollouts; of a lone one its first two thirds and the rest."""
-
-    def lacking(ids: Sequence[int], most: int) -> TorqueResidual | None:
-        plant, layout, rollouts = session.plant, session.layout, session.rollouts
-        return torque_residual(plant, layout, rollouts, ids, effects, nuisance, session.sigma, session.steps, most)
-
-    train = lacking([i for i in session.train if i not in session.accept], 4000)
+    fitted = [i for i in session.train if i not in session.accept]
+    train = torque_residual(session, fitted, effects, nuisance, rule.fitted_windows, rule)
     if session.accept:
-        return train, lacking(session.accept, 2000)
+        return train, torque_residual(session, session.accept, effects, nuisance, rule.held_windows, rule)
     if train is None:
         return None, None
-    late = train.t > np.quantile(train.t, 2 / 3)
+    late = train.t > np.quantile(train.t, rule.learned_part)
     return _part(train, ~late), _part(train, late)
 
 
@@ -139,12 +132,15 @@ def _part(data: TorqueResidual, rows: np.ndarray) -> TorqueResidual:
     return TorqueResidual(**{n: v if n in fixed else v[rows] for n, v in parts.items()})
 
 
-def _answers(plant: Plant, layout: Layout, windows: Windows, effects: Sequence[Effect], step: float) -> np.ndarray:
+def _impulse_responses(
+    session: Session, windows: Windows, effects: Sequence[Effect], rule: MissingTorque
+) -> np.ndarray:
     """(W, J, J): change of the velocities at the windows' ends for 1 N m on each joint, all through the window."""
+    plant, layout, step = session.plant, session.layout, session.steps[1]
     part = layout.slices["joint_vel"]
     base = residuals(plant, layout, windows, [vary(plant, effects)], step)[0, :, 0, part]
     inertia = 1.0 / np.maximum(plant.model.dof_invweight0[plant.dof], 1e-9)
-    sizes = 0.1 * inertia / SPAN  # 0.1 rad/s on a free joint
+    sizes = rule.push * inertia / rule.span
     out = np.empty((len(windows), len(sizes), len(sizes)))
     for j, size in enumerate(sizes):
         pushed = vary(plant, _pushed(plant, effects, plant.joints[j], size))
@@ -165,62 +161,66 @@ def _pushed(plant: Plant, effects: Sequence[Effect], joint: str, torque: float) 
     return [*rest, single("joint_spring", joint, stiffness, preload + torque)]
 
 
-def _solve(change: np.ndarray, missed: np.ndarray) -> np.ndarray:
-    """Torques (W, J) that explain the missed velocities (W, J); a joint that cannot answer gets next to none."""
+def _solve(change: np.ndarray, missed: np.ndarray, ridge: float) -> np.ndarray:
+    """Torques (W, J) that explain the missed velocities (W, J); a joint that cannot move gets next to none."""
     scale = np.median(np.abs(np.diagonal(change, axis1=1, axis2=2)), axis=0) + 1e-12
     scaled = change / scale
-    normal = np.einsum("wij,wik->wjk", scaled, scaled) + 1e-3 * np.eye(change.shape[1])
+    normal = np.einsum("wij,wik->wjk", scaled, scaled) + ridge * np.eye(change.shape[1])
     return np.linalg.solve(normal, np.einsum("wij,wi->wj", scaled, missed)[..., None])[..., 0] / scale
 
 
 def _described(
-    plant: Plant,
-    rollouts: Sequence[Rollout],
-    starts: Sequence[tuple[int, int, int]],
-    missing: np.ndarray,
-    sigma: np.ndarray,
+    session: Session, starts: Sequence[tuple[int, int, int]], missing: np.ndarray, rule: MissingTorque
 ) -> TorqueResidual:
+    """The windows with what the missing torque (N, J) may depend on."""
+    plant, rollouts = session.plant, session.rollouts
+    used = {s[0] for s in starts}
     servos = servos_of(plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
-    given = {i: servos.given(servos.controls(command_inputs(plant, rollouts[i]))) for i in {s[0] for s in starts}}
-    controls = {i: servos.controls(command_inputs(plant, rollouts[i])) for i in given}
-    travel = np.max([np.ptp(rollouts[i].joint_pos, axis=0) for i in given], axis=0)
-    past = {i: _play(rollouts[i].joint_pos, travel) for i in given}
-    rows: dict[str, list[np.ndarray]] = {name: [] for name in ("q", "v", "u", "rate", "tau", "history")}
-    time, block, spans = [], [], []
-    for i, k, last in starts:
-        r = rollouts[i]
-        inner = [k - 1, *range(k + 1, last), last + 1]
-        span = r.time[last + 1] - r.time[k - 1]
-        q = r.joint_pos[inner].mean(axis=0)
-        v = (r.joint_pos[last + 1] - r.joint_pos[k - 1]) / span
-        rows["q"].append(q)
-        rows["v"].append(v)
-        rows["u"].append(given[i][k:last].mean(axis=0))
-        rows["rate"].append((given[i][last] - given[i][k - 1]) / (r.time[last] - r.time[k - 1]))
-        rows["tau"].append(servos.torque(q, v, controls[i][k:last].mean(axis=0)))
-        rows["history"].append(past[i][k - 1])
-        centre = 0.5 * (r.time[k] + r.time[last]) - r.time[0]
-        time.append(centre)
-        block.append(i * 1_000_000 + int(centre / BLOCK))
-        spans.append(span)
-    creep = np.maximum(4.0 * np.sqrt(2.0) * sigma / float(np.median(spans)), 1e-4)
-    tables = {name: np.array(values) for name, values in rows.items()}
+    controls = {i: servos.controls(command_inputs(plant, rollouts[i])) for i in used}
+    travel = np.max([np.ptp(rollouts[i].joint_pos, axis=0) for i in used], axis=0)
+    past = {i: _backlash_states(rollouts[i].joint_pos, travel, rule.backlash) for i in used}
+    rows = [_row(rollouts[i], k, last, servos, controls[i]) | {"history": past[i][k - 1]} for i, k, last in starts]
+    tables = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    times = [_middle(rollouts[i], k, last) for i, k, last in starts]
+    spans = [float(rollouts[i].time[last + 1] - rollouts[i].time[k - 1]) for i, k, last in starts]
+    block = [i * 1_000_000 + int(time / rule.block) for (i, _, _), time in zip(starts, times, strict=True)]
+    sigma = session.sigma[session.layout.slices["joint_pos"]]
     return TorqueResidual(
         joints=plant.joints,
         rollout=np.array([s[0] for s in starts]),
         block=np.unique(np.array(block), return_inverse=True)[1],
         missing=missing,
-        t=np.array(time),
-        creep=creep,
+        t=np.array(times),
+        creep=np.maximum(rule.creep * np.sqrt(2.0) * sigma / float(np.median(spans)), rule.least_creep),
         **tables,
     )
 
 
-def _play(place: np.ndarray, travel: np.ndarray) -> np.ndarray:
-    """Where (T, J, 3) a joint stands in plays of 1, 3 and 10 % of its travel, pushed along by its motion (T, J)."""
-    half = 0.5 * np.maximum(travel, 1e-6)[:, None] * np.array([0.01, 0.03, 0.1])
-    out = np.empty((*place.shape, 3))
-    centre = np.repeat(place[0][:, None], 3, axis=1)
+def _middle(rollout: Rollout, first: int, last: int) -> float:
+    """Time of a window's middle since its rollout began [s]."""
+    return 0.5 * (rollout.time[first] + rollout.time[last]) - rollout.time[0]
+
+
+def _row(rollout: Rollout, first: int, last: int, servos: Servos, controls: np.ndarray) -> dict[str, np.ndarray]:
+    """Of one window, by joint (J,): position, velocity, target, its rate, and servo torque."""
+    r, given = rollout, servos.given(controls[first - 1 : last + 1])
+    inner = [first - 1, *range(first + 1, last), last + 1]
+    q = r.joint_pos[inner].mean(axis=0)
+    v = (r.joint_pos[last + 1] - r.joint_pos[first - 1]) / (r.time[last + 1] - r.time[first - 1])
+    return {
+        "q": q,
+        "v": v,
+        "u": given[1:-1].mean(axis=0),
+        "rate": (given[-1] - given[0]) / (r.time[last] - r.time[first - 1]),
+        "tau": servos.torque(q, v, controls[first:last].mean(axis=0)),
+    }
+
+
+def _backlash_states(place: np.ndarray, travel: np.ndarray, widths: Sequence[float]) -> np.ndarray:
+    """Where (T, J, B) a joint stands in backlashes of B `widths`, shares of its travel, left by its motion (T, J)."""
+    half = 0.5 * np.maximum(travel, 1e-6)[:, None] * np.array(widths)
+    out = np.empty((*place.shape, len(widths)))
+    centre = np.repeat(place[0][:, None], len(widths), axis=1)
     for k, q in enumerate(place):
         centre = np.clip(centre, q[:, None] - half, q[:, None] + half)
         out[k] = (q[:, None] - centre) / half

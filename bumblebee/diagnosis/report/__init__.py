@@ -1,18 +1,36 @@
 """What a diagnosis found, as a document, a page and lines for the terminal."""
 
 from bumblebee.diagnosis.report.discrepancy_entries import measured_curve
-from bumblebee.diagnosis.report.document import document
+from bumblebee.diagnosis.report.document import Findings, document
 from bumblebee.diagnosis.report.effect_entries import effect_entries, loss_entries
 from bumblebee.diagnosis.report.example_windows import examples
-from bumblebee.diagnosis.report.html import error_rows, figure, items, number, page, probability, shade, table, warning
+from bumblebee.diagnosis.report.html import (
+    error_rows,
+    figure,
+    html_page,
+    items,
+    number,
+    probability,
+    shade,
+    table,
+    warning,
+)
 from bumblebee.diagnosis.report.notes import ALONE, nothing_seen, unseen_notes
 from bumblebee.diagnosis.report.page import render_report
-from bumblebee.diagnosis.report.prediction_error import error_block, floor_block, horizon_whiteners, horizon_windows
+from bumblebee.diagnosis.report.prediction_error import (
+    HorizonWindows,
+    error_block,
+    floor_block,
+    horizon_whiteners,
+    horizon_windows,
+)
 from bumblebee.diagnosis.report.svg import cloud_picture, line_picture
 from bumblebee.diagnosis.report.terminal import gap_summary, plot, summary
 
 __all__ = [
     "ALONE",
+    "Findings",
+    "HorizonWindows",
     "cloud_picture",
     "document",
     "effect_entries",
@@ -24,13 +42,13 @@ __all__ = [
     "gap_summary",
     "horizon_whiteners",
     "horizon_windows",
+    "html_page",
     "items",
     "line_picture",
     "loss_entries",
     "measured_curve",
     "nothing_seen",
     "number",
-    "page",
     "plot",
     "probability",
     "render_report",

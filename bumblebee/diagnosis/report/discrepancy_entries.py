@@ -13,12 +13,11 @@ from scipy.stats import norm
 from bumblebee.diagnosis.candidates import Formula
 from bumblebee.diagnosis.discrepancy import Discovery, JointRemains, Law, quantities_of
 from bumblebee.diagnosis.simulation import joint_units
+from bumblebee.diagnosis.thresholds.report import MeasuredCurve, Unexplained
 
 NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
-_NAMED = 3  # joints that get a sentence
 _NOWHERE = "no joint's torque stands out, but the windows' chi-square is {:.2f} of what sensor noise gives"
 _TABLE = re.compile(r"(curve)\(([^,()]+),[^()]*\)")  # its points are for diagnosis.json
-_BINS, _FEWEST = 15, 8
 
 
 def discovered_entry(
@@ -45,11 +44,11 @@ def discovered_entry(
     }
 
 
-def unexplained(found: Discovery) -> dict[str, Any]:
+def unexplained(found: Discovery, rule: Unexplained) -> dict[str, Any]:
     """The contract's `unexplained`: what is left with all effects in force."""
     left, whole = sorted((j for j in found.left.joints if j.significant), key=lambda j: -j.excess), found.left.whole
     p = min((j.p for j in found.left.joints), default=1.0)
-    said = _described(left, found.unconfirmed, joint_units(found.problem.plant))
+    said = _described(left, found.unconfirmed, joint_units(found.problem.plant), rule.joints)
     if whole.significant and not left:
         said = _NOWHERE.format(whole.power)
     return {
@@ -67,11 +66,14 @@ def _depends_on(left: JointRemains, forms: Mapping[str, Mapping[str, float]]) ->
 
 
 def _described(
-    left: Sequence[JointRemains], forms: Mapping[str, Mapping[str, float]], units: Mapping[str, Mapping[str, str]]
+    left: Sequence[JointRemains],
+    forms: Mapping[str, Mapping[str, float]],
+    units: Mapping[str, Mapping[str, str]],
+    most: int,
 ) -> str:
-    """One sentence a joint: how much is left, on what it depends, and a form that was not kept."""
+    """One sentence a joint, of `most` joints: how much is left, on what it depends, and a form that was not kept."""
     lines = []
-    for j in left[:_NAMED]:
+    for j in left[:most]:
         on = ", ".join(_depends_on(j, forms)) or "no single quantity"
         line = f"{j.joint}: torques that depend on {on}"
         if j.laws:
@@ -84,12 +86,12 @@ def _described(
             terms = _TABLE.sub(r"\1(\2, ...)", terms)
             line += f"; near {terms}, which was not confirmed"
         lines.append(line)
-    if len(left) > _NAMED:
-        lines.append(f"and {len(left) - _NAMED} joints more")
+    if len(left) > most:
+        lines.append(f"and {len(left) - most} joints more")
     return "; ".join(lines)
 
 
-def structure_table(found: Discovery) -> dict[str, dict[str, Any]]:
+def structure_table(found: Discovery, rule: MeasuredCurve) -> dict[str, dict[str, Any]]:
     """Joint -> what its tests said, with measured curves where there is structure, for `diagnosis.json`."""
     return {
         j.joint: {
@@ -101,7 +103,7 @@ def structure_table(found: Discovery) -> dict[str, dict[str, Any]]:
             "depends_on": list(j.depends_on),
             "laws": [_law(law, size) for law, size in j.laws],
         }
-        | ({"curves": _curves(found, index)} if j.significant else {})
+        | ({"curves": _curves(found, index, rule)} if j.significant else {})
         for index, j in enumerate(found.left.joints)
     }
 
@@ -110,7 +112,7 @@ def _law(law: Law, size: np.ndarray) -> list[dict[str, Any]]:
     return [{"term": t, "coefficient": float(s)} for t, s in zip(law.texts, size, strict=True)]
 
 
-def _curves(found: Discovery, joint: int) -> dict[str, list[list[float]]]:
+def _curves(found: Discovery, joint: int, rule: MeasuredCurve) -> dict[str, list[list[float]]]:
     """Measured curves of what a joint lacks over its own quantities, by their name and unit."""
     scene = found.left.scene
     data, path, lacks = scene.data, scene.data.path, scene.evidence.lacking(joint)
@@ -120,18 +122,18 @@ def _curves(found: Discovery, joint: int) -> dict[str, list[list[float]]]:
     means = {f"{name} [{units[name]}]": path.mean(x[..., joint]).ravel() for name, x in over.items()} | {
         "time [s]": path.mean(data.t).ravel()
     }
-    return {name: measured_curve(x, lacks.ravel(), block) for name, x in means.items() if np.ptp(x) > 0}
+    return {name: measured_curve(x, lacks.ravel(), block, rule) for name, x in means.items() if np.ptp(x) > 0}
 
 
-def measured_curve(x: np.ndarray, y: np.ndarray, block: np.ndarray) -> list[list[float]]:
+def measured_curve(x: np.ndarray, y: np.ndarray, block: np.ndarray, rule: MeasuredCurve) -> list[list[float]]:
     """Rows [x, mean, half-width of its 95 % interval] of `y` (N,) over `x` (N,); what lies in one block counts once."""
-    edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)))
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, rule.bins + 1)))
     which = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
     rows = []
     for b in range(len(edges) - 1):
         mine = which == b
         blocks = len(np.unique(block[mine]))
-        if mine.sum() >= _FEWEST and blocks > 1:
+        if mine.sum() >= rule.fewest and blocks > 1:
             half = 1.96 * float(y[mine].std()) / np.sqrt(blocks)
             rows.append([float(np.median(x[mine])), float(y[mine].mean()), float(half)])
     return rows

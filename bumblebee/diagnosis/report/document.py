@@ -1,6 +1,7 @@
 """The contract's document, from what a diagnosis found."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from bumblebee.diagnosis.config import DiagnosisConfig
@@ -13,9 +14,20 @@ from bumblebee.diagnosis.report.prediction_error import error_block, floor_block
 from bumblebee.diagnosis.residuals import NAMES
 from bumblebee.diagnosis.selection import Refined, Search, detectable
 from bumblebee.diagnosis.simulation import joint_units, mixed_notes, vary
+from bumblebee.diagnosis.thresholds.report import Verdicts
 from bumblebee.sim.effects import Effect
 
 _STILL = "the joint moves no more than its sensor's noise"
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What stands in the document on effects."""
+
+    effects: Sequence[Effect]
+    entries: Sequence[dict[str, Any]]
+    """Of the effects, as the contract has them."""
+    notes: Sequence[str]
 
 
 def document(
@@ -24,36 +36,40 @@ def document(
     found: Search,
     last: Refined,
     beyond: Discovery | None,
-    effects: Sequence[Effect],
-    entries: Sequence[dict[str, Any]],
-    notes: Sequence[str],
+    findings: Findings,
 ) -> dict[str, Any]:
-    """Which rollouts took which part, `entries` of the effects, the error with them, what is left and what to know."""
-    session = material.session
-    driven = _driven(session)
+    """Which rollouts took which part, the effects, the error with them, what is left and what to know."""
+    session, rules = material.session, config.thresholds.report
     told = (
         {"schema": 1, "train": session.ids(session.train)}
         | {"holdout": session.ids(session.holdout), "accept": session.ids(session.accept)}
-        | {"effects": list(entries), "unexplained": NOT_TESTED if beyond is None else unexplained(beyond)}
-        | ({} if beyond is None else {"structure": structure_table(beyond)})
+        | {"effects": list(findings.entries)}
+        | {"unexplained": NOT_TESTED if beyond is None else unexplained(beyond, rules.unexplained)}
+        | ({} if beyond is None else {"structure": structure_table(beyond, rules.measured_curve)})
         | {
             "units": joint_units(session.plant),
-            "error": _errors(session, effects, config),
+            "error": _errors(session, findings.effects, config),
             "unidentifiable": [{"where": [name], "why": _STILL} for name in material.still],
             "smallest_detectable": detectable(found),
             "set_aside": session.set_aside,
-            "notes": [
-                *session.notes,
-                *mixed_notes(session.plant),
-                *notes,
-                *latency_notes(entries, driven),
-                *factor_notes(entries, driven),
-            ],
+            "notes": _notes(session, findings, rules.verdicts),
             "settings": _settings(material, config, found.bound, last),
         }
     )
     lone = [] if session.holdout else [LONE]
-    return told | {"warnings": [*session.warnings, *lone, *unexplained_error(told)]}
+    return told | {"warnings": [*session.warnings, *lone, *unexplained_error(told, rules.verdicts)]}
+
+
+def _notes(session: Session, findings: Findings, rule: Verdicts) -> list[str]:
+    """What to know beside the effects."""
+    driven = _driven(session)
+    return [
+        *session.notes,
+        *mixed_notes(session.plant),
+        *findings.notes,
+        *latency_notes(findings.entries, driven, rule),
+        *factor_notes(findings.entries, driven),
+    ]
 
 
 def _settings(material: Material, config: DiagnosisConfig, bound: float, last: Refined) -> dict[str, Any]:
@@ -77,14 +93,14 @@ def _driven(session: Session) -> list[str]:
 
 
 def _errors(session: Session, effects: Sequence[Effect], config: DiagnosisConfig) -> dict[str, Any]:
+    """The contract's block: of the declared and of the corrected model, and what sensor noise alone leaves."""
     ids = session.holdout or session.train
-    windows = horizon_windows(session.plant, session.layout, session.rollouts, ids, config.report_windows)
+    cuts = horizon_windows(session, ids, config.report_windows, config.thresholds.report.prediction_error)
     before, after = vary(session.plant, []), vary(session.plant, effects)
-    common = (session.plant, session.layout, windows)
-    whiteners = horizon_whiteners(*common, after, session.sigma, session.steps[1], config.seed)
+    whiteners = horizon_whiteners(cuts, after, session.sigma, session.steps[1], config.seed)
     fine = session.steps[0]
     return {
-        "before": error_block(*common, whiteners, before, fine, config.seed),
-        "after": error_block(*common, whiteners, after, fine, config.seed),
-        "floor": floor_block(*common, whiteners, session.sigma, config.seed),
+        "before": error_block(cuts, whiteners, before, fine, config.seed),
+        "after": error_block(cuts, whiteners, after, fine, config.seed),
+        "floor": floor_block(cuts, whiteners, session.sigma, config.seed),
     }

@@ -14,10 +14,9 @@ from bumblebee.diagnosis.report.discrepancy_entries import discovered_entry
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection import Loss, Refined, Search, alike, rivals
 from bumblebee.diagnosis.simulation import Plant, declared_values, unit_on
+from bumblebee.diagnosis.thresholds.report import Effects
 from bumblebee.sim.effect_catalogue import is_native
 from bumblebee.sim.effects import CATALOGUE, Effect
-
-_COMPARABLE = 0.25
 
 
 def effect_entries(found: Search, last: Refined, holdout: Holdout, beyond: Discovery | None) -> list[dict[str, Any]]:
@@ -28,7 +27,7 @@ def effect_entries(found: Search, last: Refined, holdout: Holdout, beyond: Disco
     chosen = last.fit.chosen
     if not chosen:
         return []
-    levels = _levels(last.fit)
+    levels = _levels(last.fit, last.problem.thresholds.report.effects)
     groups = [[c, *([levels[c]] if c in levels else [])] for c in chosen if c not in levels.values()]
     shares = _explained(holdout.problem or last.problem, last.fit, groups)
     classes = dict(zip(found.fit.chosen, rivals(found, holdout, alike(found.columns, found)), strict=True))
@@ -68,11 +67,12 @@ def _entry(
     }
     if others:
         kinds = dict.fromkeys([first.effect, *(o.effect for o in others)])
-        entry["separate_by"] = [EXPERIMENTS[k] for k in kinds if k in EXPERIMENTS][:3]
+        most = last.problem.thresholds.report.effects.experiments
+        entry["separate_by"] = [EXPERIMENTS[k] for k in kinds if k in EXPERIMENTS][:most]
     return entry
 
 
-def _levels(fit: Fit) -> dict[Candidate, Candidate]:
+def _levels(fit: Fit, rule: Effects) -> dict[Candidate, Candidate]:
     """Friction that changes -> the change of the same joint's dry friction that it sits on, if of comparable size.
 
     The largest, where a joint has two that change.
@@ -83,7 +83,7 @@ def _levels(fit: Fit) -> dict[Candidate, Candidate]:
     return {
         c: dry[where]
         for where, c in largest.items()
-        if abs(fit.of(c)[0]) > _COMPARABLE * abs(fit.of(dry[where])[0] - dry[where].nominal[0])
+        if abs(fit.of(c)[0]) > rule.comparable * abs(fit.of(dry[where])[0] - dry[where].nominal[0])
     }
 
 

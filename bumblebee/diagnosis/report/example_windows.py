@@ -7,23 +7,24 @@ import numpy as np
 
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.simulation import choose_starts, cut, residuals, vary
+from bumblebee.diagnosis.thresholds.report import ExampleWindows
 from bumblebee.sim.effects import Effect
 
-_LENGTHS = (1.0, 0.6, 0.2)  # [s]
-_TYPICAL = 0.9  # of a joint's windows the one at this quantile of the gain: telling, and no freak
 
-
-def examples(session: Session, effects: Sequence[Effect] = (), count: int = 3) -> list[dict[str, Any]]:
+def examples(
+    session: Session, effects: Sequence[Effect] = (), count: int = 3, rule: ExampleWindows | None = None
+) -> list[dict[str, Any]]:
     """One window each of the `count` joints where the effects matter most (without effects: where the model errs most).
 
     Each has rollout, start [s], joint, unit, time [s], measured, target (position targets only), before and, with
     effects, after, all as lists over the window's ticks.
     """
+    rule = rule or ExampleWindows()
     plant, layout, ids = session.plant, session.layout, session.holdout or session.train
     starts: list[tuple[int, int, int]] = []
-    for length in _LENGTHS:
-        starts = starts or choose_starts(session.rollouts, ids, length, 60)
-    windows = cut(plant, layout, session.rollouts, starts, outputs=120)
+    for length in rule.lengths:
+        starts = starts or choose_starts(session.rollouts, ids, length, rule.windows)
+    windows = cut(plant, layout, session.rollouts, starts, outputs=rule.ticks)
     models = [vary(plant, [])] + ([vary(plant, effects)] if effects else [])
     left = residuals(plant, layout, windows, models, session.steps[0])[..., layout.slices["joint_pos"]]
     power = np.nan_to_num((left**2).mean(axis=2), nan=0.0, posinf=0.0)
@@ -32,7 +33,8 @@ def examples(session: Session, effects: Sequence[Effect] = (), count: int = 3) -
     found = []
     for j in np.argsort(-importance)[:count]:
         order = np.argsort(gain[:, j])
-        found.append(_example(session, windows, left, int(order[int(_TYPICAL * (len(order) - 1))]), int(j)))
+        shown = int(order[int(rule.typical * (len(order) - 1))])
+        found.append(_example(session, windows, left, shown, int(j)))
     return found
 
 

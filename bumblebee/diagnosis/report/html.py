@@ -12,6 +12,7 @@ margin:2.2rem auto;padding:0 1.2rem;color:#1d2430;background:#fff}h1{font-size:1
 h2{font-size:1.15rem;margin:2rem 0 .4rem}p{margin:.4rem 0}.lead{font-size:1.08rem;max-width:52rem}
 .scroll{overflow-x:auto}table{border-collapse:collapse;margin:.5rem 0;font-size:.9rem}
 td,th{padding:.28rem .7rem .28rem 0;border-bottom:1px solid #e4e7ee;text-align:left;vertical-align:top}
+td:first-child{white-space:nowrap}
 th{color:#6b7385;font-weight:500}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .note{color:#6b7385;font-size:.86rem}.warn{border-left:4px solid #c8553d;background:#fbeeea;padding:.5rem .9rem;
 margin:.8rem 0}
@@ -25,7 +26,7 @@ details{margin:.6rem 0}summary{cursor:pointer;color:#6b7385}.good{color:#1b8a6b}
 .values{min-width:13rem;display:inline-block}"""
 
 
-def page(title: str, parts: Sequence[str]) -> str:
+def html_page(title: str, parts: Sequence[str]) -> str:
     """A whole page; it loads nothing from anywhere."""
     view = "<meta name='viewport' content='width=device-width,initial-scale=1'>"
     head = f"<meta charset='utf-8'>{view}<title>{escape(title)}</title>"
@@ -96,4 +97,4 @@ def error_rows(columns: dict[str, dict[str, Any]]) -> str:
         lost = measures.get("windows", {}).get("diverged", 0)
         if lost:
             rows.append([f"{escape(horizon)} s", "windows that diverged", str(lost), *[""] * (len(columns) - 1)])
-    return table(["after", "", *columns], rows, range(2, 2 + len(columns)))
+    return table(["horizon", "quantity", *columns], rows, range(2, 2 + len(columns)))

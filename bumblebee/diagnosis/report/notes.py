@@ -23,15 +23,11 @@ from typing import Any
 from bumblebee.diagnosis.dataset import Session, window_errors
 from bumblebee.diagnosis.report.html import number
 from bumblebee.diagnosis.simulation import pick, position_rows, rows
+from bumblebee.diagnosis.thresholds.report import Verdicts
 from bumblebee.sim.effects import Effect
 
 _LATE = ("command_delay", "encoder_delay")
-_ALIKE = 0.004  # [s]: delays of single joints closer than that are one delay
 _STRENGTH = ("motor_strength", "kp")
-_FAR = 10.0  # times as far off as the worst fitted window
-_MORE = 1.02  # by so much the error has to be larger to be called worse
-FAR = 3.0  # times what sensor noise leaves, from which on an error is called large
-_TRACE = 1e-3  # p of what is not called significant for being small, yet is no accident
 LONE = (
     "a single rollout: nothing could be held out; errors are those of the fitted data, and no effect was tested on "
     "data that it was not fitted to. Record another run"
@@ -42,20 +38,22 @@ ALONE = (
 )
 
 
-def latency_notes(effects: Sequence[dict[str, Any]], driven: Sequence[str]) -> list[str]:
+def latency_notes(effects: Sequence[dict[str, Any]], driven: Sequence[str], rule: Verdicts | None = None) -> list[str]:
     """A note where the found delays are of one size on every driven joint.
 
     Args:
         effects: the contract's list.
         driven: names of the joints with an actuator.
+        rule: how alike they must be.
     """
+    rule = rule or Verdicts()
     delays: dict[str, float] = {}
     for entry in effects:
         if entry["effect"] in _LATE:
             for name in entry["where"] or driven:
                 delays[name] = entry["parameters"]["delay"]["value"]
     values = [delays.get(name, 0.0) for name in driven]
-    if len(driven) < 2 or not values or min(values) <= 0 or max(values) - min(values) > _ALIKE:
+    if len(driven) < 2 or not values or min(values) <= 0 or max(values) - min(values) > rule.alike:
         return []
     size = 1e3 * sum(values) / len(values)
     return [
@@ -80,18 +78,21 @@ def factor_notes(effects: Sequence[dict[str, Any]], driven: Sequence[str]) -> li
     ]
 
 
-def unseen_notes(session: Session, effects: Sequence[Effect], horizon: float) -> list[str]:
+def unseen_notes(
+    session: Session, effects: Sequence[Effect], horizon: float, rule: Verdicts | None = None
+) -> list[str]:
     """A note for each rollout that was not fitted with windows of `horizon` [s] far further off than any fitted one."""
+    rule = rule or Verdicts()
     errors = window_errors(session, effects, horizon, session.steps[0])
     fitted = [i for i in session.train if i not in session.accept and i in errors]
     if not fitted:
         return []
-    bound = _FAR * max(errors[i][0] for i in fitted)
+    bound = rule.unseen * max(errors[i][0] for i in fitted)
     notes = []
     for i in sorted(set(errors) - set(fitted)):
         far = int((errors[i] > bound).sum())
         if far:
-            times = errors[i][0] / bound * _FAR
+            times = errors[i][0] / bound * rule.unseen
             notes.append(
                 f"{session.ids([i])[0]}: {far} of {len(errors[i])} windows up to {times:.0f} times further off "
                 "than any fitted one. Something acts there that no fitted rollout shows: it is neither named nor ruled "
@@ -100,7 +101,7 @@ def unseen_notes(session: Session, effects: Sequence[Effect], horizon: float) ->
     return notes
 
 
-def worse_horizons(error: dict[str, Any]) -> list[str]:
+def worse_horizons(error: dict[str, Any], rule: Verdicts) -> list[str]:
     """A line for every horizon and measure at which the corrected model errs more than the declared one."""
     lines = []
     for horizon, measures in error["before"].items():
@@ -108,11 +109,12 @@ def worse_horizons(error: dict[str, Any]) -> list[str]:
             if key[0] not in ("joint_pos_rmse", "base_pos_rmse"):
                 continue
             before, after = (pick(error[part].get(horizon, {}), key).get("value") for part in ("before", "after"))
-            if before is not None and after is not None and after > _MORE * before:
+            if before is not None and after is not None and after > rule.worse * before:
                 what = "base" if key[0].startswith("base") else f"{key[1] or 'joint'}s"
                 lines.append(
-                    f"WORSE after {horizon} s: the {what} were {scale * before:.3g} {unit} off with the declared model "
-                    f"and are {scale * after:.3g} {unit} off with the correction. Do not use it for motions that long."
+                    f"WORSE after {horizon} s: the RMS error of the {what} is {scale * before:.3g} {unit} with the "
+                    f"declared model and {scale * after:.3g} {unit} with the corrected one. Do not predict over that "
+                    "horizon with it."
                 )
     return lines
 
@@ -122,7 +124,7 @@ def told_horizon(block: Mapping[str, Any]) -> str | None:
     return "0.2" if "0.2" in block else next(iter(block), None)
 
 
-def unexplained_error(document: Mapping[str, Any]) -> list[str]:
+def unexplained_error(document: Mapping[str, Any], rule: Verdicts) -> list[str]:
     """Lines on joint errors far above the noise that the effects, if any were found, do not explain."""
     after, floor = document["error"]["after"], document["error"]["floor"]
     horizon = told_horizon(after)
@@ -131,7 +133,7 @@ def unexplained_error(document: Mapping[str, Any]) -> list[str]:
     lines = []
     for what, unit, scale, key in position_rows(after[horizon]):
         value, noise = (pick(block.get(horizon, {}), key).get("value") for block in (after, floor))
-        if value is None or not noise or value <= FAR * noise:
+        if value is None or not noise or value <= rule.large * noise:
             continue
         times = number(value / noise, 2)
         size = f"{number(scale * value)} {unit} in its {what} after {horizon} s, {times} times what noise leaves"
@@ -142,16 +144,16 @@ def unexplained_error(document: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def what_is_left(document: Mapping[str, Any]) -> str:
+def what_is_left(document: Mapping[str, Any], rule: Verdicts) -> str:
     """The sentence on what the tests of the residual saw; no comfort where the error itself is large."""
     left = document["unexplained"]
     if left["description"]:
         return left["description"]
-    if unexplained_error(document):
-        return "no structure that these tests can see, yet the error is far above the noise"
-    if left["p"] < _TRACE:
-        return "traces too slight to count"
-    return "nothing that these tests can see"
+    if unexplained_error(document, rule):
+        return "no significant structure in the residual, yet the error is far above the noise floor"
+    if left["p"] < rule.trace:
+        return "significant structure in the residual, but too small to matter"
+    return "no significant structure in the residual"
 
 
 def beside_noise(after: Mapping[str, Any], noise: Mapping[str, Any], unit: str, scale: float) -> str:
@@ -172,21 +174,21 @@ def beside_noise(after: Mapping[str, Any], noise: Mapping[str, Any], unit: str, 
     ends = f" [{scale * noise['ci95'][0]:.3g}, {scale * noise['ci95'][1]:.3g}]" if noise.get("ci95") else ""
     expected = f"{scale * floor:.3g}{ends} {unit}"
     if value <= floor:
-        return f"no more than sensor noise leaves of a complete model: {expected}, now more, now less"
-    return f"sensor noise alone leaves {expected}"
+        return f"at the noise floor: the error of a complete model scatters about {expected}"
+    return f"noise floor {expected}"
 
 
-def nothing_seen(document: Mapping[str, Any], joint: str) -> str:
+def nothing_seen(document: Mapping[str, Any], joint: str, rule: Verdicts) -> str:
     """What to say of a joint whose missing torque has no structure: no comfort where it errs by much."""
     horizon = told_horizon(document["error"])
     if horizon is None:
-        return "nothing that these tests can see"
+        return "no significant structure"
     value, noise = (
         document[part].get(horizon, {}).get("joint_pos_rmse", {}).get("per_joint", {}).get(joint, {}).get("value")
         for part in ("error", "floor")
     )
-    if value is None or not noise or value <= FAR * noise:
-        return "nothing that these tests can see"
+    if value is None or not noise or value <= rule.large * noise:
+        return "no significant structure"
     return (
-        f"no structure that these tests can see, yet {number(value / noise, 2)} times the noise off after {horizon} s"
+        f"no significant structure, yet the error after {horizon} s is {number(value / noise, 2)} times the noise floor"
     )

@@ -4,54 +4,56 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from bumblebee.diagnosis.report.html import error_rows, figure, items, number, page, probability, table, warning
+from bumblebee.diagnosis.report.html import error_rows, figure, html_page, items, number, probability, table, warning
 from bumblebee.diagnosis.report.notes import beside_noise, told_horizon, unexplained_error, what_is_left, worse_horizons
-from bumblebee.diagnosis.report.svg import curve_picture, line_picture
+from bumblebee.diagnosis.report.svg import NAMES, curve_picture, line_picture
 from bumblebee.diagnosis.simulation import named, of_joint, pick, position_rows
+from bumblebee.diagnosis.thresholds.report import ReportThresholds, Verdicts
 
-_DETECTABLE = 60
 
-
-def render_report(document: dict[str, Any], examples: Sequence[dict[str, Any]]) -> str:
+def render_report(
+    document: dict[str, Any], examples: Sequence[dict[str, Any]], rules: ReportThresholds | None = None
+) -> str:
     """HTML of the document and of windows to look at."""
-    held = bool(document["holdout"])
+    held, rules = bool(document["holdout"]), rules or ReportThresholds()
+    bad = worse_horizons(document["error"], rules.verdicts)
     parts = [
         "<h1>What the model lacks</h1>",
-        f"<p class='lead'>{_lead(document)}</p>",
-        *[warning(text) for text in [*document.get("warnings", []), *worse_horizons(document["error"])]],
+        f"<p class='lead'>{_lead(document, rules)}</p>",
+        *[warning(text) for text in [*document.get("warnings", []), *bad]],
         *[warning(f"{a['rollout']} was set aside: {a['reason']}") for a in document.get("set_aside", [])],
         *_pictures(examples),
         "<h2>Effects</h2>",
         _effects(document["effects"]),
-        "<h2>Error on rollouts that took no part in the fit</h2>" if held else "<h2>Error on the fitted rollout</h2>",
-        error_rows({k: document["error"][k] for k in ("before", "after", "oracle", "floor") if k in document["error"]}),
-        "<h2>Joint by joint</h2>",
-        _joints(document),
-        "<h2>What is left</h2>",
-        _left(document),
-        _small(document.get("smallest_detectable", [])),
+        f"<h2>Prediction error on {'held-out rollouts' if held else 'the fitted rollout'}</h2>",
+        error_rows({name: document["error"][k] for k, name in NAMES.items() if k in document["error"]}),
+        "<h2>Error by joint</h2>",
+        _joints(document, rules.verdicts),
+        "<h2>Unexplained residual</h2>",
+        _left(document, rules),
+        _small(document.get("smallest_detectable", []), rules.listing.detectable),
         "<h2>Notes</h2>",
         items(_notes(document)),
     ]
-    return page("Diagnosis", parts)
+    return html_page("Diagnosis", parts)
 
 
-def _lead(document: dict[str, Any]) -> str:
-    effects, error = document["effects"], document["error"]
+def _lead(document: dict[str, Any], rules: ReportThresholds) -> str:
+    most, effects, error = rules.listing.effects, document["effects"], document["error"]
     if effects:
         names = [
             f"<b>{escape(e['effect'])}</b> on {escape(', '.join(e['where']) or 'the whole robot')}" for e in effects
         ]
-        more = f" and {len(names) - 6} more" if len(names) > 6 else ""
-        text = f"{len(effects)} effect{'s' if len(effects) > 1 else ''}: {'; '.join(names[:6])}{more}."
-    elif far := unexplained_error(document):
+        more = f" and {len(names) - most} more" if len(names) > most else ""
+        text = f"{len(effects)} effect{'s' if len(effects) > 1 else ''}: {'; '.join(names[:most])}{more}."
+    elif far := unexplained_error(document, rules.verdicts):
         return escape(" ".join(far))
     else:
         return "No effect of the catalogue is missing, as far as these data can tell."
     horizon = told_horizon(error["before"])
     if horizon is None:
         return text
-    where = "held-out error" if document["holdout"] else "error on the fitted rollout"
+    where = "held-out RMS error" if document["holdout"] else "RMS error on the fitted rollout"
     said = []
     for what, unit, scale, key in position_rows(error["before"][horizon]):
         before, after, floor = (pick(error[k].get(horizon, {}), key) for k in ("before", "after", "floor"))
@@ -73,12 +75,12 @@ def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
         picture = line_picture(
             e["time"],
             series,
-            "s after the restart",
+            "time since the measured initial state [s]",
             axis,
-            f"{e['joint']}: measured, before, after",
+            f"{e['joint']}: measured, declared model, corrected model",
             240 if n == 0 else 130,
         )
-        text = f"{e['joint']}, restarted from the measured state in {e['rollout']} at {e['start']:.2f} s"
+        text = f"{e['joint']}, simulated from the measured state in {e['rollout']} at {e['start']:.2f} s"
         parts.append(figure(picture, escape(text)))
     return parts
 
@@ -103,10 +105,10 @@ def _effects(effects: Sequence[dict[str, Any]]) -> str:
                 _same(e),
             ]
         )
-    head = ["effect", "where", "value [95 % interval]", "declared", "explains", "p", "cannot be told from"]
+    head = ["effect", "where", "value [95 % interval]", "declared", "explains", "p", "not distinguishable from"]
     text = (
-        "<p class='note'>explains: share of the excess over the best fit that comes back when this effect alone is "
-        "taken out. p: see diagnosis.json for the test.</p>"
+        "<p class='note'>explains: share of the excess chi-square over the best fit that returns when this effect "
+        "alone is removed. p: see diagnosis.json for the test.</p>"
     )
     return table(head, rows, (5,)) + text
 
@@ -141,10 +143,10 @@ def _same(effect: dict[str, Any]) -> str:
     same = [f"{s['effect']} ({', '.join(s['where']) or 'whole'})" for s in effect["equivalent"]]
     text = escape(", ".join(same)) or "-"
     advice = "; ".join(effect.get("separate_by", []))
-    return text + (f"<br><span class='note'>to separate: {escape(advice)}</span>" if advice else "")
+    return text + (f"<br><span class='note'>to distinguish them: {escape(advice)}</span>" if advice else "")
 
 
-def _joints(document: dict[str, Any]) -> str:
+def _joints(document: dict[str, Any], rule: Verdicts) -> str:
     """Before and after by joint and horizon, coloured where they differ."""
     error = document["error"]
     if not error["before"]:
@@ -157,17 +159,18 @@ def _joints(document: dict[str, Any]) -> str:
             if None in pair:
                 cells.append("-")
                 continue
-            kind = "good" if pair[1] < 0.95 * pair[0] else "bad" if pair[1] > 1.05 * pair[0] else "note"
+            better, worse = pair[1] < rule.better * pair[0], pair[1] > rule.joint_worse * pair[0]
+            kind = "good" if better else "bad" if worse else "note"
             cells.append(f"{number(1e3 * pair[0])} <span class='{kind}'>&rarr; {number(1e3 * pair[1])}</span>")
         rows.append(cells)
-    text = "<p class='note'>RMS position error before and after, in mrad or mm, as beside the joint.</p>"
+    text = "<p class='note'>RMS position error, declared &rarr; corrected model, in mrad or mm as beside the joint.</p>"
     return text + table(["joint", *[f"{h} s" for h in error["before"]]], rows, range(1, 1 + len(error["before"])))
 
 
-def _left(document: dict[str, Any]) -> str:
+def _left(document: dict[str, Any], rules: ReportThresholds) -> str:
     left, structure = document["unexplained"], document.get("structure", {})
     if not left["significant"]:
-        said = what_is_left(document)
+        said = what_is_left(document, rules.verdicts)
         return f"<p>{escape(said[:1].upper() + said[1:])} (p = {left['p']:.2g}).</p>"
     rows = [
         [
@@ -181,12 +184,13 @@ def _left(document: dict[str, Any]) -> str:
         if joint in left["where"]
     ]
     text = (
-        "<p>Structure remains that no effect above explains. It is described, not forced into a catalogue's name.</p>"
+        "<p>The residual has structure that no effect above explains (lack of fit). It is described, not attributed to "
+        "an effect of the catalogue.</p>"
     )
-    head = ["joint", "RMS", "of the drive's", "goes with", "p"]
+    head = ["joint", "RMS", "share of drive torque", "depends on", "p"]
     said = f"<p>{escape(left['description'])}.</p>"
     listed = table(head, rows, (1, 2, 4)) if rows else ""
-    return text + listed + said + "".join(_curves(document, left["where"][:3]))
+    return text + listed + said + "".join(_curves(document, left["where"][: rules.unexplained.joints]))
 
 
 def _curves(document: dict[str, Any], joints: Sequence[str]) -> list[str]:
@@ -194,7 +198,7 @@ def _curves(document: dict[str, Any], joints: Sequence[str]) -> list[str]:
     parts = []
     for joint in joints:
         known = document.get("structure", {}).get(joint, {}).get("curves", {})
-        lacks = f"missing [{of_joint(document, joint, 'torque')}]"
+        lacks = f"residual [{of_joint(document, joint, 'torque')}]"
         drawn = [
             figure(curve_picture(rows, quantity, lacks, f"{joint} over {quantity}"), escape(joint))
             for quantity, rows in known.items()
@@ -203,7 +207,7 @@ def _curves(document: dict[str, Any], joints: Sequence[str]) -> list[str]:
     return parts
 
 
-def _small(entries: Sequence[dict[str, Any]]) -> str:
+def _small(entries: Sequence[dict[str, Any]], most: int) -> str:
     known = [e for e in entries if e.get("change") is not None]
     if not known:
         return ""
@@ -214,17 +218,22 @@ def _small(entries: Sequence[dict[str, Any]]) -> str:
             escape(e.get("parameter", "")),
             f"{e['change']:.2g} {escape(e.get('unit', ''))}",
         ]
-        for e in known[:_DETECTABLE]
+        for e in known[:most]
     ]
-    more = (
-        f"<p class='note'>and {len(known) - _DETECTABLE} more in diagnosis.json</p>" if len(known) > _DETECTABLE else ""
-    )
+    more = f"<p class='note'>and {len(known) - most} more in diagnosis.json</p>" if len(known) > most else ""
     body = table(["effect", "where", "parameter", "change"], rows, (3,))
-    return f"<details><summary>The smallest effects that these data could have shown</summary>{body}{more}</details>"
+    return f"<details><summary>Smallest detectable changes with these data</summary>{body}{more}</details>"
 
 
 def _notes(document: dict[str, Any]) -> list[str]:
-    count = {k: len(document.get(k, [])) for k in ("train", "accept", "holdout")}
-    notes = [f"rollouts: {count['train']} to fit, of which {count['accept']} to accept by; {count['holdout']} held out"]
-    notes += document.get("notes", [])
+    notes = [_parts(document), *document.get("notes", [])]
     return notes + [f"{', '.join(u['where'])}: {u['why']}" for u in document.get("unidentifiable", [])]
+
+
+def _parts(document: dict[str, Any]) -> str:
+    """How many rollouts took which part; the held-out ones may be all that there is to validate on."""
+    train, accept, holdout = (set(document.get(k, [])) for k in ("train", "accept", "holdout"))
+    text = f"rollouts: {len(train - accept)} for identification, "
+    if accept & holdout:
+        return text + f"{len(holdout)} held out and used for validation"
+    return text + f"{len(accept)} for validation, {len(holdout)} held out"

@@ -5,11 +5,13 @@ started from perturbed states and compared with readings as noisy as the sensors
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from scipy.stats import t as student
 
+from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.residuals import Whitener, fit_whitener
 from bumblebee.diagnosis.simulation import (
     KINDS,
@@ -23,80 +25,74 @@ from bumblebee.diagnosis.simulation import (
     residuals,
     select,
 )
-from bumblebee.measured.rollout import Rollout
+from bumblebee.diagnosis.thresholds.report import PredictionError
 from bumblebee.sim.units import joint_unit
 
 HORIZONS = ("0.02", "0.2", "1.0")
-_RESAMPLES = 400
-_WHITENED = {"0.02": 60, "0.2": 40, "1.0": 12}
+
+
+@dataclass(frozen=True, eq=False)
+class HorizonWindows:
+    """Windows for every horizon that the data reach."""
+
+    plant: Plant
+    layout: Layout
+    windows: dict[str, Windows]
+    """By horizon; only their last tick is compared."""
+    rule: PredictionError = field(default_factory=PredictionError)
+
+
+Whiteners = dict[str, tuple[np.ndarray, Whitener]]
+"""For every horizon some of its windows (indices) and their whitener."""
 
 
 def horizon_windows(
-    plant: Plant, layout: Layout, rollouts: Sequence[Rollout], ids: Sequence[int], budget: int
-) -> dict[str, Windows]:
-    """Windows for every horizon that the data reach; only their last tick is compared."""
+    session: Session, ids: Sequence[int], budget: int, rule: PredictionError | None = None
+) -> HorizonWindows:
+    """Windows of the rollouts `ids`, `budget` at most for every horizon."""
     found = {}
     for name in HORIZONS:
-        starts = choose_starts(rollouts, ids, float(name), budget)
+        starts = choose_starts(session.rollouts, ids, float(name), budget)
         if starts:
-            found[name] = cut(plant, layout, rollouts, starts, outputs=1)
-    return found
+            found[name] = cut(session.plant, session.layout, session.rollouts, starts, outputs=1)
+    return HorizonWindows(session.plant, session.layout, found, rule or PredictionError())
 
 
 def horizon_whiteners(
-    plant: Plant,
-    layout: Layout,
-    windows: dict[str, Windows],
-    variation: Variation,
-    sigma: np.ndarray,
-    step: float,
-    seed: int,
-) -> dict[str, tuple[np.ndarray, Whitener]]:
-    """For every horizon some of its windows (indices) and their whitener; the longer, the fewer, for they cost more."""
-    rng = np.random.default_rng(seed)
+    cuts: HorizonWindows, variation: Variation, sigma: np.ndarray, step: float, seed: int
+) -> Whiteners:
+    """The whiteners of a model; the longer the horizon, the fewer windows, for they cost more."""
+    rng, most = np.random.default_rng(seed), dict(cuts.rule.whitened)
     found = {}
-    for name, part in windows.items():
-        count = min(len(part), _WHITENED[name])
+    for name, part in cuts.windows.items():
+        count = min(len(part), most[name])
         keep = np.unique(np.linspace(0, len(part) - 1, count).round().astype(int))
-        found[name] = keep, fit_whitener(plant, layout, select(part, keep), variation, sigma, step, rng)
+        found[name] = keep, fit_whitener(cuts.plant, cuts.layout, select(part, keep), variation, sigma, step, rng)
     return found
 
 
 def error_block(
-    plant: Plant,
-    layout: Layout,
-    windows: dict[str, Windows],
-    whiteners: dict[str, tuple[np.ndarray, Whitener]],
-    variation: Variation,
-    step: float,
-    seed: int = 0,
+    cuts: HorizonWindows, whiteners: Whiteners, variation: Variation, step: float, seed: int = 0
 ) -> dict[str, Any]:
     """`before` or `after`: horizon -> measure -> value, ci95 and, for joints, per_joint."""
     rng = np.random.default_rng(seed)
     block = {}
-    for name, part in windows.items():
+    for name, part in cuts.windows.items():
         keep, whitener = whiteners[name]
-        raw = residuals(plant, layout, part, [variation], step)[0]
+        raw = residuals(cuts.plant, cuts.layout, part, [variation], step)[0]
         good = np.isfinite(raw).all(axis=(1, 2))
         chi = (whitener(raw[keep]) ** 2).mean(axis=1)[good[keep]]
         chi_groups = part.rollout[keep][good[keep]]
-        block[name] = _measures(plant, layout, raw[good, 0], part.rollout[good], chi, chi_groups, rng)
+        block[name] = _measures(cuts, (raw[good, 0], part.rollout[good]), (chi, chi_groups), rng)
         block[name]["windows"] = {"value": int(good.sum()), "diverged": int((~good).sum())}
     return block
 
 
-def floor_block(
-    plant: Plant,
-    layout: Layout,
-    windows: dict[str, Windows],
-    whiteners: dict[str, tuple[np.ndarray, Whitener]],
-    sigma: np.ndarray,
-    seed: int = 0,
-) -> dict[str, Any]:
+def floor_block(cuts: HorizonWindows, whiteners: Whiteners, sigma: np.ndarray, seed: int = 0) -> dict[str, Any]:
     """What sensor noise alone leaves of the errors, in the same form, from the starts that the whiteners simulated."""
     rng = np.random.default_rng(seed)
     block = {}
-    for name, every in windows.items():
+    for name, every in cuts.windows.items():
         keep, whitener = whiteners[name]
         part = select(every, keep)
         moved = np.linalg.solve(whitener.factor[None], (whitener.moved + whitener.curvature)[..., None])[..., 0]
@@ -105,50 +101,49 @@ def floor_block(
         good = np.broadcast_to(whitener.valid, error.shape[:2])
         chi = (whitener(error, centre=False) ** 2).mean(axis=2)[good]
         groups = np.broadcast_to(part.rollout, good.shape)[good]
-        block[name] = _measures(plant, layout, error[good][:, 0], groups, chi, groups, rng)
+        block[name] = _measures(cuts, (error[good][:, 0], groups), (chi, groups), rng)
     return block
 
 
 def _measures(
-    plant: Plant,
-    layout: Layout,
-    error: np.ndarray,
-    groups: np.ndarray,
-    chi: np.ndarray,
-    chi_groups: np.ndarray,
+    cuts: HorizonWindows,
+    errors: tuple[np.ndarray, np.ndarray],
+    chi: tuple[np.ndarray, np.ndarray],
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """Measures of errors (W, D) and of chi-squares (some of W), with intervals over rollouts."""
-    out = {}
+    """Measures of errors (W, D) and of chi-squares (some of W), each with its rollouts, and intervals over these."""
+    (error, groups), draws, out = errors, cuts.rule.resamples, {}
     for name in ("joint_pos", "joint_vel"):
-        squares = error[:, layout.slices[name]] ** 2
-        whole = _with_interval(squares.mean(axis=1), groups, rng)
-        whole |= _by_kind(plant, name, squares, groups)
-        whole["per_joint"] = {joint: _with_interval(squares[:, j], groups, rng) for j, joint in enumerate(plant.joints)}
+        squares = error[:, cuts.layout.slices[name]] ** 2
+        whole = _with_interval(squares.mean(axis=1), groups, rng, draws)
+        whole |= _by_kind(cuts, name, squares, groups)
+        joints = enumerate(cuts.plant.joints)
+        whole["per_joint"] = {joint: _with_interval(squares[:, j], groups, rng, draws) for j, joint in joints}
         out[f"{name}_rmse"] = whole
     for name in ("base_pos", "base_rot"):
-        if name in layout.slices:
-            out[f"{name}_rmse"] = _with_interval((error[:, layout.slices[name]] ** 2).sum(axis=1), groups, rng)
-    out["chi2"] = _with_interval(chi, chi_groups, rng, root=False)
+        if name in cuts.layout.slices:
+            squares = (error[:, cuts.layout.slices[name]] ** 2).sum(axis=1)
+            out[f"{name}_rmse"] = _with_interval(squares, groups, rng, draws)
+    out["chi2"] = _with_interval(*chi, rng, draws, root=False)
     return out
 
 
-def _by_kind(plant: Plant, name: str, squares: np.ndarray, groups: np.ndarray) -> dict[str, Any]:
+def _by_kind(cuts: HorizonWindows, name: str, squares: np.ndarray, groups: np.ndarray) -> dict[str, Any]:
     """Of squares (W, J): the unit of their root mean square; hinges and slides apart where the robot has both."""
-    hinge, kinds = {"joint_pos": "rad", "joint_vel": "rad/s"}[name], members(plant)
+    hinge, kinds = {"joint_pos": "rad", "joint_vel": "rad/s"}[name], members(cuts.plant)
     units = {kind: joint_unit(hinge, KINDS[kind]) for kind in kinds}
     if len(kinds) == 1:
         return {"unit": next(iter(units.values()))}
     rng = np.random.default_rng(0)
     apart = {
-        kind: _with_interval(squares[:, columns].mean(axis=1), groups, rng) | {"unit": units[kind]}
+        kind: _with_interval(squares[:, columns].mean(axis=1), groups, rng, cuts.rule.resamples) | {"unit": units[kind]}
         for kind, columns in kinds.items()
     }
     return {"unit": f"{units['hinge']}, 1 {units['slide']} as 1 {units['hinge']}", "by_kind": apart}
 
 
 def _with_interval(
-    values: np.ndarray, groups: np.ndarray, rng: np.random.Generator, root: bool = True
+    values: np.ndarray, groups: np.ndarray, rng: np.random.Generator, resamples: int, root: bool = True
 ) -> dict[str, Any]:
     """Mean (or its root) of per-window values and its 95 % bootstrap interval over rollouts; None with one rollout."""
     names, index = np.unique(groups, return_inverse=True)
@@ -159,7 +154,7 @@ def _with_interval(
     finish = np.sqrt if root else np.asarray
     if len(names) < 2:
         return {"value": float(finish(mean)), "ci95": None}
-    draws = rng.integers(0, len(names), size=(_RESAMPLES, len(names)))
+    draws = rng.integers(0, len(names), size=(resamples, len(names)))
     means = sums[draws].sum(axis=1) / counts[draws].sum(axis=1)
     value, ends = float(finish(mean)), np.quantile(finish(means), [0.025, 0.975])
     # Percentiles of few rollouts are too narrow: widened as Student's t is wider than the normal distribution.

@@ -8,6 +8,8 @@ import numpy as np
 
 INK, GRID, FAINT = "#1d2430", "#e4e7ee", "#6b7385"
 COLOURS = {"measured": INK, "before": "#c8553d", "after": "#1b8a6b", "target": "#9aa3b5", "model": "#c8553d"}
+NAMES = {"before": "declared model", "after": "corrected model", "oracle": "true effects", "floor": "noise floor"}
+"""What keys of the document are called for people."""
 
 
 @dataclass(frozen=True)
@@ -91,9 +93,9 @@ def line_picture(
         dash = " stroke-dasharray='4 3'" if name == "target" else ""
         wide = 2.2 if name == "measured" else 1.8
         parts.append(f"<polyline fill='none' stroke='{COLOURS[name]}' stroke-width='{wide}'{dash} points='{points}'/>")
-        x0 = frame.left + 96 * row
+        x0 = frame.left + 136 * row
         parts.append(f"<rect x='{x0}' y='{frame.top - 16}' width='14' height='3' fill='{COLOURS[name]}'/>")
-        parts.append(f"<text x='{x0 + 18}' y='{frame.top - 10}' fill='{COLOURS[name]}'>{name}</text>")
+        parts.append(f"<text x='{x0 + 18}' y='{frame.top - 10}' fill='{COLOURS[name]}'>{NAMES.get(name, name)}</text>")
     return _svg(frame, parts, title)
 
 

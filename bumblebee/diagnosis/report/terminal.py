@@ -7,26 +7,31 @@ import numpy as np
 
 from bumblebee.diagnosis.report.notes import nothing_seen, what_is_left, worse_horizons
 from bumblebee.diagnosis.simulation import motion_error, named, of_joint, pick, rows
+from bumblebee.diagnosis.thresholds.report import Listing, ReportThresholds, Verdicts
 
 _MARKS = {"target": ".", "before": "x", "after": "o", "measured": "#"}
+_COLUMNS = {"before": "declared", "after": "corrected", "oracle": "true", "floor": "noise floor"}
+"""Keys of the error block, as they are called for people."""
 
 
-def summary(document: dict[str, Any]) -> str:
+def summary(document: dict[str, Any], rules: ReportThresholds | None = None) -> str:
     """Effects with intervals, error before, after and floor, what is left."""
-    lines = [line for e in document["effects"] for line in _effect(e)]
+    rules = rules or ReportThresholds()
+    lines = [line for e in document["effects"] for line in _effect(e, rules.listing)]
     lines = ["effects:", *lines] if lines else ["no effect found"]
     lines = [*(f"WARNING: {text}" for text in document.get("warnings", [])), *lines]
-    columns = {k: document["error"][k] for k in ("before", "after", "oracle", "floor") if k in document["error"]}
+    columns = {k: document["error"][k] for k in _COLUMNS if k in document["error"]}
     where = "held-out rollouts" if document["holdout"] else "the fitted rollout"
-    lines += ["", f"error on {where}:", *_errors(columns), *worse_horizons(document["error"]), ""]
+    lines += ["", f"RMS prediction error on {where}:", *_errors(columns)]
+    lines += [*worse_horizons(document["error"], rules.verdicts), ""]
     left = document["unexplained"]
-    lines.append(f"unexplained: {what_is_left(document)} (p = {left['p']:.2g})")
+    lines.append(f"unexplained: {what_is_left(document, rules.verdicts)} (p = {left['p']:.2g})")
     lines += [f"note: {note}" for note in document.get("notes", [])]
     lines += [f"unidentifiable: {', '.join(u['where'])}: {u['why']}" for u in document.get("unidentifiable", [])]
     return "\n".join(lines)
 
 
-def _effect(effect: dict[str, Any]) -> list[str]:
+def _effect(effect: dict[str, Any], rule: Listing) -> list[str]:
     place, lines = ", ".join(effect["where"]) or "whole robot", []
     if effect["effect"] == "discovered":
         values = [(t["term"][:48], t | {"value": t["coefficient"], "unit": "", "nominal": None})
@@ -41,15 +46,16 @@ def _effect(effect: dict[str, Any]) -> list[str]:
             f" explains {100 * effect['explains']:.0f} %"
         )
     if effect["equivalent"]:
-        same = ", ".join(f"{s['effect']} on {', '.join(s['where']) or 'all'}" for s in effect["equivalent"][:4])
-        lines.append(f"  {'':<18} cannot be told from: {same}")
-        lines += [f"  {'':<18} to separate: {text}" for text in effect.get("separate_by", [])]
+        some = effect["equivalent"][: rule.equivalent]
+        same = ", ".join(f"{s['effect']} on {', '.join(s['where']) or 'all'}" for s in some)
+        lines.append(f"  {'':<18} not distinguishable from: {same}")
+        lines += [f"  {'':<18} to distinguish them: {text}" for text in effect.get("separate_by", [])]
     return lines
 
 
 def _errors(columns: dict[str, dict[str, Any]]) -> list[str]:
     """Measures by horizon, a column for each error block."""
-    lines = [f"  {'after':<8}{'':<34}" + "".join(f"{name:>12}" for name in columns)]
+    lines = [f"  {'horizon':<8}{'':<34}" + "".join(f"{_COLUMNS.get(name, name):>12}" for name in columns)]
     for horizon, measures in next(iter(columns.values())).items():
         for label, unit, scale, key in rows(measures):
             cells = [pick(block.get(horizon, {}), key).get("value") for block in columns.values()]
@@ -60,7 +66,7 @@ def _errors(columns: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def plot(example: dict[str, Any], width: int = 76, height: int = 14) -> str:
-    """A window as characters: # measured, x before (or the model), o after, . target."""
+    """A window as characters: # measured, x the declared model, o the corrected one, . target."""
     time = np.asarray(example["time"], dtype=float)
     series = {n: np.asarray(example[n], dtype=float) for n in _MARKS if n in example}
     known = np.concatenate([series[n] for n in ("measured", "target") if n in series])
@@ -79,52 +85,62 @@ def plot(example: dict[str, Any], width: int = 76, height: int = 14) -> str:
             if np.isfinite(value) and low <= value <= high:
                 canvas[round((high - value) / max(high - low, 1e-12) * (height - 1))][x] = _MARKS[name]
     head = f"{example['joint']} [{example['unit']}] in {example['rollout']} from {example['start']:.2f} s"
-    legend = "  ".join(f"{_MARKS[n]} {'model' if n == 'before' and 'after' not in series else n}" for n in series)
+    legend = "  ".join(
+        f"{_MARKS[n]} {'model' if n == 'before' and 'after' not in series else _COLUMNS.get(n, n)}" for n in series
+    )
     sides = [f"{high:>9.3g} |", *[f"{'':>9} |"] * (height - 2), f"{low:>9.3g} |"]
     body = [side + "".join(row) for side, row in zip(sides, canvas, strict=True)]
     return "\n".join([f"{head}   {legend}", *body, f"{'':>10} {time[0]:.2f} s{time[-1]:>{width - 8}.2f} s"])
 
 
-def gap_summary(document: dict[str, Any], examples: Sequence[dict[str, Any]]) -> str:
+def gap_summary(
+    document: dict[str, Any], examples: Sequence[dict[str, Any]], rules: ReportThresholds | None = None
+) -> str:
     """The gap report: a picture, errors by horizon and joint, the torque that is missing, motions, notes."""
+    rules = rules or ReportThresholds()
     error = document["error"]
     lines = [plot(examples[0]) if examples else "", ""]
     lines += [f"WARNING: {text}" for text in document.get("warnings", [])]
     lines += [
-        "error of windows restarted from measured states:",
+        "RMS prediction error of windows that start from measured states:",
         *_errors({"model": error, "floor": document["floor"]}),
     ]
-    if error:
-        lines += ["", f"  {'joint position, joint by joint':<34}" + "".join(f"{h + ' s':>12}" for h in error)]
-        joints = next(iter(error.values()))["joint_pos_rmse"]["per_joint"]
-        for joint in joints:
-            values = [m["joint_pos_rmse"]["per_joint"][joint]["value"] for m in error.values()]
-            lines.append(
-                f"  {named(document, joint):<34}"
-                + "".join(f"{'-':>12}" if v is None else f"{1e3 * v:>12.4g}" for v in values)
-            )
-    lines += ["", "torque that the model lacks:", *_missing(document)]
+    lines += _joints(document)
+    lines += ["", "residual torque, which the model lacks:", *_missing(document, rules.verdicts)]
     lines += _reported(document)
     lines += ["", "worst motions:"]
-    for m in document["motions"][:5]:
+    for m in document["motions"][: rules.listing.motions]:
         lines.append(f"  {m['motion']:<40} {motion_error(m)} after {m['horizon']} s")
     lines += [f"note: {note}" for note in document["notes"]]
     lines += [f"unidentifiable: {', '.join(u['where'])}: {u['why']}" for u in document["unidentifiable"]]
     return "\n".join(lines)
 
 
+def _joints(document: dict[str, Any]) -> list[str]:
+    """Position errors of every joint, a column a horizon."""
+    error = document["error"]
+    if not error:
+        return []
+    lines = ["", f"  {'joint position, joint by joint':<34}" + "".join(f"{h + ' s':>12}" for h in error)]
+    for joint in next(iter(error.values()))["joint_pos_rmse"]["per_joint"]:
+        values = [m["joint_pos_rmse"]["per_joint"][joint]["value"] for m in error.values()]
+        row = "".join(f"{'-':>12}" if v is None else f"{1e3 * v:>12.4g}" for v in values)
+        lines.append(f"  {named(document, joint):<34}{row}")
+    return lines
+
+
 def _reported(document: dict[str, Any]) -> list[str]:
     if not document["reported_torque"]:
         return []
-    lines = ["", "the drives' own torque against the declared drives':"]
+    lines = ["", "reported drive torque against that of the declared drives:"]
     for j, e in document["reported_torque"].items():
         bias = f"{e['bias']:.3g} {of_joint(document, j, 'torque')}"
-        late, alike = f"{1e3 * e['delay']:.1f} ms late", f"correlation {e['correlation']:.3f}"
+        late, alike = f"delay {1e3 * e['delay']:.1f} ms", f"correlation {e['correlation']:.3f}"
         lines.append(f"  {j:<28} gain {e['gain']:.3f}, bias {bias}, {late}, {alike}")
     return lines
 
 
-def _missing(document: dict[str, Any]) -> list[str]:
+def _missing(document: dict[str, Any], rule: Verdicts) -> list[str]:
     lacking = document["missing_torque"]
     if not lacking:
         return ["  too few windows to say"]
@@ -133,8 +149,8 @@ def _missing(document: dict[str, Any]) -> list[str]:
         if e["significant"]:
             share = 100 * e["structured_rms"] / e["drive_rms"]
             on = ", ".join(e["depends_on"]) or "no single quantity"
-            size = f"{e['structured_rms']:.3g} {e['unit']} RMS ({share:.0f} % of its drive's)"
-            lines.append(f"  {joint:<28} {size}, goes with {on}")
+            size = f"{e['structured_rms']:.3g} {e['unit']} RMS ({share:.0f} % of its drive torque)"
+            lines.append(f"  {joint:<28} {size}, depends on {on}")
         else:
-            lines.append(f"  {joint:<28} {nothing_seen(document, joint)} (p = {e['p']:.2g})")
+            lines.append(f"  {joint:<28} {nothing_seen(document, joint, rule)} (p = {e['p']:.2g})")
     return lines

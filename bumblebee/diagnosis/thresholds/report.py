@@ -1,8 +1,103 @@
 """Numbers that the report goes by."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class PredictionError:
+    """Of the error block."""
+
+    resamples: int = 400
+    """Bootstrap draws of the rollouts for an interval."""
+    whitened: tuple[tuple[str, int], ...] = (("0.02", 60), ("0.2", 40), ("1.0", 12))
+    """Horizon [s] and windows of it whose chi-square is taken: the longer, the fewer, for they cost more."""
+
+
+@dataclass(frozen=True)
+class MeasuredCurve:
+    """Of the mean of a missing torque over one quantity."""
+
+    bins: int = 15
+    """Bins of equally many windows."""
+    fewest: int = 8
+    """Values in a bin below which no mean is given."""
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Of the list of effects."""
+
+    comparable: float = 0.25
+    """Share of the change of dry friction from which on friction that changes with direction or speed is one entry
+    with it: a smaller one is an effect beside it, not its shape."""
+    experiments: int = 3
+    """Experiments at most that are proposed to separate one effect from what cannot be told from it."""
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """Of the words on what is left."""
+
+    joints: int = 3
+    """Joints that get a sentence, and pictures on the page."""
+
+
+@dataclass(frozen=True)
+class ExampleWindows:
+    """Of the windows to look at."""
+
+    lengths: tuple[float, ...] = (1.0, 0.6, 0.2)
+    """Lengths that are tried, until the logs are long enough [s]."""
+    windows: int = 60
+    """Windows that the examples are chosen from."""
+    ticks: int = 120
+    """Points at most that are drawn of one."""
+    typical: float = 0.9
+    """Quantile of the gain among a joint's windows that is shown: telling, and no freak."""
+
+
+@dataclass(frozen=True)
+class Verdicts:
+    """Of what is said of errors and of what is left."""
+
+    alike: float = 0.004
+    """Delays of single joints closer than that are one delay [s]."""
+    unseen: float = 10.0
+    """Times as far off as the worst fitted window, from which on a window that was not fitted is noted."""
+    worse: float = 1.02
+    """Times the error before by which the error after has to be larger to be called worse."""
+    large: float = 3.0
+    """Times what sensor noise leaves, from which on an error is called large."""
+    trace: float = 1e-3
+    """p of what is not called significant for being small, yet is no accident."""
+    better: float = 0.95
+    """Times a joint's error before, below which the error after is coloured as better."""
+    joint_worse: float = 1.05
+    """Times a joint's error before, above which the error after is coloured as worse."""
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Of how much page and terminal list."""
+
+    effects: int = 6
+    """Effects that the first sentence names."""
+    detectable: int = 60
+    """Smallest detectable changes on the page."""
+    equivalent: int = 4
+    """Effects that cannot be told from one, in the terminal."""
+    motions: int = 5
+    """Worst motions in the terminal."""
 
 
 @dataclass(frozen=True)
 class ReportThresholds:
     """All of them."""
+
+    prediction_error: PredictionError = field(default_factory=PredictionError)
+    measured_curve: MeasuredCurve = field(default_factory=MeasuredCurve)
+    effects: Effects = field(default_factory=Effects)
+    unexplained: Unexplained = field(default_factory=Unexplained)
+    example_windows: ExampleWindows = field(default_factory=ExampleWindows)
+    verdicts: Verdicts = field(default_factory=Verdicts)
+    listing: Listing = field(default_factory=Listing)

@@ -37,7 +37,7 @@ def test_without_names_every_fourth_rollout_is_held_out(count: int, held: int) -
 def test_every_horizon_compares_the_state_at_its_own_end() -> None:
     rollouts = arm.simulate({}, count=2, seconds=3.0)
     session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
-    windows = horizon_windows(session.plant, session.layout, rollouts, [0, 1], budget=8)
+    windows = horizon_windows(session, [0, 1], budget=8).windows
     assert set(windows) == set(HORIZONS)
     for name, part in windows.items():
         np.testing.assert_allclose(part.out_time[:, -1], float(name), atol=1e-9)

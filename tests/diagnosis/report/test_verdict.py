@@ -11,7 +11,8 @@ from bumblebee.diagnosis.dataset.undriven import commanded_undriven
 from bumblebee.diagnosis.gap.gap import gap
 from bumblebee.diagnosis.report.notes import beside_noise, unexplained_error, what_is_left
 from bumblebee.diagnosis.report.page import render_report
-from bumblebee.diagnosis.report.terminal import gap_summary, summary
+from bumblebee.diagnosis.report.terminal import summary
+from bumblebee.diagnosis.thresholds.report import Verdicts
 from bumblebee.errors import BadInput
 from tests.diagnosis import cart
 
@@ -36,29 +37,29 @@ def document(after: float, effects: bool = False) -> dict:
 
 def test_a_large_error_without_an_effect_is_said_and_nothing_comforts():
     made = document(80.0)
-    made["warnings"] = unexplained_error(made)
+    made["warnings"] = unexplained_error(made, Verdicts())
     assert "160 mrad" in made["warnings"][0] and "no effect of the catalogue explains it" in made["warnings"][0]
     for text in (summary(made), render_report(made, [])):
         assert "no effect of the catalogue explains it" in text
-        assert "nothing that these tests can see" not in text and "No effect of the catalogue is missing" not in text
+        assert "structure in the residual (p" not in text and "No effect of the catalogue is missing" not in text
 
 
 def test_a_large_error_beside_effects_is_said_too():
-    assert "what was found does not explain that" in unexplained_error(document(5.0, effects=True))[0]
+    assert "what was found does not explain that" in unexplained_error(document(5.0, effects=True), Verdicts())[0]
 
 
 def test_an_error_at_the_noise_warns_of_nothing():
     made = document(1.1)
-    assert unexplained_error(made) == []
-    assert what_is_left(made) == "nothing that these tests can see"
+    assert unexplained_error(made, Verdicts()) == []
+    assert what_is_left(made, Verdicts()) == "no significant structure in the residual"
     assert "No effect of the catalogue is missing" in render_report(made, [])
 
 
 def test_an_error_below_the_expected_noise_is_explained():
     floor = {"value": 4.39e-3, "ci95": [2.5e-3, 6e-3]}
     below = beside_noise({"value": 3.25e-3}, floor, "mrad", 1e3)
-    assert "no more than sensor noise leaves of a complete model" in below and "[2.5, 6]" in below
-    assert beside_noise({"value": 9e-3}, floor, "mrad", 1e3) == "sensor noise alone leaves 4.39 [2.5, 6] mrad"
+    assert "at the noise floor" in below and "[2.5, 6]" in below
+    assert beside_noise({"value": 9e-3}, floor, "mrad", 1e3) == "noise floor 4.39 [2.5, 6] mrad"
 
 
 def test_one_rollout_says_what_could_not_be_tested(diagnosed):
@@ -66,12 +67,6 @@ def test_one_rollout_says_what_could_not_be_tested(diagnosed):
     assert any("single rollout" in text for text in made["warnings"])
     assert "WARNING: a single rollout" in summary(made)
     assert "single rollout" in render_report(made, []).split("<h2>")[0]
-
-
-def test_a_gap_report_of_one_rollout_says_what_could_not_be_tested():
-    report = gap(make_session(mujoco.MjSpec.from_string(cart.xml()), cart.record(count=1), "cart", "memory"))
-    assert any("could not be tested" in text for text in report.document["warnings"])
-    assert "WARNING: a single rollout" in gap_summary(report.document, report.examples)
 
 
 def undriven(*names: str) -> str:
@@ -97,3 +92,10 @@ def test_a_joint_that_is_told_nothing_needs_no_actuator():
         object.__setattr__(rollout, "joint_target", np.zeros_like(rollout.joint_target))
     made = make_session(mujoco.MjSpec.from_string(undriven("pole", "cart")), rollouts, "cart", "memory")
     assert made.warnings == ()
+
+
+def test_the_page_counts_every_rollout_once():
+    made = document(1.1) | {"train": ["a", "b", "c"], "accept": ["c"], "holdout": ["d"]}
+    assert "rollouts: 2 for identification, 1 for validation, 1 held out" in render_report(made, [])
+    made |= {"accept": ["d"]}
+    assert "rollouts: 3 for identification, 1 held out and used for validation" in render_report(made, [])
