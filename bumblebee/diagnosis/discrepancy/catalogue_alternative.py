@@ -28,13 +28,7 @@ from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection import Search, score_tests, try_one
 from bumblebee.diagnosis.sensitivities import Columns
 from bumblebee.diagnosis.simulation import Plant
-
-_OFFERS, _SHAPES = 5, 2  # effects whose sensitivities are simulated, and shapes of each
-_ANYWHERE = 2  # of these the most promising may be on other joints
-_TRIALS, _FITS = 4, 2  # of these tried at their size, and refitted jointly
-_ROUNDS = 2  # effects of the catalogue that together may take a form's place
-_HOPELESS = 0.5  # share of what a form gains, above which no second name is tried
-_SHARE = 0.1  # of what a form gains; less is what laws differ by whose torques correlate by 0.95
+from bumblebee.diagnosis.thresholds.discrepancy import CatalogueAlternative
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,18 +38,18 @@ class Offers:
     candidates: Sequence[Candidate] = ()
     """The most promising first."""
 
-    def on(self, plant: Plant, joint: str) -> list[Candidate]:
+    def on(self, plant: Plant, joint: str, rule: CatalogueAlternative) -> list[Candidate]:
         """Those that could act on a joint, a few shapes of each; and the most promising wherever they are.
 
         What sits on another joint or on a body that the joint does not carry is left out.
         """
         elsewhere = (set(plant.joints) | set(plant.bodies)) - {joint, *_carried(plant, joint)}
-        best = list(dict.fromkeys((c.effect, c.where) for c in self.candidates))[:_ANYWHERE]
+        best = list(dict.fromkeys((c.effect, c.where) for c in self.candidates))[: rule.anywhere]
         kept: list[Candidate] = []
         for c in self.candidates:
             if c.where in elsewhere and (c.effect, c.where) not in best:
                 continue
-            if sum((c.effect, c.where) == (o.effect, o.where) for o in kept) < _SHAPES:
+            if sum((c.effect, c.where) == (o.effect, o.where) for o in kept) < rule.shapes:
                 kept.append(c)
         return kept
 
@@ -93,37 +87,38 @@ def named_instead(problem: Problem, holdout: Holdout, fit: Fit, form: Fit, joint
         joint: where it is.
         offers: the catalogue's candidates beside `fit`.
     """
-    named = fit
-    for _ in range(_ROUNDS):
+    rule, named = problem.thresholds.discrepancy.catalogue_alternative, fit
+    for _ in range(rule.rounds):
         new = _one_more(problem, named, joint, offers)
         if new is None:
             return None
         named = new
         short = lead(problem, holdout, form, named)
-        if short <= (_SHARE if parameters(named) <= parameters(form) else 0.0):
+        if short <= (rule.lacking if parameters(named) <= parameters(form) else 0.0):
             return named
         # A table has a height for everything: names that explain the fit better for their numbers go before it.
         if criterion(problem, named) >= criterion(problem, form):
             return named
-        if short > _HOPELESS:
+        if short > rule.hopeless:
             return None
     return None
 
 
 def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers) -> Fit | None:
     """The best of the catalogue's effects beside `fit`, if any is worth its parameters."""
-    open_ = [c for c in offers.on(problem.plant, joint) if not is_chosen(c, fit.chosen)]
+    rule = problem.thresholds.discrepancy.catalogue_alternative
+    open_ = [c for c in offers.on(problem.plant, joint, rule) if not is_chosen(c, fit.chosen)]
     many = len(problem.plant.joints)
-    names = list(dict.fromkeys((c.effect, c.where) for c in open_ if not shortlisted(c, many)))[:_OFFERS]
+    names = list(dict.fromkeys((c.effect, c.where) for c in open_ if not shortlisted(c, many)))[: rule.effects]
     looked = [c for c in open_ if (c.effect, c.where) in names or (shortlisted(c, many) and c.where == joint)]
     if not looked:
         return None
     columns = Columns(looked, problem.sensitivities(looked, fit.effects))
     weights = window_weights(fit.clean(problem))
     tests = score_tests(problem, columns, fit, weights)
-    order = [k for k in np.argsort(-tests.gain) if tests.gain[k] > 0][:_TRIALS]
+    order = [k for k in np.argsort(-tests.gain) if tests.gain[k] > 0][: rule.trials]
     trials = [try_one(problem, fit, looked[k], tests.steps[k], weights) for k in order]
-    tried = sorted((t for t in trials if t is not None), key=lambda t: t.cost + 2 * len(t.candidate.free))[:_FITS]
+    tried = sorted((t for t in trials if t is not None), key=lambda t: t.cost + 2 * len(t.candidate.free))[: rule.fits]
     fits = []
     for t in tried:
         new = refitted(problem, (*fit.chosen, t.candidate), np.concatenate((fit.values, t.values)), fit)

@@ -18,17 +18,11 @@ from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.comparison import SURE, Holdout, is_better, less, wald, without_idle, without_spent
 from bumblebee.diagnosis.discrepancy.catalogue_alternative import Offers, named_instead
-from bumblebee.diagnosis.discrepancy.form import MANY, Form, best_form, form_of
+from bumblebee.diagnosis.discrepancy.form import Form, best_form, form_of
 from bumblebee.diagnosis.discrepancy.residual_tests import JointRemains, Remains, remains
 from bumblebee.diagnosis.discrepancy.single_law import single_laws
 from bumblebee.diagnosis.estimation import Fit, resolved
 from bumblebee.diagnosis.residuals import Problem, window_weights
-
-_JOINTS = 3  # joints at most that get a form
-_Z, _LEAST = 2.0, 0.01  # of the judging windows' gain, and its least share
-_OF_ALL = 0.05  # share of what all effects gain together that a form must, what it replaces being gone
-_MOST = 0.5  # share of a joint's excess that may remain where its form was found
-_TRIALS = 2  # laws tried at most in the place of names on one joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +82,8 @@ def discover(
     state, kinds = _without_names(_State(problem, holdout, before, left, typical, still), offers, budget, say)
     unconfirmed: dict[str, dict[str, float]] = {}
     tried = list(kinds)
-    for _ in range(_JOINTS if len(state.fit.chosen) <= MANY else 1):
+    rules = problem.thresholds.discrepancy
+    for _ in range(rules.discover.joints if len(state.fit.chosen) <= rules.form.many_effects else 1):
         worst = state.left.worst(tried)
         if worst is None or not budget.has_time_for(f"a law on {worst.joint}"):
             break
@@ -121,7 +116,7 @@ def _without_names(
 ) -> tuple[_State, dict[str, str]]:
     """One law in the place of all names on a joint where it explains more; joints that got one, with its kind."""
     kinds: dict[str, str] = {}
-    if len(state.fit.chosen) > MANY:
+    if len(state.fit.chosen) > state.problem.thresholds.discrepancy.form.many_effects:
         return state, kinds
     for joint in dict.fromkeys(c.where for c in state.fit.chosen if c.where in state.problem.plant.joints):
         if not budget.has_time_for(f"one law in the place of the names on {joint}"):
@@ -137,14 +132,15 @@ def _without_names(
 def _judged(state: _State, form: Form, worst: JointRemains, offers: Offers) -> tuple[_State | None, bool]:
     """The state with a form, or with effects of the catalogue that do what it does (then True); None if refused."""
     problem, holdout, fit = state.problem, state.holdout, state.fit
+    rule = problem.thresholds.discrepancy.discover
     if not _is_worth_it(problem, holdout, fit, form, state.left.sought.bound):
         return None, False
     named = named_instead(problem, holdout, fit, form.fit, worst.joint, offers)
     if named is not None:
-        return (state.around(named), True) if holdout.gains(fit, named, _Z, _LEAST) else (None, False)
+        return (state.around(named), True) if holdout.gains(fit, named, rule.gain_z, rule.least_gain) else (None, False)
     new = state.around(form.fit)
     excess = new.left.joints[problem.plant.joints.index(worst.joint)].excess
-    if excess > max(_MOST * worst.excess, 2.0) or _surety(new.problem, new.fit, fit) < SURE:
+    if excess > max(rule.most_left * worst.excess, rule.noise) or _surety(new.problem, new.fit, fit) < SURE:
         return None, False
     return new, False
 
@@ -156,12 +152,13 @@ def _names(effects: Sequence[Candidate]) -> list[str]:
 
 def _is_worth_it(problem: Problem, holdout: Holdout, fit: Fit, form: Form, bound: float) -> bool:
     """Whether a form pays on the judging windows, is no trifle, and as sure in the joint fit as its law had to be."""
+    rule = problem.thresholds.discrepancy.discover
     if _surety(problem, form.fit, fit) < bound:
         return False
-    if not holdout.gains(fit, form.fit, _Z, _LEAST):
+    if not holdout.gains(fit, form.fit, rule.gain_z, rule.least_gain):
         return False
     own = next(c for c in form.fit.chosen if c not in fit.chosen)
-    return holdout.gains(less(problem, form.fit, [own]), form.fit, _Z, _OF_ALL)
+    return holdout.gains(less(problem, form.fit, [own]), form.fit, rule.gain_z, rule.least_of_all)
 
 
 def _surety(problem: Problem, fit: Fit, before: Fit) -> float:
@@ -177,7 +174,7 @@ def _instead_of_names(state: _State, joint: str, offers: Offers) -> Form | None:
     """
     problem, holdout, fit, left = state.problem, state.holdout, state.fit, state.left
     laws = single_laws(problem, fit, left.scene, left.library, joint)
-    for gone, one in itertools.islice(laws, _TRIALS):
+    for gone, one in itertools.islice(laws, problem.thresholds.discrepancy.discover.swaps):
         bare = less(problem, fit, gone)
         form = form_of(problem, bare, joint, [one])
         if form is None or not is_better(problem, holdout, fit, form.fit):

@@ -52,7 +52,7 @@ class Scene:
         answers = answers_of(plant, problem.layout, windows, variation, problem.coarse, sizes, only=only)
         white = joint_answers(problem, answers)
         evidence = make_evidence(problem, white, self.residual, self.columns, self.weights)
-        return evidence, quantities(plant, windows, answers.path, variation.model)
+        return evidence, quantities(plant, windows, answers.path, variation.model, problem.thresholds.discrepancy)
 
     @property
     def evidence(self) -> Evidence:

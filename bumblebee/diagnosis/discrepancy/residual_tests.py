@@ -19,16 +19,6 @@ from bumblebee.diagnosis.discrepancy.term_library import Law
 from bumblebee.diagnosis.estimation import Fit, solve
 from bumblebee.diagnosis.residuals import Problem
 
-_LEAST = 0.01  # share of a joint's typical torque below which structure is not worth a word
-_POWER, _AGAIN, _ALONE = 4.0, 1.5, 6.0  # standard errors of a joint's power: fitted, judged, fitted without judges
-_LOUDEST = 2  # windows of a rollout that do not count there
-_LONE = 20.0  # standard errors of a joint's power in one rollout alone, its loudest windows not counted
-_WHOLE, _WHOLE_ALONE = (2.0, 4.0), 6.0  # standard errors of all windows: each of fitted and judged, both; fitted alone
-_FELT, _PAYS = 9.0, 25.0  # chi-square of a law on judging windows that do not meet it; its gain on half of the fitted
-_SLIGHT = 0.03  # share of a joint's typical torque below which a power that no law explains is no structure by itself
-_HINT = 3.0  # z from which a law says what a power that no law explains depends on
-_MOST = 8  # joints that laws are sought on, those that lack most
-
 
 @dataclass(frozen=True)
 class JointRemains:
@@ -91,16 +81,17 @@ def remains(
         typical: (J,) RMS torques of the joints [N m].
         still: joints that never move.
     """
+    rule = problem.thresholds.discrepancy.residual_tests
     # Where a foot tips one window holds more than all others: on a base that can fall the loudest do not count.
-    spared = _LOUDEST if problem.plant.floating else 0
+    spared = rule.loudest if problem.plant.floating else 0
     scene = fitted_scene(problem, fit, typical)
     excess, again, judged = scene.excess(spared), None, None
     names = problem.plant.joints
-    moving = [j for j in np.argsort(-excess) if names[j] not in still][:_MOST]
+    moving = [j for j in np.argsort(-excess) if names[j] not in still][: rule.joints]
     some = library(scene.data, moving)
     sought = seek(problem, scene.evidence, scene.residual, scene.columns, some)
     if judge is not None:  # of what is not seen in the fitted windows nothing need be simulated in others
-        asked = sorted({*np.flatnonzero(excess > _POWER).tolist(), *(one.joint for one in sought.found)})
+        asked = sorted({*np.flatnonzero(excess > rule.excess_fitted).tolist(), *(one.joint for one in sought.found)})
         judged = judged_scene(judge, fit, typical, asked)
         again = judged.excess(spared) if asked else np.zeros_like(excess)
     kept, whole = confirmed(scene, sought, judged), in_whole(scene, judged)
@@ -109,20 +100,19 @@ def remains(
         own = [(one, size) for one, size in kept if one.joint == j]
         lacks = [np.einsum("fws,f->ws", one.torque, size) for one, size in own]
         rms = float(np.sqrt((np.sum(lacks, axis=0) ** 2).mean())) if own else scene.evidence.implied(j)
-        loud = excess[j] > (_ALONE if again is None else _POWER)
-        # Other steps and integrators feign a hundredth or two of a joint's torque, in contact all windows' power, too.
-        more = rms > _SLIGHT * typical[j]
+        loud = excess[j] > (rule.excess_alone if again is None else rule.excess_fitted)
+        more = rms > rule.slight_torque * typical[j]
         if again is not None:
-            loud &= again[j] > _AGAIN or _in_two(scene, j, more)
+            loud &= again[j] > rule.excess_validation or _in_two(scene, j, more)
         loud &= more or whole.significant
-        real = bool(own) and rms > _LEAST * typical[j]
+        real = bool(own) and rms > rule.least_torque * typical[j]
         p = [2 * norm.sf(one.verdict.z) * some.count for one, _ in own]
         p.append(float(norm.sf(excess[j])) * len(names))
         on = list(dict.fromkeys(quantity for one, _ in own for quantity in one.law.on))
         if loud and not on:
             on = list(dict.fromkeys(quantity for one in sought.found if one.joint == j for quantity in one.law.on))
         if loud and not on:
-            hint = closest(sought.evidence, some, j, _HINT)
+            hint = closest(sought.evidence, some, j, rule.hint)
             on = list(hint.law.on) if hint is not None else []
         found.append(
             JointRemains(
@@ -135,14 +125,15 @@ def remains(
 
 def in_whole(scene: Scene, judged: Scene | None) -> Whole:
     """Whether the windows are further off than noise makes them; never in contact, where whitening is not that sure."""
-    power, error = scene.power(_LOUDEST)
-    z, least = [(power - 1) / error], _WHOLE_ALONE
+    rule = scene.problem.thresholds.discrepancy.residual_tests
+    power, error = scene.power(rule.loudest)
+    z, least = [(power - 1) / error], rule.whole_alone
     if judged is not None:
-        again, error = judged.power(_LOUDEST)
+        again, error = judged.power(rule.loudest)
         z.append((again - 1) / error)
-        least = _WHOLE[1]
+        least = rule.whole_both
     both = float(np.sum(z) / np.sqrt(len(z)))
-    return Whole(power, both, min(z) > _WHOLE[0] and both > least and not scene.problem.plant.floating)
+    return Whole(power, both, min(z) > rule.whole_each and both > least and not scene.problem.plant.floating)
 
 
 def _in_two(scene: Scene, joint: int, much: bool) -> bool:
@@ -151,10 +142,11 @@ def _in_two(scene: Scene, joint: int, much: bool) -> bool:
     So may what a rollout's loudest windows show: where a foot tips, one of them holds more than all others. A base that
     cannot fall has no such accidents: there one rollout does that shows very much in many windows, if it is `much`.
     """
-    excess = [scene.quiet_excess(joint, _LOUDEST, [i]) for i in np.unique(scene.problem.windows.rollout)]
-    if much and not scene.problem.plant.floating and max(excess) > _LONE:
+    rule, rollouts = scene.problem.thresholds.discrepancy.residual_tests, np.unique(scene.problem.windows.rollout)
+    excess = [scene.quiet_excess(joint, rule.loudest, [i]) for i in rollouts]
+    if much and not scene.problem.plant.floating and max(excess) > rule.excess_one_rollout:
         return True
-    return sum(e > _POWER for e in excess) > 1
+    return sum(e > rule.excess_fitted for e in excess) >= rule.rollouts
 
 
 def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[Found, np.ndarray]]:
@@ -162,6 +154,7 @@ def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[
 
     Where there are none, or none that meet it, each half of the fitted windows must be better with what the other says.
     """
+    rule = scene.problem.thresholds.discrepancy.residual_tests
     evidence, found = sought.evidence, sought.found
     sizes = solve(evidence.basis, evidence.inverse, scene.residual, evidence.weights)
     sizes = sizes[len(sizes) - sum(len(one.torque) for one in found) :]
@@ -174,7 +167,7 @@ def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[
         if judged is not None:
             moved = judged.evidence.column(one.joint, one.law.torque(judged.data, one.joint))
             change = np.tensordot(size, moved, axes=1)
-            if not better(left, left - change) and ((change**2).sum() > _FELT or not _repeats(scene, one)):
+            if not better(left, left - change) and ((change**2).sum() > rule.met or not _repeats(scene, one)):
                 continue
             left = left - change
         kept.append((one, size))
@@ -184,12 +177,13 @@ def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[
 def _repeats(scene: Scene, one: Found) -> bool:
     """Whether a law fitted to every other window pays on those between, both ways: what the judges never meet."""
     evidence, torque = scene.evidence, one.torque
+    least = scene.problem.thresholds.discrepancy.residual_tests.half_gain
     own = np.einsum("fws,ws->wf", torque, evidence.score[one.joint])
     normal = np.einsum("fws,wst,gwt->wfg", torque, evidence.power[one.joint], torque, optimize=True)
     halves = np.arange(len(own)) % 2 == 0
     for fitted in (halves, ~halves):
         size = np.linalg.lstsq(normal[fitted].sum(axis=0), own[fitted].sum(axis=0), rcond=None)[0]
         gain = 2 * size @ own[~fitted].sum(axis=0) - size @ normal[~fitted].sum(axis=0) @ size
-        if gain < _PAYS * max(evidence.spread, 1.0):
+        if gain < least * max(evidence.spread, 1.0):
             return False
     return True

@@ -19,15 +19,11 @@ from bumblebee.diagnosis.discrepancy.torque_scores import Evidence
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
 
-_LOOK = 3  # best laws whose inner numbers are refined
-_NEAR = 0.9  # share of what the names gain that a law at a guess of its inner number must
-_MOST = 3  # names on a joint, beyond which only all of them together are looked at
 
-
-def groups(fit: Fit, joint: str) -> Iterator[tuple[Candidate, ...]]:
-    """The catalogue's effects on a joint in every combination, all of them first."""
+def groups(fit: Fit, joint: str, most: int) -> Iterator[tuple[Candidate, ...]]:
+    """The catalogue's effects on a joint in every combination, all of them first; of more than `most` all alone."""
     own = [c for c in fit.chosen if c.where == joint and not isinstance(c, Formula)]
-    least = len(own) - 1 if len(own) > _MOST else 0
+    least = len(own) - 1 if len(own) > most else 0
     for count in range(len(own), least, -1):
         yield from combinations(own, count)
 
@@ -45,7 +41,7 @@ def single_laws(
         joint: name of the joint.
     """
     j = problem.plant.joints.index(joint)
-    for gone in groups(fit, joint):
+    for gone in groups(fit, joint, problem.thresholds.discrepancy.single_law.most_effects):
         if not some.laws[j]:
             some = library(scene.data, [j])
         evidence, worth = _without(problem, fit, scene, gone)
@@ -71,11 +67,11 @@ def _without(problem: Problem, fit: Fit, scene: Scene, gone: Sequence[Candidate]
 
 def _best(evidence: Evidence, some: Library, joint: int, worth: float, most: int) -> Found | None:
     """The strange law on a joint that explains most, if that is as much as `worth`; `most` numbers at most."""
-    laws = some.laws[joint]
+    laws, rule = some.laws[joint], some.data.thresholds.single_law
     gains = evidence.gains(joint, some.torque[joint], some.rows[joint])
     fits = np.array([not law.known and not law.table and _count(law) <= most for law in laws])
     gains = np.where(fits, gains, 0.0)
-    order = [k for k in np.argsort(-gains)[:_LOOK] if gains[k] > _NEAR * worth]
+    order = [k for k in np.argsort(-gains)[: rule.refined] if gains[k] > rule.near * worth]
     found = [closer(evidence, some.data, joint, laws[k]) for k in order]
     found = [f for f in found if f.verdict.gain > worth]
     return max(found, key=lambda f: f.verdict.gain, default=None)

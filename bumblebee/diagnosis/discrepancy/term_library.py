@@ -12,13 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bumblebee.diagnosis.discrepancy.regressors import Quantities
+from bumblebee.diagnosis.thresholds.discrepancy import TermLibrary
 from bumblebee.sim.effect_terms import Term, read_term
 
 QUANTITIES = ("position", "velocity", "target", "torque", "time", "history")
 _POSITION, _VELOCITY, _TARGET, _TORQUE, _TIME, _HISTORY = ((name,) for name in QUANTITIES)
-_COGS = (*range(1, 31), 32, 36, 40, 42, 48, 56, 60, 64, 72, 84, 96)
-_RATE = 12.0  # [Hz]: the fastest beat that is looked for
-_FINEST = 250  # steps of a rounded target over its range
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,37 +71,40 @@ def all_laws(data: Quantities, joint: int) -> list[Law]:
 
 def _catalogue(data: Quantities, j: int) -> Iterator[Law]:
     """What names of the catalogue look like on one joint."""
+    rule = data.thresholds.term_library
     speed, travel = _rms(data.v[..., j]), float(np.ptp(data.q[..., j]))
     yield Law(("friction(1)",), _VELOCITY, 1, "coulomb_friction")
     yield Law(("v",), _VELOCITY, 1, "viscous_friction")
     yield Law(("1",), (), 1, "joint_spring")
     yield Law(("q", "1"), _POSITION, 1, "joint_spring")
     yield Law(("t*tau",), _TIME, 2, "strength_drift")
-    for share in (0.1, 0.3, 1.0):
+    for share in rule.stribeck_speeds:
         yield Law((f"friction(exp(-(v/{share * speed:.3g})^2))",), _VELOCITY, 2, "stribeck_friction")
-    for n in _COGS:
-        if n * travel > 0.5 * np.pi:
-            step = 0.5 / travel
+    for n in rule.cogging_harmonics:
+        if n * travel > rule.cogging_travel * np.pi:
+            step = rule.harmonic_reach / travel
             yield Law(_waves("{}")(n), _POSITION, 2, "cogging", float(n), _waves("{}"), step)
     if np.ptp(data.tau[..., j]) > 0:
         yield Law(("tau",), _TORQUE, 1, "motor_strength")
         yield Law(("u - q",), _TARGET, 1, "kp")
         yield Law(("friction(abs(tau))",), _TORQUE, 2, "load_dependent_friction")
-        for share in (0.3, 0.5, 0.7, 0.85, 0.95):
+        for share in rule.saturation_quantiles:
             edge = f"{np.quantile(np.abs(data.tau[..., j]), share):.4g}"
             yield Law((f"relu(tau - {edge}) - relu(-tau - {edge})",), _TORQUE, 2, "torque_limit")
 
 
 def _friction(data: Quantities, j: int) -> Iterator[Law]:
-    travel = float(np.ptp(data.q[..., j]))
+    rule, travel = data.thresholds.term_library, float(np.ptp(data.q[..., j]))
     yield Law(("friction(q)",), _POSITION, 3)
     yield Law(("friction(q)", "friction(q^2)"), _POSITION, 4)
-    for n in range(1, 13):
-        if n * travel > 1.5:
-            yield Law(_waves("friction({})")(n), _POSITION, 3, "", float(n), _waves("friction({})"), 0.5)
+    for n in range(1, rule.friction_harmonics + 1):
+        if n * travel > rule.friction_travel:
+            yield Law(
+                _waves("friction({})")(n), _POSITION, 3, "", float(n), _waves("friction({})"), rule.friction_reach
+            )
     yield Law(("friction(t)",), _TIME, 3)
-    for time in (0.1, 0.3, 1.0):
-        for way in (0.005, 0.02, 0.08):
+    for time in rule.rest_times:
+        for way in rule.rest_ways:
             yield _rest(time, way)
 
 
@@ -111,7 +112,7 @@ def _rest(time: float, way: float) -> Law:
     return Law((f"friction(rested({time:.3g}, {way:.3g}))",), _HISTORY, 3)
 
 
-def beside(law: Law) -> list[Law]:
+def beside(law: Law, rule: TermLibrary) -> list[Law]:
     """Laws with other inner numbers next to those of a law that has two; [] for others.
 
     Friction that holds a joint is far from linear: which of them is best, only the simulator tells.
@@ -120,17 +121,20 @@ def beside(law: Law) -> list[Law]:
     if found is None:
         return []
     time, way = float(found[1]), float(found[2])
-    return [_rest(time * f, way * g) for f, g in ((3.0, 1.0), (1 / 3.0, 1.0), (1.0, 4.0), (1.0, 0.25))]
+    longer, further = rule.rest_time_ratio, rule.rest_way_ratio
+    ratios = ((longer, 1.0), (1 / longer, 1.0), (1.0, further), (1.0, 1 / further))
+    return [_rest(time * f, way * g) for f, g in ratios]
 
 
 def _position(data: Quantities, j: int) -> Iterator[Law]:
     yield Law(("q^2",), _POSITION, 2)
     yield Law(("q^3",), _POSITION, 2)
     yield Law(("q^2", "q^3"), _POSITION, 4)
-    edges = np.quantile(data.q[..., j], np.linspace(0.08, 0.92, 10))
+    rule = data.thresholds.term_library
+    edges = np.quantile(data.q[..., j], np.linspace(*rule.edge_quantiles, rule.edges))
     for edge in edges:
         for make in (_above, _below):
-            yield Law(make(edge), _POSITION, 2, "", float(edge), make, float(np.ptp(edges) / 9))
+            yield Law(make(edge), _POSITION, 2, "", float(edge), make, float(np.ptp(edges) / (rule.edges - 1)))
 
 
 def _velocity() -> Iterator[Law]:
@@ -142,22 +146,22 @@ def _velocity() -> Iterator[Law]:
 
 def _target(data: Quantities, j: int) -> Iterator[Law]:
     """Dead bands, and targets that arrive in steps."""
-    u, tau = data.u[..., j], data.tau[..., j]
+    rule, u, tau = data.thresholds.term_library, data.u[..., j], data.tau[..., j]
     if np.ptp(u) == 0 or np.array_equal(u, tau):
         return
     error = np.abs(u - data.q[..., j])
-    for band in np.quantile(error, 0.98) * np.geomspace(0.03, 0.9, 14):
-        yield Law(_bound(band), _TARGET, 2, "", float(band), _bound, 0.25 * float(band))
+    for band in np.quantile(error, rule.dead_band_quantile) * np.geomspace(*rule.dead_bands):
+        yield Law(_bound(band), _TARGET, 2, "", float(band), _bound, rule.dead_band_reach * float(band))
     yield Law(("(u - q)^3",), _TARGET, 3)
     moves = np.abs(np.diff(u, axis=1)) / data.tick
-    for rate in np.geomspace(0.05, 0.97, 24) * float(moves.max()):
+    for rate in np.geomspace(*rule.slew_rates) * float(moves.max()):
         make = _slewed(data.tick)
-        yield Law(make(rate), (*_TARGET, *_HISTORY), 2, "", float(rate), make, 0.07 * float(rate))
+        yield Law(make(rate), (*_TARGET, *_HISTORY), 2, "", float(rate), make, rule.slew_reach * float(rate))
     span = float(np.ptp(u))
-    for steps in np.arange(2.0, _FINEST, 0.4):
+    for steps in np.arange(rule.least_target_steps, rule.most_target_steps, rule.target_steps_apart):
         size = span / steps
-        if size > 1e-3:
-            yield Law(_stair(size), _TARGET, 3, "", size, _stair, 0.4 * size / steps)
+        if size > rule.least_target_step:
+            yield Law(_stair(size), _TARGET, 3, "", size, _stair, rule.target_steps_apart * size / steps)
 
 
 def _torque(data: Quantities, j: int) -> Iterator[Law]:
@@ -169,10 +173,15 @@ def _torque(data: Quantities, j: int) -> Iterator[Law]:
 
 def _time(data: Quantities, j: int) -> Iterator[Law]:
     """Beats in time, by themselves or of the drive's strength."""
-    span = float(np.ptp(data.t))
-    step = 0.5 / max(span, 1e-6)
+    rule, span = data.thresholds.term_library, float(np.ptp(data.t))
+    step = rule.beat_step / max(span, 1e-6)
     yield Law(("t", "1"), _TIME, 2)
-    for kind, fastest in (("{}", _RATE), ("tau*{}", 3.0), ("friction({})", 1.0)):
+    beats = (
+        ("{}", rule.fastest_beat),
+        ("tau*{}", rule.fastest_strength_beat),
+        ("friction({})", rule.fastest_friction_beat),
+    )
+    for kind, fastest in beats:
         if "tau" in kind and np.ptp(data.tau[..., j]) == 0:
             continue
         for hertz in np.arange(step, fastest, step):
@@ -200,27 +209,28 @@ def _others(data: Quantities, j: int) -> Iterator[Law]:
 
 def _tables(data: Quantities, j: int) -> Iterator[Law]:
     """Heights over one quantity, straight between knots."""
+    rule = data.thresholds.term_library
     u, tau, own = data.u[..., j], data.tau[..., j], {"q": _POSITION, "v": _VELOCITY}
     if np.ptp(tau) > 0:
         own |= {"tau": _TORQUE} | ({} if np.array_equal(u, tau) else {"u - q": _TARGET})
     for name, on in own.items():
-        yield _table(data, j, name, "{}", 11, on, 8)
-    yield _table(data, j, "t", "{}", 11, _TIME, 8)
-    yield _table(data, j, "q", "friction({})", 7, _POSITION, 8)
+        yield _table(data, j, name, "{}", rule.table_knots, on, 8)
+    yield _table(data, j, "t", "{}", rule.table_knots, _TIME, 8)
+    yield _table(data, j, "q", "friction({})", rule.friction_knots, _POSITION, 8)
     if np.ptp(tau) > 0:
-        yield _table(data, j, "t", "tau*{}", 9, _TIME, 8)
+        yield _table(data, j, "t", "tau*{}", rule.strength_knots, _TIME, 8)
     for name in data.joints:
         if name != data.joints[j]:
             other = name if name.isidentifier() else repr(name)
             for what in ("q", "v"):
-                yield _table(data, j, f"{what}[{other}]", "{}", 6, (other_joint(name),), 9)
+                yield _table(data, j, f"{what}[{other}]", "{}", rule.coupling_knots, (other_joint(name),), 9)
 
 
 def _table(data: Quantities, j: int, name: str, frame: str, count: int, on: tuple[str, ...], cost: int) -> Law:
-    x = read_term(name)(data.values(j))
-    knots = [float(f"{k:.5g}") for k in np.unique(np.quantile(x, np.linspace(0.02, 0.98, count)))]
+    rule, x = data.thresholds.term_library, read_term(name)(data.values(j))
+    knots = [float(f"{k:.5g}") for k in np.unique(np.quantile(x, np.linspace(*rule.table_quantiles, count)))]
     knots = sorted(set(knots))
-    if len(knots) < 3:
+    if len(knots) < rule.fewest_knots:
         knots = [float(x.min()), float(x.mean()), float(x.max()) + 1e-6]
     rows = [[float(k == i) for k in range(len(knots))] for i in range(len(knots))]
     return Law(tuple(frame.format(_curve(name, knots, row)) for row in rows), on, cost)

@@ -16,11 +16,7 @@ from bumblebee.diagnosis.comparison import z_value
 from bumblebee.diagnosis.estimation import project, solve
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.sensitivities import Answers
-
-_SEEN = 1e-3  # share of a column's power that must be left beside what is already explained
-_LEAST_SPREAD = 0.25  # of the curvature: a variance over few windows may come out far too small
-_RIDGE = 0.1  # of the mean curvature
-_RANK = 1e-4  # of the largest eigenvalue, of scaled columns: what is smaller is no direction of its own
+from bumblebee.diagnosis.thresholds.discrepancy import TorqueScores
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +55,7 @@ class Evidence:
     """(J, W, S, B) weighted products of answers and basis."""
     spread: float
     """Mean square of `left`, weighted: 1 where sensor noise is all that is left."""
+    rule: TorqueScores
 
     @property
     def joints(self) -> int:
@@ -99,7 +96,7 @@ class Evidence:
             rows = np.stack([np.arange(groups[k].start, groups[k].stop) for k in which])
             raw = np.einsum("gfn,ghn->gfh", wide[rows], flat[rows], optimize=True)
             curvature = raw - np.einsum("gfb,ghb->gfh", shares[rows], cross[rows], optimize=True)
-            out[which] = _falls(total[rows], curvature, np.einsum("gff->gf", raw))
+            out[which] = _falls(total[rows], curvature, np.einsum("gff->gf", raw), self.rule)
         return out / max(self.spread, 1.0)
 
     def test(self, joint: int, torque: np.ndarray) -> Verdict:
@@ -108,7 +105,7 @@ class Evidence:
         The gain is compared with chi-square, and the sizes with their errors by how the windows differ (Wald's test);
         the less sure of both counts, for the first trusts the whitening and the second the number of windows.
         """
-        flat = torque.reshape(len(torque), -1)
+        rule, flat = self.rule, torque.reshape(len(torque), -1)
         wide = np.einsum("fws,wst->fwt", torque, self.power[joint], optimize=True)
         normals = np.einsum("fws,gws->wfg", wide, torque, optimize=True)
         cross = flat @ self.cross[joint].reshape(flat.shape[1], -1)
@@ -116,11 +113,11 @@ class Evidence:
         raw = normals.sum(axis=0)
         curvature = raw - shares @ cross.T
         size = np.zeros(len(torque))
-        seen = np.diag(curvature) > _SEEN * np.diag(raw) + 1e-12
+        seen = np.diag(curvature) > rule.unexplained * np.diag(raw) + 1e-12
         if not seen.any():
             return Verdict(0.0, 0.0, size, np.full(len(torque), np.inf))
         inverse = np.zeros_like(curvature)
-        inverse[np.ix_(seen, seen)] = _inverse(curvature[np.ix_(seen, seen)])
+        inverse[np.ix_(seen, seen)] = _inverse(curvature[np.ix_(seen, seen)], rule.rank)
         total = flat @ self.score[joint].ravel()
         size = inverse @ total
         gain = float(total @ size) / max(self.spread, 1.0)
@@ -130,17 +127,17 @@ class Evidence:
         refit = self.left - np.tensordot(size, moved, axes=1) + np.tensordot(shares.T @ size, self.basis, axes=1)
         own += np.einsum("fws,wsb,b->wf", torque, self.cross[joint], shares.T @ size, optimize=True)
         own -= np.einsum("bwm,wm->wb", self.basis, refit * self.weights[:, None], optimize=True) @ shares.T
-        spread = own.T @ own + _LEAST_SPREAD * np.diag(np.maximum(np.diag(curvature), 0.0))
+        spread = own.T @ own + rule.least_variance * np.diag(np.maximum(np.diag(curvature), 0.0))
         covariance = inverse @ spread @ inverse
-        rank = int(np.linalg.matrix_rank(curvature[np.ix_(seen, seen)], rtol=_RANK, hermitian=True))
-        wald = float(size[seen] @ _inverse(covariance[np.ix_(seen, seen)]) @ size[seen])
+        rank = int(np.linalg.matrix_rank(curvature[np.ix_(seen, seen)], rtol=rule.rank, hermitian=True))
+        wald = float(size[seen] @ _inverse(covariance[np.ix_(seen, seen)], rule.rank) @ size[seen])
         z = min(chi_z(gain, rank), z_value(wald, rank, len(own)))
         return Verdict(z, gain, size, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
 
     def lacking(self, joint: int) -> np.ndarray:
         """(W, S) torque [N m] that a joint lacks in every segment, by itself; what noise hides is drawn to zero."""
         power, score = self.power[joint], self.score[joint]
-        ridge = _RIDGE * np.einsum("wss->w", power)[:, None, None] / power.shape[1] * np.eye(power.shape[1])
+        ridge = self.rule.ridge * np.einsum("wss->w", power)[:, None, None] / power.shape[1] * np.eye(power.shape[1])
         return np.linalg.solve(power + ridge, score[..., None])[..., 0]
 
     def free(self, joint: int, some: np.ndarray | None = None, spared: int = 0) -> tuple[float, int]:
@@ -151,7 +148,7 @@ class Evidence:
         """
         values, vectors = np.linalg.eigh(self.power[joint])
         along = np.einsum("wst,ws->wt", vectors, self.score[joint])
-        seen = values > 1e-4 * values.max()
+        seen = values > self.rule.visible * values.max()
         if some is not None:
             seen &= some[:, None]
         values = np.where(seen, values, 1.0)
@@ -165,20 +162,20 @@ class Evidence:
         return float(np.sqrt(max(value - count, 0.0) / max(np.einsum("wss->", self.power[joint]), 1e-30)))
 
 
-def _falls(total: np.ndarray, curvature: np.ndarray, raw: np.ndarray) -> np.ndarray:
+def _falls(total: np.ndarray, curvature: np.ndarray, raw: np.ndarray, rule: TorqueScores) -> np.ndarray:
     """(G,) falls of the cost for scores (G, F) and matrices (G, F, F); `raw` (G, F) their diagonals without a basis."""
     diagonal = np.einsum("gff->gf", curvature)
-    scale = np.where(diagonal > _SEEN * raw + 1e-12, 1.0 / np.sqrt(np.maximum(diagonal, 1e-30)), 0.0)
+    scale = np.where(diagonal > rule.unexplained * raw + 1e-12, 1.0 / np.sqrt(np.maximum(diagonal, 1e-30)), 0.0)
     values, vectors = np.linalg.eigh(curvature * scale[:, :, None] * scale[:, None, :])
     along = np.einsum("gfh,gf->gh", vectors, total * scale)
-    seen = values > _RANK * np.maximum(values[:, -1:], 1e-12)
+    seen = values > rule.rank * np.maximum(values[:, -1:], 1e-12)
     return np.where(seen, along**2 / np.where(seen, values, 1.0), 0.0).sum(axis=1)
 
 
-def _inverse(matrix: np.ndarray) -> np.ndarray:
+def _inverse(matrix: np.ndarray, rank: float) -> np.ndarray:
     """Pseudo-inverse of a normal matrix (F, F) whose rows may have different units."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-30))
-    return np.linalg.pinv(matrix * np.outer(scale, scale), rcond=_RANK, hermitian=True) * np.outer(scale, scale)
+    return np.linalg.pinv(matrix * np.outer(scale, scale), rcond=rank, hermitian=True) * np.outer(scale, scale)
 
 
 def chi_z(value: float, count: int) -> float:
@@ -212,6 +209,7 @@ def make_evidence(
         power=np.matmul(heavy, answers.transpose(0, 1, 3, 2)).astype(float),
         cross=np.matmul(heavy, basis.transpose(1, 2, 0)[None].astype(np.float32)).astype(float),
         spread=float((weights[:, None] * left**2).mean() / weights.mean()),
+        rule=problem.thresholds.discrepancy.torque_scores,
     )
 
 

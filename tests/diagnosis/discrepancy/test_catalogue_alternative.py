@@ -11,6 +11,7 @@ from bumblebee.diagnosis.comparison.submodel import refitted
 from bumblebee.diagnosis.discrepancy.catalogue_alternative import Offers, named_instead
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.thresholds.discrepancy import CatalogueAlternative
 from tests.diagnosis.discrepancy.test_discover import prepared
 
 COULOMB = Candidate("coulomb_friction", "pole", (0.0,), (0.02,))
@@ -55,9 +56,9 @@ def test_an_offer_acts_on_the_joint_on_what_it_carries_or_on_all_or_is_among_the
     places = ("pole", "cart", "cart", "pole", "")
     kinds = ("armature", "armature", "viscous_friction", "link_mass", "command_delay")
     offers = Offers([Candidate(k, w, (0.0,), (0.1,)) for k, w in zip(kinds, places, strict=True)])
-    on_pole = [(c.effect, c.where) for c in offers.on(problem.plant, "pole")]
+    on_pole = [(c.effect, c.where) for c in offers.on(problem.plant, "pole", CatalogueAlternative())]
     assert on_pole == [("armature", "pole"), ("armature", "cart"), ("link_mass", "pole"), ("command_delay", "")]
-    assert len(offers.on(problem.plant, "cart")) == 5
+    assert len(offers.on(problem.plant, "cart", CatalogueAlternative())) == 5
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from bumblebee.diagnosis.discrepancy.torque_scores import Evidence
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.estimation.least_squares import cost_of
 from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.thresholds.discrepancy import TermLibrary
 from bumblebee.sim.effect_terms import read_term
 from tests.diagnosis.discrepancy.test_discover import prepared
 
@@ -149,6 +150,6 @@ def test_better_is_beyond_doubt_or_not_at_all() -> None:
 
 def test_a_law_of_two_inner_numbers_has_neighbours_and_others_have_none() -> None:
     rest = Law(("friction(rested(0.3, 0.02))",), ("history",), 3)
-    texts = {law.texts[0] for law in beside(rest)}
+    texts = {law.texts[0] for law in beside(rest, TermLibrary())}
     assert texts == {f"friction(rested({a}))" for a in ("0.9, 0.02", "0.1, 0.02", "0.3, 0.08", "0.3, 0.005")}
-    assert beside(Law(("q^3",), ("position",), 2)) == []
+    assert beside(Law(("q^3",), ("position",), 2), TermLibrary()) == []
