@@ -11,7 +11,7 @@ from bumblebee.diagnosis.thresholds.discrepancy import CatalogueTerms
 from bumblebee.sim.effect_terms import read_term
 from bumblebee.sim.servo import servos_of
 
-# Effects of the catalogue that are of one family with a law: its constant part, its linear part, its first harmonic.
+# Effects of the catalogue of one family with a basis function: its constant part, linear part, first harmonic.
 _FAMILY = {
     "friction(": ("coulomb_friction", "stribeck_friction", "load_dependent_friction"),
     "q": ("joint_spring", "cogging"),
@@ -48,7 +48,7 @@ def in_terms(plant: Plant, fit: Fit, candidate: Candidate) -> dict[str, float]:
 
 
 def quantities_of(texts: Sequence[str]) -> tuple[str, ...]:
-    """Quantities that terms depend on: of `laws.QUANTITIES`, and "another joint (NAME)"."""
+    """Quantities that terms depend on: of `term_library.QUANTITIES`, and "another joint (NAME)"."""
     found: list[str] = []
     for term in map(read_term, texts):
         found += [f"another joint ({other})" for other in term.others]
@@ -58,7 +58,7 @@ def quantities_of(texts: Sequence[str]) -> tuple[str, ...]:
 
 
 def related(texts: Sequence[str], effect: str) -> bool:
-    """Whether a catalogue's effect is of the family of the laws `texts`: of friction, position or velocity."""
+    """Whether a catalogue effect is of the family of basis functions `texts`: of friction, position or velocity."""
     kinds = set()
     for text in texts:
         if text.startswith("friction("):

@@ -1,4 +1,4 @@
-"""Which laws the remaining torques follow: forward selection over all joints, each law tested given those before it."""
+"""Which basis functions the remaining torques follow: forward selection over all joints, each given those before."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import norm
 
 from bumblebee.diagnosis.discrepancy.regressors import Quantities
-from bumblebee.diagnosis.discrepancy.term_library import Law, all_laws
+from bumblebee.diagnosis.discrepancy.term_library import BasisFunction, basis_functions
 from bumblebee.diagnosis.discrepancy.torque_scores import Evidence, Verdict
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.thresholds.discrepancy import StepwiseRegression
@@ -15,65 +15,65 @@ from bumblebee.diagnosis.thresholds.discrepancy import StepwiseRegression
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """One law on one joint."""
+    """One basis function on one joint."""
 
     joint: int
-    law: Law
+    function: BasisFunction
     torque: np.ndarray
     """(F, W, S) for coefficient 1."""
     verdict: Verdict
-    """Given the laws before it."""
+    """Given the basis functions before it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sought:
-    """The laws that were found, in their order, and what they leave."""
+    """The basis functions that were found, in their order, and what they leave."""
 
     found: list[Found]
     evidence: Evidence
     bound: float
-    """z that a law had to reach."""
+    """z that a basis function had to reach."""
     rivals: list[Found]
-    """Of the first law: others that explain much of what it does and depend on something else."""
+    """Of the first basis function: others that explain much of what it does and depend on something else."""
 
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """All laws of all joints with their torques on some windows."""
+    """All basis functions of all joints with their torques on some windows."""
 
     data: Quantities
-    laws: list[list[Law]]
+    functions: list[list[BasisFunction]]
     torque: list[np.ndarray]
-    """By joint: (E, W, S) of all laws' terms, one after the other, float32."""
+    """By joint: (E, W, S) of all basis functions' terms, one after the other, float32."""
     rows: list[list[slice]]
 
     @property
     def count(self) -> int:
-        """How many laws there are."""
-        return sum(len(laws) for laws in self.laws)
+        """How many basis functions there are."""
+        return sum(len(functions) for functions in self.functions)
 
 
 def library(data: Quantities, joints: Sequence[int]) -> Library:
-    """The laws of `joints` (indices), others get none."""
-    laws: list[list[Law]] = [[] for _ in data.joints]
+    """The basis functions of `joints` (indices), others get none."""
+    functions: list[list[BasisFunction]] = [[] for _ in data.joints]
     torque: list[np.ndarray] = [np.zeros((0, *data.path.mean(data.t).shape)) for _ in data.joints]
     rows: list[list[slice]] = [[] for _ in data.joints]
     for j in joints:
         kept, parts, at = [], [], 0
-        for law in all_laws(data, j):
-            part = law.torque(data, j)
+        for function in basis_functions(data, j):
+            part = function.torque(data, j)
             if np.isfinite(part).all():
-                kept.append(law)
+                kept.append(function)
                 parts.append(part.astype(np.float32))
                 rows[j].append(slice(at, at + len(part)))
                 at += len(part)
-        laws[j], torque[j] = kept, np.concatenate(parts)
-    return Library(data, laws, torque, rows)
+        functions[j], torque[j] = kept, np.concatenate(parts)
+    return Library(data, functions, torque, rows)
 
 
 def seek(problem: Problem, evidence: Evidence, residual: np.ndarray, columns: np.ndarray, some: Library,
          most: int | None = None) -> Sought:  # fmt: skip
-    """Laws that explain what `residual` (W, M) holds beside `columns` (F, W, M) of what was found before.
+    """Basis functions that explain what `residual` (W, M) holds conditional on `columns` (F, W, M) of what was found.
 
     At most `most` of them; None for as many as the thresholds allow.
     """
@@ -99,38 +99,38 @@ def seek(problem: Problem, evidence: Evidence, residual: np.ndarray, columns: np
 
 
 def _seen(evidence: Evidence, some: Library, found: Sequence[Found], bound: float) -> list[Found]:
-    """The laws that explain most for their coefficients and are beyond doubt."""
+    """The basis functions that explain most for their coefficients and are beyond doubt."""
     rule = some.data.thresholds.stepwise_regression
     least = rule.least_share * float((evidence.weights[:, None] * evidence.left**2).sum()) / max(evidence.spread, 1.0)
-    taken = {(f.joint, text) for f in found for text in f.law.texts}
-    best: list[tuple[float, int, Law]] = []
-    for j, laws in enumerate(some.laws):
-        if not laws:
+    taken = {(f.joint, text) for f in found for text in f.function.texts}
+    best: list[tuple[float, int, BasisFunction]] = []
+    for j, functions in enumerate(some.functions):
+        if not functions:
             continue
         worth = evidence.gains(j, some.torque[j], some.rows[j])
-        worth = worth - [rule.coefficient_price * len(law.texts) for law in laws]
+        worth = worth - [rule.coefficient_price * len(function.texts) for function in functions]
         kinds: dict[tuple[str, ...], int] = {}
         for k in np.argsort(-worth):
-            on = laws[k].on
+            on = functions[k].on
             if worth[k] <= 0 or kinds.get(on, 0) >= rule.of_one_kind or sum(kinds.values()) >= rule.looked_at:
                 continue
-            if (j, laws[k].texts[0]) not in taken:
+            if (j, functions[k].texts[0]) not in taken:
                 kinds[on] = kinds.get(on, 0) + 1
-                best.append((float(worth[k]), j, laws[k]))
+                best.append((float(worth[k]), j, functions[k]))
     best.sort(key=lambda b: -b[0])
     seen = [
-        (closer if k < rule.refined else _at)(evidence, some.data, j, law)
-        for k, (_, j, law) in enumerate(best[: rule.looked_at])
+        (closer if k < rule.refined else _at)(evidence, some.data, j, function)
+        for k, (_, j, function) in enumerate(best[: rule.looked_at])
     ]
     return [f for f in seen if f.verdict.z >= bound and f.verdict.gain >= least]
 
 
 def _rivals(one: Found, seen: Sequence[Found], rule: StepwiseRegression) -> list[Found]:
     """The best of every other kind of dependence on the same joint; a formula beside a table is one, too."""
-    kinds: dict[tuple[tuple[str, ...], bool], Found] = {(one.law.on, one.law.table): one}
+    kinds: dict[tuple[tuple[str, ...], bool], Found] = {(one.function.on, one.function.table): one}
     for f in sorted(seen, key=lambda f: _worth(f, rule), reverse=True):
         if f.joint == one.joint and _worth(f, rule) > rule.rival * _worth(one, rule):
-            kinds.setdefault((f.law.on, f.law.table), f)
+            kinds.setdefault((f.function.on, f.function.table), f)
     return list(kinds.values())[1 : 1 + rule.rivals]
 
 
@@ -139,42 +139,42 @@ def _simplest(seen: Sequence[Found], rule: StepwiseRegression) -> Found:
     top = max(seen, key=lambda f: _worth(f, rule))
     least = _worth(top, rule) - max(rule.tie, rule.tie_share * top.verdict.gain)
     near = [f for f in seen if f.joint == top.joint and _worth(f, rule) > least]
-    return min(near, key=lambda f: (f.law.cost, -f.verdict.gain))
+    return min(near, key=lambda f: (f.function.cost, -f.verdict.gain))
 
 
 def closest(evidence: Evidence, some: Library, joint: int, least: float) -> Found | None:
-    """The law that explains most on one joint, however little, if its z reaches `least`."""
-    if not some.laws[joint]:
+    """The basis function that explains most on one joint, however little, if its z reaches `least`."""
+    if not some.functions[joint]:
         return None
     rule = some.data.thresholds.stepwise_regression
     worth = evidence.gains(joint, some.torque[joint], some.rows[joint])
-    worth = worth - [rule.coefficient_price * len(law.texts) for law in some.laws[joint]]
-    top = [_at(evidence, some.data, joint, some.laws[joint][k]) for k in np.argsort(-worth)[: rule.looked_at]]
+    worth = worth - [rule.coefficient_price * len(function.texts) for function in some.functions[joint]]
+    top = [_at(evidence, some.data, joint, some.functions[joint][k]) for k in np.argsort(-worth)[: rule.looked_at]]
     return max((f for f in top if f.verdict.z >= least), key=lambda f: _worth(f, rule), default=None)
 
 
 def _worth(found: Found, rule: StepwiseRegression) -> float:
-    return found.verdict.gain - rule.coefficient_price * len(found.law.texts)
+    return found.verdict.gain - rule.coefficient_price * len(found.function.texts)
 
 
-def closer(evidence: Evidence, data: Quantities, joint: int, law: Law) -> Found:
-    """The law at its best inner number; a whole number where that is as good."""
-    best, rule = _at(evidence, data, joint, law), data.thresholds.stepwise_regression
-    if law.family is None:
+def closer(evidence: Evidence, data: Quantities, joint: int, function: BasisFunction) -> Found:
+    """The basis function at its best inner number; a whole number where that is as good."""
+    best, rule = _at(evidence, data, joint, function), data.thresholds.stepwise_regression
+    if function.family is None:
         return best
-    reach = law.reach
+    reach = function.reach
     for _ in range(rule.refinement_rounds):
-        for at in best.law.at + reach * np.linspace(-1, 1, rule.refinement):
-            if at > 0 or law.at <= 0:
-                best = max(best, _at(evidence, data, joint, law.moved(float(at))), key=lambda f: f.verdict.gain)
+        for at in best.function.at + reach * np.linspace(-1, 1, rule.refinement):
+            if at > 0 or function.at <= 0:
+                best = max(best, _at(evidence, data, joint, function.moved(float(at))), key=lambda f: f.verdict.gain)
         reach /= rule.narrowing
-    if law.at >= 1 and law.at == round(law.at):
-        whole = _at(evidence, data, joint, law.moved(float(max(round(best.law.at), 1))))
+    if function.at >= 1 and function.at == round(function.at):
+        whole = _at(evidence, data, joint, function.moved(float(max(round(best.function.at), 1))))
         if whole.verdict.gain > best.verdict.gain - rule.tie:
             return whole
     return best
 
 
-def _at(evidence: Evidence, data: Quantities, joint: int, law: Law) -> Found:
-    torque = law.torque(data, joint)
-    return Found(joint, law, torque, evidence.test(joint, torque))
+def _at(evidence: Evidence, data: Quantities, joint: int, function: BasisFunction) -> Found:
+    torque = function.torque(data, joint)
+    return Found(joint, function, torque, evidence.test(joint, torque))

@@ -1,9 +1,9 @@
 """What whitened windows say about torques that the model lacks on its joints, ready for any number of questions.
 
-The answers of a window to pulses of torque (`diagnosis/pulses.py`) turn its residual into scores: for each joint and
-fifth of the window, how much the cost would fall with a little torque there, and how fast that gain would end. Any
-formula or table for a torque along the path is then tested by a few products of small matrices, as the catalogue's
-candidates are, with all the power of the windows and through contact and servo.
+The answers of a window to impulses of torque turn its residual into scores: for each joint and fifth of the window, how
+much the cost would fall with a little torque there, and how fast that gain would end. Any formula or table for a torque
+along the path is then tested by a few products of small matrices, as the catalogue's candidates are, with all that the
+windows say and through contact and servo.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ class Verdict:
     z: float
     """The test's p-value as a two-sided standard normal; the smaller one of two tests, see `Evidence.test`."""
     gain: float
-    """Fall of the cost, in units of the residual's power: chi-square of as many degrees of freedom as columns."""
+    """Fall of the cost over the reduced chi-square: chi-square with as many degrees of freedom as columns."""
     size: np.ndarray
     """(F,) coefficients."""
     error: np.ndarray
@@ -49,7 +49,7 @@ class Evidence:
     """(W,)."""
     score: np.ndarray
     """(J, W, S) weighted product of answers and `left`."""
-    power: np.ndarray
+    normal: np.ndarray
     """(J, W, S, S) weighted products of the answers."""
     cross: np.ndarray
     """(J, W, S, B) weighted products of answers and basis."""
@@ -63,7 +63,7 @@ class Evidence:
         return len(self.answers)
 
     def with_columns(self, problem: Problem, residual: np.ndarray, columns: np.ndarray) -> "Evidence":
-        """The same answers beside other columns (F, W, M) and another residual (W, M), weighed as these leave it."""
+        """The same answers given other columns (F, W, M) and another residual (W, M), weighed as these leave it."""
         basis, inverse = project(problem, columns, self.weights)
         left = residual - np.tensordot(solve(basis, inverse, residual, self.weights), basis, axes=1)
         return make_evidence(problem, self.answers, residual, columns, window_weights(left))
@@ -77,7 +77,7 @@ class Evidence:
         return np.einsum("fws,wsm->fwm", torque, self.answers[joint], optimize=True)
 
     def gains(self, joint: int, torque: np.ndarray, groups: Sequence[slice]) -> np.ndarray:
-        """Fall of the cost (G,) by each group of torques on a joint, in units of the residual's power.
+        """Fall of the cost (G,) by each group of torques on a joint, in units of the residual's reduced chi-square.
 
         Args:
             joint: index of the joint.
@@ -85,7 +85,7 @@ class Evidence:
             groups: rows of `torque` that belong together.
         """
         flat = torque.reshape(len(torque), -1)
-        wide = np.einsum("ews,wst->ewt", torque, self.power[joint], optimize=True).reshape(flat.shape)
+        wide = np.einsum("ews,wst->ewt", torque, self.normal[joint], optimize=True).reshape(flat.shape)
         total = flat @ self.score[joint].ravel()
         cross = flat @ self.cross[joint].reshape(flat.shape[1], -1)
         shares = cross @ self.inverse
@@ -106,7 +106,7 @@ class Evidence:
         the less sure of both counts, for the first trusts the whitening and the second the number of windows.
         """
         rule, flat = self.rule, torque.reshape(len(torque), -1)
-        wide = np.einsum("fws,wst->fwt", torque, self.power[joint], optimize=True)
+        wide = np.einsum("fws,wst->fwt", torque, self.normal[joint], optimize=True)
         normals = np.einsum("fws,gws->wfg", wide, torque, optimize=True)
         cross = flat @ self.cross[joint].reshape(flat.shape[1], -1)
         shares = cross @ self.inverse
@@ -136,30 +136,30 @@ class Evidence:
 
     def lacking(self, joint: int) -> np.ndarray:
         """(W, S) torque [N m] that a joint lacks in every segment, by itself; what noise hides is drawn to zero."""
-        power, score = self.power[joint], self.score[joint]
-        ridge = self.rule.ridge * np.einsum("wss->w", power)[:, None, None] / power.shape[1] * np.eye(power.shape[1])
-        return np.linalg.solve(power + ridge, score[..., None])[..., 0]
+        normal, score = self.normal[joint], self.score[joint]
+        ridge = self.rule.ridge * np.einsum("wss->w", normal)[:, None, None] / normal.shape[1] * np.eye(normal.shape[1])
+        return np.linalg.solve(normal + ridge, score[..., None])[..., 0]
 
-    def free(self, joint: int, some: np.ndarray | None = None, spared: int = 0) -> tuple[float, int]:
+    def chi_square(self, joint: int, some: np.ndarray | None = None, spared: int = 0) -> tuple[float, int]:
         """Chi-square of a torque of its own in every segment of every window, and its degrees of freedom.
 
         Directions that sensor noise hides (whitened answers below a hundredth of the strongest) are left out; `some`
         (W,) bool are the windows that count, all by default, less the `spared` ones that say most.
         """
-        values, vectors = np.linalg.eigh(self.power[joint])
+        values, vectors = np.linalg.eigh(self.normal[joint])
         along = np.einsum("wst,ws->wt", vectors, self.score[joint])
         seen = values > self.rule.visible * values.max()
         if some is not None:
             seen &= some[:, None]
         values = np.where(seen, values, 1.0)
-        power = np.where(seen, along**2 / values / self.weights[:, None], 0.0).sum(axis=1)
-        keep = np.argsort(power)[: max(0, len(power) - spared)]
-        return float(power[keep].sum()), int(seen[keep].sum())
+        squares = np.where(seen, along**2 / values / self.weights[:, None], 0.0).sum(axis=1)
+        keep = np.argsort(squares)[: max(0, len(squares) - spared)]
+        return float(squares[keep].sum()), int(seen[keep].sum())
 
     def implied(self, joint: int) -> float:
         """RMS [N m] of the torques that a joint's chi-square above noise stands for, if all segments lack alike."""
-        value, count = self.free(joint)
-        return float(np.sqrt(max(value - count, 0.0) / max(np.einsum("wss->", self.power[joint]), 1e-30)))
+        value, count = self.chi_square(joint)
+        return float(np.sqrt(max(value - count, 0.0) / max(np.einsum("wss->", self.normal[joint]), 1e-30)))
 
 
 def _falls(total: np.ndarray, curvature: np.ndarray, raw: np.ndarray, rule: TorqueScores) -> np.ndarray:
@@ -187,7 +187,7 @@ def chi_z(value: float, count: int) -> float:
 def make_evidence(
     problem: Problem, answers: np.ndarray, residual: np.ndarray, columns: np.ndarray, weights: np.ndarray
 ) -> Evidence:
-    """Scores of `residual` (W, M) beside the problem's nuisances and `columns` (F, W, M).
+    """Scores of `residual` (W, M) conditional on the problem's nuisances and `columns` (F, W, M).
 
     Args:
         problem: windows and nuisances.
@@ -206,7 +206,7 @@ def make_evidence(
         inverse=inverse,
         weights=weights,
         score=np.einsum("jwsm,wm->jws", heavy, left, optimize=True),
-        power=np.matmul(heavy, answers.transpose(0, 1, 3, 2)).astype(float),
+        normal=np.matmul(heavy, answers.transpose(0, 1, 3, 2)).astype(float),
         cross=np.matmul(heavy, basis.transpose(1, 2, 0)[None].astype(np.float32)).astype(float),
         spread=float((weights[:, None] * left**2).mean() / weights.mean()),
         rule=problem.thresholds.discrepancy.torque_scores,
