@@ -11,7 +11,14 @@ from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.comparison import Holdout, standing
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset import Session
-from bumblebee.diagnosis.discrepancy import Discovery, discover, offers_of, remains, with_named
+from bumblebee.diagnosis.discrepancy import (
+    Discovery,
+    JointActivity,
+    discover,
+    lack_of_fit,
+    offers_of,
+    with_catalogue_effects,
+)
 from bumblebee.diagnosis.estimation import gauss_newton
 from bumblebee.diagnosis.prepare import Material, gather
 from bumblebee.diagnosis.report import Findings, document, effect_entries, loss_entries, unseen_notes
@@ -103,9 +110,10 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
         return _Found(found, last, holdout, None, (time,))
     say("what is left")
     offers, budget = offers_of(found, material.candidates), Budget(larger * config.beyond_seconds)
-    beyond = discover(last.problem, holdout, last.fit, material.typical, material.still, say, offers, budget)
+    activity = JointActivity(material.typical, material.still)
+    beyond = discover(last.problem, holdout, last.fit, activity, say, offers, budget)
     last = _with(beyond, last)
-    return _Found(with_named(found, last.fit), last, beyond.holdout, beyond, (time, budget))
+    return _Found(with_catalogue_effects(found, last.fit), last, beyond.holdout, beyond, (time, budget))
 
 
 def _steps_of_encoders(session: Session, found: _Found) -> tuple[list[dict[str, Any]], list[Effect]]:
@@ -121,7 +129,8 @@ def _nothing(material: Material, found: _Found) -> _Found:
     last = Refined(problem, gauss_newton(problem, (), (), weights), weights, np.empty(0))
     beyond = None
     if found.beyond is not None:
-        left = remains(problem, holdout.problem, last.fit, material.typical, material.still)
+        activity = JointActivity(material.typical, material.still)
+        left = lack_of_fit(problem, holdout.problem, last.fit, activity)
         beyond = Discovery(problem, holdout, last.fit, left, {}, {}, [])
     return replace(found, last=last, holdout=holdout, beyond=beyond)
 

@@ -1,18 +1,19 @@
-"""What no effect of the catalogue explains: whether it is there, on which joint, and in what form."""
+"""What no effect of the catalogue explains: whether it is there, on which joint, and with which discrepancy model."""
 
-from bumblebee.diagnosis.discrepancy.catalogue_alternative import offers_of, with_named
+from bumblebee.diagnosis.discrepancy.catalogue_alternative import offers_of, with_catalogue_effects
 from bumblebee.diagnosis.discrepancy.catalogue_terms import quantities_of
 from bumblebee.diagnosis.discrepancy.discover import Discovery, discover
-from bumblebee.diagnosis.discrepancy.residual_tests import JointRemains, remains
-from bumblebee.diagnosis.discrepancy.term_library import Law
+from bumblebee.diagnosis.discrepancy.residual_tests import JointActivity, JointLackOfFit, lack_of_fit
+from bumblebee.diagnosis.discrepancy.term_library import BasisFunction
 
 __all__ = [
+    "BasisFunction",
     "Discovery",
-    "JointRemains",
-    "Law",
+    "JointActivity",
+    "JointLackOfFit",
     "discover",
+    "lack_of_fit",
     "offers_of",
     "quantities_of",
-    "remains",
-    "with_named",
+    "with_catalogue_effects",
 ]

@@ -1,8 +1,9 @@
-"""The catalogue in a form's place: before a form is kept, effects that have a name are tried for what it explains.
+"""A swap of a discrepancy model for effects of the catalogue, tried before the model is kept.
 
-A form has more freedom than any effect of the catalogue and is sought among thousands: where the true effect was
-refused by a hair, some form explains nearly as much of the fitted windows. A name says more than a formula, so a form
-must be clearly better than the best that names can do, on windows that took no part in either fit.
+A discrepancy model has more freedom than any effect of the catalogue and is sought among thousands: where the true
+effect was refused by a hair, some model explains nearly as much of the fitted windows. An effect of the catalogue says
+more than a formula, so a discrepancy model must be clearly better than the best that such effects can do, on windows
+that took no part in either fit.
 """
 
 from collections.abc import Sequence
@@ -28,13 +29,7 @@ from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection import Search, score_tests, try_one
 from bumblebee.diagnosis.sensitivities import Columns
 from bumblebee.diagnosis.simulation import Plant
-
-_OFFERS, _SHAPES = 5, 2  # effects whose sensitivities are simulated, and shapes of each
-_ANYWHERE = 2  # of these the most promising may be on other joints
-_TRIALS, _FITS = 4, 2  # of these tried at their size, and refitted jointly
-_ROUNDS = 2  # effects of the catalogue that together may take a form's place
-_HOPELESS = 0.5  # share of what a form gains, above which no second name is tried
-_SHARE = 0.1  # of what a form gains; less is what laws differ by whose torques correlate by 0.95
+from bumblebee.diagnosis.thresholds.discrepancy import CatalogueAlternative
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,30 +39,30 @@ class Offers:
     candidates: Sequence[Candidate] = ()
     """The most promising first."""
 
-    def on(self, plant: Plant, joint: str) -> list[Candidate]:
+    def on(self, plant: Plant, joint: str, rule: CatalogueAlternative) -> list[Candidate]:
         """Those that could act on a joint, a few shapes of each; and the most promising wherever they are.
 
         What sits on another joint or on a body that the joint does not carry is left out.
         """
         elsewhere = (set(plant.joints) | set(plant.bodies)) - {joint, *_carried(plant, joint)}
-        best = list(dict.fromkeys((c.effect, c.where) for c in self.candidates))[:_ANYWHERE]
+        best = list(dict.fromkeys((c.effect, c.where) for c in self.candidates))[: rule.anywhere]
         kept: list[Candidate] = []
         for c in self.candidates:
             if c.where in elsewhere and (c.effect, c.where) not in best:
                 continue
-            if sum((c.effect, c.where) == (o.effect, o.where) for o in kept) < _SHAPES:
+            if sum((c.effect, c.where) == (o.effect, o.where) for o in kept) < rule.shapes:
                 kept.append(c)
         return kept
 
 
 def offers_of(found: Search, candidates: Sequence[Candidate]) -> Offers:
-    """The search's candidates by their gain beside what was found, and those that are never screened."""
+    """The search's candidates by their gain conditional on what was found, and those that are never screened."""
     order = np.argsort(-found.tests.gain)
     screened = [found.columns.candidates[k] for k in order if found.tests.gain[k] > 0]
     return Offers([*screened, *(c for c in candidates if shortlisted(c, len(found.problem.plant.joints)))])
 
 
-def with_named(found: Search, fit: Fit) -> Search:
+def with_catalogue_effects(found: Search, fit: Fit) -> Search:
     """The search as if it had found what the catalogue's effects of `fit` are, with evidence for those that are new."""
     chosen = [c for c in fit.chosen if not isinstance(c, Formula)]
     if set(chosen) <= set(found.fit.chosen):
@@ -82,48 +77,49 @@ def with_named(found: Search, fit: Fit) -> Search:
     return replace(found, fit=joint, steps=steps)
 
 
-def named_instead(problem: Problem, holdout: Holdout, fit: Fit, form: Fit, joint: str, offers: Offers) -> Fit | None:
-    """`fit` with one or two more effects of the catalogue that do what a form on `joint` does; None where none can.
+def catalogue_swap(problem: Problem, holdout: Holdout, fit: Fit, model: Fit, joint: str, offers: Offers) -> Fit | None:
+    """`fit` with one or two more effects of the catalogue that do what a discrepancy model does; None where none can.
 
     Args:
         problem: the fitted windows.
-        holdout: the windows that judge.
-        fit: without the form.
-        form: the fit with it.
+        holdout: the validation set.
+        fit: without the discrepancy model.
+        model: the fit with it.
         joint: where it is.
-        offers: the catalogue's candidates beside `fit`.
+        offers: the catalogue's candidates conditional on `fit`.
     """
-    named = fit
-    for _ in range(_ROUNDS):
-        new = _one_more(problem, named, joint, offers)
+    rule, swapped = problem.thresholds.discrepancy.catalogue_alternative, fit
+    for _ in range(rule.rounds):
+        new = _one_more(problem, swapped, joint, offers)
         if new is None:
             return None
-        named = new
-        short = lead(problem, holdout, form, named)
-        if short <= (_SHARE if parameters(named) <= parameters(form) else 0.0):
-            return named
-        # A table has a height for everything: names that explain the fit better for their numbers go before it.
-        if criterion(problem, named) >= criterion(problem, form):
-            return named
-        if short > _HOPELESS:
+        swapped = new
+        short = lead(problem, holdout, model, swapped)
+        if short <= (rule.lacking if parameters(swapped) <= parameters(model) else 0.0):
+            return swapped
+        # A table has a height for everything: effects that explain the fit better for their numbers go before it.
+        if criterion(problem, swapped) >= criterion(problem, model):
+            return swapped
+        if short > rule.hopeless:
             return None
     return None
 
 
 def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers) -> Fit | None:
-    """The best of the catalogue's effects beside `fit`, if any is worth its parameters."""
-    open_ = [c for c in offers.on(problem.plant, joint) if not is_chosen(c, fit.chosen)]
+    """The best of the catalogue's effects conditional on `fit`, if any is worth its parameters."""
+    rule = problem.thresholds.discrepancy.catalogue_alternative
+    open_ = [c for c in offers.on(problem.plant, joint, rule) if not is_chosen(c, fit.chosen)]
     many = len(problem.plant.joints)
-    names = list(dict.fromkeys((c.effect, c.where) for c in open_ if not shortlisted(c, many)))[:_OFFERS]
-    looked = [c for c in open_ if (c.effect, c.where) in names or (shortlisted(c, many) and c.where == joint)]
+    kinds = list(dict.fromkeys((c.effect, c.where) for c in open_ if not shortlisted(c, many)))[: rule.effects]
+    looked = [c for c in open_ if (c.effect, c.where) in kinds or (shortlisted(c, many) and c.where == joint)]
     if not looked:
         return None
     columns = Columns(looked, problem.sensitivities(looked, fit.effects))
     weights = window_weights(fit.clean(problem))
     tests = score_tests(problem, columns, fit, weights)
-    order = [k for k in np.argsort(-tests.gain) if tests.gain[k] > 0][:_TRIALS]
+    order = [k for k in np.argsort(-tests.gain) if tests.gain[k] > 0][: rule.trials]
     trials = [try_one(problem, fit, looked[k], tests.steps[k], weights) for k in order]
-    tried = sorted((t for t in trials if t is not None), key=lambda t: t.cost + 2 * len(t.candidate.free))[:_FITS]
+    tried = sorted((t for t in trials if t is not None), key=lambda t: t.cost + 2 * len(t.candidate.free))[: rule.fits]
     fits = []
     for t in tried:
         new = refitted(problem, (*fit.chosen, t.candidate), np.concatenate((fit.values, t.values)), fit)

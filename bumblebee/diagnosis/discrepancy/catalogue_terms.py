@@ -7,11 +7,11 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate, Formula
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.simulation import Plant, declared_values
+from bumblebee.diagnosis.thresholds.discrepancy import CatalogueTerms
 from bumblebee.sim.effect_terms import read_term
 from bumblebee.sim.servo import servos_of
 
-_STIFF = 2.0
-# Effects of the catalogue that are of one family with a law: its constant part, its linear part, its first harmonic.
+# Effects of the catalogue of one family with a basis function: its constant part, linear part, first harmonic.
 _FAMILY = {
     "friction(": ("coulomb_friction", "stribeck_friction", "load_dependent_friction"),
     "q": ("joint_spring", "cogging"),
@@ -20,16 +20,12 @@ _FAMILY = {
 _NAMES = {"u": "target", "tau": "torque", "t": "time", "q": "position", "v": "velocity"}
 
 
-def stiffer_than_the_drive(plant: Plant, own: Formula, values: np.ndarray) -> bool:
-    """Whether a term that acts on the target asks for more than `_STIFF` times the servo's own gain.
-
-    A target that is changed on its way cannot do more than the servo makes of it. Such a coefficient belongs to a term
-    that is nearly always zero in the data, and would throw the robot where it is not.
-    """
+def stiffer_than_the_drive(plant: Plant, own: Formula, values: np.ndarray, rule: CatalogueTerms) -> bool:
+    """Whether a term that acts on the target asks for more than `rule.stiff` times the servo's own gain."""
     servo = servos_of(plant.model, [int(plant.model.joint(own.where).id)])
     gain = float(abs(servo.bias[0, 1]))
     acts = [abs(v) for text, v in zip(own.texts, values, strict=True) if read_term(text).drives]
-    return bool(gain > 0 and acts and max(acts) > _STIFF * gain)
+    return bool(gain > 0 and acts and max(acts) > rule.stiff * gain)
 
 
 def in_terms(plant: Plant, fit: Fit, candidate: Candidate) -> dict[str, float]:
@@ -52,7 +48,7 @@ def in_terms(plant: Plant, fit: Fit, candidate: Candidate) -> dict[str, float]:
 
 
 def quantities_of(texts: Sequence[str]) -> tuple[str, ...]:
-    """Quantities that terms depend on: of `laws.QUANTITIES`, and "another joint (NAME)"."""
+    """Quantities that terms depend on: of `term_library.QUANTITIES`, and "another joint (NAME)"."""
     found: list[str] = []
     for term in map(read_term, texts):
         found += [f"another joint ({other})" for other in term.others]
@@ -62,7 +58,7 @@ def quantities_of(texts: Sequence[str]) -> tuple[str, ...]:
 
 
 def related(texts: Sequence[str], effect: str) -> bool:
-    """Whether a catalogue's effect is of the family of the laws `texts`: of friction, position or velocity."""
+    """Whether a catalogue effect is of the family of basis functions `texts`: of friction, position or velocity."""
     kinds = set()
     for text in texts:
         if text.startswith("friction("):

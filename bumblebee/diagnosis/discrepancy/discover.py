@@ -1,34 +1,26 @@
-"""Beyond the catalogue: what remains after the best fit, its form, and that form refitted in the simulator.
+"""Model discrepancy: what lacks after the best fit, as basis functions that are refitted in the simulator.
 
-A law is found in the whitened windows (`diagnosis/seek.py`), with and without the catalogue's effects on its joint: a
-strange effect is often half explained by a name that it has not. Its terms then join the fit like any other effect,
-and what they make needless is dropped. The form is kept if the windows that took no part in the fit are better with it
-by more than two standard errors, if it explains most of what the joint lacked, and if it is clearly better there than
-what effects of the catalogue can do in its place (`diagnosis/instead.py`); else these take it. What is not kept is
-described, never forced into a name.
+Basis functions are found in the whitened windows (`stepwise_regression`), with and without the catalogue's effects on
+their joint: a strange effect is often half explained by an effect that it is not. The terms then join the fit like any
+other effect, and what they make redundant is dropped. A discrepancy model is kept if the validation set is better with
+it by more than two standard errors, if it explains most of what the joint lacked, and if it is clearly better there
+than what effects of the catalogue can do in a swap (`catalogue_alternative`); else these are swapped in. What is not
+kept is described, never forced into an effect of the catalogue.
 """
 
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.comparison import SURE, Holdout, is_better, less, wald, without_idle, without_spent
-from bumblebee.diagnosis.discrepancy.catalogue_alternative import Offers, named_instead
-from bumblebee.diagnosis.discrepancy.form import MANY, Form, best_form, form_of
-from bumblebee.diagnosis.discrepancy.residual_tests import JointRemains, Remains, remains
-from bumblebee.diagnosis.discrepancy.single_law import single_laws
+from bumblebee.diagnosis.discrepancy.catalogue_alternative import Offers, catalogue_swap
+from bumblebee.diagnosis.discrepancy.form import DiscrepancyModel, best_model, refitted_model
+from bumblebee.diagnosis.discrepancy.residual_tests import JointActivity, JointLackOfFit, LackOfFit, lack_of_fit
+from bumblebee.diagnosis.discrepancy.single_law import single_functions
 from bumblebee.diagnosis.estimation import Fit, resolved
 from bumblebee.diagnosis.residuals import Problem, window_weights
-
-_JOINTS = 3  # joints at most that get a form
-_Z, _LEAST = 2.0, 0.01  # of the judging windows' gain, and its least share
-_OF_ALL = 0.05  # share of what all effects gain together that a form must, what it replaces being gone
-_MOST = 0.5  # share of a joint's excess that may remain where its form was found
-_TRIALS = 2  # laws tried at most in the place of names on one joint
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,151 +31,179 @@ class Discovery:
     """Its nuisances around the fit."""
     holdout: Holdout
     fit: Fit
-    left: Remains
+    left: LackOfFit
     unconfirmed: dict[str, dict[str, float]]
     """Joint -> terms that were found and not kept."""
     kinds: dict[str, str]
-    """Joint with a form -> "formula" or "curve"."""
+    """Joint with a discrepancy model -> "formula" or "curve"."""
     withdrawn: list[str]
-    """Effects of the catalogue that a form or another name made needless."""
+    """Effects of the catalogue that a discrepancy model or another effect made redundant."""
 
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """A fit, problem and judges with their nuisances around it, and what it leaves."""
+    """A fit, problem and validation set with their nuisances around it, and what it leaves."""
 
     problem: Problem
     holdout: Holdout
     fit: Fit
-    left: Remains
-    typical: np.ndarray
-    still: Sequence[str]
+    left: LackOfFit
+    activity: JointActivity
 
     def around(self, fit: Fit) -> "_State":
         """The same of another fit."""
         moved = self.problem.relinearised(fit.effects)
         new = resolved(moved, fit, window_weights(fit.clean(moved)))
-        judged = self.holdout.relinearised(new.effects)
-        left = remains(moved, judged.problem, new, self.typical, self.still)
-        return _State(moved, judged, new, left, self.typical, self.still)
+        validation = self.holdout.relinearised(new.effects)
+        left = lack_of_fit(moved, validation.problem, new, self.activity)
+        return _State(moved, validation, new, left, self.activity)
+
+
+@dataclass(frozen=True, eq=False)
+class _Means:
+    """What the look for discrepancy models may use."""
+
+    offers: Offers
+    budget: Budget
+    say: Callable[[str], None]
 
 
 def discover(
     problem: Problem,
     holdout: Holdout,
     fit: Fit,
-    typical: np.ndarray,
-    still: Sequence[str] = (),
+    activity: JointActivity,
     say: Callable[[str], None] = lambda text: None,
     offers: Offers | None = None,
     budget: Budget | None = None,
 ) -> Discovery:
-    """Test, name and refit what `fit` leaves; arguments as of `remains`, and the catalogue's `offers` beside `fit`.
+    """Test what `fit` leaves, find discrepancy models of it and refit them.
 
-    What there is no time for in `budget` is left out and written down there.
+    Args:
+        problem: the fitted windows.
+        holdout: the validation set.
+        fit: of the catalogue's effects.
+        activity: of the joints.
+        say: told of progress.
+        offers: the catalogue's candidates conditional on `fit`.
+        budget: of time; what there is none for is left out and written down there.
     """
-    budget, offers = budget or Budget(), offers or Offers()
+    means = _Means(offers or Offers(), budget or Budget(), say)
     before = without_spent(problem, holdout, without_idle(problem, holdout, fit))
-    left = remains(problem, holdout.problem, before, typical, still)
-    state, kinds = _without_names(_State(problem, holdout, before, left, typical, still), offers, budget, say)
-    unconfirmed: dict[str, dict[str, float]] = {}
-    tried = list(kinds)
-    for _ in range(_JOINTS if len(state.fit.chosen) <= MANY else 1):
-        worst = state.left.worst(tried)
-        if worst is None or not budget.has_time_for(f"a law on {worst.joint}"):
-            break
-        tried.append(worst.joint)
-        say(f"looking for a law on {worst.joint}")
-        form = best_form(state.problem, state.fit, state.left, worst.joint, typical, budget)
-        if form is None:
-            continue
-        after, named = _judged(state, form, worst, offers)
-        if after is None:
-            unconfirmed[worst.joint] = form.terms
-            continue
-        if named:
-            tried.remove(worst.joint)  # a name may leave something that has none
-            new = [c for c in after.fit.chosen if c not in state.fit.chosen]
-            say(f"in a form's place on {worst.joint}: {', '.join(_names(new))}")
-        else:
-            kinds[worst.joint] = form.kind
-            say(f"discovered on {worst.joint}: {form}")
-        state = after
+    left = lack_of_fit(problem, holdout.problem, before, activity)
+    state, kinds = _swapped_for_single_functions(_State(problem, holdout, before, left, activity), means)
+    state, kinds, unconfirmed = _with_models(state, kinds, means)
     rest = without_spent(state.problem, state.holdout, state.fit) if kinds else state.fit
     if rest is not state.fit:
         state = state.around(rest)
-    gone = _names([c for c in before.chosen if c not in state.fit.chosen])
+    gone = _with_places([c for c in before.chosen if c not in state.fit.chosen])
     return Discovery(state.problem, state.holdout, state.fit, state.left, unconfirmed, kinds, gone)
 
 
-def _without_names(
-    state: _State, offers: Offers, budget: Budget, say: Callable[[str], None]
-) -> tuple[_State, dict[str, str]]:
-    """One law in the place of all names on a joint where it explains more; joints that got one, with its kind."""
+def _with_models(
+    state: _State, single: dict[str, str], means: _Means
+) -> tuple[_State, dict[str, str], dict[str, dict[str, float]]]:
+    """The state with discrepancy models on the joints that lack most; their kinds by joint; terms that were not kept.
+
+    `single` are joints that have one already, with its kind.
+    """
+    kinds, unconfirmed = dict(single), {}
+    tried, rules = list(single), state.problem.thresholds.discrepancy
+    for _ in range(rules.discover.joints if len(state.fit.chosen) <= rules.form.many_effects else 1):
+        worst = state.left.worst(tried)
+        if worst is None or not means.budget.has_time_for(f"a law on {worst.joint}"):
+            break
+        tried.append(worst.joint)
+        means.say(f"looking for a law on {worst.joint}")
+        model = best_model(state.problem, state.fit, state.left, worst.joint, means.budget)
+        if model is None:
+            continue
+        after, is_swap = _validated(state, model, worst, means.offers)
+        if after is None:
+            unconfirmed[worst.joint] = model.terms
+            continue
+        if is_swap:
+            tried.remove(worst.joint)  # an effect of the catalogue may leave something that it has no effect for
+            new = [c for c in after.fit.chosen if c not in state.fit.chosen]
+            means.say(f"in a form's place on {worst.joint}: {', '.join(_with_places(new))}")
+        else:
+            kinds[worst.joint] = model.kind
+            means.say(f"discovered on {worst.joint}: {model}")
+        state = after
+    return state, kinds, unconfirmed
+
+
+def _swapped_for_single_functions(state: _State, means: _Means) -> tuple[_State, dict[str, str]]:
+    """A swap of all effects on a joint for one basis function where it explains more; such joints with its kind."""
     kinds: dict[str, str] = {}
-    if len(state.fit.chosen) > MANY:
+    if len(state.fit.chosen) > state.problem.thresholds.discrepancy.form.many_effects:
         return state, kinds
     for joint in dict.fromkeys(c.where for c in state.fit.chosen if c.where in state.problem.plant.joints):
-        if not budget.has_time_for(f"one law in the place of the names on {joint}"):
+        if not means.budget.has_time_for(f"one law in the place of the names on {joint}"):
             break
-        form = _instead_of_names(state, joint, offers)
-        if form is not None:
-            state = state.around(form.fit)
-            kinds[joint] = form.kind
-            say(f"in the place of names on {joint}: {form}")
+        model = _swap_for_one_function(state, joint, means.offers)
+        if model is not None:
+            state = state.around(model.fit)
+            kinds[joint] = model.kind
+            means.say(f"in the place of names on {joint}: {model}")
     return state, kinds
 
 
-def _judged(state: _State, form: Form, worst: JointRemains, offers: Offers) -> tuple[_State | None, bool]:
-    """The state with a form, or with effects of the catalogue that do what it does (then True); None if refused."""
+def _validated(
+    state: _State, model: DiscrepancyModel, worst: JointLackOfFit, offers: Offers
+) -> tuple[_State | None, bool]:
+    """The state with a discrepancy model, or with effects of the catalogue in a swap (then True); None if refused."""
     problem, holdout, fit = state.problem, state.holdout, state.fit
-    if not _is_worth_it(problem, holdout, fit, form, state.left.sought.bound):
+    rule = problem.thresholds.discrepancy.discover
+    if not _is_worth_it(problem, holdout, fit, model, state.left.sought.bound):
         return None, False
-    named = named_instead(problem, holdout, fit, form.fit, worst.joint, offers)
-    if named is not None:
-        return (state.around(named), True) if holdout.gains(fit, named, _Z, _LEAST) else (None, False)
-    new = state.around(form.fit)
+    swapped = catalogue_swap(problem, holdout, fit, model.fit, worst.joint, offers)
+    if swapped is not None:
+        gains = holdout.gains(fit, swapped, rule.gain_z, rule.least_gain)
+        return (state.around(swapped), True) if gains else (None, False)
+    new = state.around(model.fit)
     excess = new.left.joints[problem.plant.joints.index(worst.joint)].excess
-    if excess > max(_MOST * worst.excess, 2.0) or _surety(new.problem, new.fit, fit) < SURE:
+    if excess > max(rule.most_left * worst.excess, rule.noise) or _surety(new.problem, new.fit, fit) < SURE:
         return None, False
     return new, False
 
 
-def _names(effects: Sequence[Candidate]) -> list[str]:
+def _with_places(effects: Sequence[Candidate]) -> list[str]:
     """Effects with their places, for messages."""
     return [f"{c.effect} on {c.where or 'the whole robot'}" for c in effects]
 
 
-def _is_worth_it(problem: Problem, holdout: Holdout, fit: Fit, form: Form, bound: float) -> bool:
-    """Whether a form pays on the judging windows, is no trifle, and as sure in the joint fit as its law had to be."""
-    if _surety(problem, form.fit, fit) < bound:
+def _is_worth_it(problem: Problem, holdout: Holdout, fit: Fit, model: DiscrepancyModel, bound: float) -> bool:
+    """Whether a discrepancy model gains out of sample, is no trifle, and as sure as its basis function had to be."""
+    rule = problem.thresholds.discrepancy.discover
+    if _surety(problem, model.fit, fit) < bound:
         return False
-    if not holdout.gains(fit, form.fit, _Z, _LEAST):
+    if not holdout.gains(fit, model.fit, rule.gain_z, rule.least_gain):
         return False
-    own = next(c for c in form.fit.chosen if c not in fit.chosen)
-    return holdout.gains(less(problem, form.fit, [own]), form.fit, _Z, _OF_ALL)
+    own = next(c for c in model.fit.chosen if c not in fit.chosen)
+    return holdout.gains(less(problem, model.fit, [own]), model.fit, rule.gain_z, rule.least_of_all)
 
 
 def _surety(problem: Problem, fit: Fit, before: Fit) -> float:
-    """Wald's z of the form that `fit` has and `before` has not."""
+    """Wald's z of the discrepancy model that `fit` has and `before` has not."""
     own = next(i for i, c in enumerate(fit.chosen) if c not in before.chosen)
     return wald(problem, fit, window_weights(fit.clean(problem)), own)
 
 
-def _instead_of_names(state: _State, joint: str, offers: Offers) -> Form | None:
-    """One law that explains a joint better than the catalogue's effects on it, with no more numbers; or None.
+def _swap_for_one_function(state: _State, joint: str, offers: Offers) -> DiscrepancyModel | None:
+    """One basis function that explains a joint better than the effects on it, with no more numbers; or None.
 
     Nor may other effects of the catalogue do what it does.
     """
     problem, holdout, fit, left = state.problem, state.holdout, state.fit, state.left
-    laws = single_laws(problem, fit, left.scene, left.library, joint)
-    for gone, one in itertools.islice(laws, _TRIALS):
+    swaps = single_functions(problem, fit, left.scene, left.library, joint)
+    for gone, one in itertools.islice(swaps, problem.thresholds.discrepancy.discover.swaps):
         bare = less(problem, fit, gone)
-        form = form_of(problem, bare, joint, [one])
-        if form is None or not is_better(problem, holdout, fit, form.fit):
+        model = refitted_model(problem, bare, joint, [one])
+        if model is None or not is_better(problem, holdout, fit, model.fit):
             continue
-        if _surety(problem, form.fit, fit) < left.sought.bound:
+        if _surety(problem, model.fit, fit) < left.sought.bound:
             continue
-        if named_instead(problem, holdout, bare, form.fit, joint, offers) is None:
-            return form
+        if catalogue_swap(problem, holdout, bare, model.fit, joint, offers) is None:
+            return model
     return None

@@ -1,4 +1,4 @@
-"""The form of what a joint lacks: laws found in its windows, refitted in the simulator beside everything else."""
+"""The discrepancy model of a joint: basis functions found in its windows, refitted in the simulator with all else."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,21 +10,15 @@ from bumblebee.diagnosis.candidates import formula
 from bumblebee.diagnosis.comparison import PARAMETER, criterion, less, refitted, without_needless, without_one
 from bumblebee.diagnosis.discrepancy.catalogue_terms import in_terms, related, stiffer_than_the_drive
 from bumblebee.diagnosis.discrepancy.missing_torque import fitted_scene
-from bumblebee.diagnosis.discrepancy.residual_tests import Remains
+from bumblebee.diagnosis.discrepancy.residual_tests import LackOfFit
 from bumblebee.diagnosis.discrepancy.stepwise_regression import Found, library, seek
-from bumblebee.diagnosis.discrepancy.term_library import beside, joined
+from bumblebee.diagnosis.discrepancy.term_library import joined, neighbours
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
 
-MANY = (
-    8  # effects in a fit beyond which one joint gets a form, names stay, inner numbers too: every trial refits them all
-)
-_LAWS, _WORTH, _SHARE = 3, 12.0, 0.03  # laws in a form; what a further one must bring, and as a share of the first's
-_PART = 0.2  # an effect of the catalogue is a part of a law that is at least this share of it
-
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class DiscrepancyModel:
     """One way to explain a joint."""
 
     fit: Fit
@@ -34,79 +28,87 @@ class Form:
     terms: dict[str, float]
 
     def __str__(self) -> str:
-        """The form in a line."""
+        """The discrepancy model in a line."""
         return " + ".join(f"{v:.3g} {t}" for t, v in self.terms.items())[:100]
 
 
-def best_form(
-    problem: Problem, fit: Fit, left: Remains, joint: str, typical: np.ndarray, budget: Budget
-) -> Form | None:
-    """The form that explains the fitted windows best for its parameters; None where no strange law was found."""
-    column = problem.plant.joints.index(joint)
+def best_model(problem: Problem, fit: Fit, left: LackOfFit, joint: str, budget: Budget) -> DiscrepancyModel | None:
+    """The one that explains the fitted windows best for its parameters; None where no strange function was found."""
+    column, rule = problem.plant.joints.index(joint), problem.thresholds.discrepancy.form
     ways: list[tuple[Fit, list[Found]]] = [(fit, [f for f in left.sought.found if f.joint == column])]
     ways += [(fit, [rival]) for rival in left.sought.rivals if rival.joint == column]
     own = [c for c in fit.chosen if c.where == joint]
     if own:
         bare = less(problem, fit, own)
-        scene = fitted_scene(problem, bare, typical, [column])
+        scene = fitted_scene(problem, bare, left.scene.torque, [column])
         some = library(scene.data, [column])
-        sought = seek(problem, scene.evidence, scene.residual, scene.columns, some, most=_LAWS)
+        sought = seek(problem, scene.evidence, scene.residual, scene.columns, some, most=rule.functions)
         ways += [(bare, sought.found), (fit, sought.found), *((bare, [rival]) for rival in sought.rivals)]
-    forms = [_growing(problem, base, joint, found, budget) for base, found in ways]
-    return max((f for f in forms if f is not None), key=lambda f: f.score, default=None)
+    models = [_growing(problem, base, joint, found, budget) for base, found in ways]
+    return max((f for f in models if f is not None), key=lambda f: f.score, default=None)
 
 
-def _growing(problem: Problem, base: Fit, joint: str, found: Sequence[Found], budget: Budget) -> Form | None:
-    """The form of as many of the laws as are worth it, in the order in which they were found."""
+def _growing(
+    problem: Problem, base: Fit, joint: str, found: Sequence[Found], budget: Budget
+) -> DiscrepancyModel | None:
+    """That of as many of the basis functions as are worth it, in the order in which they were found."""
+    rule = problem.thresholds.discrepancy.form
     there = {c.effect for c in base.chosen if c.where == joint}
-    strange = [f for f in found if not f.law.known or f.law.known in there]
+    strange = [f for f in found if not f.function.effect or f.function.effect in there]
     best, start = None, criterion(problem, base)
-    for count in range(1, min(len(strange), _LAWS) + 1):
+    for count in range(1, min(len(strange), rule.functions) + 1):
         if not budget.has_time_for(f"all forms on {joint}"):
             break
-        form = form_of(problem, base, joint, strange[:count])
-        if form is None:
+        model = refitted_model(problem, base, joint, strange[:count])
+        if model is None:
             break
-        if count == 1 and len(base.chosen) <= MANY:
-            form = _climbed(problem, base, joint, strange[0], form, budget)
-        if best is not None and form.score - best.score < max(_WORTH, _SHARE * (best.score - start)):
+        if count == 1 and len(base.chosen) <= rule.many_effects:
+            model = _climbed(problem, base, joint, strange[0], model, budget)
+        if best is not None and model.score - best.score < max(rule.worth, rule.worth_share * (best.score - start)):
             break
-        best = form
+        best = model
     return best
 
 
-def _climbed(problem: Problem, base: Fit, joint: str, one: Found, form: Form, budget: Budget) -> Form:
-    """The form at the best of the law's two inner numbers, from neighbour to neighbour."""
-    seen, law = {one.law.texts}, one.law
+def _climbed(
+    problem: Problem, base: Fit, joint: str, one: Found, model: DiscrepancyModel, budget: Budget
+) -> DiscrepancyModel:
+    """The discrepancy model at the best of the basis function's two inner numbers, from neighbour to neighbour."""
+    rule = problem.thresholds.discrepancy.term_library
+    seen, function = {one.function.texts}, one.function
     while budget.has_time_for(f"the best inner numbers of a form on {joint}"):
         tried = {}
-        for other in beside(law):
+        for other in neighbours(function, rule):
             if other.texts not in seen:
                 seen.add(other.texts)
-                tried[other] = form_of(problem, base, joint, [replace(one, law=other)])
+                tried[other] = refitted_model(problem, base, joint, [replace(one, function=other)])
         best = max((f for f in tried.values() if f is not None), key=lambda f: f.score, default=None)
-        if best is None or best.score < form.score + PARAMETER:
-            return form
-        law, form = next(other for other, f in tried.items() if f is best), best
-    return form
+        if best is None or best.score < model.score + PARAMETER:
+            return model
+        function, model = next(other for other, f in tried.items() if f is best), best
+    return model
 
 
-def form_of(problem: Problem, base: Fit, joint: str, strange: Sequence[Found]) -> Form | None:
-    """`base` with strange laws, refitted; effects that became needless are dropped."""
+def refitted_model(problem: Problem, base: Fit, joint: str, strange: Sequence[Found]) -> DiscrepancyModel | None:
+    """`base` with strange basis functions, refitted; effects that became needless are dropped."""
+    rules = problem.thresholds.discrepancy
     terms: dict[str, float] = {}
     for one in strange:
-        for text, size in zip(*joined(list(one.law.texts), one.verdict.size), strict=True):
+        for text, size in zip(*joined(list(one.function.texts), one.verdict.size), strict=True):
             terms[text] = float(size)
-    kind = "curve" if any(one.law.table for one in strange) else "formula"
+    kind = "curve" if any(one.function.table for one in strange) else "formula"
     chosen, values = base.chosen, base.values
     for c in [c for c in chosen if c.where == joint and related(list(terms), c.effect)]:
         parts = in_terms(problem.plant, base, c)
-        if parts and max(map(abs, terms.values())) > _PART * max(map(abs, parts.values())):
+        if parts and max(map(abs, terms.values())) > rules.form.part * max(map(abs, parts.values())):
             chosen, values = without_one(chosen, values, c)
             terms = parts | terms
     own = formula(joint, terms)
     fit = refitted(problem, (*chosen, own), np.concatenate((values, list(terms.values()))), base)
     fit = without_needless(problem, fit, own)
-    if own not in fit.chosen or stiffer_than_the_drive(problem.plant, own, fit.of(own)):
+    stiff = own in fit.chosen and stiffer_than_the_drive(problem.plant, own, fit.of(own), rules.catalogue_terms)
+    if own not in fit.chosen or stiff:
         return None
-    return Form(fit, criterion(problem, fit), kind, dict(zip(own.texts, map(float, fit.of(own)), strict=True)))
+    return DiscrepancyModel(
+        fit, criterion(problem, fit), kind, dict(zip(own.texts, map(float, fit.of(own)), strict=True))
+    )

@@ -52,7 +52,7 @@ class Scene:
         answers = answers_of(plant, problem.layout, windows, variation, problem.coarse, sizes, only=only)
         white = joint_answers(problem, answers)
         evidence = make_evidence(problem, white, self.residual, self.columns, self.weights)
-        return evidence, quantities(plant, windows, answers.path, variation.model)
+        return evidence, quantities(plant, windows, answers.path, variation.model, problem.thresholds.discrepancy)
 
     @property
     def evidence(self) -> Evidence:
@@ -61,7 +61,7 @@ class Scene:
 
     @property
     def data(self) -> Quantities:
-        """What a law may depend on."""
+        """What a basis function may depend on."""
         return self._seen[1]
 
     def excess(self, spared: int = 0) -> np.ndarray:
@@ -72,14 +72,15 @@ class Scene:
         """The same of one joint on some rollouts, all by default, each less the `spared` windows that say most."""
         of = self.problem.windows.rollout
         ids = np.unique(of) if rollouts is None else rollouts
-        parts = [self.evidence.free(joint, of == i, spared) for i in ids] if spared else [self.evidence.free(joint)]
+        each = self.evidence.chi_square
+        parts = [each(joint, of == i, spared) for i in ids] if spared else [each(joint)]
         value, count = np.sum(parts, axis=0)
         return float((value - count) / np.sqrt(2.0 * max(count, 1)))
 
-    def power(self, spared: int = 0) -> tuple[float, float]:
+    def reduced_chi_square(self, spared: int = 0) -> tuple[float, float]:
         """Mean square of what is left, 1 for noise, and its standard error; without each rollout's loudest windows."""
-        powers, rollouts = (self.left**2).mean(axis=1), self.problem.windows.rollout
-        each = [np.sort(powers[rollouts == i]) for i in np.unique(rollouts)]
+        squares, rollouts = (self.left**2).mean(axis=1), self.problem.windows.rollout
+        each = [np.sort(squares[rollouts == i]) for i in np.unique(rollouts)]
         kept = np.concatenate([some[: len(some) - spared] for some in each if len(some) > spared] or [np.ones(1)])
         values = self.left.shape[1]
         error = kept.std(ddof=1) if len(kept) > 1 else np.inf
@@ -92,7 +93,7 @@ def fitted_scene(problem: Problem, fit: Fit, torque: np.ndarray, joints: Sequenc
     return Scene(problem, fit.residual, fit.columns, fit.effects, weights, torque, joints)
 
 
-def judged_scene(problem: Problem, fit: Fit, torque: np.ndarray, joints: Sequence[int] | None = None) -> Scene:
+def validation_scene(problem: Problem, fit: Fit, torque: np.ndarray, joints: Sequence[int] | None = None) -> Scene:
     """Windows that took no part in `fit`: its effects as they are, its numerical differences taken out."""
     residual = problem.residual([fit.effects])[0]
     residual = residual - np.tensordot(fit.nuisance, problem.nuisance, axes=1)

@@ -13,11 +13,10 @@ import numpy as np
 
 from bumblebee.diagnosis.sensitivities import Path
 from bumblebee.diagnosis.simulation import Plant, Windows, at_starts, state_before
+from bumblebee.diagnosis.thresholds.discrepancy import DiscrepancyThresholds
 from bumblebee.sim.effect_states import State
 from bumblebee.sim.effect_terms import Term
 from bumblebee.sim.servo import servos_of
-
-_CREEP = 0.02  # [rad/s]: speeds below are no motion that dry friction could be told by
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +39,8 @@ class Quantities:
     """(J,) largest torque of the drives [N m]."""
     plant: Plant
     windows: Windows
+    thresholds: DiscrepancyThresholds
+    """What basis functions of the quantities are made and chosen by."""
     _known: dict[tuple, np.ndarray] = field(default_factory=dict, repr=False)
 
     @property
@@ -61,7 +62,7 @@ class Quantities:
     def against(self, joint: int) -> np.ndarray:
         """(W, K): -1 where the joint moves forward, 1 where it moves back, between where it creeps."""
         if ("against", joint) not in self._known:
-            self._known["against", joint] = -np.tanh(self.v[..., joint] / _CREEP)
+            self._known["against", joint] = -np.tanh(self.v[..., joint] / self.thresholds.regressors.creep)
         return self._known["against", joint]
 
     def state(self, joint: int, key: str, numbers: tuple[float, ...]) -> np.ndarray:
@@ -102,7 +103,9 @@ class _Values(Mapping[str, np.ndarray]):
         return 1 + len(self._own)
 
 
-def quantities(plant: Plant, windows: Windows, path: Path, model: mujoco.MjModel) -> Quantities:
+def quantities(
+    plant: Plant, windows: Windows, path: Path, model: mujoco.MjModel, thresholds: DiscrepancyThresholds
+) -> Quantities:
     """From the paths of windows under `model`'s servos."""
     servos = servos_of(model, [int(plant.model.joint(name).id) for name in plant.joints])
     q, v = path.qpos[:, :-1, plant.qpos], path.qvel[:, :-1, plant.dof]
@@ -119,4 +122,5 @@ def quantities(plant: Plant, windows: Windows, path: Path, model: mujoco.MjModel
         limit=servos.limit,
         plant=plant,
         windows=windows,
+        thresholds=thresholds,
     )

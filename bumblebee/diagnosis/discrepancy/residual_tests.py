@@ -1,9 +1,10 @@
-"""What a fit leaves unexplained, joint by joint: how much, on what it depends, by which law; or nothing.
+"""What a fit leaves unexplained, joint by joint: how much, on what it depends, by which basis function; or nothing.
 
-Two tests, both on the fitted windows and again on those that took no part in the fit. Laws: whether one of several
-thousand, each with its few coefficients, explains what is left (`diagnosis/seek.py`). Power: whether the torques that a
-joint lacks, free in every fifth of every window, are larger than sensor noise makes them; it sees what no law names.
-A third says whether the windows as a whole are further off than noise makes them: no joint need lack a torque for that.
+Two tests, both on the fitted windows and again on the validation set. Basis functions: whether one of several thousand,
+each with its few coefficients, explains what is left (`stepwise_regression`). Lack of fit: whether the torques that a
+joint lacks, free in every fifth of every window, are larger than sensor noise makes them; it sees what no basis
+function follows. A third says whether the windows as a whole are further off than noise makes them: no joint need lack
+a torque for that.
 """
 
 from collections.abc import Sequence
@@ -13,40 +14,40 @@ import numpy as np
 from scipy.stats import norm
 
 from bumblebee.diagnosis.comparison import better
-from bumblebee.diagnosis.discrepancy.missing_torque import Scene, fitted_scene, judged_scene
+from bumblebee.diagnosis.discrepancy.missing_torque import Scene, fitted_scene, validation_scene
 from bumblebee.diagnosis.discrepancy.stepwise_regression import Found, Library, Sought, closest, library, seek
-from bumblebee.diagnosis.discrepancy.term_library import Law
+from bumblebee.diagnosis.discrepancy.term_library import BasisFunction
 from bumblebee.diagnosis.estimation import Fit, solve
 from bumblebee.diagnosis.residuals import Problem
 
-_LEAST = 0.01  # share of a joint's typical torque below which structure is not worth a word
-_POWER, _AGAIN, _ALONE = 4.0, 1.5, 6.0  # standard errors of a joint's power: fitted, judged, fitted without judges
-_LOUDEST = 2  # windows of a rollout that do not count there
-_LONE = 20.0  # standard errors of a joint's power in one rollout alone, its loudest windows not counted
-_WHOLE, _WHOLE_ALONE = (2.0, 4.0), 6.0  # standard errors of all windows: each of fitted and judged, both; fitted alone
-_FELT, _PAYS = 9.0, 25.0  # chi-square of a law on judging windows that do not meet it; its gain on half of the fitted
-_SLIGHT = 0.03  # share of a joint's typical torque below which a power that no law explains is no structure by itself
-_HINT = 3.0  # z from which a law says what a power that no law explains depends on
-_MOST = 8  # joints that laws are sought on, those that lack most
+
+@dataclass(frozen=True, eq=False)
+class JointActivity:
+    """What the logs say of J joints before anything is asked of them."""
+
+    typical: np.ndarray
+    """(J,) RMS torques of their servos [N m]."""
+    still: Sequence[str] = ()
+    """Joints that never move."""
 
 
 @dataclass(frozen=True)
-class JointRemains:
+class JointLackOfFit:
     """What is left in one joint."""
 
     joint: str
     p: float
-    """Of the surer test, shared among all laws or joints."""
+    """Of the surer test, shared among all basis functions or joints."""
     excess: float
     """Standard errors by which its torques are larger than noise makes them."""
-    laws: tuple[tuple[Law, np.ndarray], ...]
-    """Laws with their sizes, each confirmed on the judging windows."""
+    functions: tuple[tuple[BasisFunction, np.ndarray], ...]
+    """Basis functions with their sizes, each confirmed on the validation set."""
     rms: float
-    """RMS torque of the laws [N m]; without any, what the excess stands for."""
+    """RMS torque of the basis functions [N m]; without any, what the excess stands for."""
     typical: float
     """RMS torque of the joint's servo [N m]."""
     depends_on: tuple[str, ...]
-    """Quantities of `laws.QUANTITIES` and "another joint (NAME)", the most important first."""
+    """Quantities of `term_library.QUANTITIES` and "another joint (NAME)", the most important first."""
     significant: bool
 
 
@@ -54,127 +55,166 @@ class JointRemains:
 class Whole:
     """Of all joints and sensors together."""
 
-    power: float
+    reduced_chi_square: float
     """Mean square of what is left on the fitted windows, 1 for noise, each rollout's loudest windows not counted."""
     z: float
-    """Standard errors by which that, with the judging windows where there are any, is more than noise."""
+    """Standard errors by which that, with the validation set where there is one, is more than noise."""
     significant: bool
 
 
 @dataclass(frozen=True, eq=False)
-class Remains:
+class LackOfFit:
     """Of all joints."""
 
-    joints: list[JointRemains]
+    joints: list[JointLackOfFit]
     scene: Scene
-    judged: Scene | None
+    validation: Scene | None
     sought: Sought
     library: Library
-    """The laws that were tried on the fitted windows."""
+    """The basis functions that were tried on the fitted windows."""
     whole: Whole
 
-    def worst(self, beside: Sequence[str] = ()) -> JointRemains | None:
-        """The joint with most that is significant, those in `beside` left out."""
-        some = [j for j in self.joints if j.significant and j.joint not in beside]
+    def worst(self, besides: Sequence[str] = ()) -> JointLackOfFit | None:
+        """The joint with most that is significant, those in `besides` left out."""
+        some = [j for j in self.joints if j.significant and j.joint not in besides]
         return max(some, key=lambda j: (j.excess, j.rms / j.typical), default=None)
 
 
-def remains(
-    problem: Problem, judge: Problem | None, fit: Fit, typical: np.ndarray, still: Sequence[str] = ()
-) -> Remains:
+@dataclass(frozen=True, eq=False)
+class _Tested:
+    """What the tests of all joints gave, before it is said of each."""
+
+    scene: Scene
+    excess: np.ndarray
+    """(J,) standard errors of the joints' chi-square on the fitted windows."""
+    confirmation: np.ndarray | None
+    """(J,) the same on the validation set; None if there is none."""
+    sought: Sought
+    library: Library
+    kept: list[tuple[Found, np.ndarray]]
+    """Basis functions that were confirmed, with their sizes."""
+    whole: Whole
+    activity: JointActivity
+
+
+def lack_of_fit(problem: Problem, validation: Problem | None, fit: Fit, activity: JointActivity) -> LackOfFit:
     """Test what `fit` leaves.
 
     Args:
         problem: the fitted windows.
-        judge: windows that took no part; None if there are none.
+        validation: windows that took no part; None if there are none.
         fit: of the effects found so far.
-        typical: (J,) RMS torques of the joints [N m].
-        still: joints that never move.
+        activity: of the joints.
     """
+    rule, names = problem.thresholds.discrepancy.residual_tests, problem.plant.joints
     # Where a foot tips one window holds more than all others: on a base that can fall the loudest do not count.
-    spared = _LOUDEST if problem.plant.floating else 0
-    scene = fitted_scene(problem, fit, typical)
-    excess, again, judged = scene.excess(spared), None, None
-    names = problem.plant.joints
-    moving = [j for j in np.argsort(-excess) if names[j] not in still][:_MOST]
+    spared = rule.loudest if problem.plant.floating else 0
+    scene = fitted_scene(problem, fit, activity.typical)
+    excess, confirmation, unseen = scene.excess(spared), None, None
+    moving = [j for j in np.argsort(-excess) if names[j] not in activity.still][: rule.joints]
     some = library(scene.data, moving)
     sought = seek(problem, scene.evidence, scene.residual, scene.columns, some)
-    if judge is not None:  # of what is not seen in the fitted windows nothing need be simulated in others
-        asked = sorted({*np.flatnonzero(excess > _POWER).tolist(), *(one.joint for one in sought.found)})
-        judged = judged_scene(judge, fit, typical, asked)
-        again = judged.excess(spared) if asked else np.zeros_like(excess)
-    kept, whole = confirmed(scene, sought, judged), in_whole(scene, judged)
-    found = []
-    for j, name in enumerate(names):
-        own = [(one, size) for one, size in kept if one.joint == j]
-        lacks = [np.einsum("fws,f->ws", one.torque, size) for one, size in own]
-        rms = float(np.sqrt((np.sum(lacks, axis=0) ** 2).mean())) if own else scene.evidence.implied(j)
-        loud = excess[j] > (_ALONE if again is None else _POWER)
-        # Other steps and integrators feign a hundredth or two of a joint's torque, in contact all windows' power, too.
-        more = rms > _SLIGHT * typical[j]
-        if again is not None:
-            loud &= again[j] > _AGAIN or _in_two(scene, j, more)
-        loud &= more or whole.significant
-        real = bool(own) and rms > _LEAST * typical[j]
-        p = [2 * norm.sf(one.verdict.z) * some.count for one, _ in own]
-        p.append(float(norm.sf(excess[j])) * len(names))
-        on = list(dict.fromkeys(quantity for one, _ in own for quantity in one.law.on))
-        if loud and not on:
-            on = list(dict.fromkeys(quantity for one in sought.found if one.joint == j for quantity in one.law.on))
-        if loud and not on:
-            hint = closest(sought.evidence, some, j, _HINT)
-            on = list(hint.law.on) if hint is not None else []
-        found.append(
-            JointRemains(
-                name, float(min(1.0, *p)), float(excess[j]), tuple((one.law, size) for one, size in own), rms,
-                float(typical[j]), tuple(on), bool(real or (loud and name not in still)),
-            )
-        )  # fmt: skip
-    return Remains(found, scene, judged, sought, some, whole)
+    if validation is not None:  # of what is not seen in the fitted windows nothing need be simulated in others
+        asked = sorted({*np.flatnonzero(excess > rule.excess_fitted).tolist(), *(one.joint for one in sought.found)})
+        unseen = validation_scene(validation, fit, activity.typical, asked)
+        confirmation = unseen.excess(spared) if asked else np.zeros_like(excess)
+    kept, whole = confirmed(scene, sought, unseen), in_whole(scene, unseen)
+    tested = _Tested(scene, excess, confirmation, sought, some, kept, whole, activity)
+    joints = [_of_joint(tested, j) for j in range(len(names))]
+    return LackOfFit(joints, scene, unseen, sought, some, whole)
 
 
-def in_whole(scene: Scene, judged: Scene | None) -> Whole:
+def _of_joint(tested: _Tested, j: int) -> JointLackOfFit:
+    """What the tests say of the joint with index `j`."""
+    scene, names, activity = tested.scene, tested.scene.problem.plant.joints, tested.activity
+    rule = scene.problem.thresholds.discrepancy.residual_tests
+    own = [(one, size) for one, size in tested.kept if one.joint == j]
+    lacks = [np.einsum("fws,f->ws", one.torque, size) for one, size in own]
+    rms = float(np.sqrt((np.sum(lacks, axis=0) ** 2).mean())) if own else scene.evidence.implied(j)
+    loud = _is_loud(tested, j, rms)
+    real = bool(own) and rms > rule.least_torque * activity.typical[j]
+    p = [2 * norm.sf(one.verdict.z) * tested.library.count for one, _ in own]
+    p.append(float(norm.sf(tested.excess[j])) * len(names))
+    return JointLackOfFit(
+        joint=names[j],
+        p=float(min(1.0, *p)),
+        excess=float(tested.excess[j]),
+        functions=tuple((one.function, size) for one, size in own),
+        rms=rms,
+        typical=float(activity.typical[j]),
+        depends_on=_depends_on(tested, j, loud),
+        significant=bool(real or (loud and names[j] not in activity.still)),
+    )
+
+
+def _is_loud(tested: _Tested, j: int, rms: float) -> bool:
+    """Whether the torques that a joint lacks, `rms` [N m], are larger than noise and other integrators make them."""
+    rule, again = tested.scene.problem.thresholds.discrepancy.residual_tests, tested.confirmation
+    more = rms > rule.slight_torque * tested.activity.typical[j]
+    if not tested.excess[j] > (rule.excess_alone if again is None else rule.excess_fitted):
+        return False
+    if again is not None and not (again[j] > rule.excess_validation or _in_several(tested.scene, j, more)):
+        return False
+    return bool(more or tested.whole.significant)
+
+
+def _depends_on(tested: _Tested, j: int, loud: bool) -> tuple[str, ...]:
+    """Quantities of a joint's basis functions; if it is `loud` without any, of those that are nearest."""
+    on = dict.fromkeys(quantity for one, _ in tested.kept if one.joint == j for quantity in one.function.on)
+    if loud and not on:
+        on = dict.fromkeys(q for one in tested.sought.found if one.joint == j for q in one.function.on)
+    if loud and not on:
+        least = tested.scene.problem.thresholds.discrepancy.residual_tests.hint
+        hint = closest(tested.sought.evidence, tested.library, j, least)
+        return tuple(hint.function.on) if hint is not None else ()
+    return tuple(on)
+
+
+def in_whole(scene: Scene, validation: Scene | None) -> Whole:
     """Whether the windows are further off than noise makes them; never in contact, where whitening is not that sure."""
-    power, error = scene.power(_LOUDEST)
-    z, least = [(power - 1) / error], _WHOLE_ALONE
-    if judged is not None:
-        again, error = judged.power(_LOUDEST)
+    rule = scene.problem.thresholds.discrepancy.residual_tests
+    value, error = scene.reduced_chi_square(rule.loudest)
+    z, least = [(value - 1) / error], rule.whole_alone
+    if validation is not None:
+        again, error = validation.reduced_chi_square(rule.loudest)
         z.append((again - 1) / error)
-        least = _WHOLE[1]
+        least = rule.whole_both
     both = float(np.sum(z) / np.sqrt(len(z)))
-    return Whole(power, both, min(z) > _WHOLE[0] and both > least and not scene.problem.plant.floating)
+    return Whole(value, both, min(z) > rule.whole_each and both > least and not scene.problem.plant.floating)
 
 
-def _in_two(scene: Scene, joint: int, much: bool) -> bool:
-    """Whether a joint's power is too large in each of two rollouts: what one rollout shows may be an accident.
+def _in_several(scene: Scene, joint: int, much: bool) -> bool:
+    """Whether a joint's chi-square is too large in each of several rollouts: what one shows may be an accident.
 
     So may what a rollout's loudest windows show: where a foot tips, one of them holds more than all others. A base that
     cannot fall has no such accidents: there one rollout does that shows very much in many windows, if it is `much`.
     """
-    excess = [scene.quiet_excess(joint, _LOUDEST, [i]) for i in np.unique(scene.problem.windows.rollout)]
-    if much and not scene.problem.plant.floating and max(excess) > _LONE:
+    rule, rollouts = scene.problem.thresholds.discrepancy.residual_tests, np.unique(scene.problem.windows.rollout)
+    excess = [scene.quiet_excess(joint, rule.loudest, [i]) for i in rollouts]
+    if much and not scene.problem.plant.floating and max(excess) > rule.excess_one_rollout:
         return True
-    return sum(e > _POWER for e in excess) > 1
+    return sum(e > rule.excess_fitted for e in excess) >= rule.rollouts
 
 
-def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[Found, np.ndarray]]:
-    """The laws with their sizes, in the joint fit of all; each that the judging windows are better with.
+def confirmed(scene: Scene, sought: Sought, validation: Scene | None) -> list[tuple[Found, np.ndarray]]:
+    """The basis functions with their sizes, in the joint fit of all; each that the validation set is better with.
 
-    Where there are none, or none that meet it, each half of the fitted windows must be better with what the other says.
+    Where there is none, or none that meets it, each half of the fitted windows must be better with what the other says.
     """
+    rule = scene.problem.thresholds.discrepancy.residual_tests
     evidence, found = sought.evidence, sought.found
     sizes = solve(evidence.basis, evidence.inverse, scene.residual, evidence.weights)
     sizes = sizes[len(sizes) - sum(len(one.torque) for one in found) :]
-    kept, left, at = [], None if judged is None else judged.left.copy(), 0
+    kept, left, at = [], None if validation is None else validation.left.copy(), 0
     for one in found:
         size = sizes[at : at + len(one.torque)]
         at += len(one.torque)
-        if judged is None and not _repeats(scene, one):
+        if validation is None and not _repeats(scene, one):
             continue
-        if judged is not None:
-            moved = judged.evidence.column(one.joint, one.law.torque(judged.data, one.joint))
+        if validation is not None:
+            moved = validation.evidence.column(one.joint, one.function.torque(validation.data, one.joint))
             change = np.tensordot(size, moved, axes=1)
-            if not better(left, left - change) and ((change**2).sum() > _FELT or not _repeats(scene, one)):
+            if not better(left, left - change) and ((change**2).sum() > rule.met or not _repeats(scene, one)):
                 continue
             left = left - change
         kept.append((one, size))
@@ -182,14 +222,18 @@ def confirmed(scene: Scene, sought: Sought, judged: Scene | None) -> list[tuple[
 
 
 def _repeats(scene: Scene, one: Found) -> bool:
-    """Whether a law fitted to every other window pays on those between, both ways: what the judges never meet."""
+    """Whether a basis function fitted to every other window gains on those between, both ways.
+
+    That is for what the validation set never meets.
+    """
     evidence, torque = scene.evidence, one.torque
+    least = scene.problem.thresholds.discrepancy.residual_tests.half_gain
     own = np.einsum("fws,ws->wf", torque, evidence.score[one.joint])
-    normal = np.einsum("fws,wst,gwt->wfg", torque, evidence.power[one.joint], torque, optimize=True)
+    normal = np.einsum("fws,wst,gwt->wfg", torque, evidence.normal[one.joint], torque, optimize=True)
     halves = np.arange(len(own)) % 2 == 0
     for fitted in (halves, ~halves):
         size = np.linalg.lstsq(normal[fitted].sum(axis=0), own[fitted].sum(axis=0), rcond=None)[0]
         gain = 2 * size @ own[~fitted].sum(axis=0) - size @ normal[~fitted].sum(axis=0) @ size
-        if gain < _PAYS * max(evidence.spread, 1.0):
+        if gain < least * max(evidence.spread, 1.0):
             return False
     return True

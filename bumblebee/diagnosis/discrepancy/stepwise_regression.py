@@ -1,4 +1,4 @@
-"""Which laws the remaining torques follow: forward selection over all joints, each law tested given those before it."""
+"""Which basis functions the remaining torques follow: forward selection over all joints, each given those before."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,83 +7,79 @@ import numpy as np
 from scipy.stats import norm
 
 from bumblebee.diagnosis.discrepancy.regressors import Quantities
-from bumblebee.diagnosis.discrepancy.term_library import Law, all_laws
+from bumblebee.diagnosis.discrepancy.term_library import BasisFunction, basis_functions
 from bumblebee.diagnosis.discrepancy.torque_scores import Evidence, Verdict
 from bumblebee.diagnosis.residuals import Problem
-
-LEVEL = 0.002  # of a false law in a whole dataset, shared among all that are looked at
-_LEAST = 0.005  # share of the cost that a law must take away to be worth a word
-_PRICE = 3.0  # gain that a further coefficient must bring
-_TIE, _SHARE = 6.0, 0.03  # gains that differ by less, or by a smaller share, are the same
-_LOOK = 12  # best laws a step that are looked at more closely
-_SAME = 5  # of them of one kind of dependence
-_REFINED = 4  # of these, laws whose inner numbers are refined
-_RIVAL = 0.6  # share of the best law's gain
-_FINER = 9  # inner numbers tried around the best
+from bumblebee.diagnosis.thresholds.discrepancy import StepwiseRegression
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """One law on one joint."""
+    """One basis function on one joint."""
 
     joint: int
-    law: Law
+    function: BasisFunction
     torque: np.ndarray
     """(F, W, S) for coefficient 1."""
     verdict: Verdict
-    """Given the laws before it."""
+    """Given the basis functions before it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sought:
-    """The laws that were found, in their order, and what they leave."""
+    """The basis functions that were found, in their order, and what they leave."""
 
     found: list[Found]
     evidence: Evidence
     bound: float
-    """z that a law had to reach."""
+    """z that a basis function had to reach."""
     rivals: list[Found]
-    """Of the first law: others that explain much of what it does and depend on something else."""
+    """Of the first basis function: others that explain much of what it does and depend on something else."""
 
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """All laws of all joints with their torques on some windows."""
+    """All basis functions of all joints with their torques on some windows."""
 
     data: Quantities
-    laws: list[list[Law]]
+    functions: list[list[BasisFunction]]
     torque: list[np.ndarray]
-    """By joint: (E, W, S) of all laws' terms, one after the other, float32."""
+    """By joint: (E, W, S) of all basis functions' terms, one after the other, float32."""
     rows: list[list[slice]]
 
     @property
     def count(self) -> int:
-        """How many laws there are."""
-        return sum(len(laws) for laws in self.laws)
+        """How many basis functions there are."""
+        return sum(len(functions) for functions in self.functions)
 
 
 def library(data: Quantities, joints: Sequence[int]) -> Library:
-    """The laws of `joints` (indices), others get none."""
-    laws: list[list[Law]] = [[] for _ in data.joints]
+    """The basis functions of `joints` (indices), others get none."""
+    functions: list[list[BasisFunction]] = [[] for _ in data.joints]
     torque: list[np.ndarray] = [np.zeros((0, *data.path.mean(data.t).shape)) for _ in data.joints]
     rows: list[list[slice]] = [[] for _ in data.joints]
     for j in joints:
         kept, parts, at = [], [], 0
-        for law in all_laws(data, j):
-            part = law.torque(data, j)
+        for function in basis_functions(data, j):
+            part = function.torque(data, j)
             if np.isfinite(part).all():
-                kept.append(law)
+                kept.append(function)
                 parts.append(part.astype(np.float32))
                 rows[j].append(slice(at, at + len(part)))
                 at += len(part)
-        laws[j], torque[j] = kept, np.concatenate(parts)
-    return Library(data, laws, torque, rows)
+        functions[j], torque[j] = kept, np.concatenate(parts)
+    return Library(data, functions, torque, rows)
 
 
 def seek(problem: Problem, evidence: Evidence, residual: np.ndarray, columns: np.ndarray, some: Library,
-         most: int = 6) -> Sought:  # fmt: skip
-    """Laws that explain what `residual` (W, M) holds beside `columns` (F, W, M) of what was found before."""
-    bound = float(norm.isf(LEVEL / (2 * max(some.count, 1))))
+         most: int | None = None) -> Sought:  # fmt: skip
+    """Basis functions that explain what `residual` (W, M) holds conditional on `columns` (F, W, M) of what was found.
+
+    At most `most` of them; None for as many as the thresholds allow.
+    """
+    rule = problem.thresholds.discrepancy.stepwise_regression
+    most = rule.most if most is None else most
+    bound = float(norm.isf(rule.level / (2 * max(some.count, 1))))
     found: list[Found] = []
     rivals: list[Found] = []
     while len(found) < most:
@@ -93,9 +89,9 @@ def seek(problem: Problem, evidence: Evidence, residual: np.ndarray, columns: np
             seen = _seen(evidence.unweighted(problem, residual, columns), some, found, bound)
         if not seen:
             break
-        one = _simplest(seen)
+        one = _simplest(seen, rule)
         if not found:
-            rivals = _rivals(one, seen)
+            rivals = _rivals(one, seen, rule)
         found.append(one)
         columns = np.concatenate((columns, evidence.column(one.joint, one.torque)))
         evidence = evidence.with_columns(problem, residual, columns)
@@ -103,78 +99,82 @@ def seek(problem: Problem, evidence: Evidence, residual: np.ndarray, columns: np
 
 
 def _seen(evidence: Evidence, some: Library, found: Sequence[Found], bound: float) -> list[Found]:
-    """The laws that explain most for their coefficients and are beyond doubt."""
-    least = _LEAST * float((evidence.weights[:, None] * evidence.left**2).sum()) / max(evidence.spread, 1.0)
-    taken = {(f.joint, text) for f in found for text in f.law.texts}
-    best: list[tuple[float, int, Law]] = []
-    for j, laws in enumerate(some.laws):
-        if not laws:
+    """The basis functions that explain most for their coefficients and are beyond doubt."""
+    rule = some.data.thresholds.stepwise_regression
+    least = rule.least_share * float((evidence.weights[:, None] * evidence.left**2).sum()) / max(evidence.spread, 1.0)
+    taken = {(f.joint, text) for f in found for text in f.function.texts}
+    best: list[tuple[float, int, BasisFunction]] = []
+    for j, functions in enumerate(some.functions):
+        if not functions:
             continue
         worth = evidence.gains(j, some.torque[j], some.rows[j])
-        worth = worth - [_PRICE * len(law.texts) for law in laws]
+        worth = worth - [rule.coefficient_price * len(function.texts) for function in functions]
         kinds: dict[tuple[str, ...], int] = {}
         for k in np.argsort(-worth):
-            on = laws[k].on
-            if worth[k] <= 0 or kinds.get(on, 0) >= _SAME or sum(kinds.values()) >= _LOOK:
+            on = functions[k].on
+            if worth[k] <= 0 or kinds.get(on, 0) >= rule.of_one_kind or sum(kinds.values()) >= rule.looked_at:
                 continue
-            if (j, laws[k].texts[0]) not in taken:
+            if (j, functions[k].texts[0]) not in taken:
                 kinds[on] = kinds.get(on, 0) + 1
-                best.append((float(worth[k]), j, laws[k]))
+                best.append((float(worth[k]), j, functions[k]))
     best.sort(key=lambda b: -b[0])
     seen = [
-        (closer if k < _REFINED else _at)(evidence, some.data, j, law) for k, (_, j, law) in enumerate(best[:_LOOK])
+        (closer if k < rule.refined else _at)(evidence, some.data, j, function)
+        for k, (_, j, function) in enumerate(best[: rule.looked_at])
     ]
     return [f for f in seen if f.verdict.z >= bound and f.verdict.gain >= least]
 
 
-def _rivals(one: Found, seen: Sequence[Found]) -> list[Found]:
+def _rivals(one: Found, seen: Sequence[Found], rule: StepwiseRegression) -> list[Found]:
     """The best of every other kind of dependence on the same joint; a formula beside a table is one, too."""
-    kinds: dict[tuple[tuple[str, ...], bool], Found] = {(one.law.on, one.law.table): one}
-    for f in sorted(seen, key=_worth, reverse=True):
-        if f.joint == one.joint and _worth(f) > _RIVAL * _worth(one):
-            kinds.setdefault((f.law.on, f.law.table), f)
-    return list(kinds.values())[1:3]
+    kinds: dict[tuple[tuple[str, ...], bool], Found] = {(one.function.on, one.function.table): one}
+    for f in sorted(seen, key=lambda f: _worth(f, rule), reverse=True):
+        if f.joint == one.joint and _worth(f, rule) > rule.rival * _worth(one, rule):
+            kinds.setdefault((f.function.on, f.function.table), f)
+    return list(kinds.values())[1 : 1 + rule.rivals]
 
 
-def _simplest(seen: Sequence[Found]) -> Found:
+def _simplest(seen: Sequence[Found], rule: StepwiseRegression) -> Found:
     """The best; of several on its joint that do about the same, the simplest."""
-    top = max(seen, key=_worth)
-    near = [f for f in seen if f.joint == top.joint and _worth(f) > _worth(top) - max(_TIE, _SHARE * top.verdict.gain)]
-    return min(near, key=lambda f: (f.law.cost, -f.verdict.gain))
+    top = max(seen, key=lambda f: _worth(f, rule))
+    least = _worth(top, rule) - max(rule.tie, rule.tie_share * top.verdict.gain)
+    near = [f for f in seen if f.joint == top.joint and _worth(f, rule) > least]
+    return min(near, key=lambda f: (f.function.cost, -f.verdict.gain))
 
 
 def closest(evidence: Evidence, some: Library, joint: int, least: float) -> Found | None:
-    """The law that explains most on one joint, however little, if its z reaches `least`."""
-    if not some.laws[joint]:
+    """The basis function that explains most on one joint, however little, if its z reaches `least`."""
+    if not some.functions[joint]:
         return None
+    rule = some.data.thresholds.stepwise_regression
     worth = evidence.gains(joint, some.torque[joint], some.rows[joint])
-    worth = worth - [_PRICE * len(law.texts) for law in some.laws[joint]]
-    top = [_at(evidence, some.data, joint, some.laws[joint][k]) for k in np.argsort(-worth)[:_LOOK]]
-    return max((f for f in top if f.verdict.z >= least), key=_worth, default=None)
+    worth = worth - [rule.coefficient_price * len(function.texts) for function in some.functions[joint]]
+    top = [_at(evidence, some.data, joint, some.functions[joint][k]) for k in np.argsort(-worth)[: rule.looked_at]]
+    return max((f for f in top if f.verdict.z >= least), key=lambda f: _worth(f, rule), default=None)
 
 
-def _worth(found: Found) -> float:
-    return found.verdict.gain - _PRICE * len(found.law.texts)
+def _worth(found: Found, rule: StepwiseRegression) -> float:
+    return found.verdict.gain - rule.coefficient_price * len(found.function.texts)
 
 
-def closer(evidence: Evidence, data: Quantities, joint: int, law: Law) -> Found:
-    """The law at its best inner number; a whole number where that is as good."""
-    best = _at(evidence, data, joint, law)
-    if law.family is None:
+def closer(evidence: Evidence, data: Quantities, joint: int, function: BasisFunction) -> Found:
+    """The basis function at its best inner number; a whole number where that is as good."""
+    best, rule = _at(evidence, data, joint, function), data.thresholds.stepwise_regression
+    if function.family is None:
         return best
-    reach = law.reach
-    for _ in range(2):
-        for at in best.law.at + reach * np.linspace(-1, 1, _FINER):
-            if at > 0 or law.at <= 0:
-                best = max(best, _at(evidence, data, joint, law.moved(float(at))), key=lambda f: f.verdict.gain)
-        reach /= 4
-    if law.at >= 1 and law.at == round(law.at):
-        whole = _at(evidence, data, joint, law.moved(float(max(round(best.law.at), 1))))
-        if whole.verdict.gain > best.verdict.gain - _TIE:
+    reach = function.reach
+    for _ in range(rule.refinement_rounds):
+        for at in best.function.at + reach * np.linspace(-1, 1, rule.refinement):
+            if at > 0 or function.at <= 0:
+                best = max(best, _at(evidence, data, joint, function.moved(float(at))), key=lambda f: f.verdict.gain)
+        reach /= rule.narrowing
+    if function.at >= 1 and function.at == round(function.at):
+        whole = _at(evidence, data, joint, function.moved(float(max(round(best.function.at), 1))))
+        if whole.verdict.gain > best.verdict.gain - rule.tie:
             return whole
     return best
 
 
-def _at(evidence: Evidence, data: Quantities, joint: int, law: Law) -> Found:
-    torque = law.torque(data, joint)
-    return Found(joint, law, torque, evidence.test(joint, torque))
+def _at(evidence: Evidence, data: Quantities, joint: int, function: BasisFunction) -> Found:
+    torque = function.torque(data, joint)
+    return Found(joint, function, torque, evidence.test(joint, torque))

@@ -1,6 +1,6 @@
-"""The laws that a missing torque is looked for in: terms of `sim.effect_terms` that belong together, simplest first.
+"""The basis functions of a missing torque: terms of `sim.effect_terms` that belong together, simplest first.
 
-Some of them are names of the catalogue in other words (dry and viscous friction, springs, one harmonic of cogging,
+Some of them are effects of the catalogue in other words (dry and viscous friction, springs, one harmonic of cogging,
 gains ...). They compete with the others, so that what the search did not accept is not taken for something new, but no
 discovered effect is made of them alone.
 """
@@ -12,32 +12,30 @@ from dataclasses import dataclass
 import numpy as np
 
 from bumblebee.diagnosis.discrepancy.regressors import Quantities
+from bumblebee.diagnosis.thresholds.discrepancy import TermLibrary
 from bumblebee.sim.effect_terms import Term, read_term
 
 QUANTITIES = ("position", "velocity", "target", "torque", "time", "history")
 _POSITION, _VELOCITY, _TARGET, _TORQUE, _TIME, _HISTORY = ((name,) for name in QUANTITIES)
-_COGS = (*range(1, 31), 32, 36, 40, 42, 48, 56, 60, 64, 72, 84, 96)
-_RATE = 12.0  # [Hz]: the fastest beat that is looked for
-_FINEST = 250  # steps of a rounded target over its range
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
+class BasisFunction:
     """Terms whose coefficients are found together."""
 
     texts: tuple[str, ...]
     on: tuple[str, ...]
     """Quantities that it depends on: of `QUANTITIES`, or "another joint (NAME)"."""
     cost: int
-    """Complexity: of laws that explain nearly the same the cheapest is named."""
-    known: str = ""
-    """The catalogue's name for it, if it has one."""
+    """Complexity: of basis functions that explain nearly the same the cheapest is named."""
+    effect: str = ""
+    """The catalogue's effect that it is, if any."""
     at: float = 0.0
     """Its inner number (a frequency, an edge), where it has one; else 0."""
     family: Callable[[float], tuple[str, ...]] | None = None
     """Texts for another inner number."""
     reach: float = 0.0
-    """How far the inner number may move before the next law of its kind is nearer."""
+    """How far the inner number may move before the next basis function of its kind is nearer."""
 
     @property
     def terms(self) -> list[Term]:
@@ -53,10 +51,10 @@ class Law:
         """(F, W, S) mean torques for coefficient 1."""
         return np.stack([data.torque(term, joint) for term in self.terms])
 
-    def moved(self, at: float) -> "Law":
-        """The same law with another inner number."""
+    def moved(self, at: float) -> "BasisFunction":
+        """The same basis function with another inner number."""
         assert self.family is not None
-        return Law(self.family(at), self.on, self.cost, self.known, at, self.family, self.reach)
+        return BasisFunction(self.family(at), self.on, self.cost, self.effect, at, self.family, self.reach)
 
 
 def other_joint(name: str) -> str:
@@ -64,123 +62,136 @@ def other_joint(name: str) -> str:
     return f"another joint ({name})"
 
 
-def all_laws(data: Quantities, joint: int) -> list[Law]:
-    """Laws for a joint (an index), whose numbers follow from the data."""
+def basis_functions(data: Quantities, joint: int) -> list[BasisFunction]:
+    """Basis functions for a joint (an index), whose numbers follow from the data."""
     found = [*_catalogue(data, joint), *_friction(data, joint), *_position(data, joint), *_velocity()]
     found += [*_target(data, joint), *_torque(data, joint), *_time(data, joint), *_others(data, joint)]
     return found + list(_tables(data, joint))
 
 
-def _catalogue(data: Quantities, j: int) -> Iterator[Law]:
-    """What names of the catalogue look like on one joint."""
+def _catalogue(data: Quantities, j: int) -> Iterator[BasisFunction]:
+    """What effects of the catalogue look like on one joint."""
+    rule = data.thresholds.term_library
     speed, travel = _rms(data.v[..., j]), float(np.ptp(data.q[..., j]))
-    yield Law(("friction(1)",), _VELOCITY, 1, "coulomb_friction")
-    yield Law(("v",), _VELOCITY, 1, "viscous_friction")
-    yield Law(("1",), (), 1, "joint_spring")
-    yield Law(("q", "1"), _POSITION, 1, "joint_spring")
-    yield Law(("t*tau",), _TIME, 2, "strength_drift")
-    for share in (0.1, 0.3, 1.0):
-        yield Law((f"friction(exp(-(v/{share * speed:.3g})^2))",), _VELOCITY, 2, "stribeck_friction")
-    for n in _COGS:
-        if n * travel > 0.5 * np.pi:
-            step = 0.5 / travel
-            yield Law(_waves("{}")(n), _POSITION, 2, "cogging", float(n), _waves("{}"), step)
+    yield BasisFunction(("friction(1)",), _VELOCITY, 1, "coulomb_friction")
+    yield BasisFunction(("v",), _VELOCITY, 1, "viscous_friction")
+    yield BasisFunction(("1",), (), 1, "joint_spring")
+    yield BasisFunction(("q", "1"), _POSITION, 1, "joint_spring")
+    yield BasisFunction(("t*tau",), _TIME, 2, "strength_drift")
+    for share in rule.stribeck_speeds:
+        yield BasisFunction((f"friction(exp(-(v/{share * speed:.3g})^2))",), _VELOCITY, 2, "stribeck_friction")
+    for n in rule.cogging_harmonics:
+        if n * travel > rule.cogging_travel * np.pi:
+            step = rule.harmonic_reach / travel
+            yield BasisFunction(_waves("{}")(n), _POSITION, 2, "cogging", float(n), _waves("{}"), step)
     if np.ptp(data.tau[..., j]) > 0:
-        yield Law(("tau",), _TORQUE, 1, "motor_strength")
-        yield Law(("u - q",), _TARGET, 1, "kp")
-        yield Law(("friction(abs(tau))",), _TORQUE, 2, "load_dependent_friction")
-        for share in (0.3, 0.5, 0.7, 0.85, 0.95):
+        yield BasisFunction(("tau",), _TORQUE, 1, "motor_strength")
+        yield BasisFunction(("u - q",), _TARGET, 1, "kp")
+        yield BasisFunction(("friction(abs(tau))",), _TORQUE, 2, "load_dependent_friction")
+        for share in rule.saturation_quantiles:
             edge = f"{np.quantile(np.abs(data.tau[..., j]), share):.4g}"
-            yield Law((f"relu(tau - {edge}) - relu(-tau - {edge})",), _TORQUE, 2, "torque_limit")
+            yield BasisFunction((f"relu(tau - {edge}) - relu(-tau - {edge})",), _TORQUE, 2, "torque_limit")
 
 
-def _friction(data: Quantities, j: int) -> Iterator[Law]:
-    travel = float(np.ptp(data.q[..., j]))
-    yield Law(("friction(q)",), _POSITION, 3)
-    yield Law(("friction(q)", "friction(q^2)"), _POSITION, 4)
-    for n in range(1, 13):
-        if n * travel > 1.5:
-            yield Law(_waves("friction({})")(n), _POSITION, 3, "", float(n), _waves("friction({})"), 0.5)
-    yield Law(("friction(t)",), _TIME, 3)
-    for time in (0.1, 0.3, 1.0):
-        for way in (0.005, 0.02, 0.08):
+def _friction(data: Quantities, j: int) -> Iterator[BasisFunction]:
+    rule, travel = data.thresholds.term_library, float(np.ptp(data.q[..., j]))
+    yield BasisFunction(("friction(q)",), _POSITION, 3)
+    yield BasisFunction(("friction(q)", "friction(q^2)"), _POSITION, 4)
+    for n in range(1, rule.friction_harmonics + 1):
+        if n * travel > rule.friction_travel:
+            yield BasisFunction(
+                _waves("friction({})")(n), _POSITION, 3, "", float(n), _waves("friction({})"), rule.friction_reach
+            )
+    yield BasisFunction(("friction(t)",), _TIME, 3)
+    for time in rule.rest_times:
+        for way in rule.rest_ways:
             yield _rest(time, way)
 
 
-def _rest(time: float, way: float) -> Law:
-    return Law((f"friction(rested({time:.3g}, {way:.3g}))",), _HISTORY, 3)
+def _rest(time: float, way: float) -> BasisFunction:
+    return BasisFunction((f"friction(rested({time:.3g}, {way:.3g}))",), _HISTORY, 3)
 
 
-def beside(law: Law) -> list[Law]:
-    """Laws with other inner numbers next to those of a law that has two; [] for others.
+def neighbours(function: BasisFunction, rule: TermLibrary) -> list[BasisFunction]:
+    """Basis functions with other inner numbers next to those of a basis function that has two; [] for others.
 
     Friction that holds a joint is far from linear: which of them is best, only the simulator tells.
     """
-    found = re.fullmatch(r"friction\(rested\(([^,]+), ([^)]+)\)\)", law.texts[0])
+    found = re.fullmatch(r"friction\(rested\(([^,]+), ([^)]+)\)\)", function.texts[0])
     if found is None:
         return []
     time, way = float(found[1]), float(found[2])
-    return [_rest(time * f, way * g) for f, g in ((3.0, 1.0), (1 / 3.0, 1.0), (1.0, 4.0), (1.0, 0.25))]
+    longer, further = rule.rest_time_ratio, rule.rest_way_ratio
+    ratios = ((longer, 1.0), (1 / longer, 1.0), (1.0, further), (1.0, 1 / further))
+    return [_rest(time * f, way * g) for f, g in ratios]
 
 
-def _position(data: Quantities, j: int) -> Iterator[Law]:
-    yield Law(("q^2",), _POSITION, 2)
-    yield Law(("q^3",), _POSITION, 2)
-    yield Law(("q^2", "q^3"), _POSITION, 4)
-    edges = np.quantile(data.q[..., j], np.linspace(0.08, 0.92, 10))
+def _position(data: Quantities, j: int) -> Iterator[BasisFunction]:
+    yield BasisFunction(("q^2",), _POSITION, 2)
+    yield BasisFunction(("q^3",), _POSITION, 2)
+    yield BasisFunction(("q^2", "q^3"), _POSITION, 4)
+    rule = data.thresholds.term_library
+    edges = np.quantile(data.q[..., j], np.linspace(*rule.edge_quantiles, rule.edges))
     for edge in edges:
         for make in (_above, _below):
-            yield Law(make(edge), _POSITION, 2, "", float(edge), make, float(np.ptp(edges) / 9))
+            yield BasisFunction(
+                make(edge), _POSITION, 2, "", float(edge), make, float(np.ptp(edges) / (rule.edges - 1))
+            )
 
 
-def _velocity() -> Iterator[Law]:
-    yield Law(("v*abs(v)",), _VELOCITY, 2)
-    yield Law(("v^3",), _VELOCITY, 3)
-    yield Law(("q*v",), (*_VELOCITY, *_POSITION), 3)
-    yield Law(("q^2*v",), (*_VELOCITY, *_POSITION), 4)
+def _velocity() -> Iterator[BasisFunction]:
+    yield BasisFunction(("v*abs(v)",), _VELOCITY, 2)
+    yield BasisFunction(("v^3",), _VELOCITY, 3)
+    yield BasisFunction(("q*v",), (*_VELOCITY, *_POSITION), 3)
+    yield BasisFunction(("q^2*v",), (*_VELOCITY, *_POSITION), 4)
 
 
-def _target(data: Quantities, j: int) -> Iterator[Law]:
+def _target(data: Quantities, j: int) -> Iterator[BasisFunction]:
     """Dead bands, and targets that arrive in steps."""
-    u, tau = data.u[..., j], data.tau[..., j]
+    rule, u, tau = data.thresholds.term_library, data.u[..., j], data.tau[..., j]
     if np.ptp(u) == 0 or np.array_equal(u, tau):
         return
     error = np.abs(u - data.q[..., j])
-    for band in np.quantile(error, 0.98) * np.geomspace(0.03, 0.9, 14):
-        yield Law(_bound(band), _TARGET, 2, "", float(band), _bound, 0.25 * float(band))
-    yield Law(("(u - q)^3",), _TARGET, 3)
+    for band in np.quantile(error, rule.dead_band_quantile) * np.geomspace(*rule.dead_bands):
+        yield BasisFunction(_bound(band), _TARGET, 2, "", float(band), _bound, rule.dead_band_reach * float(band))
+    yield BasisFunction(("(u - q)^3",), _TARGET, 3)
     moves = np.abs(np.diff(u, axis=1)) / data.tick
-    for rate in np.geomspace(0.05, 0.97, 24) * float(moves.max()):
+    for rate in np.geomspace(*rule.slew_rates) * float(moves.max()):
         make = _slewed(data.tick)
-        yield Law(make(rate), (*_TARGET, *_HISTORY), 2, "", float(rate), make, 0.07 * float(rate))
+        yield BasisFunction(make(rate), (*_TARGET, *_HISTORY), 2, "", float(rate), make, rule.slew_reach * float(rate))
     span = float(np.ptp(u))
-    for steps in np.arange(2.0, _FINEST, 0.4):
+    for steps in np.arange(rule.least_target_steps, rule.most_target_steps, rule.target_steps_apart):
         size = span / steps
-        if size > 1e-3:
-            yield Law(_stair(size), _TARGET, 3, "", size, _stair, 0.4 * size / steps)
+        if size > rule.least_target_step:
+            yield BasisFunction(_stair(size), _TARGET, 3, "", size, _stair, rule.target_steps_apart * size / steps)
 
 
-def _torque(data: Quantities, j: int) -> Iterator[Law]:
+def _torque(data: Quantities, j: int) -> Iterator[BasisFunction]:
     if np.ptp(data.tau[..., j]) > 0:
-        yield Law(("tau*abs(tau)",), _TORQUE, 3)
-        yield Law(("abs(tau)",), _TORQUE, 3)
-        yield Law(("tau*abs(v)",), (*_TORQUE, *_VELOCITY), 4)
+        yield BasisFunction(("tau*abs(tau)",), _TORQUE, 3)
+        yield BasisFunction(("abs(tau)",), _TORQUE, 3)
+        yield BasisFunction(("tau*abs(v)",), (*_TORQUE, *_VELOCITY), 4)
 
 
-def _time(data: Quantities, j: int) -> Iterator[Law]:
+def _time(data: Quantities, j: int) -> Iterator[BasisFunction]:
     """Beats in time, by themselves or of the drive's strength."""
-    span = float(np.ptp(data.t))
-    step = 0.5 / max(span, 1e-6)
-    yield Law(("t", "1"), _TIME, 2)
-    for kind, fastest in (("{}", _RATE), ("tau*{}", 3.0), ("friction({})", 1.0)):
+    rule, span = data.thresholds.term_library, float(np.ptp(data.t))
+    step = rule.beat_step / max(span, 1e-6)
+    yield BasisFunction(("t", "1"), _TIME, 2)
+    beats = (
+        ("{}", rule.fastest_beat),
+        ("tau*{}", rule.fastest_strength_beat),
+        ("friction({})", rule.fastest_friction_beat),
+    )
+    for kind, fastest in beats:
         if "tau" in kind and np.ptp(data.tau[..., j]) == 0:
             continue
         for hertz in np.arange(step, fastest, step):
             rate = 2 * np.pi * float(hertz)
-            yield Law(_beats(kind)(rate), _TIME, 3, "", rate, _beats(kind), np.pi * step)
+            yield BasisFunction(_beats(kind)(rate), _TIME, 3, "", rate, _beats(kind), np.pi * step)
 
 
-def _others(data: Quantities, j: int) -> Iterator[Law]:
+def _others(data: Quantities, j: int) -> Iterator[BasisFunction]:
     for name in data.joints:
         if name == data.joints[j]:
             continue
@@ -193,37 +204,40 @@ def _others(data: Quantities, j: int) -> Iterator[Law]:
             ("v[{}]*abs(v[{}])", 3),
             ("q*q[{}]", 4),
         ):
-            yield Law((text.format(other, other),), on, cost)
-        yield Law((f"sin(q[{other}])", f"cos(q[{other}])"), on, 4)
-        yield Law((f"friction(abs(v[{other}]))",), on, 4)
+            yield BasisFunction((text.format(other, other),), on, cost)
+        yield BasisFunction((f"sin(q[{other}])", f"cos(q[{other}])"), on, 4)
+        yield BasisFunction((f"friction(abs(v[{other}]))",), on, 4)
 
 
-def _tables(data: Quantities, j: int) -> Iterator[Law]:
+def _tables(data: Quantities, j: int) -> Iterator[BasisFunction]:
     """Heights over one quantity, straight between knots."""
+    rule = data.thresholds.term_library
     u, tau, own = data.u[..., j], data.tau[..., j], {"q": _POSITION, "v": _VELOCITY}
     if np.ptp(tau) > 0:
         own |= {"tau": _TORQUE} | ({} if np.array_equal(u, tau) else {"u - q": _TARGET})
     for name, on in own.items():
-        yield _table(data, j, name, "{}", 11, on, 8)
-    yield _table(data, j, "t", "{}", 11, _TIME, 8)
-    yield _table(data, j, "q", "friction({})", 7, _POSITION, 8)
+        yield _table(data, j, name, "{}", rule.table_knots, on, 8)
+    yield _table(data, j, "t", "{}", rule.table_knots, _TIME, 8)
+    yield _table(data, j, "q", "friction({})", rule.friction_knots, _POSITION, 8)
     if np.ptp(tau) > 0:
-        yield _table(data, j, "t", "tau*{}", 9, _TIME, 8)
+        yield _table(data, j, "t", "tau*{}", rule.strength_knots, _TIME, 8)
     for name in data.joints:
         if name != data.joints[j]:
             other = name if name.isidentifier() else repr(name)
             for what in ("q", "v"):
-                yield _table(data, j, f"{what}[{other}]", "{}", 6, (other_joint(name),), 9)
+                yield _table(data, j, f"{what}[{other}]", "{}", rule.coupling_knots, (other_joint(name),), 9)
 
 
-def _table(data: Quantities, j: int, name: str, frame: str, count: int, on: tuple[str, ...], cost: int) -> Law:
-    x = read_term(name)(data.values(j))
-    knots = [float(f"{k:.5g}") for k in np.unique(np.quantile(x, np.linspace(0.02, 0.98, count)))]
+def _table(
+    data: Quantities, j: int, name: str, frame: str, count: int, on: tuple[str, ...], cost: int
+) -> BasisFunction:
+    rule, x = data.thresholds.term_library, read_term(name)(data.values(j))
+    knots = [float(f"{k:.5g}") for k in np.unique(np.quantile(x, np.linspace(*rule.table_quantiles, count)))]
     knots = sorted(set(knots))
-    if len(knots) < 3:
+    if len(knots) < rule.fewest_knots:
         knots = [float(x.min()), float(x.mean()), float(x.max()) + 1e-6]
     rows = [[float(k == i) for k in range(len(knots))] for i in range(len(knots))]
-    return Law(tuple(frame.format(_curve(name, knots, row)) for row in rows), on, cost)
+    return BasisFunction(tuple(frame.format(_curve(name, knots, row)) for row in rows), on, cost)
 
 
 def _curve(name: str, knots: list[float], heights: list[float]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import norm
 
 from bumblebee.diagnosis.candidates import Formula
-from bumblebee.diagnosis.discrepancy import Discovery, JointRemains, Law, quantities_of
+from bumblebee.diagnosis.discrepancy import BasisFunction, Discovery, JointLackOfFit, quantities_of
 from bumblebee.diagnosis.simulation import joint_units
 from bumblebee.diagnosis.thresholds.report import MeasuredCurve, Unexplained
 
@@ -50,7 +50,7 @@ def unexplained(found: Discovery, rule: Unexplained) -> dict[str, Any]:
     p = min((j.p for j in found.left.joints), default=1.0)
     said = _described(left, found.unconfirmed, joint_units(found.problem.plant), rule.joints)
     if whole.significant and not left:
-        said = _NOWHERE.format(whole.power)
+        said = _NOWHERE.format(whole.reduced_chi_square)
     return {
         "significant": bool(left) or whole.significant,
         "p": min(p, float(norm.sf(whole.z))) if whole.significant else p,
@@ -60,13 +60,13 @@ def unexplained(found: Discovery, rule: Unexplained) -> dict[str, Any]:
     }
 
 
-def _depends_on(left: JointRemains, forms: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
+def _depends_on(left: JointLackOfFit, forms: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
     """Quantities of a form that was not kept (it was sought without the joint's names, too), and of what is left."""
     return tuple(dict.fromkeys((*quantities_of(tuple(forms.get(left.joint, ()))), *left.depends_on)))
 
 
 def _described(
-    left: Sequence[JointRemains],
+    left: Sequence[JointLackOfFit],
     forms: Mapping[str, Mapping[str, float]],
     units: Mapping[str, Mapping[str, str]],
     most: int,
@@ -76,7 +76,7 @@ def _described(
     for j in left[:most]:
         on = ", ".join(_depends_on(j, forms)) or "no single quantity"
         line = f"{j.joint}: torques that depend on {on}"
-        if j.laws:
+        if j.functions:
             share = 100 * j.rms / max(j.typical, 1e-12)
             unit = units[j.joint]["torque"]
             what = "force" if unit == "N" else "torque"
@@ -101,15 +101,15 @@ def structure_table(found: Discovery, rule: MeasuredCurve) -> dict[str, dict[str
             "torque_rms": j.rms,
             "typical_torque": j.typical,
             "depends_on": list(j.depends_on),
-            "laws": [_law(law, size) for law, size in j.laws],
+            "laws": [_law(function, size) for function, size in j.functions],
         }
         | ({"curves": _curves(found, index, rule)} if j.significant else {})
         for index, j in enumerate(found.left.joints)
     }
 
 
-def _law(law: Law, size: np.ndarray) -> list[dict[str, Any]]:
-    return [{"term": t, "coefficient": float(s)} for t, s in zip(law.texts, size, strict=True)]
+def _law(function: BasisFunction, size: np.ndarray) -> list[dict[str, Any]]:
+    return [{"term": t, "coefficient": float(s)} for t, s in zip(function.texts, size, strict=True)]
 
 
 def _curves(found: Discovery, joint: int, rule: MeasuredCurve) -> dict[str, list[list[float]]]:

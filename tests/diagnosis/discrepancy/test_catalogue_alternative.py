@@ -1,4 +1,4 @@
-"""The catalogue goes before forms: a name takes a form's place unless the form is clearly better where it is judged."""
+"""The catalogue comes first: its effects are swapped in unless the discrepancy model is clearly better elsewhere."""
 
 import numpy as np
 import pytest
@@ -8,9 +8,10 @@ from bumblebee.diagnosis.candidates.formula import formula
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.information_criterion import criterion, numbers
 from bumblebee.diagnosis.comparison.submodel import refitted
-from bumblebee.diagnosis.discrepancy.catalogue_alternative import Offers, named_instead
+from bumblebee.diagnosis.discrepancy.catalogue_alternative import Offers, catalogue_swap
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.thresholds.discrepancy import CatalogueAlternative
 from tests.diagnosis.discrepancy.test_discover import prepared
 
 COULOMB = Candidate("coulomb_friction", "pole", (0.0,), (0.02,))
@@ -21,15 +22,15 @@ TABLE = "curve(v, -2, 1, -0.05, 1, 0.05, -1, 2, -1)"
 
 
 def taking(terms: dict[str, float], **truth: float | tuple[float, float]) -> Fit | None:
-    """What takes the place of a form on the pole, nothing having been found before it."""
+    """What is swapped in for a discrepancy model on the pole, nothing having been found before it."""
     _, problem, judge = prepared(**truth)
     nothing = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     form = refitted(problem, (formula("pole", terms),), np.array(list(terms.values())))
     assert criterion(problem, form) > criterion(problem, nothing)
-    return named_instead(problem, Holdout(judge), nothing, form, "pole", OFFERS)
+    return catalogue_swap(problem, Holdout(judge), nothing, form, "pole", OFFERS)
 
 
-def test_a_name_takes_the_place_of_a_table_that_follows_its_law() -> None:
+def test_a_catalogue_effect_is_swapped_in_for_a_table_that_follows_it() -> None:
     named = taking({TABLE: 0.05}, friction=(0.0, 0.05))
     assert named is not None
     assert [c.effect for c in named.chosen] == ["coulomb_friction"]
@@ -37,17 +38,17 @@ def test_a_name_takes_the_place_of_a_table_that_follows_its_law() -> None:
 
 
 @pytest.mark.parametrize(("terms", "truth"), [({"q^3": -0.6}, {"cubic": 0.6}), ({"v*abs(v)": -0.05}, {"drag": 0.05})])
-def test_no_name_takes_the_place_of_a_law_that_the_catalogue_lacks(
+def test_nothing_is_swapped_in_for_a_basis_function_that_the_catalogue_lacks(
     terms: dict[str, float], truth: dict[str, float]
 ) -> None:
     assert taking(terms, **truth) is None
 
 
-def test_without_offers_nothing_takes_a_forms_place() -> None:
+def test_without_offers_nothing_is_swapped_in() -> None:
     _, problem, judge = prepared(friction=(0.0, 0.05))
     nothing = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     form = refitted(problem, (formula("pole", {TABLE: 0.05}),), np.array([0.05]))
-    assert named_instead(problem, Holdout(judge), nothing, form, "pole", Offers()) is None
+    assert catalogue_swap(problem, Holdout(judge), nothing, form, "pole", Offers()) is None
 
 
 def test_an_offer_acts_on_the_joint_on_what_it_carries_or_on_all_or_is_among_the_best() -> None:
@@ -55,9 +56,9 @@ def test_an_offer_acts_on_the_joint_on_what_it_carries_or_on_all_or_is_among_the
     places = ("pole", "cart", "cart", "pole", "")
     kinds = ("armature", "armature", "viscous_friction", "link_mass", "command_delay")
     offers = Offers([Candidate(k, w, (0.0,), (0.1,)) for k, w in zip(kinds, places, strict=True)])
-    on_pole = [(c.effect, c.where) for c in offers.on(problem.plant, "pole")]
+    on_pole = [(c.effect, c.where) for c in offers.on(problem.plant, "pole", CatalogueAlternative())]
     assert on_pole == [("armature", "pole"), ("armature", "cart"), ("link_mass", "pole"), ("command_delay", "")]
-    assert len(offers.on(problem.plant, "cart")) == 5
+    assert len(offers.on(problem.plant, "cart", CatalogueAlternative())) == 5
 
 
 @pytest.mark.parametrize(

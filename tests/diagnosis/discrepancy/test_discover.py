@@ -11,10 +11,12 @@ from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.discrepancy.catalogue_terms import quantities_of, related, stiffer_than_the_drive
 from bumblebee.diagnosis.discrepancy.discover import Discovery, discover
+from bumblebee.diagnosis.discrepancy.residual_tests import JointActivity
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.report.discrepancy_entries import discovered_entry, structure_table, unexplained
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.diagnosis.thresholds.discrepancy import CatalogueTerms
 from tests.diagnosis import arm, cart
 
 
@@ -35,7 +37,8 @@ def discovered(chosen: tuple[Candidate, ...] = (), **truth: float) -> Discovery:
     ones = np.ones(len(problem.windows))
     start = np.concatenate([c.start for c in chosen]) if chosen else []
     fit = gauss_newton(problem, chosen, start, window_weights(gauss_newton(problem, (), (), ones).clean(problem)))
-    return discover(problem, Holdout(judge), fit, scales_of(session.plant, session.rollouts).torque)
+    activity = JointActivity(scales_of(session.plant, session.rollouts).torque)
+    return discover(problem, Holdout(judge), fit, activity)
 
 
 def test_a_cubic_spring_is_found_with_its_form_and_size() -> None:
@@ -111,6 +114,6 @@ def test_a_target_changed_on_its_way_cannot_push_harder_than_the_servo() -> None
     rollouts = arm.simulate({}, count=1, seconds=1.0)
     plant = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory").plant
     late = formula("j2", {"slewed(0.5, 0.02) - u": 60.0})
-    assert not stiffer_than_the_drive(plant, late, np.array([60.0]))
-    assert stiffer_than_the_drive(plant, late, np.array([-600.0]))
-    assert not stiffer_than_the_drive(plant, formula("j2", {"q^3": 600.0}), np.array([600.0]))
+    assert not stiffer_than_the_drive(plant, late, np.array([60.0]), CatalogueTerms())
+    assert stiffer_than_the_drive(plant, late, np.array([-600.0]), CatalogueTerms())
+    assert not stiffer_than_the_drive(plant, formula("j2", {"q^3": 600.0}), np.array([600.0]), CatalogueTerms())

@@ -1,4 +1,4 @@
-"""Evidence on missing torques: sizes and gains as a fit would find them, laws whose text and torque are the same."""
+"""Evidence on missing torques: sizes and gains as a fit finds them, functions whose text and torque are the same."""
 
 from dataclasses import replace
 
@@ -8,13 +8,14 @@ import pytest
 from bumblebee.diagnosis.candidates.signal_scales import scales_of
 from bumblebee.diagnosis.comparison.paired_tests import better
 from bumblebee.diagnosis.discrepancy.missing_torque import Scene, fitted_scene
-from bumblebee.diagnosis.discrepancy.residual_tests import in_whole, remains
+from bumblebee.diagnosis.discrepancy.residual_tests import JointActivity, in_whole, lack_of_fit
 from bumblebee.diagnosis.discrepancy.stepwise_regression import library, seek
-from bumblebee.diagnosis.discrepancy.term_library import Law, all_laws, beside, joined
+from bumblebee.diagnosis.discrepancy.term_library import BasisFunction, basis_functions, joined, neighbours
 from bumblebee.diagnosis.discrepancy.torque_scores import Evidence
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.estimation.least_squares import cost_of
 from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.thresholds.discrepancy import TermLibrary
 from bumblebee.sim.effect_terms import read_term
 from tests.diagnosis.discrepancy.test_discover import prepared
 
@@ -45,16 +46,16 @@ def test_a_planted_torque_comes_back_with_its_size() -> None:
     assert verdict.z > 10
 
 
-def test_power_that_two_windows_hold_is_gone_with_them() -> None:
+def test_a_chi_square_that_two_windows_hold_is_gone_with_them() -> None:
     problem, scene = null()
     torque = np.zeros((1, *scene.evidence.score.shape[1:]))
     torque[0, [3, 7]] = 5.0
     residual = scene.residual + scene.evidence.column(1, torque)[0]
     evidence = scene.evidence.with_columns(problem, residual, scene.columns)
-    (loud, count), (rest, fewer) = evidence.free(1), evidence.free(1, spared=2)
+    (loud, count), (rest, fewer) = evidence.chi_square(1), evidence.chi_square(1, spared=2)
     assert (loud - count) / np.sqrt(2 * count) > 10 > 4 > (rest - fewer) / np.sqrt(2 * fewer)
     assert fewer < count
-    assert evidence.free(1, spared=len(problem.windows) + 1) == (0.0, 0)
+    assert evidence.chi_square(1, spared=len(problem.windows) + 1) == (0.0, 0)
 
 
 def test_on_a_base_that_can_fall_the_loudest_windows_of_a_rollout_are_no_structure(
@@ -71,9 +72,9 @@ def test_on_a_base_that_can_fall_the_loudest_windows_of_a_rollout_are_no_structu
     assert loud.excess()[1] > 10 > 4 > loud.excess(2)[1]
     fit = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     monkeypatch.setattr("bumblebee.diagnosis.discrepancy.residual_tests.fitted_scene", lambda *_: loud)
-    assert remains(problem, None, fit, scene.torque).joints[1].significant
+    assert lack_of_fit(problem, None, fit, JointActivity(scene.torque)).joints[1].significant
     may_fall = replace(problem, plant=replace(problem.plant, floating=True))
-    assert not remains(may_fall, None, fit, scene.torque).joints[1].significant
+    assert not lack_of_fit(may_fall, None, fit, JointActivity(scene.torque)).joints[1].significant
 
 
 def test_windows_further_off_than_noise_are_seen_whatever_the_reason() -> None:
@@ -84,7 +85,7 @@ def test_windows_further_off_than_noise_are_seen_whatever_the_reason() -> None:
     assert in_whole(loud, None).significant and in_whole(loud, loud).significant
     assert not in_whole(scene, None).significant
     assert not in_whole(loud, scene).significant and not in_whole(scene, loud).significant
-    assert loud.power()[0] == pytest.approx(scene.power()[0] + 1.0, rel=0.1)
+    assert loud.reduced_chi_square()[0] == pytest.approx(scene.reduced_chi_square()[0] + 1.0, rel=0.1)
 
 
 def test_a_scene_of_one_joint_says_of_it_what_the_whole_one_says() -> None:
@@ -108,34 +109,34 @@ def test_a_gain_is_the_fall_of_the_cost_of_a_fit_with_the_column() -> None:
     assert gain == pytest.approx(before - after, rel=1e-4)
 
 
-def test_noise_follows_no_law_and_is_no_louder_than_noise() -> None:
+def test_noise_follows_no_basis_function_and_is_no_louder_than_noise() -> None:
     problem, scene = null()
     found = seek(problem, scene.evidence, scene.residual, scene.columns, library(scene.data, range(2)))
     assert found.found == []
     assert scene.excess().max() < 3.0
 
 
-def test_the_right_law_is_found_among_thousands() -> None:
+def test_the_right_basis_function_is_found_among_thousands() -> None:
     problem, scene, evidence, torque = planted(0.2)
     residual = scene.residual + 0.2 * evidence.column(1, torque)[0]
     found = seek(problem, evidence, residual, scene.columns, library(scene.data, range(2))).found
-    assert [(one.joint, one.law.known) for one in found] == [(1, "cogging")]
-    assert found[0].law.at == pytest.approx(4.0, abs=0.2)
+    assert [(one.joint, one.function.effect) for one in found] == [(1, "cogging")]
+    assert found[0].function.at == pytest.approx(4.0, abs=0.2)
 
 
-def test_every_law_can_be_read_and_is_finite() -> None:
+def test_every_basis_function_can_be_read_and_is_finite() -> None:
     _, scene = null()
     for joint in range(2):
-        for law in all_laws(scene.data, joint):
-            assert np.isfinite(law.torque(scene.data, joint)).all(), law.texts
+        for function in basis_functions(scene.data, joint):
+            assert np.isfinite(function.torque(scene.data, joint)).all(), function.texts
 
 
 def test_a_table_becomes_one_curve_of_the_same_torque() -> None:
     _, scene = null()
-    for law in (law for law in all_laws(scene.data, 1) if law.table):
-        sizes = np.linspace(-1.0, 2.0, len(law.texts))
-        (text,), _ = joined(list(law.texts), sizes)
-        wanted = np.tensordot(sizes, law.torque(scene.data, 1), axes=1)
+    for function in filter(lambda f: f.table, basis_functions(scene.data, 1)):
+        sizes = np.linspace(-1.0, 2.0, len(function.texts))
+        (text,), _ = joined(list(function.texts), sizes)
+        wanted = np.tensordot(sizes, function.torque(scene.data, 1), axes=1)
         np.testing.assert_allclose(scene.data.torque(read_term(text), 1), wanted, atol=2e-4)
 
 
@@ -147,8 +148,8 @@ def test_better_is_beyond_doubt_or_not_at_all() -> None:
     assert not better(before, before)
 
 
-def test_a_law_of_two_inner_numbers_has_neighbours_and_others_have_none() -> None:
-    rest = Law(("friction(rested(0.3, 0.02))",), ("history",), 3)
-    texts = {law.texts[0] for law in beside(rest)}
+def test_a_basis_function_of_two_inner_numbers_has_neighbours_and_others_have_none() -> None:
+    rest = BasisFunction(("friction(rested(0.3, 0.02))",), ("history",), 3)
+    texts = {function.texts[0] for function in neighbours(rest, TermLibrary())}
     assert texts == {f"friction(rested({a}))" for a in ("0.9, 0.02", "0.1, 0.02", "0.3, 0.08", "0.3, 0.005")}
-    assert beside(Law(("q^3",), ("position",), 2)) == []
+    assert neighbours(BasisFunction(("q^3",), ("position",), 2), TermLibrary()) == []
