@@ -17,7 +17,6 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.state import SearchState
 
 KINDS = ("motor_strength", "kp", "kd")
-_SHARE = 1e-3  # of what the effects on a joint's gains explain: differences of two simulators are significant, too
 
 
 def plain_gains(
@@ -33,6 +32,7 @@ def plain_gains(
     As well: the cost rises by less than `bound` squared, that of an effect which would be needless, or by less than a
     thousandth of what these effects lowered it by.
     """
+    rule = problem.thresholds.selection.proposals.gain_parameters
     for where in sorted({c.where for c in fit.chosen if c.effect in KINDS}):
         there = {c.effect: c for c in candidates if c.where == where and c.effect in KINDS}
         mine = [c for c in fit.chosen if c.where == where and c.effect in KINDS]
@@ -47,7 +47,7 @@ def plain_gains(
         rest = [c for c in fit.chosen if c not in (*mine, *damper)]
         tried = [_refit(problem, fit, rest, there, s, weights) for s in singles]
         best = min(tried, key=lambda f: f.cost)
-        most = fit.cost + max(bound**2, _SHARE * (_refit(problem, fit, rest, there, {}, weights).cost - fit.cost))
+        most = fit.cost + max(bound**2, rule.share * (_refit(problem, fit, rest, there, {}, weights).cost - fit.cost))
         if best.cost > most:
             if damper:
                 continue
