@@ -1,12 +1,12 @@
 """Parameters wrong on all joints at once: what every joint of a real robot has, fitted together.
 
-A robot with friction and latency on every joint is found one effect at a time only by a long way round: each
-effect alone explains a twentieth, and what stands for the others' share has a strange name. Where the windows are far
-from the noise still after two effects, and the second explained little or they are very far, the usual ones of all
-joints are fitted together from the declared values on, or from those found. Of a small robot that stays far off masses
-and centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows that
-took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It never begins so: a
-load at the end of an arm weakens all drives as far as these can tell.
+A robot with friction and latency on every joint is found one effect at a time only by a long way round: each effect
+alone explains a twentieth, and what stands for the others' share has a strange name. Where residuals are large still
+after two effects, and the second explained little or they are very large, the usual ones of all joints are fitted
+together from the declared values on, or from those found. Of a small robot whose residuals stay large masses and
+centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows that took
+no part; these and the fitted ones are then whitened anew, and the search goes on from there. It never begins so: a load
+at the end of an arm weakens all drives as far as these can tell.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,9 +48,9 @@ def fit_all_joints(
 ) -> Fit | None:
     """A fit of the usual effects, from the declared values on, that are sure together; None where none is.
 
-    Or from those that were `found` on, beside the others that were, if this leads nearer to the data. The long way is
-    gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot that is still
-    far from the data masses and centres of mass follow, all at once.
+    Or from those that were `found` on, together with the others, if this leads nearer to the data. The long way is
+    gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot with large
+    residuals still masses and centres of mass follow, all at once.
     """
     rule = problem.thresholds.selection.proposals.all_joints
     usual = usual_effects(candidates, problem.plant.torque_input)
@@ -73,7 +73,7 @@ def fit_all_joints(
 
 
 def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Callable[[str], None]) -> Fit:
-    """The fit with one kind of effect on all links, if it is far from the data and they bring it nearer."""
+    """The fit with one kind of effect on all links, if its residuals are large and these make them smaller."""
     rule = problem.thresholds.selection.proposals.all_joints
     bodies = [c for c in bodies if not is_chosen(c, fit.chosen)]
     if not bodies or fit.power(problem) < rule.still_off:
@@ -85,7 +85,7 @@ def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Ca
 
 
 def _large_residual_fit(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int) -> Fit:
-    """A fit from values (P,) that may be far off: Levenberg's and Marquardt's steps, windows weighed anew at each."""
+    """A fit from values (P,) with large residuals: Levenberg's and Marquardt's steps, windows weighed anew at each."""
     rule = problem.thresholds.selection.proposals.all_joints
     weights = window_weights(problem.residual([effects_at(chosen, values)])[0])
     fit = gauss_newton(problem, chosen, values, weights, iterations=0, coarse=True)
@@ -183,9 +183,9 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
 
 
 def start_with_all_joints(run: SearchState) -> bool:
-    """Begin anew with the usual effects of all joints, where some effects leave the data far from the model.
+    """Begin anew with the usual effects of all joints, where some effects leave large residuals.
 
-    Only if the last of these explained little, or they are very far: else the next may explain the rest.
+    Only if the last of these explained little, or they are very large: else the next may explain the rest.
     """
     if run.tried_many or run.given or len(run.fit.chosen) < SOME or run.power() < run.config.many:
         return False

@@ -2,10 +2,10 @@
 
 Readings on a grid of step s add up in phase at the frequency 1 / s: |mean exp(2 pi i x / s)| is 1 without further noise
 and exp(-2 (pi sigma / s)^2) with noise of standard deviation sigma, and nearly 0 where there is no grid. A thousand
-readings show a tenth, so a grid is seen under noise of a third of its step. Places where the joint rests would feign
-one: readings of places that are crowded weigh less, and a stay within a step counts as one reading. A grid's overtones
-fit nearly as well as itself: of steps that fit the largest is taken, also where the joint crosses few of them, once an
-overtone has shown that there is a grid.
+readings show a tenth, so a grid is seen under noise of a third of its step. Places where the joint rests would look
+like one: readings of places that are crowded weigh less, and a stay within a step counts as one reading. A grid's
+overtones fit nearly as well as itself: of steps that fit the largest is taken, also where the joint crosses few of
+them, once an overtone has shown that there is a grid.
 """
 
 from collections.abc import Sequence

@@ -150,7 +150,7 @@ def _effects(names: Sequence[str], servos: Sequence[Servo]) -> list[Effect]:
 
 
 def start_with_gain_grid(run: SearchState) -> bool:
-    """Begin with servos far from the declared ones, where the data are that far from the model."""
+    """Begin with servos far from the declared ones, where residuals are that large."""
     if typical_power(run.fit.residual) < run.config.far:
         return False
     found = gains_by_grid(run.problem, run.candidates)
@@ -174,7 +174,7 @@ def start_with_gain_grid(run: SearchState) -> bool:
 def gain_trials(
     problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, large_residual: float
 ) -> list[Trial]:
-    """Servo gains by factors far from one, where the data are so far from the model that slopes say nothing.
+    """Servo gains by factors far from one, where residuals are so large that slopes say nothing.
 
     That is from the median chi-square `large_residual` on. A saturated servo has no slope in its gain: only trying
     tells.

@@ -71,7 +71,7 @@ class LossLikelihoods:
 
 
 def packet_loss_of(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, Problem, Holdout] | None:
-    """Commands lost beside what the fit explains, and the windows with the commands that arrived; None for none."""
+    """Commands lost, conditional on the fit, and the windows with the commands that arrived; None for none."""
     rule = problem.thresholds.selection.proposals.packet_loss
     clean = fit.clean(problem)
     places = _places(problem, fit, clean)
@@ -233,7 +233,7 @@ def _explained(before: np.ndarray, after: np.ndarray) -> float:
 
 
 def find_packet_loss(run: SearchState) -> bool:
-    """Look for commands that never arrived; if some did not, go on with those that did."""
+    """Look for packet loss; if some commands never arrived, go on with those that did."""
     found = None if run.loss else packet_loss_of(run.problem, run.holdout, run.fit)
     if found is None:
         return False

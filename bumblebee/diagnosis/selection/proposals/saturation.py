@@ -43,7 +43,7 @@ class _Demand:
 
 @dataclass(frozen=True, eq=False)
 class _Limit:
-    """One joint's limit, tried beside a fit."""
+    """One joint's limit, tried conditional on a fit."""
 
     problem: Problem
     fit: Fit
@@ -87,7 +87,7 @@ def saturation_trials(
     hopeless: set[tuple[str, str]],
     changes: Changes | None = None,
 ) -> list[Trial]:
-    """The limit that explains most of the windows that are far off; none where no limit does.
+    """The limit that explains most of the windows with large residuals; none where no limit does.
 
     Of the four windows that a limit reaches first one must be off, and its joint in it, or it is not simulated. Where
     it acts in a few only it must bring them down to noise, which one number does not do by chance. One that only makes
@@ -127,8 +127,8 @@ def _trial(
     change = _change(problem, fit, candidate, value, np.isfinite(reach))
     if not plausible(fit.clean(problem), change):
         return []
-    beside = LeftOver(problem, fit, weights)
-    return [Trial(candidate, np.array([value]), beside.cost(fit.residual - change), beside.left(change))]
+    left_over = LeftOver(problem, fit, weights)
+    return [Trial(candidate, np.array([value]), left_over.cost(fit.residual - change), left_over.left(change))]
 
 
 def _own_off(problem: Problem, clean: np.ndarray, odd: np.ndarray, usual: float) -> np.ndarray:

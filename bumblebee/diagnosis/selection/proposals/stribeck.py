@@ -1,4 +1,4 @@
-"""Friction that grows at rest, beside dry friction or instead of a part of it."""
+"""Stribeck friction, which grows at rest: together with dry friction, or for a part of it."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from bumblebee.diagnosis.selection.state import SearchState
 
 
 def add_stribeck_friction(run: SearchState) -> bool:
-    """Try friction that grows at rest beside each dry friction that was found; whether one was accepted."""
+    """Try Stribeck friction conditional on each dry friction that was found; whether one was accepted."""
     rule = run.problem.thresholds.selection.proposals.stribeck
     dry = [c for c in run.fit.chosen if c.effect == "coulomb_friction"]
     found = False
@@ -33,7 +33,7 @@ def add_stribeck_friction(run: SearchState) -> bool:
 
 
 def add_dry_friction(run: SearchState) -> None:
-    """Fit dry friction beside friction of its joint that depends on direction or speed, where that was found alone."""
+    """Fit dry friction together with its joint's friction by direction or speed, where that was found alone."""
     rule = run.problem.thresholds.selection.proposals.stribeck
     for c in [c for c in run.fit.chosen if c.effect in SHAPED]:
         dry = next((o for o in run.candidates if (o.effect, o.where) == ("coulomb_friction", c.where)), None)
