@@ -118,7 +118,8 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
 
 def _steps_of_encoders(session: Session, found: _Found) -> tuple[list[dict[str, Any]], list[Effect]]:
     """Entries and effects of the encoders' steps that the logs show."""
-    readings = grids(session.rollouts, session.sigma[: len(session.plant.joints)])
+    rule = found.judging.thresholds.selection.proposals.encoder_resolution
+    readings = grids(session.rollouts, session.sigma[: len(session.plant.joints)], rule)
     return rounding_entries(readings, found.judging, found.last.fit)
 
 

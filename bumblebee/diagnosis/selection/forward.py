@@ -12,13 +12,13 @@ from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
-from bumblebee.diagnosis.selection.proposals.backlash import play_trials
-from bumblebee.diagnosis.selection.proposals.gain_grid import far_trials, start_with_gain_grid
+from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
+from bumblebee.diagnosis.selection.proposals.gain_grid import gain_trials, start_with_gain_grid
 from bumblebee.diagnosis.selection.proposals.gain_parameters import merge_gain_parameters
-from bumblebee.diagnosis.selection.proposals.joint_elasticity import shaft_trials
-from bumblebee.diagnosis.selection.proposals.packet_loss import find_lost_commands
-from bumblebee.diagnosis.selection.proposals.saturation import limit_trials
-from bumblebee.diagnosis.selection.proposals.stribeck import creeping, levelled
+from bumblebee.diagnosis.selection.proposals.joint_elasticity import joint_elasticity_trials
+from bumblebee.diagnosis.selection.proposals.packet_loss import find_packet_loss
+from bumblebee.diagnosis.selection.proposals.saturation import saturation_trials
+from bumblebee.diagnosis.selection.proposals.stribeck import add_dry_friction, add_stribeck_friction
 from bumblebee.diagnosis.selection.score_tests import Scores
 from bumblebee.diagnosis.selection.state import Loss, SearchState
 from bumblebee.diagnosis.selection.swap import swap
@@ -65,18 +65,18 @@ def search(
     """
     run, budget = begin(problem, holdout, remake, config, say), budget or Budget()
     _select(run, config, budget)
-    if find_lost_commands(run):
+    if find_packet_loss(run):
         _select(run, config, budget)
     for _ in range(problem.thresholds.selection.forward.swaps):
         if not budget.has_time_for("other names in the place of those found"):
             break
         say("each name against its rivals")
-        if not (swap(run) or creeping(run)):
+        if not (swap(run) or add_stribeck_friction(run)):
             break
         _select(run, config, budget)
     run.prune()
     merge_gain_parameters(run)
-    levelled(run)
+    add_dry_friction(run)
     steps = [s for s in run.steps if s.candidate in run.fit.chosen]
     return Search(
         run.fit,
@@ -116,20 +116,20 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         tried, looked = [], []
         start_with_all_joints(run)
         if not run.given:
-            tried = far_trials(run.problem, run.fit, run.candidates, run.weights, config.far)
+            tried = gain_trials(run.problem, run.fit, run.candidates, run.weights, config.far)
             tried = [t for t in tried if t.candidate not in run.closed]
         if not tried:
             tried, looked = run.trials()
         some = _where_limits_matter(tried, run)
         if judged != (run.fit, some):
             judged = (run.fit, some)
-            limits = limit_trials(run.problem, run.fit, some, run.weights, run.hopeless, run.changes)
+            limits = saturation_trials(run.problem, run.fit, some, run.weights, run.hopeless, run.changes)
         tried += [t for t in limits if t.candidate not in run.closed]
         if not tried:
-            tried = play_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+            tried = backlash_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
             tried = [t for t in tried if t.candidate not in run.closed]
         if not tried or vain == run.patience - 1:
-            tried += shaft_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+            tried += joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
         if not tried and not looked:
             break
         if not tried:
@@ -137,7 +137,7 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
             vain += 1
             continue
         best = simplest(tried, run.fit.cost, run.problem.thresholds.selection.trials)
-        if best.candidate.effect in SATURATIONS and find_lost_commands(run):
+        if best.candidate.effect in SATURATIONS and find_packet_loss(run):
             continue  # a lost command, too, spoils a few windows
         accepted, place = run.accept(best.candidate, best.values), best.candidate.where
         vain = 0 if accepted else vain + 1

@@ -35,7 +35,7 @@ from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import window_weights
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import KIND as SHAFT
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import LIKE as SHAFT_LIKE
-from bumblebee.diagnosis.selection.proposals.joint_elasticity import best_shaft, is_of_series
+from bumblebee.diagnosis.selection.proposals.joint_elasticity import best_elasticity, is_of_series
 from bumblebee.diagnosis.selection.score_tests import Scores, score_tests
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial, try_one
@@ -96,14 +96,13 @@ def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[_Tried]:
         if (SHAFT, where) in run.hopeless:
             continue
         gone = [c for c in free if c.where == where and c.effect in SHAFT_LIKE]
-        if len(gone) == 1 and is_of_series(gone[0], run.fit.of(gone[0])):
+        if len(gone) == 1 and is_of_series(run.problem, gone[0], run.fit.of(gone[0])):
             continue
         rest = columns_without(run.problem, run.fit, gone)
         own = linear_cost(run.problem, rest, run.weights) - linear_cost(run.problem, run.fit, run.weights)
         run.hopeless.add((SHAFT, where))
-        trial = best_shaft(
-            run.problem, rest, run.candidates, run.weights, where, run.problem.thresholds.selection.swap.part * own
-        )
+        least = run.problem.thresholds.selection.swap.part * own
+        trial = best_elasticity(run.problem, rest, run.candidates, run.weights, where, least)
         new = _refitted(run, rest, trial) if trial else None
         if new:
             yield gone, *new

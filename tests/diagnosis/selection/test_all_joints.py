@@ -12,7 +12,7 @@ from bumblebee.diagnosis.comparison.submodel import without_some
 from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
-from bumblebee.diagnosis.selection.proposals.all_joints import fit_many
+from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from tests.diagnosis import arm
 
@@ -38,7 +38,7 @@ def _opened(effects: dict[tuple[str, str], float]) -> tuple[Session, Problem, Pr
 def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None:
     session, problem, other = _opened(TRUTH)
     declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
-    fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
+    fit = fit_all_joints(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
     assert fit is not None
     found = {(c.effect, c.where): float(fit.of(c)[0]) for c in fit.chosen}
     for place, value in TRUTH.items():
@@ -53,7 +53,7 @@ def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None
 def test_without_candidates_there_is_no_fit() -> None:
     _, problem, _ = _opened({})
     declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
-    assert fit_many(problem, [], declared, lambda text: None) is None
+    assert fit_all_joints(problem, [], declared, lambda text: None) is None
 
 
 def test_a_load_that_was_found_stays_and_the_drives_are_not_weak() -> None:
@@ -62,7 +62,7 @@ def test_a_load_that_was_found_stays_and_the_drives_are_not_weak() -> None:
     candidates = all_candidates(session.plant, session.rollouts, [])
     mass = next(c for c in candidates if (c.effect, c.where) == ("link_mass", "l3"))
     start = gauss_newton(problem, (mass,), mass.start, np.ones(len(problem.windows)))
-    fit = fit_many(problem, candidates, start, lambda text: None)
+    fit = fit_all_joints(problem, candidates, start, lambda text: None)
     assert fit is not None and fit.of(mass)[0] == pytest.approx(0.9, rel=0.02)
     assert not [c for c in fit.chosen if c.effect == "motor_strength"]
 
@@ -71,7 +71,7 @@ def test_what_is_found_on_a_robot_like_its_model_does_not_pay() -> None:
     """Another integrator looks like a little inertia on every joint."""
     session, problem, other = _opened({})
     declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
-    fit = fit_many(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
+    fit = fit_all_joints(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
     assert fit is None or not pays_together(problem, Holdout(other), declared, fit)
 
 

@@ -9,7 +9,7 @@ from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.prepare import Material, gather
 from bumblebee.diagnosis.residuals.problem import Problem, window_weights
-from bumblebee.diagnosis.selection.proposals.backlash import play_trials
+from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
 from bumblebee.diagnosis.selection.proposals.joint_misfit import joint_chi_squares, odd_joints
 from tests.diagnosis import arm
 from tests.diagnosis.strange_arm import Truth, simulate
@@ -54,7 +54,7 @@ def test_a_gap_is_tried_where_there_is_one(truth: Truth) -> None:
     material = _material(truth)
     problem = material.problem
     fit = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
-    found = play_trials(problem, fit, material.candidates, window_weights(fit.clean(problem)), set())
+    found = backlash_trials(problem, fit, material.candidates, window_weights(fit.clean(problem)), set())
     if not truth:
         assert not found
         return

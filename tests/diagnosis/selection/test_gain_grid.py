@@ -9,7 +9,7 @@ import pytest
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem
-from bumblebee.diagnosis.selection.proposals.gain_grid import far_servos
+from bumblebee.diagnosis.selection.proposals.gain_grid import gains_by_grid
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from tests.diagnosis import arm
 
@@ -27,7 +27,7 @@ def test_gains_declared_thirty_and_ten_times_too_large_are_found() -> None:
     xml = re.sub(r'kp="(\d+)"', lambda m: f'kp="{30 * int(m[1])}"', arm.XML)
     xml = re.sub(r'kv="(\d+)"', lambda m: f'kv="{10 * int(m[1])}"', xml)
     session, problem = _opened(xml)
-    found = far_servos(problem, all_candidates(session.plant, session.rollouts, []))
+    found = gains_by_grid(problem, all_candidates(session.plant, session.rollouts, []))
     factors = {(c.effect, c.where): value for c, value in found}
     for joint in arm.JOINTS:
         assert factors["kp", joint] == pytest.approx(1 / 30, rel=0.35)
@@ -38,4 +38,4 @@ def test_gains_declared_thirty_and_ten_times_too_large_are_found() -> None:
 
 def test_servos_that_are_right_stay() -> None:
     session, problem = _opened(arm.XML)
-    assert far_servos(problem, all_candidates(session.plant, session.rollouts, [])) == []
+    assert gains_by_grid(problem, all_candidates(session.plant, session.rollouts, [])) == []

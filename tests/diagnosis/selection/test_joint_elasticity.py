@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.selection.proposals.joint_elasticity import best_shaft, is_of_series, series, shaft_trials
+from bumblebee.diagnosis.selection.proposals.joint_elasticity import (
+    best_elasticity,
+    is_of_series,
+    joint_elasticity_trials,
+    series,
+)
 from bumblebee.diagnosis.selection.swap import exchange
+from bumblebee.diagnosis.thresholds.proposals import JointElasticity
 from tests.diagnosis import arm
 from tests.diagnosis.selection.test_swap import begun, names
 from tests.diagnosis.strange_arm import simulate
@@ -16,12 +22,12 @@ def test_a_shaft_takes_the_place_of_the_rotor_that_it_passed_for() -> None:
     assert exchange(run)
     assert names(run) == [("series_elasticity", "j2")]
     assert 1 / run.fit.values[0] == pytest.approx(600.0, rel=0.2)
-    assert is_of_series(run.fit.chosen[0], run.fit.values)
+    assert is_of_series(run.problem, run.fit.chosen[0], run.fit.values)
     assert not exchange(run)
 
 
 def test_stiffnesses_get_finer_where_a_servo_on_the_joint_would_shake() -> None:
-    on_motor, on_joint = series(False), series(True)
+    on_motor, on_joint = series(False, JointElasticity()), series(True, JointElasticity())
     assert (np.diff(on_motor) < 0).all() and (np.diff(on_joint) < 0).all()
     assert on_joint[-1] > on_motor[-1]
     soft = on_joint[on_joint < 40]
@@ -30,16 +36,16 @@ def test_stiffnesses_get_finer_where_a_servo_on_the_joint_would_shake() -> None:
 
 def test_a_joint_that_is_off_and_has_no_name_is_tried() -> None:
     run = begun(arm.XML, simulate({("series_elasticity", "j2"): (600.0,)}, seed=3), {})
-    found = shaft_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+    found = joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
     assert [(t.candidate.where, t.values[1]) for t in found] == [("j2", 0.0)]
     assert run.hopeless == {("series_elasticity", "j2")}
-    assert not shaft_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+    assert not joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
 
 
 def test_no_shaft_explains_noise() -> None:
     run = begun(arm.XML, simulate({}, seed=3), {})
-    assert not shaft_trials(run.problem, run.fit, run.candidates, run.weights, set())
-    assert best_shaft(run.problem, run.fit, run.candidates, run.weights, "j2") is None
+    assert not joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, set())
+    assert best_elasticity(run.problem, run.fit, run.candidates, run.weights, "j2") is None
 
 
 def test_a_rotor_is_no_shaft() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import diagnose
-from bumblebee.diagnosis.selection.proposals.packet_loss import Losses
+from bumblebee.diagnosis.selection.proposals.packet_loss import LossLikelihoods
 from tests.diagnosis import arm
 from tests.diagnosis.strange_arm import simulate
 from tests.diagnosis.test_catalogue import CONFIG
@@ -41,7 +41,7 @@ def test_the_share_of_largest_likelihood_is_that_of_the_patterns() -> None:
     index = np.array([int(np.flatnonzero((patterns == row).all(axis=1))[0]) for row in true])
     logs = np.full((200, 16), -1e3)
     logs[np.arange(200), index] = 0.0
-    losses = Losses(patterns, logs - logs[:, :1])
+    losses = LossLikelihoods(patterns, logs - logs[:, :1])
     share = losses.best()
     assert share == pytest.approx(true.mean(), rel=1e-6)
     assert (losses.likely(share) == true).all()

@@ -12,7 +12,7 @@ from bumblebee.diagnosis.prepare import gather
 from bumblebee.diagnosis.residuals.problem import window_weights
 from bumblebee.diagnosis.selection import confounding
 from bumblebee.diagnosis.selection.forward import begin
-from bumblebee.diagnosis.selection.proposals.stribeck import creeping, levelled
+from bumblebee.diagnosis.selection.proposals.stribeck import add_dry_friction, add_stribeck_friction
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.swap import exchange
 from bumblebee.diagnosis.selection.trial import Trial
@@ -60,7 +60,7 @@ def test_two_names_that_stand_for_one_give_way_to_it() -> None:
 def test_friction_that_grows_at_rest_is_found_beside_dry_friction_only_where_it_is(stiction: float) -> None:
     truth = {("coulomb_friction", "j2"): (1.0,)} | ({("stribeck_friction", "j2"): (stiction, 0.15)} if stiction else {})
     run = begun(arm.XML, simulate(truth, seed=3), {("coulomb_friction", "j2"): 1.0})
-    assert creeping(run) is bool(stiction)
+    assert add_stribeck_friction(run) is bool(stiction)
     assert [n for n, _ in names(run)] == ["coulomb_friction", *(["stribeck_friction"] if stiction else [])]
     if stiction:
         assert run.fit.of(run.fit.chosen[1])[0] == pytest.approx(stiction, rel=0.15)
@@ -70,7 +70,7 @@ def test_friction_that_grows_at_rest_is_found_beside_dry_friction_only_where_it_
 def test_friction_that_grows_at_rest_is_told_from_the_dry_friction_that_it_sits_on(level: float) -> None:
     truth = {("stribeck_friction", "j2"): (1.5, 0.15)} | ({("coulomb_friction", "j2"): (level,)} if level else {})
     run = begun(arm.XML, simulate(truth, seed=3), {("stribeck_friction", "j2"): (1.0, 0.3)})
-    levelled(run)
+    add_dry_friction(run)
     assert [n for n, _ in names(run)] == ["stribeck_friction", *(["coulomb_friction"] if level else [])]
     assert run.fit.of(run.fit.chosen[0])[0] == pytest.approx(1.5, rel=0.15)
     if level:

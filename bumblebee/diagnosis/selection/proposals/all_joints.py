@@ -1,12 +1,12 @@
-"""Many parameters wrong at once: what every joint of a real robot has, fitted together.
+"""Parameters wrong on all joints at once: what every joint of a real robot has, fitted together.
 
-A robot on which every joint rubs and comes late is found one effect at a time only by a long way round: each
-effect alone explains a twentieth, and what stands for the others' share has a strange name. Where the windows are far
-from the noise still after two effects, and the second explained little or they are very far, the usual ones of all
-joints are fitted together from the declared values on, or from those found. Of a small robot that stays far off masses
-and centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows that
-took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It never begins so: a
-load at the end of an arm weakens all drives as far as these can tell.
+A robot with friction and latency on every joint is found one effect at a time only by a long way round: each effect
+alone explains a twentieth, and what stands for the others' share has a strange name. Where residuals are large still
+after two effects, and the second explained little or they are very large, the usual ones of all joints are fitted
+together from the declared values on, or from those found. Of a small robot whose residuals stay large masses and
+centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows that took
+no part; these and the fitted ones are then whitened anew, and the search goes on from there. It never begins so: a load
+at the end of an arm weakens all drives as far as these can tell.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,14 +31,6 @@ from bumblebee.diagnosis.selection.state import LITTLE, PATIENCE, SOME, SearchSt
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
-_DAMPING = 1e-3
-_ROUNDS = 3
-_STEPS, _MORE = 9, 5  # of the way, and of that with the links
-_STIFF, _STILL, _FREE = 100.0, 0.995, 10.0  # damping and share of the cost that end it; changes that matter
-_WINDOWS = 60  # that the way from the declared values is gone on
-_SMALL = 12  # degrees of freedom up to which links are asked, too
-_LEFT = 2.0  # median chi-square beside the joints' effects, above which they are
-
 
 def usual_effects(candidates: Sequence[Candidate], torque: bool = False) -> list[Candidate]:
     """Of `candidates` those that every joint of a real robot has; `torque`: whose drives are told torques."""
@@ -51,76 +43,84 @@ def is_whole(c: Candidate) -> bool:
     return c.effect != "link_mass" or c.step[1] != 0
 
 
-def fit_many(problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None]) -> Fit | None:
+def fit_all_joints(
+    problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None]
+) -> Fit | None:
     """A fit of the usual effects, from the declared values on, that are sure together; None where none is.
 
-    Or from those that were `found` on, beside the others that were, if this leads nearer to the data. The long way is
-    gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot that is still
-    far from the data masses and centres of mass follow, all at once.
+    Or from those that were `found` on, together with the others, if this leads nearer to the data. The long way is
+    gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot with large
+    residuals still masses and centres of mass follow, all at once.
     """
+    rule = problem.thresholds.selection.proposals.all_joints
     usual = usual_effects(candidates, problem.plant.torque_input)
     if not usual:
         return None
-    some = problem.part(screening_windows(problem, _WINDOWS))
-    fit = _far(some, usual, np.concatenate([c.nominal for c in usual]))
+    some = problem.part(screening_windows(problem, rule.windows))
+    fit = _large_residual_fit(some, usual, np.concatenate([c.nominal for c in usual]), rule.steps)
     if found.chosen:
         there = {(c.effect, c.where) for c in found.chosen}
         chosen = [*found.chosen, *(c for c in usual if (c.effect, c.where) not in there)]
         values = np.concatenate((found.values, *(c.nominal for c in chosen[len(found.chosen) :])))
-        fit = min(fit, _far(some, chosen, values), key=lambda f: f.power(some))
+        fit = min(fit, _large_residual_fit(some, chosen, values, rule.steps), key=lambda f: f.power(some))
     say(f"{len(fit.chosen)} usual effects together: chi-square {fit.power(some):.3g}")
-    for kind in USUAL_OF_BODIES if problem.plant.model.nv <= _SMALL and not problem.plant.floating else ():
+    small = problem.plant.model.nv <= rule.small_robot and not problem.plant.floating
+    for kind in USUAL_OF_BODIES if small else ():
         fit = _with_links(some, fit, [c for c in candidates if c.effect == kind and is_whole(c)], say)
-    if fit.power(some) < _LEFT:
+    if fit.power(some) < rule.still_off:
         return _sure_of(problem, surest(some, fit, window_weights(fit.clean(some))))
     return _sure_by_misfit(problem, fit)
 
 
 def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Callable[[str], None]) -> Fit:
-    """The fit with one kind of effect on all links, if it is far from the data and they bring it nearer."""
+    """The fit with one kind of effect on all links, if its residuals are large and these make them smaller."""
+    rule = problem.thresholds.selection.proposals.all_joints
     bodies = [c for c in bodies if not is_chosen(c, fit.chosen)]
-    if not bodies or fit.power(problem) < _LEFT:
+    if not bodies or fit.power(problem) < rule.still_off:
         return fit
     values = np.concatenate((fit.values, *(c.nominal for c in bodies)))
-    larger = _far(problem, [*fit.chosen, *bodies], values, _MORE)
+    larger = _large_residual_fit(problem, [*fit.chosen, *bodies], values, rule.steps_with_links)
     say(f"{len(larger.chosen)} with {bodies[0].effect} on all links: chi-square {larger.power(problem):.3g}")
     return larger if larger.power(problem) < (1 - MUCH) * fit.power(problem) else fit
 
 
-def _far(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int = _STEPS) -> Fit:
-    """A fit from values (P,) that may be far off: Levenberg's and Marquardt's steps, windows weighed anew at each."""
+def _large_residual_fit(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int) -> Fit:
+    """A fit from values (P,) with large residuals: Levenberg's and Marquardt's steps, windows weighed anew at each."""
+    rule = problem.thresholds.selection.proposals.all_joints
     weights = window_weights(problem.residual([effects_at(chosen, values)])[0])
     fit = gauss_newton(problem, chosen, values, weights, iterations=0, coarse=True)
-    damping, moving = _DAMPING, np.flatnonzero(fit.scales)
+    damping, moving = rule.damping, np.flatnonzero(fit.scales)
     at = np.tile(fit.values, (len(moving), 1))
     for _ in range(steps):
         weights = window_weights(fit.clean(problem))
         cost = cost_of(problem, fit.residual, weights)[0]
-        while damping < _STIFF:
+        while damping < rule.most_damping:
             trial = _moved(problem, fit, weights, damping)
             residual = problem.residual([effects_at(chosen, trial)])[0]
             new, nuisance = cost_of(problem, residual, weights)
             if new < cost:
                 break
-            damping *= 10.0
+            damping *= rule.more_damping
         else:
             break
         columns = columns_at(problem, chosen, trial, fit.scales, True, fit.columns, at)
-        fit, damping = Fit(fit.chosen, trial, nuisance, residual, columns, new), max(0.1 * damping, _DAMPING)
-        if new > _STILL * cost:
+        fit = Fit(fit.chosen, trial, nuisance, residual, columns, new)
+        damping = max(rule.less_damping * damping, rule.damping)
+        if new > rule.settled * cost:
             break
     return fit
 
 
 def _moved(problem: Problem, fit: Fit, weights: np.ndarray, damping: float) -> np.ndarray:
     """Values (P,) after one step; what the data hardly tell stays within ten changes that matter of where it is."""
+    rule = problem.thresholds.selection.proposals.all_joints
     basis, _ = project(problem, fit.columns, weights)
     flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
     normal, count = flat @ flat.T, len(problem.nuisance)
     own = np.arange(len(normal))
     power = max(float((weights[:, None] * fit.clean(problem) ** 2).mean()), 1.0)
     normal[own[:count], own[:count]] += 1.0
-    normal[own[count:], own[count:]] += damping * normal[own[count:], own[count:]] + power / _FREE**2
+    normal[own[count:], own[count:]] += damping * normal[own[count:], own[count:]] + power / rule.free**2
     move = np.linalg.solve(normal, flat @ (fit.residual * np.sqrt(weights)[:, None]).ravel())[count:]
     values = fit.values.copy()
     values[fit.scales > 0] += move * fit.scales[fit.scales > 0]
@@ -129,12 +129,13 @@ def _moved(problem: Problem, fit: Fit, weights: np.ndarray, damping: float) -> n
 
 def _sure_of(problem: Problem, fit: Fit) -> Fit | None:
     """The same effects fitted on all windows, less those that are not sure there."""
+    rule = problem.thresholds.selection.proposals.all_joints
     known = None
-    for _ in range(_ROUNDS):
+    for _ in range(rule.rounds):
         if not fit.chosen:
             return None
         weights = window_weights(problem.residual([fit.effects])[0])
-        fit = gauss_newton(problem, fit.chosen, fit.values, weights, 2, coarse=True, damping=_DAMPING, known=known)
+        fit = gauss_newton(problem, fit.chosen, fit.values, weights, 2, coarse=True, damping=rule.damping, known=known)
         sure = surest(problem, fit, window_weights(fit.clean(problem)))
         if sure.chosen == fit.chosen:
             break
@@ -145,19 +146,20 @@ def _sure_of(problem: Problem, fit: Fit) -> Fit | None:
 def _sure_by_misfit(problem: Problem, fit: Fit) -> Fit | None:
     """The same where the windows stay far from the noise: what is sure is asked by what is left, not by the noise.
 
-    On a real double pendulum, 300 times the noise away, the noise's measure left 2 of 17 effects, this one 8.
+    By the noise's measure hardly any effect would be sure there.
     """
+    rule = problem.thresholds.selection.proposals.all_joints
 
     def fitted(here: Problem, fit: Fit, iterations: int) -> Fit:
         weights = window_weights(here.residual([fit.effects])[0])
-        return gauss_newton(here, fit.chosen, fit.values, weights, iterations, coarse=True, damping=_DAMPING)
+        return gauss_newton(here, fit.chosen, fit.values, weights, iterations, coarse=True, damping=rule.damping)
 
     other = by_misfit(problem, fitted(problem, fit, 0).clean(problem))
     sure = _sure_of(other, fitted(other, fit, 2))
     return None if sure is None else fitted(problem, sure, 0)
 
 
-def anew(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Problem, Holdout, Fit]:
+def whitened_anew(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Problem, Holdout, Fit]:
     """Windows to fit and to judge whitened anew around a fit that is far from the declared model, and fitted there."""
     problem = _whitened_around(problem, fit.effects)
     if holdout.problem is not None:
@@ -181,19 +183,19 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
 
 
 def start_with_all_joints(run: SearchState) -> bool:
-    """Begin anew with the usual effects of all joints, where some effects leave the data far from the model.
+    """Begin anew with the usual effects of all joints, where some effects leave large residuals.
 
-    Only if the last of these explained little, or they are very far: else the next may explain the rest.
+    Only if the last of these explained little, or they are very large: else the next may explain the rest.
     """
     if run.tried_many or run.given or len(run.fit.chosen) < SOME or run.power() < run.config.many:
         return False
     if run.fall >= LITTLE and run.power() < run.config.far:
         return False
     run.tried_many = True
-    fit = fit_many(run.problem, run.candidates, run.fit, run.say)
+    fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
     if fit is None or not pays_together(run.problem, run.holdout, run.fit, fit):
         return False
-    run.problem, run.holdout, fit = anew(run.problem, run.holdout, fit)
+    run.problem, run.holdout, fit = whitened_anew(run.problem, run.holdout, fit)
     run.keep = screening_windows(run.problem, run.config.screen_windows)
     weights = window_weights(fit.clean(run.problem))
     z = certainty(run.problem, fit, weights)

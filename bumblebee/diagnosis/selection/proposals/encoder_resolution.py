@@ -2,10 +2,10 @@
 
 Readings on a grid of step s add up in phase at the frequency 1 / s: |mean exp(2 pi i x / s)| is 1 without further noise
 and exp(-2 (pi sigma / s)^2) with noise of standard deviation sigma, and nearly 0 where there is no grid. A thousand
-readings show a tenth, so a grid is seen under noise of a third of its step. Places where the joint rests would feign
-one: readings of places that are crowded weigh less, and a stay within a step counts as one reading. A grid's overtones
-fit nearly as well as itself: of steps that fit the largest is taken, also where the joint crosses few of them, once an
-overtone has shown that there is a grid.
+readings show a tenth, so a grid is seen under noise of a third of its step. Places where the joint rests would look
+like one: readings of places that are crowded weigh less, and a stay within a step counts as one reading. A grid's
+overtones fit nearly as well as itself: of steps that fit the largest is taken, also where the joint crosses few of
+them, once an overtone has shown that there is a grid.
 """
 
 from collections.abc import Sequence
@@ -17,17 +17,9 @@ import numpy as np
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.simulation import unit_on
+from bumblebee.diagnosis.thresholds.proposals import EncoderResolution
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect, single
-
-_SAMPLES = 20_000
-_SMALLEST, _CELLS = 5e-4, 12  # a step is at least half a milliradian, and the joint crosses at least so many
-_ON_GRID = 0.8  # of the resultant that the noise leaves of a grid
-_CHANCE = 1e-5  # of a joint without a grid
-_COARSEST = 0.7  # of the largest resultant: a grid's multiples in frequency fit as well as itself
-_OVERTONES, _FEWEST = (5, 4, 3, 2), 3  # of a grid that is looked for; cells of it that the joint crosses at least
-_PLACES = 40  # in which the crowd is counted
-_DENSE = 0.25  # of the width of a peak
 
 
 @dataclass(frozen=True)
@@ -43,17 +35,21 @@ class Grid:
     """Rayleigh's test, times the number of frequencies looked at."""
 
 
-def grids(rollouts: Sequence[Rollout], noise: Sequence[float] | np.ndarray | None = None) -> list[Grid]:
+def grids(
+    rollouts: Sequence[Rollout],
+    noise: Sequence[float] | np.ndarray | None = None,
+    rule: EncoderResolution | None = None,
+) -> list[Grid]:
     """The joints whose positions were read in steps, with the step.
 
     `noise` (J,) [rad] is that of the readings: where it is much smaller than a step the readings must lie on the grid,
     and not merely prefer it, as the turning points of a motion do that is repeated.
     """
-    joints = rollouts[0].joints
+    rule, joints = rule or EncoderResolution(), rollouts[0].joints
     every = np.concatenate([r.joint_pos for r in rollouts])
-    some = every[:: -(-len(every) // _SAMPLES)]
+    some = every[:: -(-len(every) // rule.samples)]
     most = np.full(len(joints), np.inf) if noise is None else np.asarray(noise, dtype=float)
-    found = [_grid(name, some[:, j], float(most[j])) for j, name in enumerate(joints)]
+    found = [_grid(name, some[:, j], float(most[j]), rule) for j, name in enumerate(joints)]
     return [g for g in found if g is not None]
 
 
@@ -91,33 +87,34 @@ def entries(found: Sequence[Grid], problem: Problem, fit: Fit) -> tuple[list[dic
     return out, effects
 
 
-def _grid(joint: str, x: np.ndarray, noise: float) -> Grid | None:
+def _grid(joint: str, x: np.ndarray, noise: float, rule: EncoderResolution) -> Grid | None:
+    """The grid of one joint's readings `x` (N,) [rad] with noise [rad], or None."""
     span = float(np.ptp(x))
-    if span < _CELLS * _SMALLEST:
+    if span < rule.cells * rule.smallest:
         return None
     x = x - x.mean()
-    weights = _uncrowded(x, span)
+    weights = _uncrowded(x, span, rule.places)
     # The mean phase at evenly spaced frequencies is the Fourier transform of a histogram, in cells far below a step.
-    cell = _SMALLEST / 8
-    count = int(2 ** np.ceil(np.log2(span / (_DENSE * cell))))
+    cell = rule.smallest / 8
+    count = int(2 ** np.ceil(np.log2(span / (rule.dense * cell))))
     counts = np.bincount(np.round((x - x.min()) / cell).astype(int), weights, minlength=count)
     every = np.arange(count // 2 + 1) / (count * cell)
-    inside = (every >= _CELLS / span) & (every <= 1.0 / _SMALLEST)
+    inside = (every >= rule.cells / span) & (every <= 1.0 / rule.smallest)
     if inside.sum() < 2:
         return None
     frequency, resultant = every[inside], np.abs(np.fft.rfft(counts, count))[inside]
     width = frequency[1] - frequency[0]
-    fits = np.where(resultant > _ON_GRID * _left_of(frequency, noise), resultant, 0.0)
-    high = np.flatnonzero(fits > max(_COARSEST * fits.max(), 1e-9))
+    fits = np.where(resultant > rule.on_grid * _left_of(frequency, noise), resultant, 0.0)
+    high = np.flatnonzero(fits > max(rule.coarsest * fits.max(), 1e-9))
     if not len(high):
         return None
     first = high[frequency[high] <= frequency[high[0]] + 2 / span]
     best = frequency[first[np.argmax(resultant[first])]]
     value, top = _peak(x, weights, best, width)
     p = len(frequency) * float(np.exp(-min(_readings(x, weights, 1.0 / value) * top**2, 600.0)))
-    if p > _CHANCE or top < _ON_GRID * _left_of(value, noise):
+    if p > rule.chance or top < rule.on_grid * _left_of(value, noise):
         return None
-    value, top = _undertone(x, weights, value, top, width)
+    value, top = _undertone(x, weights, (value, top), width, rule)
     # Phase noise of each reading, and how well a slope of phase over x is known from them.
     spread = np.sqrt(-2.0 * np.log(min(top, 1 - 1e-6)))
     error = spread / (2 * np.pi * np.sqrt(len(x)) * x.std())
@@ -132,16 +129,20 @@ def _peak(x: np.ndarray, weights: np.ndarray, frequency: float, width: float) ->
 
 
 def _undertone(
-    x: np.ndarray, weights: np.ndarray, frequency: float, resultant: float, width: float
+    x: np.ndarray, weights: np.ndarray, found: tuple[float, float], width: float, rule: EncoderResolution
 ) -> tuple[float, float]:
-    """The grid of which a grid found is an overtone, if the readings are as much in phase there; else the same."""
-    for number in _OVERTONES:
-        if frequency / number < _FEWEST / float(np.ptp(x)):
+    """The grid of which a grid found is an overtone, if the readings are as much in phase there; else the same.
+
+    Both are a frequency [1/rad] and the resultant there.
+    """
+    frequency, resultant = found
+    for number in rule.overtones:
+        if frequency / number < rule.fewest_cells / float(np.ptp(x)):
             continue
         lower = _peak(x, weights, frequency / number, width / number)
         if lower[1] >= resultant:
             return lower
-    return frequency, resultant
+    return found
 
 
 def _left_of(frequency: np.ndarray | float, noise: float) -> np.ndarray | float:
@@ -149,9 +150,9 @@ def _left_of(frequency: np.ndarray | float, noise: float) -> np.ndarray | float:
     return np.exp(-2.0 * (np.pi * np.minimum(noise, 1e3) * frequency) ** 2)
 
 
-def _uncrowded(x: np.ndarray, span: float) -> np.ndarray:
+def _uncrowded(x: np.ndarray, span: float, places: int) -> np.ndarray:
     """Weights (N,) of readings, together 1: those of a place with more than the usual crowd share its weight."""
-    place = np.floor((x - x.min()) / (span / _PLACES)).astype(int)
+    place = np.floor((x - x.min()) / (span / places)).astype(int)
     crowd = np.bincount(place)
     usual = float(np.median(crowd[crowd > 0]))
     weights = np.minimum(1.0, usual / crowd[place])

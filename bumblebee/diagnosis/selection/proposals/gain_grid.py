@@ -1,4 +1,4 @@
-"""Servos far from the declared ones, found before anything else is looked for: gains, and dry friction beside them.
+"""Servos with gains far from the declared ones and dry friction, found before anything else is looked for.
 
 Where a model's gains are off by factors, residuals are so far from linear that no slope and no test says anything, and
 every effect helps. Published gains are often another firmware's, and the joints of a robot often share one type of
@@ -25,22 +25,13 @@ from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.diagnosis.simulation import Windows, choose_starts, cut, residuals, vary
+from bumblebee.diagnosis.thresholds.proposals import GainGrid
 from bumblebee.sim.effects import Effect, single
 from bumblebee.sim.servo import servos_of
 
 KINDS = ("kp", "kd", "coulomb_friction")
-_SHARED = (1.0, 0.3, 0.1, 0.03, 0.01, 3.0)
-_LONG, _WINDOWS = 1.0, 36  # [s]; windows of it
-_SWEEPS = ((0.3, 0.6, 1.6, 3.0), (0.3, 0.6, 1.6, 3.0), (0.5, 0.8, 1.25, 2.0), (0.7, 0.9, 1.1, 1.4), (0.85, 1.15))
-_RUBS = (0.01, 0.03, 0.1)  # dry friction tried first, as shares of the servo's torque limit
-_UNLIKE = 0.02  # score of a gain that is e times the others'
-_BETTER = 0.1  # fall of the score
-_LEAST = 1e-3  # smallest factor tried
-_STEP = 0.1  # share of a value that matters
 Servo = tuple[float, float, float]
 """Factors on kp and kd, dry friction [N m]."""
-# Factors on a servo's gains that are tried where the declared ones are far off.
-_FACTORS = (0.5, 0.2, 0.1, 0.03, 0.01, 2.0, 5.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,19 +46,24 @@ class _Course:
     limit: np.ndarray
     """(S,) the servos' torque limit [N m]."""
 
+    @property
+    def rule(self) -> GainGrid:
+        """What is tried, and how servos are compared."""
+        return self.problem.thresholds.selection.proposals.gain_grid
+
     def scores(self, several: Sequence[Sequence[Servo]]) -> np.ndarray:
         """(V, S) score of every joint under each of V sets of servos; lower is better."""
-        p, part = self.problem, self.problem.layout.slices["joint_pos"]
+        rule, p, part = self.rule, self.problem, self.problem.layout.slices["joint_pos"]
         models = [vary(p.plant, _effects(self.names, servos)) for servos in several]
         error = residuals(p.plant, p.layout, self.windows, models, p.coarse)[..., part][..., self.columns]
         noise = p.sigma[part][self.columns]
-        square = np.where(np.isfinite(error), error, 10.0) ** 2
-        score = np.log(square.mean(axis=2) + (3.0 * noise) ** 2).mean(axis=1)
-        logs = np.log(np.maximum(np.array(several)[..., :2], _LEAST))
-        return score + _UNLIKE * ((logs - np.median(logs, axis=1, keepdims=True)) ** 2).sum(axis=2)
+        square = np.where(np.isfinite(error), error, rule.diverged) ** 2
+        score = np.log(square.mean(axis=2) + (rule.noise_factor * noise) ** 2).mean(axis=1)
+        logs = np.log(np.maximum(np.array(several)[..., :2], rule.least_factor))
+        return score + rule.unlike * ((logs - np.median(logs, axis=1, keepdims=True)) ** 2).sum(axis=2)
 
 
-def far_servos(problem: Problem, candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
+def gains_by_grid(problem: Problem, candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     """Candidates of `KINDS` with values, all servos together.
 
     Empty where none makes the model much better, or where fewer than half of the servos are far off.
@@ -79,35 +75,37 @@ def far_servos(problem: Problem, candidates: Sequence[Candidate]) -> list[tuple[
     course = _course(problem, names) if names else None
     if course is None:
         return []
+    rule = course.rule
     declared: list[Servo] = [(1.0, 1.0, table["coulomb_friction", where].nominal[0]) for where in names]
     servos = _shared(course, declared)
-    for factors in _SWEEPS:
+    for factors in rule.sweeps:
         servos = _swept(course, servos, factors)
     before, after = course.scores([declared, servos]).mean(axis=1)
-    if before - after < _BETTER or not _mostly_far(servos):
+    if before - after < rule.least_fall or not _mostly_wrong(servos, rule):
         return []
     found = []
     for where, values, old in zip(names, servos, declared, strict=True):
         for effect, value, was in zip(KINDS, values, old, strict=True):
             if value != was:
-                step = float(np.sign(value - was)) * _STEP * value
+                step = float(np.sign(value - was)) * rule.step * value
                 found.append((replace(table[effect, where], step=(step,)), value))
     return found
 
 
-def _mostly_far(servos: Sequence[Servo]) -> bool:
+def _mostly_wrong(servos: Sequence[Servo], rule: GainGrid) -> bool:
     """Whether at least half of the servos have a kp that is wrong by a factor of two.
 
     Else one effect may have carried the residuals that far away, and the search finds it better alone.
     """
-    return float(np.mean([abs(np.log(max(kp, _LEAST))) >= np.log(2.0) for kp, _, _ in servos])) >= 0.5
+    wrong = [abs(np.log(max(kp, rule.least_factor))) >= np.log(rule.wrong_factor) for kp, _, _ in servos]
+    return float(np.mean(wrong)) >= rule.wrong_servos
 
 
 def _course(problem: Problem, names: tuple[str, ...]) -> _Course | None:
     """Windows of a second of the fitted rollouts; None where these are shorter."""
-    windows, plant = problem.windows, problem.plant
+    rule, windows, plant = problem.thresholds.selection.proposals.gain_grid, problem.windows, problem.plant
     ids = [int(i) for i in np.unique(windows.rollout)]
-    starts = choose_starts(windows.source, ids, _LONG, _WINDOWS)
+    starts = choose_starts(windows.source, ids, rule.span, rule.windows)
     if not starts:
         return None
     long = cut(plant, problem.layout, windows.source, starts, outputs=5)
@@ -117,13 +115,14 @@ def _course(problem: Problem, names: tuple[str, ...]) -> _Course | None:
 
 def _shared(course: _Course, declared: list[Servo]) -> list[Servo]:
     """The best of all factors on every servo's gains at once."""
-    options = [[(p, d, s[2]) for s in declared] for p, d in itertools.product(_SHARED, _SHARED)]
+    factors = itertools.product(course.rule.shared, course.rule.shared)
+    options = [[(p, d, s[2]) for s in declared] for p, d in factors]
     return options[int(np.argmin(course.scores(options).mean(axis=1)))]
 
 
 def _swept(course: _Course, servos: list[Servo], factors: Sequence[float]) -> list[Servo]:
     """Every servo at its best option, if that is better for all of them together."""
-    options = [_options(s, factors, limit) for s, limit in zip(servos, course.limit, strict=True)]
+    options = [_options(s, factors, limit, course.rule) for s, limit in zip(servos, course.limit, strict=True)]
     sets = [servos, *([o[k] for o in options] for k in range(len(options[0])))]
     best = np.argmin(course.scores(sets), axis=0)
     chosen = [sets[k][j] for j, k in enumerate(best)]
@@ -131,15 +130,17 @@ def _swept(course: _Course, servos: list[Servo], factors: Sequence[float]) -> li
     return chosen if new < old else servos
 
 
-def _options(servo: Servo, factors: Sequence[float], limit: float) -> list[Servo]:
+def _options(servo: Servo, factors: Sequence[float], limit: float, rule: GainGrid) -> list[Servo]:
+    """The servo with other gains and dry friction; `limit` is its torque limit [N m]."""
     kp, kd, dry = servo
-    most = 0.5 * limit
+    least, most = rule.least_factor, rule.most_dry * limit
     rub = limit if np.isfinite(limit) else max(dry, 1.0)
-    out = [(max(kp * f, _LEAST), kd, dry) for f in factors]
-    out += [(kp, max(kd * f, _LEAST), dry) for f in factors]
-    out += [(max(kp * f, _LEAST), max(kd * f, _LEAST), dry) for f in factors]
+    out = [(max(kp * f, least), kd, dry) for f in factors]
+    out += [(kp, max(kd * f, least), dry) for f in factors]
+    out += [(max(kp * f, least), max(kd * f, least), dry) for f in factors]
     out += [(kp, kd, min(dry * f, most)) for f in factors]
-    return out + [(kp, max(kd * f, _LEAST), min(dry + rub * r, most)) for f in (1.0, factors[0]) for r in _RUBS]
+    both = itertools.product((1.0, factors[0]), rule.dry_shares)
+    return out + [(kp, max(kd * f, least), min(dry + rub * r, most)) for f, r in both]
 
 
 def _effects(names: Sequence[str], servos: Sequence[Servo]) -> list[Effect]:
@@ -149,10 +150,10 @@ def _effects(names: Sequence[str], servos: Sequence[Servo]) -> list[Effect]:
 
 
 def start_with_gain_grid(run: SearchState) -> bool:
-    """Begin with servos far from the declared ones, where the data are that far from the model."""
+    """Begin with servos far from the declared ones, where residuals are that large."""
     if typical_power(run.fit.residual) < run.config.far:
         return False
-    found = far_servos(run.problem, run.candidates)
+    found = gains_by_grid(run.problem, run.candidates)
     if not found:
         return False
     chosen, values = [c for c, _ in found], np.array([v for _, v in found])
@@ -170,27 +171,29 @@ def start_with_gain_grid(run: SearchState) -> bool:
     return True
 
 
-def far_trials(
-    problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, far: float
+def gain_trials(
+    problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, large_residual: float
 ) -> list[Trial]:
-    """Servo gains by factors far from one, where the data are so far from the model that slopes say nothing.
+    """Servo gains by factors far from one, where residuals are so large that slopes say nothing.
 
-    A saturated servo has no slope in its gain: only trying tells.
+    That is from the median chi-square `large_residual` on. A saturated servo has no slope in its gain: only trying
+    tells.
     """
     power = float(np.median((fit.residual**2).mean(axis=1)))
-    if power < far:
+    if power < large_residual:
         return []
+    rule = problem.thresholds.selection.proposals.gain_grid
     chosen = {(c.effect, c.where) for c in fit.chosen}
     kinds = [c for c in candidates if c.effect in ("motor_strength", "kp") and (c.effect, c.where) not in chosen]
-    beside = LeftOver(problem, fit, weights)
-    start = beside.cost(fit.residual)
+    left_over = LeftOver(problem, fit, weights)
+    start = left_over.cost(fit.residual)
     declared = problem.residual([fit.effects], coarse=True)[0]
     found = []
     for c in kinds:
-        moved = problem.residual([[*fit.effects, c.at([f])] for f in _FACTORS], coarse=True)
-        costs = [beside.cost(fit.residual - (declared - m)) for m in moved]
+        moved = problem.residual([[*fit.effects, c.at([f])] for f in rule.single], coarse=True)
+        costs = [left_over.cost(fit.residual - (declared - m)) for m in moved]
         best = int(np.argmin(costs))
-        if costs[best] < 0.9 * start:
-            change = beside.left(declared - moved[best])
-            found.append(Trial(c, np.array([_FACTORS[best]]), costs[best], change))
+        if costs[best] < rule.single_share * start:
+            change = left_over.left(declared - moved[best])
+            found.append(Trial(c, np.array([rule.single[best]]), costs[best], change))
     return found

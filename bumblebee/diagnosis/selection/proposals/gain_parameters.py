@@ -2,8 +2,8 @@
 
 `motor_strength` scales kp and kd together, so any two of the three can say what any other two say. A forward search
 takes that which explains most first, and so writes half the damping as kp twice and strength half. A servo damps as the
-joint does, so viscous friction beside one of them may be the rest of another: a weaker drive whose damping is made up
-for is a lower kp.
+joint does, so viscous friction together with one of them may be the rest of another: a weaker drive whose damping is
+made up for is a lower kp.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +17,6 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.state import SearchState
 
 KINDS = ("motor_strength", "kp", "kd")
-_SHARE = 1e-3  # of what the effects on a joint's gains explain: differences of two simulators are significant, too
 
 
 def plain_gains(
@@ -30,9 +29,10 @@ def plain_gains(
 ) -> Fit:
     """A fit in which no joint has two effects on its gains where one fits as well, and none has other two than kp, kd.
 
-    As well: the cost rises by less than `bound` squared, that of an effect which would be needless, or by less than a
+    As well: the cost rises by less than `bound` squared, that of an effect which would be redundant, or by less than a
     thousandth of what these effects lowered it by.
     """
+    rule = problem.thresholds.selection.proposals.gain_parameters
     for where in sorted({c.where for c in fit.chosen if c.effect in KINDS}):
         there = {c.effect: c for c in candidates if c.where == where and c.effect in KINDS}
         mine = [c for c in fit.chosen if c.where == where and c.effect in KINDS]
@@ -47,7 +47,7 @@ def plain_gains(
         rest = [c for c in fit.chosen if c not in (*mine, *damper)]
         tried = [_refit(problem, fit, rest, there, s, weights) for s in singles]
         best = min(tried, key=lambda f: f.cost)
-        most = fit.cost + max(bound**2, _SHARE * (_refit(problem, fit, rest, there, {}, weights).cost - fit.cost))
+        most = fit.cost + max(bound**2, rule.share * (_refit(problem, fit, rest, there, {}, weights).cost - fit.cost))
         if best.cost > most:
             if damper:
                 continue
@@ -67,6 +67,7 @@ def _refit(
     factors: dict[str, float],
     weights: np.ndarray,
 ) -> Fit:
+    """The `rest` of a fit's effects and, of those `there` on a servo's gains, some with their factors."""
     chosen = [*rest, *(there[kind] for kind in factors)]
     values = np.concatenate([np.empty(0), *(fit.of(c) for c in rest), *([v] for v in factors.values())])
     return gauss_newton(problem, chosen, values, weights, iterations=2, coarse=True, known=fit)

@@ -7,17 +7,15 @@ from scipy.stats import chi2
 from bumblebee.diagnosis.estimation import cost_of, typical_power
 from bumblebee.diagnosis.residuals import Problem
 
-_ODD = 0.05  # chance of noise to put any window of a joint so far off
-_MOST_JOINTS, _WINDOWS = 2, 16
-
 
 def odd_joints(problem: Problem, clean: np.ndarray) -> list[tuple[str, np.ndarray]]:
     """Joints whose own readings are off in some windows, with these windows, the furthest first; the worst joints."""
+    rule = problem.thresholds.selection.proposals.joint_misfit
     own, freedom = joint_chi_squares(problem, clean)
     usual = max(typical_power(clean), 1.0)
     doubt = chi2.sf(own.max(axis=0) / usual, freedom) * len(own)
-    worst = [int(j) for j in np.argsort(doubt)[:_MOST_JOINTS] if doubt[j] < _ODD]
-    return [(problem.plant.joints[j], np.sort(np.argsort(-own[:, j])[:_WINDOWS])) for j in worst]
+    worst = [int(j) for j in np.argsort(doubt)[: rule.joints] if doubt[j] < rule.chance]
+    return [(problem.plant.joints[j], np.sort(np.argsort(-own[:, j])[: rule.windows])) for j in worst]
 
 
 def joint_chi_squares(problem: Problem, clean: np.ndarray) -> tuple[np.ndarray, int]:

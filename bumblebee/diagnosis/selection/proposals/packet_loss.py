@@ -1,4 +1,6 @@
-"""Which commands never arrived: a likelihood of each window's course over all ways in which its commands can be lost.
+"""Packet loss: commands that never arrived.
+
+A likelihood of each window's course over all ways in which its commands can be lost.
 
 A lost command leaves the one before in force for a tick. What that does to a window's readings is simulated for every
 tick and every length of a run of losses; to first order the effects of several add up, so that the residual of a window
@@ -10,7 +12,7 @@ really got, and the rest of the diagnosis goes on with that.
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -20,30 +22,22 @@ from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.state import Loss, SearchState
 from bumblebee.diagnosis.simulation import Windows, residuals, vary
+from bumblebee.diagnosis.thresholds.proposals import PacketLoss
 from bumblebee.sim.effects import Effect
 
-_LONGEST = 3  # ticks in a row
-_MOST_TICKS = 11  # of a window; of more the patterns are too many, and single ticks too short to matter
-_ODD = 1.6  # whitened power of a window that a lost command may have spoilt
-_FEW_ODD, _HINT = 0.5, 4.0  # share of windows that are odd, below which these alone are asked first; what they must say
-_ALL_OFF = 10.0  # median power of a model that lacks something in every window: that comes first
-_WORTH = 8.0  # log-likelihood on the fitted windows
-_PAYS = 2.0  # log-likelihood on the held-out windows
-_SURE, _RARE = 30.0, -3.0  # of a fit so sure the held-out windows need only not contradict: few of them may have any
-_MOSTLY = 0.7  # share of the excess of log(1 + power) that must go in the windows said to have lost commands
-_MOST_OF = 0.5  # share of the held-out excess of chi-square that must go with a joint's own lost commands
-_HALF = 1.92  # fall of the log-likelihood at the ends of a 95 % interval
-_FEW_JOINTS = 8
+_HALF = 1.92  # half of a chi-square's 95 % quantile: fall of the log-likelihood at the ends of a 95 % interval
 
 
 @dataclass(frozen=True, eq=False)
-class Losses:
+class LossLikelihoods:
     """Likelihoods of W windows under the P patterns of their T ticks."""
 
     patterns: np.ndarray
     """(P, T) bool, the first without a loss."""
     logs: np.ndarray
     """(W, P) log-likelihood of each pattern, less that of none."""
+    rule: PacketLoss = field(default_factory=PacketLoss)
+    """How a share is sought."""
 
     def total(self, share: float) -> float:
         """Log-likelihood of a share, summed over windows."""
@@ -51,8 +45,8 @@ class Losses:
 
     def best(self) -> float:
         """The share of largest likelihood, by expectation and maximisation."""
-        lost, share = self.patterns.sum(axis=1), 0.02
-        for _ in range(60):
+        lost, share = self.patterns.sum(axis=1), self.rule.first_share
+        for _ in range(self.rule.iterations):
             weights = self._weights(share)
             share = float(np.clip((weights @ lost).mean() / self.patterns.shape[1], 1e-6, 0.9))
         return share
@@ -76,64 +70,88 @@ class Losses:
         return np.exp(posterior - logsumexp(posterior, axis=1, keepdims=True))
 
 
-def find_loss(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, Problem, Holdout] | None:
-    """Commands lost beside what the fit explains, and the windows with the commands that arrived; None for none."""
+def packet_loss_of(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Loss, Problem, Holdout] | None:
+    """Commands lost, conditional on the fit, and the windows with the commands that arrived; None for none."""
+    rule = problem.thresholds.selection.proposals.packet_loss
     clean = fit.clean(problem)
-    ticks = _ticks(problem.windows)
-    driven = [j for j, a in zip(problem.plant.joints, problem.plant.actuator, strict=True) if a >= 0]
-    power = (clean**2).mean(axis=1)
-    if not driven or not 1 <= ticks <= _MOST_TICKS or (power > _ODD).sum() < 2 or np.median(power) > _ALL_OFF:
+    places = _places(problem, fit, clean)
+    if not places:
         return None
-    places = [""] + (driven if 1 < len(driven) <= _FEW_JOINTS else [])
-    if (odd := np.flatnonzero(power > _ODD)).size < _FEW_ODD * len(power):
-        some = problem.part(odd)  # what these do not show at all the others need not be simulated for
-        seen = [losses_of(some, fit.effects, clean[odd], place) for place in places]
-        if max(losses.total(losses.best()) for losses in seen) < _HINT:
-            return None
-    tried = [(losses_of(problem, fit.effects, clean, place), place) for place in places]
+    tried = [(loss_likelihoods(problem, fit.effects, clean, place), place) for place in places]
     gains = [losses.total(losses.best()) for losses, _ in tried]
     best = int(np.argmax(gains))
     losses, place = tried[best]
     share, gain = losses.best(), gains[best]
     lost = losses.likely(share)
-    if gain < _WORTH + np.log(len(places)) or not lost.any():
+    if gain < rule.least_gain + np.log(len(places)) or not lost.any():
         return None
-    fitted, paid, explains = arrived(problem, lost, place), np.inf, 1.0
-    if _cleared(clean, _clean(fitted, fit), lost.any(axis=1)) < _MOSTLY:
+    fitted = arrived(problem, lost, place)
+    if _cleared(clean, _clean(fitted, fit), lost.any(axis=1)) < rule.cleared:
         return None
+    found = Loss(place, share, losses.interval(share), gain, np.inf, 1.0)
     if holdout.problem is not None:
-        left = _clean(holdout.problem, fit)
-        seen = losses_of(holdout.problem, fit.effects, left, place)
-        paid = seen.total(share)
-        # A bus that loses whole rows is usual, a joint that loses its own is not: that must be seen again.
-        if paid < _PAYS and (place or gain < _SURE or paid < _RARE):
+        seen = _seen_again(holdout.problem, fit, found)
+        if seen is None:
             return None
-        kept = arrived(holdout.problem, seen.likely(share), place)
-        explains = _explained(left, _clean(kept, fit))
-        if place and explains < _MOST_OF:  # sticking, too, looks like a command that comes late, here and there
-            return None
+        found, kept = seen
         holdout = replace(holdout, problem=kept)
-    elif place and gain < _SURE:
-        return None  # nor may it be believed as easily where it cannot be seen again
-    return Loss(place, share, losses.interval(share), gain, paid, explains), fitted, holdout
+    elif place and gain < rule.sure_gain:
+        return None  # a joint's own loss may not be believed as easily where it cannot be seen again
+    return found, fitted, holdout
 
 
-def losses_of(problem: Problem, effects: Sequence[Effect], clean: np.ndarray, place: str) -> Losses:
+def _places(problem: Problem, fit: Fit, clean: np.ndarray) -> list[str]:
+    """Where commands may have been lost: "" for all joints at once, and joints; none where nothing hints at it."""
+    rule = problem.thresholds.selection.proposals.packet_loss
+    driven = [j for j, a in zip(problem.plant.joints, problem.plant.actuator, strict=True) if a >= 0]
+    power = (clean**2).mean(axis=1)
+    odd = np.flatnonzero(power > rule.odd_power)
+    if not driven or not 1 <= _ticks(problem.windows) <= rule.most_ticks:
+        return []
+    if odd.size < rule.least_odd or np.median(power) > rule.most_usual_power:
+        return []
+    places = [""] + (driven if 1 < len(driven) <= rule.most_joints else [])
+    if odd.size < rule.few_odd * len(power):
+        some = problem.part(odd)  # what these do not show at all the others need not be simulated for
+        seen = [loss_likelihoods(some, fit.effects, clean[odd], place) for place in places]
+        if max(losses.total(losses.best()) for losses in seen) < rule.hint:
+            return []
+    return places
+
+
+def _seen_again(problem: Problem, fit: Fit, found: Loss) -> tuple[Loss, Problem] | None:
+    """The loss with what the held-out windows say of it, and these with the commands that arrived; None if against."""
+    rule = problem.thresholds.selection.proposals.packet_loss
+    left = _clean(problem, fit)
+    seen = loss_likelihoods(problem, fit.effects, left, found.where)
+    paid = seen.total(found.share)
+    # A bus that loses whole rows is usual, a joint that loses its own is not: that must be seen again.
+    if paid < rule.held_out_gain and (found.where or found.gain < rule.sure_gain or paid < rule.contradiction):
+        return None
+    kept = arrived(problem, seen.likely(found.share), found.where)
+    explains = _explained(left, _clean(kept, fit))
+    if found.where and explains < rule.own_explained:
+        return None
+    return replace(found, paid=paid, explains=explains), kept
+
+
+def loss_likelihoods(problem: Problem, effects: Sequence[Effect], clean: np.ndarray, place: str) -> LossLikelihoods:
     """Likelihoods of the residuals `clean` (W, M) under all patterns of losses, on a joint or ("") on all at once."""
-    ticks = _ticks(problem.windows)
+    rule, ticks = problem.thresholds.selection.proposals.packet_loss, _ticks(problem.windows)
     patterns = np.array(list(itertools.product([False, True], repeat=ticks)))
-    runs = _runs(patterns)
+    runs = _runs(patterns, rule.longest)
     changes = _changes(problem, effects, place, ticks)
     usual = max(float(np.median((clean**2).mean(axis=1))), 1.0)
-    table = np.stack([runs == length for length in range(1, _LONGEST + 1)], axis=1).reshape(len(patterns), -1)
-    table = table.astype(np.float32)  # (P, _LONGEST * T)
-    flat = changes.reshape(-1, *clean.shape).transpose(1, 0, 2)  # (W, _LONGEST * T, M)
+    lengths = range(1, rule.longest + 1)
+    table = np.stack([runs == length for length in lengths], axis=1).reshape(len(patterns), -1)
+    table = table.astype(np.float32)  # (P, L * T) of L lengths of a run
+    flat = changes.reshape(-1, *clean.shape).transpose(1, 0, 2)  # (W, L * T, M)
     linear = np.einsum("wkm,wm->wk", flat, clean, optimize=True)
     square = np.matmul(flat, flat.transpose(0, 2, 1)).astype(np.float32)
     logs = np.empty((len(clean), len(patterns)))
     for w in range(len(clean)):
         logs[w] = (table @ linear[w] - 0.5 * ((table @ square[w]) * table).sum(axis=1)) / usual
-    return Losses(patterns, logs)
+    return LossLikelihoods(patterns, logs, rule)
 
 
 def arrived(problem: Problem, lost: np.ndarray, place: str) -> Problem:
@@ -149,7 +167,8 @@ def arrived(problem: Problem, lost: np.ndarray, place: str) -> Problem:
 
 
 def _changes(problem: Problem, effects: Sequence[Effect], place: str, ticks: int) -> np.ndarray:
-    """(_LONGEST, T, W, M) whitened change of the prediction where tick t has the command of 1, 2, 3 ticks before."""
+    """(L, T, W, M) whitened change of the prediction where tick t has the command of 1, 2, 3 ticks before."""
+    longest = problem.thresholds.selection.proposals.packet_loss.longest
     windows, columns = problem.windows, _columns(problem, place)
     first, rows = _first(windows), np.arange(len(windows))
     variation = [vary(problem.plant, effects)]
@@ -160,8 +179,8 @@ def _changes(problem: Problem, effects: Sequence[Effect], place: str, ticks: int
         return problem.whitener(raw, centre=False)
 
     base = simulate(windows.command)
-    out = np.zeros((_LONGEST, ticks, *base.shape), dtype=np.float32)
-    for length, t in itertools.product(range(1, _LONGEST + 1), range(ticks)):
+    out = np.zeros((longest, ticks, *base.shape), dtype=np.float32)
+    for length, t in itertools.product(range(1, longest + 1), range(ticks)):
         command = windows.command.copy()
         at = (first + t)[:, None]
         command[rows[:, None], at, columns] = windows.command[rows[:, None], np.maximum(at - length, 0), columns]
@@ -187,12 +206,12 @@ def _ticks(windows: Windows) -> int:
     return min(counts)
 
 
-def _runs(patterns: np.ndarray) -> np.ndarray:
-    """(P, T) how many commands in a row were lost up to each tick, at most `_LONGEST`; 0 for one that arrived."""
+def _runs(patterns: np.ndarray, longest: int) -> np.ndarray:
+    """(P, T) how many commands in a row were lost up to each tick, at most `longest`; 0 for one that arrived."""
     out = np.zeros(patterns.shape, dtype=int)
     for t in range(patterns.shape[1]):
         before = out[:, t - 1] if t else 0
-        out[:, t] = np.where(patterns[:, t], np.minimum(before + 1, _LONGEST), 0)
+        out[:, t] = np.where(patterns[:, t], np.minimum(before + 1, longest), 0)
     return out
 
 
@@ -213,9 +232,9 @@ def _explained(before: np.ndarray, after: np.ndarray) -> float:
     return float(np.clip((power[0] - power[1]) / max(power[0] - 1.0, 1e-12), 0.0, 1.0))
 
 
-def find_lost_commands(run: SearchState) -> bool:
-    """Look for commands that never arrived; if some did not, go on with those that did."""
-    found = None if run.loss else find_loss(run.problem, run.holdout, run.fit)
+def find_packet_loss(run: SearchState) -> bool:
+    """Look for packet loss; if some commands never arrived, go on with those that did."""
+    found = None if run.loss else packet_loss_of(run.problem, run.holdout, run.fit)
     if found is None:
         return False
     run.loss, run.problem, run.holdout = found

@@ -1,4 +1,4 @@
-"""Limits of torque, tried at many sizes on just the windows that they reach.
+"""Actuator saturation: limits of torque, tried at many sizes on just the windows that they reach.
 
 A limit acts in few windows: there it decides everything, elsewhere nothing. It has no slope where it does not reach,
 the windows that it spoils weigh little in a fit, and they are too few for a variance between windows to call them
@@ -21,17 +21,10 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.joint_misfit import joint_chi_squares
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.diagnosis.simulation import Changes, Plant, Windows, command_inputs, vary
+from bumblebee.diagnosis.thresholds.proposals import Saturation
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect
 from bumblebee.sim.servo import Servos, servos_of
-
-_ODD, _FIRST = 1.6, 4  # power of a window that is off; windows that a limit reaches first
-_CHANCE = 0.01  # that noise puts a joint's own readings of one window as far off
-_WORTH, _SHARE = 15.0, 2e-3  # fall of the cost; share of it that a size must gain to be looked at closer
-_REACHED = (1, 2, 4, 7, 12, 24, 50, 100, 200)  # windows that the sizes tried reach
-_HOPELESS = 1.5  # rise of log(1 + power / s), summed, by each of two sizes from which on no more are tried
-_ENOUGH = 12  # windows: where no size that reaches up to so many gains, no more are tried
-_CLOSER = 5  # halvings of the interval around the best of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +41,45 @@ class _Demand:
         return -self.peak[:, j] if kind == "torque_limit" else self.slowest[:, j]
 
 
-def limit_trials(
+@dataclass(frozen=True, eq=False)
+class _Limit:
+    """One joint's limit, tried conditional on a fit."""
+
+    problem: Problem
+    fit: Fit
+    clean: np.ndarray
+    """(W, M) whitened residual of the fit."""
+    usual: float
+    """Median power of the windows, at least that of noise."""
+    candidate: Candidate
+    reach: np.ndarray
+    """(W,) sizes from which on the windows feel it."""
+    changes: Changes
+    """What was simulated before."""
+
+    @property
+    def rule(self) -> Saturation:
+        """What it is judged by."""
+        return self.problem.thresholds.selection.proposals.saturation
+
+    def value(self, size: float) -> float:
+        """The fitted parameter of a size: the torque is the size with the other sign."""
+        return -size if self.candidate.effect == "torque_limit" else size
+
+    def gain(self, size: float, fresh: bool) -> float:
+        """Fall of the robust cost; only windows that may feel the limit are simulated."""
+        felt = self.reach <= size + self.rule.margin * abs(size)
+
+        def simulate() -> np.ndarray:
+            return _change(self.problem, self.fit, self.candidate, self.value(size), felt)[felt]
+
+        key = (self.candidate.effect, size, felt.tobytes())
+        left = self.clean[felt] - self.changes.get(self.fit.effects, self.candidate.where, key, simulate, fresh)
+        before, after = (np.log1p((x**2).mean(axis=1) / self.usual) for x in (self.clean[felt], left))
+        return float(2.0 * self.usual * self.clean.shape[1] * (before - after).sum())
+
+
+def saturation_trials(
     problem: Problem,
     fit: Fit,
     candidates: Sequence[Candidate],
@@ -56,100 +87,110 @@ def limit_trials(
     hopeless: set[tuple[str, str]],
     changes: Changes | None = None,
 ) -> list[Trial]:
-    """The limit that explains most of the windows that are far off; none where no limit does.
+    """The limit that explains most of the windows with large residuals; none where no limit does.
 
     Of the four windows that a limit reaches first one must be off, and its joint in it, or it is not simulated. Where
     it acts in a few only it must bring them down to noise, which one number does not do by chance. One that only makes
     the windows worse that it reaches first joins the `hopeless` (effect, place), which are not tried. `changes` are
     what was simulated before.
     """
+    rule = problem.thresholds.selection.proposals.saturation
     clean = fit.clean(problem)
     power = (clean**2).mean(axis=1)
     usual = max(float(np.median(power)), 1.0)
     taken = {(c.effect, c.where) for c in fit.chosen}
     kinds = [c for c in candidates if c.effect in SATURATIONS and (c.effect, c.where) not in taken | hopeless]
-    odd = power > _ODD
+    odd = power > rule.odd_power
     if not odd.any() or not kinds:
         return []
-    own_off = _own_off(problem, clean, odd, usual)
-    demand = _demand(problem, fit.effects)
-    beside = LeftOver(problem, fit, weights)
+    own_off, demand = _own_off(problem, clean, odd, usual), _demand(problem, fit.effects)
     changes = (changes or Changes()).on(problem.windows, problem.whitener)
     found = []
     for kind, where in dict.fromkeys((c.effect, c.where) for c in kinds):
-        own = [c for c in kinds if (c.effect, c.where) == (kind, where)]
-        reach = demand.reach(kind, problem.plant.joints.index(where))
-        if not own_off[np.argsort(reach)[:_FIRST], problem.plant.joints.index(where)].any():
+        own, j = [c for c in kinds if (c.effect, c.where) == (kind, where)], problem.plant.joints.index(where)
+        reach = demand.reach(kind, j)
+        if not own_off[np.argsort(reach)[: rule.reached_first], j].any():
             continue
-        changes.taken = False
-        best = _profile(problem, fit, clean, usual, own[0], reach, changes)
-        if best is not None and changes.taken:
-            best = _profile(problem, fit, clean, usual, own[0], reach, changes, fresh=True)
-        if best is not None and best[1] <= 0:
+        value, gain = _best(_Limit(problem, fit, clean, usual, own[0], reach, changes)) or (None, None)
+        if gain is not None and gain <= 0:
             hopeless.add((kind, where))
-        if best is not None and best[1] > _WORTH:
-            nearest = min(own, key=lambda c: abs(c.start[0] - best[0]))
-            change = _change(problem, fit, nearest, best[0], np.isfinite(reach))
-            if not plausible(clean, change):
-                continue
-            found.append(Trial(nearest, np.array([best[0]]), beside.cost(fit.residual - change), beside.left(change)))
+        if gain is not None and gain > rule.least_gain:
+            nearest = min(own, key=lambda c, value=value: abs(c.start[0] - value))
+            found += _trial(problem, fit, weights, nearest, value, reach)
     return sorted(found, key=lambda t: t.cost)[:1]
+
+
+def _trial(
+    problem: Problem, fit: Fit, weights: np.ndarray, candidate: Candidate, value: float, reach: np.ndarray
+) -> list[Trial]:
+    """The limit on all windows that it reaches, if it does there what a limit may do."""
+    change = _change(problem, fit, candidate, value, np.isfinite(reach))
+    if not plausible(fit.clean(problem), change):
+        return []
+    left_over = LeftOver(problem, fit, weights)
+    return [Trial(candidate, np.array([value]), left_over.cost(fit.residual - change), left_over.left(change))]
 
 
 def _own_off(problem: Problem, clean: np.ndarray, odd: np.ndarray, usual: float) -> np.ndarray:
     """(W, J) whether a window is `odd` (W,) and a joint's own readings in it are off: what its limit spoils first."""
+    rule = problem.thresholds.selection.proposals.saturation
     out = np.zeros((len(clean), len(problem.plant.joints)), dtype=bool)
     own, freedom = joint_chi_squares(problem.part(odd), clean[odd])
-    out[odd] = own / usual > chi2.isf(_CHANCE, freedom)
+    out[odd] = own / usual > chi2.isf(rule.noise_chance, freedom)
     return out
 
 
-def _profile(
-    problem: Problem,
-    fit: Fit,
-    clean: np.ndarray,
-    usual: float,
-    candidate: Candidate,
-    reach: np.ndarray,
-    changes: Changes,
-    fresh: bool = False,
-) -> tuple[float, float] | None:
-    """Size and gain of the best of the sizes tried, `reach` (W,) being where each window begins to feel it.
+def _best(limit: _Limit) -> tuple[float, float] | None:
+    """Value and gain of a limit; simulated anew if it looks well by what was simulated around an earlier fit."""
+    limit.changes.taken = False
+    best = _profile(limit)
+    return _profile(limit, fresh=True) if best is not None and limit.changes.taken else best
 
-    None where no size is worth a closer look; no gain where all that were tried only do harm. What `changes` know of an
-    earlier fit is taken for this one's, unless all is to be `fresh`: half of what is worth a look is enough for it.
+
+def _profile(limit: _Limit, fresh: bool = False) -> tuple[float, float] | None:
+    """Value and gain of the best of the sizes tried.
+
+    None where no size is worth a closer look; no gain where all that were tried only do harm. What the limit's
+    `changes` know of an earlier fit is taken for this one's, unless all is to be `fresh`: half of what is worth a look
+    is enough for it.
     """
+    rule, cost = limit.rule, limit.fit.cost
 
     def gain(size: float) -> float:
-        return _gain(problem, fit, clean, usual, candidate, size, reach, changes, fresh)
+        return limit.gain(size, fresh)
 
-    order = np.argsort(reach)
-    felt = reach[order][np.isfinite(reach[order])]
-    counts = sorted({min(n, len(felt) - 1) for n in _REACHED if len(felt) >= 2} - {0})
+    order = np.argsort(limit.reach)
+    felt = limit.reach[order][np.isfinite(limit.reach[order])]
+    counts = sorted({min(n, len(felt) - 1) for n in rule.reached if len(felt) >= 2} - {0})
     if not counts:
         return None
     sizes = [float(0.5 * (felt[n - 1] + felt[n])) for n in counts]
     gains: list[float] = []
     for count, size in zip(counts, sizes, strict=True):
         gains.append(gain(size))
-        harmful = len(gains) > 1 and max(gains[-2:]) < -2.0 * usual * clean.shape[1] * _HOPELESS
-        if harmful or (count >= _ENOUGH and max(gains) < 0.5 * _SHARE * fit.cost):
+        harmful = len(gains) > 1 and max(gains[-2:]) < -2.0 * limit.usual * limit.clean.shape[1] * rule.harm
+        nothing = count >= rule.enough_windows and max(gains) < rule.earlier_share * rule.promising_share * cost
+        if harmful or nothing:
             break  # smaller limits spoil these windows further, and others
     best = int(np.argmax(gains))
     if gains[best] <= 0 and harmful:
-        return _value(candidate, sizes[best]), 0.0
-    if gains[best] <= (0.5 if changes.taken and not fresh else 1.0) * _SHARE * fit.cost:
+        return limit.value(sizes[best]), 0.0
+    earlier = limit.changes.taken and not fresh
+    if gains[best] <= (rule.earlier_share if earlier else 1.0) * rule.promising_share * cost:
         return None
-    if changes.taken and not fresh:
-        return _value(candidate, sizes[best]), gains[best]
+    if earlier:
+        return limit.value(sizes[best]), gains[best]
     low, high = sizes[max(best - 1, 0)], sizes[min(best + 1, len(gains) - 1)]
-    at = _closer(gain, low, sizes[best], high, gains[best])
-    return (_value(candidate, at[0]), at[1])
+    size, most = _closer(gain, (low, sizes[best], high), gains[best], rule.halvings)
+    return limit.value(size), most
 
 
-def _closer(gain: Callable[[float], float], low: float, middle: float, high: float, best: float) -> tuple[float, float]:
+def _closer(
+    gain: Callable[[float], float], interval: tuple[float, float, float], best: float, halvings: int
+) -> tuple[float, float]:
     """The best of a few more sizes, halving the wider side of the interval around the best so far."""
-    for _ in range(_CLOSER):
+    low, middle, high = interval
+    for _ in range(halvings):
         left = middle - low >= high - middle
         new = 0.5 * (low + middle) if left else 0.5 * (middle + high)
         value = gain(new)
@@ -160,34 +201,6 @@ def _closer(gain: Callable[[float], float], low: float, middle: float, high: flo
         else:
             high = new
     return middle, best
-
-
-def _value(candidate: Candidate, size: float) -> float:
-    """The fitted parameter of a size: the torque is the size with the other sign."""
-    return -size if candidate.effect == "torque_limit" else size
-
-
-def _gain(
-    problem: Problem,
-    fit: Fit,
-    clean: np.ndarray,
-    usual: float,
-    candidate: Candidate,
-    size: float,
-    reach: np.ndarray,
-    changes: Changes,
-    fresh: bool,
-) -> float:
-    """Fall of the robust cost; only windows that may feel the limit are simulated."""
-    felt = reach <= size + 0.05 * abs(size)
-
-    def simulate() -> np.ndarray:
-        return _change(problem, fit, candidate, _value(candidate, size), felt)[felt]
-
-    key = (candidate.effect, size, felt.tobytes())
-    left = clean[felt] - changes.get(fit.effects, candidate.where, key, simulate, fresh)
-    before, after = (np.log1p((x**2).mean(axis=1) / usual) for x in (clean[felt], left))
-    return float(2.0 * usual * clean.shape[1] * (before - after).sum())
 
 
 def _change(problem: Problem, fit: Fit, candidate: Candidate, value: float, felt: np.ndarray) -> np.ndarray:

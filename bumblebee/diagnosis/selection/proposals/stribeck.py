@@ -1,4 +1,4 @@
-"""Friction that grows at rest, beside dry friction or instead of a part of it."""
+"""Stribeck friction, which grows at rest: together with dry friction, or for a part of it."""
 
 from dataclasses import replace
 
@@ -10,66 +10,65 @@ from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.state import SearchState
 
-_LEVEL = 3.0  # standard errors of the dry friction on which other friction sits
-_REST = 0.6  # share of such friction that is left when its level is taken from it
-_CREEP = (0.06, 0.2)  # of the joint's usual speed: velocities at which friction is tried to grow
 
-
-def creeping(run: SearchState) -> bool:
-    """Try friction that grows at rest beside each dry friction that was found; whether one was accepted."""
+def add_stribeck_friction(run: SearchState) -> bool:
+    """Try Stribeck friction conditional on each dry friction that was found; whether one was accepted."""
+    rule = run.problem.thresholds.selection.proposals.stribeck
     dry = [c for c in run.fit.chosen if c.effect == "coulomb_friction"]
     found = False
     for c in dry:
         kinds = [o for o in run.candidates if (o.effect, o.where) == ("stribeck_friction", c.where)]
         if not kinds or is_chosen(kinds[0], run.fit.chosen):
             continue
-        looked = [_slower(max(kinds, key=lambda o: o.step[1]), share) for share in _CREEP]
-        tests = score_tests(run.problem, run.sensitivities(looked), run.fit, run.weights)
+        tried = [_slower(max(kinds, key=lambda o: o.step[1]), share, rule.shape_scale) for share in rule.creep]
+        tests = score_tests(run.problem, run.sensitivities(tried), run.fit, run.weights)
         k = int(np.argmax(tests.gain))
         power = max(run.fit.power(run.problem), 1.0)
-        if tests.gain[k] < power * run.bound**2 or looked[k] in run.closed:
+        if tests.gain[k] < power * run.bound**2 or tried[k] in run.closed:
             continue
-        values = looked[k].start
-        values[0] = tests.steps[k][0] * looked[k].step[0]
-        found |= bool(values[0] > 0) and run.accept(looked[k], values)
+        values = tried[k].start
+        values[0] = tests.steps[k][0] * tried[k].step[0]
+        found |= bool(values[0] > 0) and run.accept(tried[k], values)
     return found
 
 
-def levelled(run: SearchState) -> None:
-    """Fit dry friction beside friction of its joint that depends on direction or speed, where that was found alone."""
+def add_dry_friction(run: SearchState) -> None:
+    """Fit dry friction together with its joint's friction by direction or speed, where that was found alone."""
+    rule = run.problem.thresholds.selection.proposals.stribeck
     for c in [c for c in run.fit.chosen if c.effect in SHAPED]:
         dry = next((o for o in run.candidates if (o.effect, o.where) == ("coulomb_friction", c.where)), None)
         if dry is None or is_chosen(dry, run.fit.chosen):
             continue
         chosen = (*run.fit.chosen, dry)
         tried = [
-            gauss_newton(run.problem, chosen, start, run.weights, iterations=5, coarse=True, known=run.fit)
-            for start in _on_level(run.fit, c, dry)
+            gauss_newton(run.problem, chosen, start, run.weights, rule.iterations, coarse=True, known=run.fit)
+            for start in _on_level(run.fit, c, dry, rule.rest)
         ]
         fit = min(tried, key=lambda one: one.cost)
         z = wald(run.problem, fit, run.weights, len(chosen) - 1)
-        if z < _LEVEL or fit.of(dry)[0] < dry.nominal[0] or not no_worse_by_mean(run.holdout, run.fit, fit):
+        if z < rule.dry_z or fit.of(dry)[0] < dry.nominal[0] or not no_worse_by_mean(run.holdout, run.fit, fit):
             continue
         run.say(f"{c.effect} on {c.where} sits on dry friction: {fit.of(dry).round(5)}")
         run.steps.append(evidence(dry, z, 1))
         run.renew(fit)
 
 
-def _on_level(fit: Fit, candidate: Candidate, dry: Candidate) -> list[np.ndarray]:
-    """Values (P,) from which the two are fitted: the first less a share that is level, or at the velocity of a trial.
+def _on_level(fit: Fit, candidate: Candidate, dry: Candidate, rest: float) -> list[np.ndarray]:
+    """Values (P,) from which the two are fitted: the first less its level, or at the velocity of a trial.
 
-    With a velocity far too high it is all level already, and no slope leads from there.
+    The share `rest` of the first is left where its level is taken from it. With a velocity far too high it is all
+    level already, and no slope leads from there.
     """
     mine = fit.slices[fit.chosen.index(candidate)]
     shaping = [mine.start + i for i in range(mine.stop - mine.start) if i not in candidate.free]
-    near, far = fit.values.copy(), fit.values.copy()
-    near[mine] *= _REST
-    far[shaping] = candidate.start[[i - mine.start for i in shaping]]
-    level = dry.nominal[0] + (1 - _REST) * abs(fit.values[mine.start])
-    return [np.append(near, level), np.append(far, dry.start)]
+    near, slow = fit.values.copy(), fit.values.copy()
+    near[mine] *= rest
+    slow[shaping] = candidate.start[[i - mine.start for i in shaping]]
+    level = dry.nominal[0] + (1 - rest) * abs(fit.values[mine.start])
+    return [np.append(near, level), np.append(slow, dry.start)]
 
 
-def _slower(candidate: Candidate, share: float) -> Candidate:
-    """The same friction at a share of its velocity."""
+def _slower(candidate: Candidate, share: float, scale: float) -> Candidate:
+    """The same friction at a share of its velocity; of that the share `scale` matters."""
     speed = share * candidate.step[1]
-    return replace(candidate, step=(candidate.step[0], speed), shape_scale=0.3 * speed)
+    return replace(candidate, step=(candidate.step[0], speed), shape_scale=scale * speed)
