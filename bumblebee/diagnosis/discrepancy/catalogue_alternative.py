@@ -13,16 +13,15 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, Formula, is_chosen, shortlisted
 from bumblebee.diagnosis.comparison import (
-    SURE,
     Holdout,
     costs_more_than,
     criterion,
+    drop_beside,
     evidence,
     lead,
     parameters,
     refitted,
     wald,
-    without_needless,
 )
 from bumblebee.diagnosis.estimation import Fit, gauss_newton, resolved
 from bumblebee.diagnosis.residuals import Problem, window_weights
@@ -123,7 +122,7 @@ def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers) -> Fit | N
     fits = []
     for t in tried:
         new = refitted(problem, (*fit.chosen, t.candidate), np.concatenate((fit.values, t.values)), fit)
-        new = without_needless(problem, new, t.candidate)
+        new = drop_beside(problem, new, t.candidate)
         if _is_sure(problem, fit, new, t.candidate):
             fits.append(new)
     best = max(fits, key=lambda f: criterion(problem, f), default=None)
@@ -132,10 +131,10 @@ def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers) -> Fit | N
 
 def _is_sure(problem: Problem, fit: Fit, new: Fit, candidate: Candidate) -> bool:
     """Whether an effect that `new` has beside `fit` is beyond doubt, by its slopes or by what its loss costs."""
-    weights = window_weights(new.clean(problem))
-    if wald(problem, new, weights, new.chosen.index(candidate)) >= SURE:
+    weights, sure = window_weights(new.clean(problem)), problem.thresholds.comparison.elimination.redundant_z
+    if wald(problem, new, weights, new.chosen.index(candidate)) >= sure:
         return True
-    return costs_more_than(problem, resolved(problem, new, weights), resolved(problem, fit, weights), SURE)
+    return costs_more_than(problem, resolved(problem, new, weights), resolved(problem, fit, weights), sure)
 
 
 def _carried(plant: Plant, joint: str) -> list[str]:

@@ -10,11 +10,11 @@ kept is described, never forced into an effect of the catalogue.
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.comparison import SURE, Holdout, is_better, less, wald, without_idle, without_spent
+from bumblebee.diagnosis.comparison import Holdout, compare, drop_redundant, drop_unpaid_saturations, simulated_without, wald
 from bumblebee.diagnosis.discrepancy.catalogue_alternative import Offers, catalogue_swap
 from bumblebee.diagnosis.discrepancy.form import DiscrepancyModel, best_model, refitted_model
 from bumblebee.diagnosis.discrepancy.residual_tests import JointActivity, JointLackOfFit, LackOfFit, lack_of_fit
@@ -89,11 +89,11 @@ def discover(
         budget: of time; what there is none for is left out and written down there.
     """
     means = _Means(offers or Offers(), budget or Budget(), say)
-    before = without_spent(problem, holdout, without_idle(problem, holdout, fit))
+    before = drop_unpaid_saturations(problem, holdout, drop_redundant(problem, holdout, fit))
     left = lack_of_fit(problem, holdout.problem, before, activity)
     state, kinds = _swapped_for_single_functions(_State(problem, holdout, before, left, activity), means)
     state, kinds, unconfirmed = _with_models(state, kinds, means)
-    rest = without_spent(state.problem, state.holdout, state.fit) if kinds else state.fit
+    rest = drop_unpaid_saturations(state.problem, state.holdout, state.fit) if kinds else state.fit
     if rest is not state.fit:
         state = state.around(rest)
     gone = _with_places([c for c in before.chosen if c not in state.fit.chosen])
@@ -159,11 +159,12 @@ def _validated(
         return None, False
     swapped = catalogue_swap(problem, holdout, fit, model.fit, worst.joint, offers)
     if swapped is not None:
-        gains = holdout.gains(fit, swapped, rule.gain_z, rule.least_gain)
+        gains = compare(problem, holdout, fit, swapped).passes(problem.thresholds.comparison.validation)
         return (state.around(swapped), True) if gains else (None, False)
     new = state.around(model.fit)
+    redundant = problem.thresholds.comparison.elimination.redundant_z
     excess = new.left.joints[problem.plant.joints.index(worst.joint)].excess
-    if excess > max(rule.most_left * worst.excess, rule.noise) or _surety(new.problem, new.fit, fit) < SURE:
+    if excess > max(rule.most_left * worst.excess, rule.noise) or _surety(new.problem, new.fit, fit) < redundant:
         return None, False
     return new, False
 
@@ -178,10 +179,12 @@ def _is_worth_it(problem: Problem, holdout: Holdout, fit: Fit, model: Discrepanc
     rule = problem.thresholds.discrepancy.discover
     if _surety(problem, model.fit, fit) < bound:
         return False
-    if not holdout.gains(fit, model.fit, rule.gain_z, rule.least_gain):
+    validation = problem.thresholds.comparison.validation
+    if not compare(problem, holdout, fit, model.fit).passes(validation):
         return False
     own = next(c for c in model.fit.chosen if c not in fit.chosen)
-    return holdout.gains(less(problem, model.fit, [own]), model.fit, rule.gain_z, rule.least_of_all)
+    others = simulated_without(problem, model.fit, [own])
+    return compare(problem, holdout, others, model.fit).passes(replace(validation, least_share=rule.least_of_all))
 
 
 def _surety(problem: Problem, fit: Fit, before: Fit) -> float:
@@ -198,9 +201,10 @@ def _swap_for_one_function(state: _State, joint: str, offers: Offers) -> Discrep
     problem, holdout, fit, left = state.problem, state.holdout, state.fit, state.left
     swaps = single_functions(problem, fit, left.scene, left.library, joint)
     for gone, one in itertools.islice(swaps, problem.thresholds.discrepancy.discover.swaps):
-        bare = less(problem, fit, gone)
+        bare = simulated_without(problem, fit, gone)
         model = refitted_model(problem, bare, joint, [one])
-        if model is None or not is_better(problem, holdout, fit, model.fit):
+        rule = problem.thresholds.comparison.window_by_window
+        if model is None or not compare(problem, holdout, fit, model.fit).passes(rule):
             continue
         if _surety(problem, model.fit, fit) < left.sought.bound:
             continue

@@ -7,7 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.candidates import formula
-from bumblebee.diagnosis.comparison import PARAMETER, criterion, less, refitted, without_needless, without_one
+from bumblebee.diagnosis.comparison import criterion, drop_beside, refitted, simulated_without
 from bumblebee.diagnosis.discrepancy.catalogue_terms import in_terms, related, stiffer_than_the_drive
 from bumblebee.diagnosis.discrepancy.missing_torque import fitted_scene
 from bumblebee.diagnosis.discrepancy.residual_tests import LackOfFit
@@ -39,7 +39,7 @@ def best_model(problem: Problem, fit: Fit, left: LackOfFit, joint: str, budget: 
     ways += [(fit, [rival]) for rival in left.sought.rivals if rival.joint == column]
     own = [c for c in fit.chosen if c.where == joint]
     if own:
-        bare = less(problem, fit, own)
+        bare = simulated_without(problem, fit, own)
         scene = fitted_scene(problem, bare, left.scene.torque, [column])
         some = library(scene.data, [column])
         sought = seek(problem, scene.evidence, scene.residual, scene.columns, some, most=rule.functions)
@@ -83,7 +83,7 @@ def _climbed(
                 seen.add(other.texts)
                 tried[other] = refitted_model(problem, base, joint, [replace(one, function=other)])
         best = max((f for f in tried.values() if f is not None), key=lambda f: f.score, default=None)
-        if best is None or best.score < model.score + PARAMETER:
+        if best is None or best.score < model.score + problem.thresholds.comparison.criterion.parameter:
             return model
         function, model = next(other for other, f in tried.items() if f is best), best
     return model
@@ -97,15 +97,16 @@ def refitted_model(problem: Problem, base: Fit, joint: str, strange: Sequence[Fo
         for text, size in zip(*joined(list(one.function.texts), one.verdict.size), strict=True):
             terms[text] = float(size)
     kind = "curve" if any(one.function.table for one in strange) else "formula"
-    chosen, values = base.chosen, base.values
-    for c in [c for c in chosen if c.where == joint and related(list(terms), c.effect)]:
+    gone = []
+    for c in [c for c in base.chosen if c.where == joint and related(list(terms), c.effect)]:
         parts = in_terms(problem.plant, base, c)
         if parts and max(map(abs, terms.values())) > rules.form.part * max(map(abs, parts.values())):
-            chosen, values = without_one(chosen, values, c)
+            gone.append(c)
             terms = parts | terms
     own = formula(joint, terms)
-    fit = refitted(problem, (*chosen, own), np.concatenate((values, list(terms.values()))), base)
-    fit = without_needless(problem, fit, own)
+    rest = base.without(gone)
+    fit = refitted(problem, (*rest.chosen, own), np.concatenate((rest.values, list(terms.values()))), base)
+    fit = drop_beside(problem, fit, own)
     stiff = own in fit.chosen and stiffer_than_the_drive(problem.plant, own, fit.of(own), rules.catalogue_terms)
     if own not in fit.chosen or stiff:
         return None

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from bumblebee.diagnosis.comparison import better
+from bumblebee.diagnosis.comparison import confirmed as is_confirmed
 from bumblebee.diagnosis.discrepancy.missing_torque import Scene, fitted_scene, validation_scene
 from bumblebee.diagnosis.discrepancy.stepwise_regression import Found, Library, Sought, closest, library, seek
 from bumblebee.diagnosis.discrepancy.term_library import BasisFunction
@@ -201,7 +201,7 @@ def confirmed(scene: Scene, sought: Sought, validation: Scene | None) -> list[tu
 
     Where there is none, or none that meets it, each half of the fitted windows must be better with what the other says.
     """
-    rule = scene.problem.thresholds.discrepancy.residual_tests
+    rule, gain = scene.problem.thresholds.discrepancy.residual_tests, scene.problem.thresholds.comparison.confirmed
     evidence, found = sought.evidence, sought.found
     sizes = solve(evidence.basis, evidence.inverse, scene.residual, evidence.weights)
     sizes = sizes[len(sizes) - sum(len(one.torque) for one in found) :]
@@ -214,7 +214,7 @@ def confirmed(scene: Scene, sought: Sought, validation: Scene | None) -> list[tu
         if validation is not None:
             moved = validation.evidence.column(one.joint, one.function.torque(validation.data, one.joint))
             change = np.tensordot(size, moved, axes=1)
-            if not better(left, left - change) and ((change**2).sum() > rule.met or not _repeats(scene, one)):
+            if not is_confirmed(left, left - change, gain) and ((change**2).sum() > rule.met or not _repeats(scene, one)):
                 continue
             left = left - change
         kept.append((one, size))

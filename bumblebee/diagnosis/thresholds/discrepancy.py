@@ -246,10 +246,6 @@ class Discover:
 
     joints: int = 3
     """Joints at most that get one."""
-    gain_z: float = 2.0
-    """Standard errors of the gain on the validation set that it must have."""
-    least_gain: float = 0.01
-    """Share of the cost there that it must take away."""
     least_of_all: float = 0.05
     """Share of what all effects gain together that it must gain, what it replaces being gone."""
     most_left: float = 0.5

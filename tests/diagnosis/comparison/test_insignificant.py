@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.comparison.backward_elimination import shares, still_paying
+from bumblebee.diagnosis.comparison.backward_elimination import drop_unpaid, shares
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
@@ -25,7 +25,7 @@ def kept(chosen: Sequence[Candidate], friction: tuple[float, float]) -> tuple[li
         return gauss_newton(problem, chosen, values, weights)
 
     fit, holdout = refit(chosen, np.concatenate([c.start for c in chosen])), Holdout(judge)
-    left = still_paying(fit, refit, holdout)
+    left = drop_unpaid(fit, refit, holdout)
     return [f"{c.effect} {c.where}" for c in left.chosen], shares(holdout, fit)
 
 
@@ -44,4 +44,4 @@ def test_a_small_effect_that_is_real_stays() -> None:
 def test_with_nothing_to_judge_by_all_stay() -> None:
     _, problem, _ = prepared()
     fit = gauss_newton(problem, (SPRING,), SPRING.start, np.ones(len(problem.windows)))
-    assert still_paying(fit, lambda chosen, values: fit, Holdout()) is fit
+    assert drop_unpaid(fit, lambda chosen, values: fit, Holdout()) is fit

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis import diagnose as diagnosis
-from bumblebee.diagnosis.comparison.paired_tests import is_worse_than, standing
+from bumblebee.diagnosis.comparison.withdrawal import is_worse, standing
 from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
@@ -46,7 +46,7 @@ def test_what_was_read_off_the_logs_falls_alone(rubbing: Problem) -> None:
 
 
 def test_the_same_model_is_not_worse(rubbing: Problem) -> None:
-    assert not is_worse_than(rubbing, [TRUE], [TRUE])
+    assert not is_worse(rubbing, [TRUE], [TRUE])
 
 
 def test_structure_is_that_of_the_model_that_stands(monkeypatch) -> None:

@@ -7,7 +7,7 @@ from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.candidates.formula import formula
 from bumblebee.diagnosis.comparison import paired_tests
 from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.paired_tests import is_better
+from bumblebee.diagnosis.comparison.compare import compare
 from bumblebee.diagnosis.comparison.submodel import refitted
 from bumblebee.diagnosis.discrepancy.single_law import groups
 from bumblebee.diagnosis.estimation.fit import Fit
@@ -49,20 +49,20 @@ def test_a_basis_function_is_better_than_an_effect_only_where_it_is_true() -> No
         _, problem, judge = prepared(**truth)
         named = refitted(problem, (COULOMB,), np.array([0.02]))
         form = refitted(problem, (CUBIC,), np.array([law]))
-        assert is_better(problem, Holdout(judge), named, form) is better
+        assert compare(problem, Holdout(judge), named, form).passes(RULE) is better
 
 
 def test_a_basis_function_with_more_numbers_than_the_effects_is_never_better() -> None:
     _, problem, judge = prepared(cubic=0.6)
     named = refitted(problem, (COULOMB,), np.array([0.02]))
     form = refitted(problem, (formula("pole", {"q": 1.0, "q^3": 1.0}),), np.array([0.0, -0.6]))
-    assert not is_better(problem, Holdout(judge), named, form)
+    assert not compare(problem, Holdout(judge), named, form).passes(RULE)
 
 
 def test_a_basis_function_that_saves_two_numbers_and_fits_better_need_not_do_so_beyond_doubt(monkeypatch) -> None:
     _, problem, judge = prepared(cubic=0.6)
-    monkeypatch.setattr(paired_tests, "_doubt", lambda gain, count=2.0: np.inf)
+    monkeypatch.setattr(judging, "margin", lambda gain, z=2.0: np.inf)
     form = refitted(problem, (CUBIC,), np.array([-0.6]))
     for names, start, better in (((SPRING, COULOMB), [0.1, 0.0, 0.01], True), ((COULOMB,), [0.01], False)):
         named = refitted(problem, names, np.array(start))
-        assert is_better(problem, Holdout(judge), named, form) is better
+        assert compare(problem, Holdout(judge), named, form).passes(RULE) is better

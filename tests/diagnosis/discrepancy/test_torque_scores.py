@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates.signal_scales import scales_of
-from bumblebee.diagnosis.comparison.paired_tests import better
+from bumblebee.diagnosis.comparison.paired_tests import confirmed
+from bumblebee.diagnosis.thresholds.comparison import Confirmed
 from bumblebee.diagnosis.discrepancy.missing_torque import Scene, fitted_scene
 from bumblebee.diagnosis.discrepancy.residual_tests import JointActivity, in_whole, lack_of_fit
 from bumblebee.diagnosis.discrepancy.stepwise_regression import library, seek
@@ -143,9 +144,9 @@ def test_a_table_becomes_one_curve_of_the_same_torque() -> None:
 def test_better_is_beyond_doubt_or_not_at_all() -> None:
     rng = np.random.default_rng(0)
     before = rng.standard_normal((30, 40))
-    assert better(2.0 * before, before)
-    assert not better(before, 2.0 * before)
-    assert not better(before, before)
+    assert confirmed(2.0 * before, before, Confirmed())
+    assert not confirmed(before, 2.0 * before, Confirmed())
+    assert not confirmed(before, before, Confirmed())
 
 
 def test_a_basis_function_of_two_inner_numbers_has_neighbours_and_others_have_none() -> None:

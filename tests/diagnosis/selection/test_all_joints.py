@@ -7,8 +7,8 @@ import pytest
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.comparison.backward_elimination import certainty
 from bumblebee.diagnosis.comparison.holdout import Holdout
-from bumblebee.diagnosis.comparison.paired_tests import pays_together
-from bumblebee.diagnosis.comparison.submodel import without_some
+from bumblebee.diagnosis.comparison.compare import compare
+from bumblebee.diagnosis.comparison.submodel import moved_without
 from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
@@ -45,9 +45,9 @@ def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None
         assert found[place] == pytest.approx(value, rel=0.25), place
     assert set(found) - set(TRUTH) <= {(kind, j) for kind in ("motor_strength", "encoder_offset") for j in arm.JOINTS}
     assert certainty(problem, fit, window_weights(fit.clean(problem))).min() >= 4.0
-    assert pays_together(problem, Holdout(other), declared, fit)
-    assert not pays_together(problem, Holdout(other), fit, declared)
-    assert pays_together(problem, Holdout(), declared, fit) and not pays_together(problem, Holdout(), fit, declared)
+    assert pays(problem, Holdout(other), declared, fit)
+    assert not pays(problem, Holdout(other), fit, declared)
+    assert pays(problem, Holdout(), declared, fit) and not pays(problem, Holdout(), fit, declared)
 
 
 def test_without_candidates_there_is_no_fit() -> None:
@@ -72,7 +72,7 @@ def test_what_is_found_on_a_robot_like_its_model_does_not_pay() -> None:
     session, problem, other = _opened({})
     declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     fit = fit_all_joints(problem, all_candidates(session.plant, session.rollouts, []), declared, lambda text: None)
-    assert fit is None or not pays_together(problem, Holdout(other), declared, fit)
+    assert fit is None or not pays(problem, Holdout(other), declared, fit)
 
 
 def test_an_effect_taken_out_by_slopes_leaves_what_a_refit_in_the_simulator_leaves() -> None:
@@ -80,10 +80,10 @@ def test_an_effect_taken_out_by_slopes_leaves_what_a_refit_in_the_simulator_leav
     three = [c for c in all_candidates(session.plant, session.rollouts, []) if c.effect == "viscous_friction"]
     weights = window_weights(problem.residual([[]])[0])
     full = gauss_newton(problem, three, [c.nominal[0] for c in three], weights, iterations=3)
-    less = without_some(problem, full, weights, {2})
+    less = moved_without(problem, full, weights, three[2:])
     again = gauss_newton(problem, less.chosen, less.values, weights, iterations=3)
     assert less.chosen == tuple(three[:2])
     assert less.values == pytest.approx(again.values, abs=0.002)
     assert less.cost == pytest.approx(again.cost, rel=0.01)
     declared = gauss_newton(problem, (), (), weights)
-    assert without_some(problem, full, weights, {0, 1, 2}).cost == pytest.approx(declared.cost, rel=0.05)
+    assert moved_without(problem, full, weights, three).cost == pytest.approx(declared.cost, rel=0.05)

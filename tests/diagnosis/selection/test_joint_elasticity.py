@@ -9,7 +9,7 @@ from bumblebee.diagnosis.selection.proposals.joint_elasticity import (
     joint_elasticity_trials,
     series,
 )
-from bumblebee.diagnosis.selection.swap import exchange
+from bumblebee.diagnosis.selection.swap import swap
 from bumblebee.diagnosis.thresholds.proposals import JointElasticity
 from tests.diagnosis import arm
 from tests.diagnosis.selection.test_swap import begun, names
@@ -19,11 +19,11 @@ from tests.diagnosis.strange_arm import simulate
 def test_a_shaft_takes_the_place_of_the_rotor_that_it_passed_for() -> None:
     truth = {("series_elasticity", "j2"): (600.0,)}
     run = begun(arm.XML, simulate(truth, seed=3), {("armature", "j2"): 0.015})
-    assert exchange(run)
+    assert swap(run)
     assert names(run) == [("series_elasticity", "j2")]
     assert 1 / run.fit.values[0] == pytest.approx(600.0, rel=0.2)
     assert is_of_series(run.problem, run.fit.chosen[0], run.fit.values)
-    assert not exchange(run)
+    assert not swap(run)
 
 
 def test_stiffnesses_get_finer_where_a_servo_on_the_joint_would_shake() -> None:
@@ -50,5 +50,5 @@ def test_no_shaft_explains_noise() -> None:
 
 def test_a_rotor_is_no_shaft() -> None:
     run = begun(arm.XML, arm.simulate({("armature", "j2"): 0.015}, seed=3), {("armature", "j2"): 0.013})
-    assert not exchange(run)
+    assert not swap(run)
     assert names(run) == [("armature", "j2")]

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.comparison.paired_tests import no_worse_within_errors
+from bumblebee.diagnosis.comparison.compare import compare
 from bumblebee.diagnosis.comparison.submodel import linearly_without
 from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
@@ -14,8 +14,9 @@ from bumblebee.diagnosis.selection import confounding
 from bumblebee.diagnosis.selection.forward import begin
 from bumblebee.diagnosis.selection.proposals.stribeck import add_dry_friction, add_stribeck_friction
 from bumblebee.diagnosis.selection.state import SearchState
-from bumblebee.diagnosis.selection.swap import exchange
+from bumblebee.diagnosis.selection.swap import swap
 from bumblebee.diagnosis.selection.trial import Trial
+from bumblebee.diagnosis.thresholds.comparison import NoWorseWithinErrors
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import arm, cart
 from tests.diagnosis.strange_arm import simulate
@@ -42,17 +43,17 @@ def names(run: SearchState) -> list[tuple[str, str]]:
 
 def test_a_wrong_name_gives_way_to_the_right_one_and_that_stays() -> None:
     run = begun(cart.xml(), cart.record(friction=(0.0, 0.05)), {("viscous_friction", "pole"): 0.03})
-    assert exchange(run)
+    assert swap(run)
     assert names(run) == [("coulomb_friction", "pole")]
     assert run.fit.values[0] == pytest.approx(0.05, rel=0.05)
     assert [s.candidate for s in run.steps] == list(run.fit.chosen)
-    assert not exchange(run)
+    assert not swap(run)
 
 
 def test_two_names_that_stand_for_one_give_way_to_it() -> None:
     two = {("viscous_friction", "pole"): 0.03, ("armature", "pole"): 0.001}
     run = begun(cart.xml(), cart.record(friction=(0.0, 0.05)), two)
-    assert exchange(run)
+    assert swap(run)
     assert names(run) == [("coulomb_friction", "pole")]
 
 
@@ -79,11 +80,11 @@ def test_friction_that_grows_at_rest_is_told_from_the_dry_friction_that_it_sits_
 
 def test_cogging_is_fitted_in_its_periods_before_a_spring_is_said_to_have_no_rival() -> None:
     run = begun(arm.XML, simulate({("cogging", "j2"): (1.5, 0.0, 4.0)}, seed=3), {("joint_spring", "j2"): (1.0, 0.0)})
-    rest = linearly_without(run.fit, 0)
+    rest = linearly_without(run.fit, run.fit.chosen[0])
     there = [c for c in run.candidates if (c.effect, c.where) == ("cogging", "j2")]
     rival = min((c for c in there if c.start[2] > 4.5), key=lambda c: c.start[2])
     first = Trial(rival, rival.start, np.inf, np.zeros(0))
     placed = confounding._in_place(run, rest, first)
     assert placed.values[2] == pytest.approx(4.0, rel=0.05)
     assert placed.cost < run.fit.cost
-    assert no_worse_within_errors(run.problem, run.holdout, run.fit, placed)
+    assert compare(run.problem, run.holdout, run.fit, placed).passes(NoWorseWithinErrors())

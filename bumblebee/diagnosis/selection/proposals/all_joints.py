@@ -24,10 +24,10 @@ from bumblebee.diagnosis.candidates import (
     effects_at,
     is_chosen,
 )
-from bumblebee.diagnosis.comparison import MUCH, Holdout, certainty, evidence, pays_together, surest
+from bumblebee.diagnosis.comparison import Holdout, certainty, compare, drop_unsure, evidence
 from bumblebee.diagnosis.estimation import Fit, columns_at, cost_of, gauss_newton, project
 from bumblebee.diagnosis.residuals import Problem, by_misfit, make_problem, screening_windows, window_weights
-from bumblebee.diagnosis.selection.state import LITTLE, PATIENCE, SOME, SearchState
+from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
@@ -68,7 +68,7 @@ def fit_all_joints(
     for kind in USUAL_OF_BODIES if small else ():
         fit = _with_links(some, fit, [c for c in candidates if c.effect == kind and is_whole(c)], say)
     if fit.power(some) < rule.still_off:
-        return _sure_of(problem, surest(some, fit, window_weights(fit.clean(some))))
+        return _sure_of(problem, drop_unsure(some, fit, window_weights(fit.clean(some))))
     return _sure_by_misfit(problem, fit)
 
 
@@ -81,7 +81,7 @@ def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Ca
     values = np.concatenate((fit.values, *(c.nominal for c in bodies)))
     larger = _large_residual_fit(problem, [*fit.chosen, *bodies], values, rule.steps_with_links)
     say(f"{len(larger.chosen)} with {bodies[0].effect} on all links: chi-square {larger.power(problem):.3g}")
-    return larger if larger.power(problem) < (1 - MUCH) * fit.power(problem) else fit
+    return larger if larger.power(problem) < (1 - problem.thresholds.comparison.together.fall) * fit.power(problem) else fit
 
 
 def _large_residual_fit(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int) -> Fit:
@@ -136,7 +136,7 @@ def _sure_of(problem: Problem, fit: Fit) -> Fit | None:
             return None
         weights = window_weights(problem.residual([fit.effects])[0])
         fit = gauss_newton(problem, fit.chosen, fit.values, weights, 2, coarse=True, damping=rule.damping, known=known)
-        sure = surest(problem, fit, window_weights(fit.clean(problem)))
+        sure = drop_unsure(problem, fit, window_weights(fit.clean(problem)))
         if sure.chosen == fit.chosen:
             break
         known, fit = fit, sure
@@ -187,13 +187,14 @@ def start_with_all_joints(run: SearchState) -> bool:
 
     Only if the last of these explained little, or they are very large: else the next may explain the rest.
     """
-    if run.tried_many or run.given or len(run.fit.chosen) < SOME or run.power() < run.config.many:
+    if run.tried_many or run.given or len(run.fit.chosen) < run.rule.many_after or run.power() < run.config.many:
         return False
-    if run.fall >= LITTLE and run.power() < run.config.far:
+    if run.fall >= run.rule.many_little and run.power() < run.config.far:
         return False
     run.tried_many = True
     fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
-    if fit is None or not pays_together(run.problem, run.holdout, run.fit, fit):
+    rule = run.problem.thresholds.comparison.together
+    if fit is None or not compare(run.problem, run.holdout, run.fit, fit).passes(rule):
         return False
     run.problem, run.holdout, fit = whitened_anew(run.problem, run.holdout, fit)
     run.keep = screening_windows(run.problem, run.config.screen_windows)
@@ -203,7 +204,7 @@ def start_with_all_joints(run: SearchState) -> bool:
     run.say(f"begun anew with {len(fit.chosen)} effects together: chi-square {fit.power(run.problem):.3g}")
     run.closed.clear()
     run.hopeless.clear()
-    run.given, run.patience = len(fit.chosen), min(run.patience, PATIENCE)
+    run.given, run.patience = len(fit.chosen), min(run.patience, run.rule.many_patience)
     run.weights, run.fit = weights, fit
     run.rescreen()
     return True

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, effects_at
-from bumblebee.diagnosis.comparison import evidence, wald
+from bumblebee.diagnosis.comparison import compare, evidence, wald
 from bumblebee.diagnosis.estimation import Fit, LeftOver, gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.state import SearchState
@@ -159,7 +159,8 @@ def start_with_gain_grid(run: SearchState) -> bool:
     chosen, values = [c for c, _ in found], np.array([v for _, v in found])
     weights = window_weights(run.problem.residual([effects_at(chosen, values)])[0])
     fit = gauss_newton(run.problem, chosen, values, weights, iterations=0, coarse=True)
-    if not run.holdout.gains(run.fit, fit, run.config.holdout_z, run.config.least_gain):
+    gain = compare(run.problem, run.holdout, run.fit, fit)
+    if not gain.passes(run.problem.thresholds.comparison.validation):
         return False
     for i, c in enumerate(fit.chosen):
         z = wald(run.problem, fit, weights, i)

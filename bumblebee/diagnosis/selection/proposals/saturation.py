@@ -125,7 +125,7 @@ def _trial(
 ) -> list[Trial]:
     """The limit on all windows that it reaches, if it does there what a limit may do."""
     change = _change(problem, fit, candidate, value, np.isfinite(reach))
-    if not plausible(fit.clean(problem), change):
+    if not plausible(fit.clean(problem), change, problem.thresholds.comparison.plausible):
         return []
     left_over = LeftOver(problem, fit, weights)
     return [Trial(candidate, np.array([value]), left_over.cost(fit.residual - change), left_over.left(change))]

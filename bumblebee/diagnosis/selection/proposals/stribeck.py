@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from bumblebee.diagnosis.candidates import SHAPED, Candidate, is_chosen
-from bumblebee.diagnosis.comparison import evidence, no_worse_by_mean, wald
+from bumblebee.diagnosis.comparison import compare, evidence, wald
 from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.state import SearchState
@@ -46,7 +46,10 @@ def add_dry_friction(run: SearchState) -> None:
         ]
         fit = min(tried, key=lambda one: one.cost)
         z = wald(run.problem, fit, run.weights, len(chosen) - 1)
-        if z < rule.dry_z or fit.of(dry)[0] < dry.nominal[0] or not no_worse_by_mean(run.holdout, run.fit, fit):
+        if z < rule.dry_z or fit.of(dry)[0] < dry.nominal[0]:
+            continue
+        no_worse = run.problem.thresholds.comparison.no_worse_on_average
+        if not compare(run.problem, run.holdout, run.fit, fit).passes(no_worse):
             continue
         run.say(f"{c.effect} on {c.where} sits on dry friction: {fit.of(dry).round(5)}")
         run.steps.append(evidence(dry, z, 1))
