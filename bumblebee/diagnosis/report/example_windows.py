@@ -22,7 +22,7 @@ def examples(session: Session, effects: Sequence[Effect] = (), count: int = 3) -
     plant, layout, ids = session.plant, session.layout, session.holdout or session.train
     starts: list[tuple[int, int, int]] = []
     for length in _LENGTHS:
-        starts = starts or choose_starts(session.rollouts, ids, length, 60)
+        starts = starts or choose_starts(session.rollouts, ids, length, 60, plant.thresholds.windows)
     windows = cut(plant, layout, session.rollouts, starts, outputs=120)
     models = [vary(plant, [])] + ([vary(plant, effects)] if effects else [])
     left = residuals(plant, layout, windows, models, session.steps[0])[..., layout.slices["joint_pos"]]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from bumblebee.diagnosis.residuals import Whitener, fit_whitener
+from bumblebee.diagnosis.residuals import NoisyWindows, Whitener, fit_whitener
 from bumblebee.diagnosis.simulation import (
     KINDS,
     Layout,
@@ -37,7 +37,7 @@ def horizon_windows(
     """Windows for every horizon that the data reach; only their last tick is compared."""
     found = {}
     for name in HORIZONS:
-        starts = choose_starts(rollouts, ids, float(name), budget)
+        starts = choose_starts(rollouts, ids, float(name), budget, plant.thresholds.windows)
         if starts:
             found[name] = cut(plant, layout, rollouts, starts, outputs=1)
     return found
@@ -58,7 +58,8 @@ def horizon_whiteners(
     for name, part in windows.items():
         count = min(len(part), _WHITENED[name])
         keep = np.unique(np.linspace(0, len(part) - 1, count).round().astype(int))
-        found[name] = keep, fit_whitener(plant, layout, select(part, keep), variation, sigma, step, rng)
+        noisy = NoisyWindows(plant, layout, select(part, keep), variation, sigma, step)
+        found[name] = keep, fit_whitener(noisy, rng)
     return found
 
 

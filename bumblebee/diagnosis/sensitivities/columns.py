@@ -67,11 +67,12 @@ def screen(
     plain = Variation(variation.model, variation.delay, variation.offset) if variation.plant is None else None
     around = plain or vary(problem.plant, [])
     only = _near(problem.plant, before.effects, effects) if before is not None else np.arange(problem.plant.model.nv)
-    answers = answers_of(problem.plant, problem.layout, problem.windows, around, problem.coarse, torque, only=only)
+    rules, scene = problem.thresholds.sensitivities, (problem.plant, problem.layout, problem.windows)
+    answers = answers_of(*scene, around, problem.coarse, torque, only, rules.impulses.segments)
     fresh = _whitened(problem, answers, only)
     white = fresh if before is None else before.white.copy()
     white[:, only] = fresh
-    signatures = Signatures(problem.plant, problem.windows, around, answers.path)
+    signatures = Signatures(problem.plant, problem.windows, around, answers.path, rules.signatures)
     ends = np.cumsum([len(c.free) for c in kept]).tolist()
     values = np.empty((ends[-1] if ends else 0, *problem.nuisance.shape[1:]), dtype=np.float32)
     simulated, torques = [], []
@@ -136,12 +137,12 @@ def _whitened(problem: Problem, answers: Answers, only: np.ndarray) -> np.ndarra
 
 
 def pulse_sizes(problem: Problem, torque: np.ndarray) -> np.ndarray:
-    """(nv,) pulses of a tenth of the joints' typical torque (J,); a hundredth of the weight on a floating base."""
-    plant = problem.plant
-    out = np.full(plant.model.nv, 0.1 * float(np.median(torque)))
-    out[plant.dof] = 0.1 * torque
+    """(nv,) pulses [N m, N]: shares of the joints' typical torque (J,), on a floating base of the weight."""
+    plant, rule = problem.plant, problem.thresholds.sensitivities.impulses
+    out = np.full(plant.model.nv, rule.torque * float(np.median(torque)))
+    out[plant.dof] = rule.torque * torque
     if plant.floating:
         weight = 9.81 * float(plant.model.body_mass.sum())
-        out[plant.base_dof : plant.base_dof + 3] = 0.01 * weight
-        out[plant.base_dof + 3 : plant.base_dof + 6] = 0.002 * weight
+        out[plant.base_dof : plant.base_dof + 3] = rule.force * weight
+        out[plant.base_dof + 3 : plant.base_dof + 6] = rule.moment * weight
     return np.maximum(out, 1e-9)

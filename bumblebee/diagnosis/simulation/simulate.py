@@ -13,17 +13,10 @@ from bumblebee.diagnosis.simulation.actuator_history import read_at, remember
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
 from bumblebee.diagnosis.simulation.hidden_states import Known, earlier, restructured, set_plastic, step_share
 from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.readings import (
-    Layout,
-    conjugate,
-    difference,
-    from_rotation_vector,
-    multiply,
-    rotate,
-    simulated_readings,
-)
+from bumblebee.diagnosis.simulation.readings import Layout, difference, simulated_readings
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
+from bumblebee.quaternions import conjugate, from_rotation_vector, multiply, rotate_by_cross
 from bumblebee.sim.effect_forces import Memory, StepHooks
 
 THREADS: int | None = None
@@ -72,7 +65,7 @@ def residuals(
     while first < copies:
         part = _together(variations, first, chunk) if starts is None else range(first, min(first + chunk, copies))
         chosen = [variations[0] if starts is not None else variations[v] for v in part]
-        short = step * step_share(chosen[0].hidden)
+        short = step * step_share(chosen[0].hidden, plant.thresholds.hidden)
         count = int(np.ceil(windows.span / short - 1e-6))
         inputs = [inputs_of(windows, variation, short, count, cache) for variation in chosen]
         models = [] if chosen[0].plant is not None else list({id(v.model): v.model for v in chosen}.values())
@@ -237,9 +230,9 @@ def _righted(plant: Plant, qpos: np.ndarray, qvel: np.ndarray, tilt: np.ndarray)
     """Starts whose base stands as it is, not as a tilted sensor says; velocities in the base's frame stay."""
     qpos, qvel = qpos.copy(), qvel.copy()
     at, dof = slice(plant.base_qpos + 3, plant.base_qpos + 7), slice(plant.base_dof, plant.base_dof + 3)
-    speed_b = rotate(conjugate(qpos[..., at]), qvel[..., dof])
+    speed_b = rotate_by_cross(conjugate(qpos[..., at]), qvel[..., dof])
     qpos[..., at] = multiply(qpos[..., at], conjugate(from_rotation_vector(tilt)))
-    qvel[..., dof] = rotate(qpos[..., at], speed_b)
+    qvel[..., dof] = rotate_by_cross(qpos[..., at], speed_b)
     return qpos, qvel
 
 
