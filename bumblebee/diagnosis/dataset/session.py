@@ -107,7 +107,7 @@ def make_session(
     spec, folded = fold_dampers(spec)
     plant = make_plant(spec, long[0], model)
     refuse_unlogged(plant, model)
-    undriven = undriven_warnings(plant, long, model)
+    undriven = tuple(undriven_warnings(plant, long, model))
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)
     train, holdout = split(long, rules.split)
@@ -127,9 +127,8 @@ def make_session(
         notes += more
     aside = [{"rollout": name, "reason": str(error)} for name, error in failed]
     return Session(
-        spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, tuple(undriven),
-        rules,
-    )  # fmt: skip
+        spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, undriven, rules
+    )
 
 
 def _sorted_out(

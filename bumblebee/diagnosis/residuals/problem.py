@@ -187,31 +187,25 @@ def make_problem(
     whitener = fit_whitener(replace(noisy, windows=windows), rng, move)
     raw = nuisance_columns(plant, layout, windows, variation, fine, rules.nuisances)
     keep = whitener.valid & np.isfinite(raw).all(axis=(0, 2, 3))
-    if keep.mean() < rules.outliers.finite:
+    _refuse_divergent(keep, windows.span, rules.outliers.finite)
+    windows, raw, whitener = select(windows, keep), raw[:, keep], whitener.part(keep)
+    columns = _columns(whitener, raw)
+    finest, read = fine if finest is None else finest, select(read, keep)
+    return Problem(
+        plant, layout, windows, sigma, fine, finest, fine, coarse, whitener, columns, read, tilt_of(effects),
+        thresholds=thresholds,
+    )  # fmt: skip
+
+
+def _refuse_divergent(keep: np.ndarray, span: float, least: float) -> None:
+    """`BadInput` where less than a share `least` of the windows (W,) of `span` s stay finite."""
+    if keep.mean() < least:
         raise BadInput(
             f"declared model, {(~keep).sum()} of {len(keep)} windows",
-            f"simulations that stay finite for {windows.span:.2g} s from the measured states and commands",
+            f"simulations that stay finite for {span:.2g} s from the measured states and commands",
             "simulations that diverge",
             "Look at gains, time step and units of the declared model.",
         )
-    windows, raw, whitener = select(windows, keep), raw[:, keep], whitener.part(keep)
-    columns = _columns(whitener, raw)
-    finest = fine if finest is None else finest
-    return Problem(
-        plant,
-        layout,
-        windows,
-        sigma,
-        fine,
-        finest,
-        fine,
-        coarse,
-        whitener,
-        columns,
-        select(read, keep),
-        tilt_of(effects),
-        thresholds=thresholds,
-    )
 
 
 def _columns(whitener: Whitener, raw: np.ndarray) -> np.ndarray:

@@ -68,7 +68,7 @@ def screen(
     around = plain or vary(problem.plant, [])
     only = _near(problem.plant, before.effects, effects) if before is not None else np.arange(problem.plant.model.nv)
     rules, scene = problem.thresholds.sensitivities, (problem.plant, problem.layout, problem.windows)
-    answers = answers_of(*scene, around, problem.coarse, torque, only, rules.impulses.segments)
+    answers = answers_of(*scene, around, problem.coarse, torque, only=only, segments=rules.impulses.segments)
     fresh = _whitened(problem, answers, only)
     white = fresh if before is None else before.white.copy()
     white[:, only] = fresh
@@ -85,13 +85,21 @@ def screen(
     for c, end in zip(kept, ends, strict=True):
         if c.effect == "encoder_delay" and not is_simulated(c, len(problem.plant.joints)):
             values[end - 1] += signatures.late.readings(problem, c.start[0], problem.plant.joints.index(c.where))
-    if simulated:
-        drawn = problem.sensitivities([c for c, _ in simulated], list(effects))
-        first = 0
-        for c, where in simulated:
-            values[where : where + len(c.free)] = drawn[first : first + len(c.free)]
-            first += len(c.free)
+    _simulate(problem, values, simulated, effects)
     return Columns(kept, values), white
+
+
+def _simulate(
+    problem: Problem, values: np.ndarray, simulated: Sequence[tuple[Candidate, int]], effects: Sequence[Effect]
+) -> None:
+    """Set the rows of `values` (., W, M) to the simulated columns of candidates, each from its first row on."""
+    if not simulated:
+        return
+    drawn = problem.sensitivities([c for c, _ in simulated], list(effects))
+    first = 0
+    for c, where in simulated:
+        values[where : where + len(c.free)] = drawn[first : first + len(c.free)]
+        first += len(c.free)
 
 
 def _fill(values: np.ndarray, torques: Sequence[tuple[int, np.ndarray]], white: np.ndarray) -> None:
