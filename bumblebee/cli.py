@@ -58,8 +58,9 @@ def diagnose(
     from bumblebee.diagnosis.report import examples, plot, summary
 
     claim_folder(out, DIAGNOSIS, overwrite, inputs_of(model, dataset))
-    session = open_session(model, dataset)
-    result = diagnose(session, DiagnosisConfig(max_windows=max_windows, seed=seed), _teller())
+    config = DiagnosisConfig(max_windows=max_windows, seed=seed)
+    session = open_session(model, dataset, config.thresholds.dataset)
+    result = diagnose(session, config, _teller())
     print(summary(result.document, result.problem.thresholds.report))  # said first: the disk may fail now
     shown = examples(result.session, result.effects, count=1)
     print(plot(shown[0]) if shown else "", flush=True)

@@ -41,8 +41,9 @@ def main(round: int) -> None:
     config = load("diagnose", DiagnoseConfig)
     measured = Path(f"data/measured/r{round}")
     mujoco.set_mju_user_warning(lambda text: None)  # what is tried and diverges is judged so, not logged
-    session = open_session(measured / "model.xml", measured)
-    result = diagnose(session, DiagnosisConfig(**vars(config)), say=lambda text: print(text, flush=True))
+    diagnosis = DiagnosisConfig(**vars(config))
+    session = open_session(measured / "model.xml", measured, diagnosis.thresholds.dataset)
+    result = diagnose(session, diagnosis, say=lambda text: print(text, flush=True))
     with output_folder(f"data/diagnosis/r{round}") as folder:
         fill(result, folder)
     print(summary(result.document, result.problem.thresholds.report))

@@ -19,7 +19,7 @@ FLOORS = [
 ]
 ONLY = {"clustering": {"motion"}, "tracking": {"motion", "sim"}, "diagnosis": {"sim", "measured"}}
 # Below the ground floor: known to everybody.
-FREE = {"errors", "files", "io", "last_line", "progress", "ranges", "__init__"}
+FREE = {"errors", "files", "io", "last_line", "progress", "quaternions", "ranges", "__init__"}
 
 
 def imports(path: Path) -> Iterator[tuple[int, str]]:

@@ -13,7 +13,7 @@ from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
-from bumblebee.motion.quaternions import conjugate, rotate
+from bumblebee.quaternions import conjugate, rotate
 
 _FAMILIES, _SHORTEST = ("stand", "squat"), 3.6  # [s]
 

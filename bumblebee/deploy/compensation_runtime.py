@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from bumblebee import quaternions
 from bumblebee.deploy.compensation import Compensation
 from bumblebee.deploy.compensation_reference import ReferenceTable
 from bumblebee.deploy.sensors import Sensors
 from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
-from bumblebee.motion import quaternions
 from bumblebee.robot.facts import joints
 from bumblebee.robot.model import gains
 from bumblebee.sim.effect_terms import read_term

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bumblebee import quaternions
 from bumblebee.deploy.compensation import Compensation
 from bumblebee.deploy.odometry import placed
 from bumblebee.deploy.policy import ExportedPolicy
@@ -16,7 +17,6 @@ from bumblebee.deploy.sensors import SensorNoise, Sensors, add_noise, draws
 from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.measured.rollout import Rollout
-from bumblebee.motion import quaternions
 from bumblebee.motion.clip import Clip, velocities
 from bumblebee.motion.kinematics import sole_points
 from bumblebee.robot.facts import joint_names

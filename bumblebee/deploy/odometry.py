@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bumblebee import quaternions
 from bumblebee.deploy.sensors import SensorNoise, Sensors
-from bumblebee.motion import quaternions
 from bumblebee.motion.kinematics import sole_points
 
 

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from bumblebee import quaternions
 from bumblebee.deploy.sensors import Sensors
 from bumblebee.deploy.servo_command import ServoCommand
-from bumblebee.motion import quaternions
 from bumblebee.robot.facts import joints as robot_joints
 from bumblebee.robot.model import gains
 from bumblebee.sim.sensors import load_model

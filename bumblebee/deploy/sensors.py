@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from bumblebee.motion import quaternions
+from bumblebee import quaternions
 
 
 @dataclass(frozen=True)

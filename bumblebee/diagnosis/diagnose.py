@@ -27,8 +27,6 @@ from bumblebee.diagnosis.selection import Refined, Search, grids, half_widths, r
 from bumblebee.diagnosis.selection import entries as rounding_entries
 from bumblebee.sim.effects import Effect
 
-_SMALL = 12  # degrees of freedom
-
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
@@ -98,7 +96,7 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
 
 def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator, say: Callable[[str], None]) -> _Found:
     """The effects of the catalogue, then what lies beyond it."""
-    larger = max(1.0, material.session.plant.model.nv / _SMALL)
+    larger = max(1.0, material.session.plant.model.nv / material.session.thresholds.extent.small_model)
     time = Budget(larger * config.search_seconds, "among the catalogue's effects", "search_seconds")
     found = search(material.problem, material.holdout, material.remade, config.search, say, time)
     say(f"the last fit, of {len(found.fit.chosen)} effects")

@@ -1,7 +1,7 @@
 """What a diagnosis works on: windows to fit, windows to accept by, candidates."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,12 +10,10 @@ from bumblebee.diagnosis.comparison import Holdout
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset import Session, informative
 from bumblebee.diagnosis.residuals import Problem, make_problem
-from bumblebee.diagnosis.simulation import choose_starts, cut, vary
+from bumblebee.diagnosis.simulation import choose_starts, cut, plant_by, vary
+from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
-
-_LONG = 1.0  # [s]
-_MORE = 2.5  # times as many windows for the smallest models
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +35,16 @@ class Material:
         plant, rollouts = self.session.plant, self.session.rollouts
         varied = vary(plant, effects)
         model = varied.model if varied.plant is None else None
-        return all_candidates(plant, rollouts, self.still, model), scales_of(plant, rollouts, model).torque
+        rules = self.problem.thresholds.candidates
+        typical = scales_of(plant, rollouts, rules.scales, model).torque
+        return all_candidates(plant, rollouts, self.still, rules, model), typical
 
 
 def gather(session: Session, config: DiagnosisConfig, rng: np.random.Generator, say: Callable[[str], None]) -> Material:
     """Cut the windows and whiten them by simulation; `BadInput` where no stretch is long enough."""
-    still = still_joints(session.plant, session.rollouts, session.sigma)
-    candidates = all_candidates(session.plant, session.rollouts, still)
+    session, rules = _by(session, config.thresholds), config.thresholds.candidates
+    still = still_joints(session.plant, session.rollouts, session.sigma, rules.still)
+    candidates = all_candidates(session.plant, session.rollouts, still, rules)
     session = informative(session, config.horizon)
     fitted = [i for i in session.train if i not in session.accept]
     say(
@@ -51,13 +52,20 @@ def gather(session: Session, config: DiagnosisConfig, rng: np.random.Generator, 
         f"{len(candidates)} candidates"
     )
     # A small model costs little to simulate: more windows.
-    more = float(np.clip(12 / session.plant.model.nv, 1.0, _MORE)) if config.grow else 1.0
+    extent = session.thresholds.extent
+    more = float(np.clip(extent.cheap_model / session.plant.model.nv, 1.0, extent.more)) if config.grow else 1.0
     say("what noise in the starts becomes, by simulation")
     problem = _problem(session, fitted, round(more * config.max_windows), config, rng)
     holdout = _holdout(session, config, more, rng)
     say(f"{len(problem.windows)} windows of {config.horizon:g} s")
-    typical = scales_of(session.plant, session.rollouts).torque
+    typical = scales_of(session.plant, session.rollouts, rules.scales).torque
     return Material(session, still, candidates, typical, problem, holdout)
+
+
+def _by(session: Session, thresholds: Thresholds) -> Session:
+    """The session used and simulated by other thresholds; what was decided when it was made stands."""
+    plant = plant_by(session.plant, thresholds.simulation)
+    return replace(session, plant=plant, thresholds=thresholds.dataset)
 
 
 def _holdout(session: Session, config: DiagnosisConfig, more: float, rng: np.random.Generator) -> Holdout:
@@ -65,7 +73,8 @@ def _holdout(session: Session, config: DiagnosisConfig, more: float, rng: np.ran
     if not session.accept:
         return Holdout()
     problem = _problem(session, session.accept, round(more * config.max_holdout_windows), config, rng)
-    starts = choose_starts(session.rollouts, session.accept, _LONG, config.max_long_windows)
+    length, rule = session.thresholds.extent.long_window, session.plant.thresholds.windows
+    starts = choose_starts(session.rollouts, session.accept, length, config.max_long_windows, rule)
     long = cut(session.plant, session.layout, session.rollouts, starts, outputs=1) if starts else None
     return Holdout(problem, long)
 
@@ -74,7 +83,7 @@ def _problem(
     session: Session, ids: Sequence[int], budget: int, config: DiagnosisConfig, rng: np.random.Generator
 ) -> Problem:
     horizon = config.horizon
-    starts = choose_starts(session.rollouts, ids, horizon, budget)
+    starts = choose_starts(session.rollouts, ids, horizon, budget, session.plant.thresholds.windows)
     if not starts:
         names = ", ".join(session.ids(ids)[:3])
         raise BadInput(f"rollouts {names}", f"stretches of {horizon:g} s", "shorter ones", "Record longer runs.")

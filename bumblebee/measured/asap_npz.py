@@ -14,7 +14,6 @@ from bumblebee.errors import BadInput
 from bumblebee.io.read import require_real
 from bumblebee.measured.checks_base import check_base
 from bumblebee.measured.checks_units import driven_joints
-from bumblebee.measured.quaternion import conjugate, rotate
 from bumblebee.measured.rollout import Rollout
 from bumblebee.measured.source import (
     NO_VELOCITY,
@@ -28,6 +27,7 @@ from bumblebee.measured.source import (
 from bumblebee.measured.tables import require_finite
 from bumblebee.measured.thresholds import Thresholds
 from bumblebee.measured.view import View
+from bumblebee.quaternions import conjugate, rotate_by_cross
 from bumblebee.robot.facts import joint_names
 
 NEEDED = ("time", "joint_pos", "joint_pos_cmd")
@@ -179,8 +179,8 @@ def _base(table: dict[str, np.ndarray], time: np.ndarray) -> tuple[dict[str, np.
     if not np.isfinite(rate).all():
         return base, "; lin_vel taken as given in the base frame, as the time stamps do not increase"
     in_world = np.nanmedian(np.linalg.norm(rate - base["base_lin_vel"], axis=1))
-    in_base = np.nanmedian(np.linalg.norm(rate - rotate(quat, base["base_lin_vel"]), axis=1))
+    in_base = np.nanmedian(np.linalg.norm(rate - rotate_by_cross(quat, base["base_lin_vel"]), axis=1))
     if in_world >= in_base:
         return base, "; lin_vel agrees with the base frame"
-    base["base_lin_vel"] = rotate(conjugate(quat), base["base_lin_vel"])
+    base["base_lin_vel"] = rotate_by_cross(conjugate(quat), base["base_lin_vel"])
     return base, "; lin_vel was in the world frame and has been turned into the base frame"

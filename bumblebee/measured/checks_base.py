@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from bumblebee.measured.quaternion import conjugate, multiply, rotate, rotation_vector
 from bumblebee.measured.stance import check_stance
 from bumblebee.measured.view import View, integral
+from bumblebee.quaternions import conjugate, multiply_by_cross, rotate_by_cross, rotation_vector
 
 TURN_SECONDS = (0.2, 0.5, 1.0)  # the slower the base turns, the longer until it stands out of the noise
 
@@ -36,7 +36,8 @@ def _check_norm(view: View, quat: np.ndarray) -> bool:
 def turns(quat: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
     """Rotation over `window` rows as a vector in the base frame and in the world frame, (T - window, 3) each."""
     first, last = quat[:-window], quat[window:]
-    return rotation_vector(multiply(conjugate(first), last)), rotation_vector(multiply(last, conjugate(first)))
+    in_base, in_world = multiply_by_cross(conjugate(first), last), multiply_by_cross(last, conjugate(first))
+    return rotation_vector(in_base), rotation_vector(in_world)
 
 
 def _check_turning(view: View, quat: np.ndarray) -> None:
@@ -97,7 +98,7 @@ def _check_travel(view: View, quat: np.ndarray) -> None:
     place, speed = view.values("base_pos"), view.values("base_lin_vel")
     moved = place[window:] - place[:-window]
     span = (rollout.time[window:] - rollout.time[:-window])[:, None]
-    readings = {"base": rotate(quat, speed), "world": speed}
+    readings = {"base": rotate_by_cross(quat, speed), "world": speed}
     errors = {name: _robust((moved - integral(rollout.time, value, window)) / span) for name, value in readings.items()}
     if errors["base"] < limits.drift_floor:
         return

@@ -17,8 +17,8 @@ import numpy as np
 
 from bumblebee.measured.checks_sign import correlation
 from bumblebee.measured.checks_units import servo_gains
-from bumblebee.measured.quaternion import conjugate, rotate
 from bumblebee.measured.view import View
+from bumblebee.quaternions import conjugate, rotate_by_cross
 
 MIRRORED = -0.9  # correlation of the changes of a position that follows its target's negative
 NOT_ALONG = 2.0  # standard errors: from here on a joint's acceleration is seen to go along with its command
@@ -125,7 +125,8 @@ def _base(view: View) -> np.ndarray:
     rollout, columns = view.rollout, [np.zeros((view.rollout.frames, 0))]
     if rollout.base_quat is not None:
         norm = np.linalg.norm(rollout.base_quat, axis=1, keepdims=True)
-        columns.append(rotate(conjugate(rollout.base_quat / np.maximum(norm, 1e-9)), np.array([0.0, 0.0, 1.0])))
+        to_base = conjugate(rollout.base_quat / np.maximum(norm, 1e-9))
+        columns.append(rotate_by_cross(to_base, np.array([0.0, 0.0, 1.0])))
     columns += [values for values in (rollout.base_ang_vel, rollout.base_lin_vel) if values is not None]
     return np.concatenate(columns, axis=1)
 

@@ -7,8 +7,8 @@ point. The lowest geom is taken for the one that stands; medians over the rollou
 import mujoco
 import numpy as np
 
-from bumblebee.measured.quaternion import conjugate, rotate
 from bumblebee.measured.view import View
+from bumblebee.quaternions import conjugate, rotate_by_cross
 
 ROWS = 400  # as many rows say enough
 
@@ -23,7 +23,7 @@ def check_stance(view: View, quat: np.ndarray) -> None:
     if expected is None:
         return
     given = view.values("base_lin_vel")[rows]
-    as_world = rotate(conjugate(quat[rows]), given)
+    as_world = rotate_by_cross(conjugate(quat[rows]), given)
     apart = np.maximum(2 * limits.drift_floor, limits.frame_apart * np.linalg.norm(given, axis=1))
     telling = np.linalg.norm(as_world - given, axis=1) > apart  # else both readings are one
     if telling.sum() < 10:
@@ -57,4 +57,4 @@ def stance_velocity(view: View, quat: np.ndarray, rows: np.ndarray) -> np.ndarra
         lowest = int(geoms[np.argmin(data.geom_xpos[geoms, 2] - size)])
         mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, lowest, motion, 0)
         out[index] = -motion[3:]
-    return rotate(conjugate(quat[rows]), out)
+    return rotate_by_cross(conjugate(quat[rows]), out)

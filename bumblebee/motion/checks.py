@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from bumblebee import quaternions
 from bumblebee.errors import BadInput
 from bumblebee.io.read import require_within
-from bumblebee.motion import quaternions
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import forward_key_positions, lowest
 from bumblebee.motion.raw import RawMotion

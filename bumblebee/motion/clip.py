@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.motion import quaternions
+from bumblebee import quaternions
 
 _CONTACT_HEIGHT = 0.03  # m: a sole lower than this may touch the floor
 _CONTACT_SPEED = 0.5  # m/s: and does, if it moves slower than this

@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 from scipy import ndimage
 
-from bumblebee.motion import quaternions
+from bumblebee import quaternions
 from bumblebee.motion.kinematics import forward_bodies, lowest, sole_points
 from bumblebee.ranges import Range, Ranged
 from bumblebee.robot.facts import FEET, joint_names, joints

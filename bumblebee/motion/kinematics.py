@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from bumblebee.motion import quaternions
+from bumblebee import quaternions
 from bumblebee.motion.clip import Clip
 from bumblebee.robot.facts import FEET, KEY_BODIES, g1_bodies, joint_names
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from bumblebee.motion import quaternions
+from bumblebee import quaternions
 from bumblebee.motion.raw import RawMotion
 
 

@@ -15,7 +15,7 @@ from bumblebee.learning.policy import Policy, Shape, new_actor
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.motion.kinematics import forward_key_positions, make_clip
-from bumblebee.motion.quaternions import from_axis_angle
+from bumblebee.quaternions import from_axis_angle
 from bumblebee.robot.facts import KEY_BODIES, joint_names
 from bumblebee.tracking.mirror import other_side
 from bumblebee.tracking.observations import layout

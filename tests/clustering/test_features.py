@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bumblebee import quaternions
 from bumblebee.clustering.features import COLUMNS, TARGET_COLUMNS, fit_normaliser, heading, motion_windows, pad
-from bumblebee.motion import quaternions
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import make_clip
 from tests.clustering.conftest import made_clip

@@ -6,10 +6,10 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from bumblebee import quaternions
 from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.sensors import Sensors
 from bumblebee.deploy.servo_command import ServoCommand
-from bumblebee.motion import quaternions
 from bumblebee.sim.effect_forces import StepHooks
 from bumblebee.sim.effects import Effect, add_to_spec, runtime_hooks
 from bumblebee.sim.mujoco_cpu import history_template

@@ -15,6 +15,8 @@ from bumblebee.diagnosis.replay import replay
 from bumblebee.diagnosis.report.notes import latency_notes
 from bumblebee.diagnosis.simulation.actuators import drive_law
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.diagnosis.thresholds.dataset import Smoothing
+from bumblebee.diagnosis.thresholds.simulation import DriveProbe
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import cart
@@ -59,7 +61,7 @@ def test_targets_for_motors_of_unknown_gains_are_refused() -> None:
 def test_actuators_of_several_inputs_are_refused() -> None:
     text = cart.xml("dcmotor_servo").replace('input="pos"', 'input="pos ff"')
     with pytest.raises(BadInput, match="one input"):
-        drive_law(mujoco.MjModel.from_xml_string(text), "cart.xml")
+        drive_law(mujoco.MjModel.from_xml_string(text), "cart.xml", DriveProbe())
 
 
 @pytest.mark.parametrize(("hz", "jitter", "most"), [(50.0, 0.3, 2.0), (500.0, 0.3, 2.0), (1000.0, 0.0, 12.0)])
@@ -100,12 +102,12 @@ def test_smoothing_leaves_the_noise_that_it_says() -> None:
                     speed + 0.07 * rng.standard_normal(speed.shape), joint_target=place)  # fmt: skip
     slow = replace(noisy, **{k: getattr(noisy, k)[::10] for k in ("time", "joint_pos", "joint_vel", "joint_target")})
     layout = session(cart.record(count=1)).layout.__class__({"joint_pos": slice(0, 1), "joint_vel": slice(1, 2)}, 2)
-    (out,), sigma, count = smooth_rollouts([noisy], layout, np.array([1e-3, 0.07]))
+    (out,), sigma, count = smooth_rollouts([noisy], layout, np.array([1e-3, 0.07]), Smoothing())
     inner = slice(10, -10)
     assert count == 1 and sigma[1] < 0.035
     assert (out.joint_pos - place)[inner].std() == pytest.approx(sigma[0], rel=0.2)
     assert (out.joint_vel - speed)[inner].std() == pytest.approx(sigma[1], rel=0.2)
-    (same,), sigma, count = smooth_rollouts([slow], layout, np.array([1e-3, 0.07]))
+    (same,), sigma, count = smooth_rollouts([slow], layout, np.array([1e-3, 0.07]), Smoothing())
     assert count == 0 and same is slow and sigma.tolist() == [1e-3, 0.07]
 
 

@@ -13,9 +13,9 @@ from mujoco import sysid
 from bumblebee.errors import BadInput
 from bumblebee.measured.checks import check_rollout
 from bumblebee.measured.importers import import_dataset, read_rollouts
-from bumblebee.measured.quaternion import rotate
 from bumblebee.measured.rollout import Rollout, read_dataset
 from bumblebee.measured.source import open_source
+from bumblebee.quaternions import rotate_by_cross
 from bumblebee.robot.facts import joint_names
 from tests.measured.simulated import ARM, arm_model, arm_rollout, g1_model, g1_rollout
 
@@ -170,7 +170,7 @@ def asap_file(path: Path, rollout: Rollout, lin_vel: np.ndarray, joints: int = 2
 @pytest.mark.parametrize("frame", ["world", "base"])
 def test_an_asap_log_comes_out_in_the_contract_s_frames_whatever_its_own(tmp_path: Path, frame: str) -> None:
     rollout = g1_rollout(0, 0.5, heading=1.5)
-    given = rotate(rollout.base_quat, rollout.base_lin_vel) if frame == "world" else rollout.base_lin_vel
+    given = rotate_by_cross(rollout.base_quat, rollout.base_lin_vel) if frame == "world" else rollout.base_lin_vel
     asap_file(tmp_path / "motion_0.npz", rollout, given)
     (back,) = read_rollouts(tmp_path, "asap", g1_model())
     assert back.joints == rollout.joints and frame in back.meta["notes"]

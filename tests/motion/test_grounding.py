@@ -5,7 +5,7 @@ import pytest
 
 from bumblebee.motion.grounding import GroundingConfig, ground
 from bumblebee.motion.kinematics import forward_bodies, lowest
-from bumblebee.motion.quaternions import rotate
+from bumblebee.quaternions import rotate
 from bumblebee.robot.facts import ANKLE_JOINTS, FEET, joint_names
 
 FPS = 50.0

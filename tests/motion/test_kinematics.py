@@ -67,7 +67,7 @@ def test_angular_velocity_is_in_the_bodys_frame_and_blind_to_signs():
     lying = np.array([np.sqrt(0.5), np.sqrt(0.5), 0, 0])  # rolled by 90 degrees: the body's y is the world's z
     half = 0.3 * np.arange(30) / 50
     about_z = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
-    from bumblebee.motion.quaternions import multiply
+    from bumblebee.quaternions import multiply
 
     quat = multiply(about_z, lying)
     quat[::2] *= -1

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bumblebee.motion.quaternions import normalised
 from bumblebee.motion.resample import resample
+from bumblebee.quaternions import normalised
 
 FIELDS = ("root_pos", "root_quat", "joint_pos")
 

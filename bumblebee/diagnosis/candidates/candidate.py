@@ -1,10 +1,11 @@
 """One effect in one place that the model may lack: its parameters, where they start, what changes of them matter."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from bumblebee.diagnosis.thresholds.candidates import CandidateLimits
 from bumblebee.sim.effect_native import physical_inertia
 from bumblebee.sim.effects import CATALOGUE, Effect, single
 
@@ -18,8 +19,6 @@ SIMULATED = (
 )  # fmt: skip
 # To first order a torque and a start that moved, which for the light joints of a stiff servo is a poor likeness.
 _SLOW = ("torque_lag", "encoder_delay")
-_FEW_JOINTS = 8
-_POINT = 0.01  # of its declared moments, below which no link is: what moments near zero say is lost to their bound
 
 
 @dataclass(frozen=True)
@@ -37,6 +36,8 @@ class Candidate:
     """Parameters that the effect is tested in; of the others those with a step shape it, from `nominal + step` on."""
     shape_scale: float = 0.0
     """A change of its shape that matters; 0: the shape is not fitted."""
+    limits: CandidateLimits = field(default_factory=CandidateLimits, repr=False, compare=False)
+    """How it is simulated and how far it may go."""
 
     @property
     def start(self) -> np.ndarray:
@@ -64,10 +65,10 @@ class Candidate:
         kinds = CATALOGUE[self.effect].parameters
         low, high = (np.array([getattr(p, side) for p in kinds]) for side in ("lower", "upper"))
         if self.effect in INVERSE:
-            # An infinitely stiff shaft cannot be simulated: a fiftieth of the first step is as good as absent.
-            low[0], high[0] = max(1.0 / high[0], 0.02 * abs(self.step[0])), 1.0 / low[0]
+            # An infinitely stiff shaft cannot be simulated.
+            low[0], high[0] = max(1.0 / high[0], self.limits.stiffest * abs(self.step[0])), 1.0 / low[0]
         if self.effect == "link_inertia":
-            low = np.maximum(low, _POINT * np.array(self.nominal))
+            low = np.maximum(low, self.limits.point * np.array(self.nominal))
         inside = np.clip(np.asarray(values, dtype=float), low, high)
         return physical_inertia(inside) if self.effect == "link_inertia" else inside
 
@@ -82,12 +83,12 @@ class Candidate:
 
 def is_simulated(c: Candidate, joints: int) -> bool:
     """Whether a candidate's column is simulated: where it is no torque, or where one can afford it to be exact."""
-    return c.effect in SIMULATED or (c.effect in _SLOW and (not c.where or joints <= _FEW_JOINTS))
+    return c.effect in SIMULATED or (c.effect in _SLOW and (not c.where or joints <= c.limits.few_joints))
 
 
 def shortlisted(c: Candidate, joints: int) -> bool:
     """Whether a candidate costs too much to be simulated on every joint: only those worst explained are tried."""
-    return c.effect == "backlash" or (c.effect == "series_elasticity" and joints > _FEW_JOINTS)
+    return c.effect == "backlash" or (c.effect == "series_elasticity" and joints > c.limits.few_joints)
 
 
 def without(effects: Sequence[Effect], candidate: Candidate) -> list[Effect]:

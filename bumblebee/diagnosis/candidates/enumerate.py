@@ -1,6 +1,7 @@
 """The candidates: every effect of the catalogue on every place it can sit on, and the size of a first step."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -8,140 +9,200 @@ import numpy as np
 from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.candidates.signal_scales import Scales, scales_of
 from bumblebee.diagnosis.simulation import Plant, declared_values, touching
+from bumblebee.diagnosis.thresholds.candidates import BodySteps, CandidateThresholds, StillJoints
 from bumblebee.measured.rollout import Rollout
 
-_STIFF = 0.03  # of a servo's own compliance
-_HARMONICS = (*range(1, 25), 28, 30, 32, 36, 40, 42, 48, 50, 56, 60, 64, 72, 80, 84, 96, 100, 120, 128, 144)
+_AXES = (0.0, 0.0)
 
 
-def still_joints(plant: Plant, rollouts: Sequence[Rollout], sigma: np.ndarray) -> list[str]:
+def still_joints(
+    plant: Plant, rollouts: Sequence[Rollout], sigma: np.ndarray, rule: StillJoints | None = None
+) -> list[str]:
     """Joints that move no more than their sensors' noise: nothing can be said of them."""
-    count = len(plant.joints)
+    rule, count = rule or StillJoints(), len(plant.joints)
     span = np.max([np.std(r.joint_pos, axis=0) for r in rollouts], axis=0)
     speed = np.max([np.std(r.joint_vel, axis=0) for r in rollouts], axis=0)
-    still = (span < 2.5 * sigma[:count]) & (speed < 1.5 * sigma[count : 2 * count])
+    still = (span < rule.place * sigma[:count]) & (speed < rule.speed * sigma[count : 2 * count])
     return [name for name, s in zip(plant.joints, still, strict=True) if s]
 
 
 def all_candidates(
-    plant: Plant, rollouts: Sequence[Rollout], still: Sequence[str], model: mujoco.MjModel | None = None
+    plant: Plant,
+    rollouts: Sequence[Rollout],
+    still: Sequence[str],
+    rules: CandidateThresholds | None = None,
+    model: mujoco.MjModel | None = None,
 ) -> list[Candidate]:
     """Every candidate on joints that move, on bodies that they carry, on the ground and on the whole robot.
 
     The first steps follow from the servos of `model`, the declared one if none is given.
     """
-    scales = scales_of(plant, rollouts, model)
+    rules = rules or CandidateThresholds()
+    scales = scales_of(plant, rollouts, rules.scales, model)
     found: list[Candidate] = []
     for j, name in enumerate(plant.joints):
         if name not in still:
-            found += [c for c in _on_joint(plant, scales, j, name)]
-    found += _on_whole(plant)
+            found += _OnJoint(plant, scales, j, name, rules).every()
+    found += _on_whole(plant, rules)
     total = plant.model.body_mass.sum()
     for body in _carried(plant, still):
-        found += _on_body(plant, body, total)
-    if plant.floating:
-        base = plant.model.body(int(plant.model.jnt_bodyid[plant.model.dof_jntid[plant.base_dof]])).name
-        if base:
-            found.append(Candidate("imu_offset", base, (0.0, 0.0), (0.01, 0.01), (0, 1)))
-        for ground in _grounds(plant):
-            for kind, share in (("ground_friction", -0.1), ("ground_compliance", 0.2)):
-                value = declared_values(plant, kind, ground)[0]
-                if value > 0:
-                    found.append(Candidate(kind, ground, (value,), (share * value,)))
-    return found
+        found += _on_body(plant, body, total, rules.body)
+    found += _under_floating_base(plant, rules.body)
+    return [replace(c, limits=rules.limits) for c in found]
 
 
-def _on_joint(plant: Plant, s: Scales, j: int, name: str) -> Iterator[Candidate]:
-    def make(
-        kind: str, *step: float, free: tuple[int, ...] = (0,), start: Sequence[float] | None = None, shape: float = 0.0
+@dataclass(frozen=True, eq=False)
+class _OnJoint:
+    """One joint, on which candidates are made."""
+
+    plant: Plant
+    scales: Scales
+    j: int
+    """Its column."""
+    name: str
+    rules: CandidateThresholds
+
+    def every(self) -> Iterator[Candidate]:
+        """All candidates on the joint."""
+        plant, j = self.plant, self.j
+        yield from self._friction()
+        yield from self._springs()
+        yield self._make("encoder_offset", self.rules.joint.offset)
+        if plant.actuator[j] < 0:
+            return
+        yield from self._of_any_drive()
+        if plant.scalable[j] and plant.torque_input:
+            yield self._make("motor_strength", self.rules.drive.gain)
+        elif plant.scalable[j]:
+            yield from self._of_servo()
+            yield from self._saturations()
+
+    def _make(
+        self,
+        kind: str,
+        *step: float,
+        free: tuple[int, ...] = (0,),
+        start: Sequence[float] | None = None,
+        shape: float = 0.0,
     ) -> Candidate:
-        nominal = declared_values(plant, kind, name) if start is None else start
-        return Candidate(kind, name, tuple(0.0 if np.isinf(x) else x for x in nominal), step, free, shape)
+        """A candidate of first steps `step`, absent at `start`, or where the declared model has it."""
+        nominal = declared_values(self.plant, kind, self.name) if start is None else start
+        return Candidate(kind, self.name, tuple(0.0 if np.isinf(x) else x for x in nominal), step, free, shape)
 
-    tenth = 0.1 * s.torque[j]
-    yield make("coulomb_friction", tenth)
-    yield make("viscous_friction", tenth / s.speed[j])
-    for share in (0.3, 1.0):
-        speed = share * s.speed[j]
-        yield make("stribeck_friction", tenth, speed, start=(0.0, 0.0), shape=0.3 * speed)
-    yield make("asymmetric_friction", tenth)
-    yield make("armature", 0.1 * s.inertia[j])
-    yield make("joint_spring", tenth / max(s.travel[j], 0.05), tenth, free=(0, 1))
-    joint = plant.model.joint(name).id
-    sprung = bool(plant.model.jnt_stiffness[joint])
-    for share in (0.03, 0.2):
-        width = share * max(s.travel[j], 0.02)
-        for dahl in (1.0,) if sprung else (0.0, 1.0):  # MJCF has one spring a joint; Dahl's law is a hook
-            yield make("hysteresis", tenth, width, dahl, start=(0.0, 0.0, 0.0), shape=0.3 * width)
-    hinge = plant.model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_HINGE)
-    for n in _HARMONICS if hinge else ():
-        if n * s.travel[j] > np.pi:
-            sizes = (0.5 * tenth, 0.5 * tenth, float(n))
-            yield make("cogging", *sizes, free=(0, 1), start=(0.0, 0.0, 0.0), shape=0.3 / s.travel[j])
-    yield make("encoder_offset", 0.01)
-    if plant.actuator[j] < 0:
-        return
-    yield make("load_dependent_friction", 0.05)
-    yield make("command_delay", 0.005)
-    yield make("dropped_commands", 0.2)
-    if s.peak[j] > 0:
-        for encoder in (0.0, 1.0):  # on the motor, on the joint
-            steps = (_twist(plant, s, j, encoder), encoder, 1e-3, 0.1)
-            yield make("series_elasticity", *steps, start=(0.0,) * 4, shape=3e-4)
-            yield make("backlash", max(0.01 * s.travel[j], 0.002), encoder, start=(0.0, 0.0))
-    if not plant.scalable[j] or plant.torque_input:
-        if plant.torque_input and plant.scalable[j]:
-            yield make("motor_strength", -0.1)
-        return
-    for kind in ("motor_strength", "kp", "kd"):
-        yield make(kind, -0.1)
-    yield make("torque_lag", 0.005)
-    yield make("encoder_delay", 0.005)
-    yield make("strength_drift", 0.1 / max(s.duration, 1.0))
-    yield make("thermal_fade", 0.1 / max(s.duration, 1.0))
-    limit = declared_values(plant, "torque_limit", name)[0]
-    for share in (0.9, 0.6, 0.35):
-        if s.peak[j] > 0 and share * s.peak[j] < limit:
-            yield make("torque_limit", (share - 1.0) * s.peak[j], start=(min(limit, s.peak[j]),))
-    if np.isfinite(limit):
-        for factor in (0.6, 1.5, 4.0):
-            yield make("torque_speed_limit", 1.0 / (factor * s.fastest[j]), start=(0.0,))
+    @property
+    def _torque(self) -> float:
+        """Torque [N m] of a first step."""
+        return self.rules.joint.torque * self.scales.torque[self.j]
+
+    def _friction(self) -> Iterator[Candidate]:
+        s, j, rule = self.scales, self.j, self.rules.joint
+        yield self._make("coulomb_friction", self._torque)
+        yield self._make("viscous_friction", self._torque / s.speed[j])
+        for share in rule.stribeck:
+            speed = share * s.speed[j]
+            yield self._make("stribeck_friction", self._torque, speed, start=(0.0, 0.0), shape=rule.shape * speed)
+        yield self._make("asymmetric_friction", self._torque)
+        yield self._make("armature", rule.inertia * s.inertia[j])
+
+    def _springs(self) -> Iterator[Candidate]:
+        plant, s, j, rule, none = self.plant, self.scales, self.j, self.rules.joint, (0.0, 0.0, 0.0)
+        yield self._make("joint_spring", self._torque / max(s.travel[j], rule.spring_travel), self._torque, free=(0, 1))
+        joint = plant.model.joint(self.name).id
+        sprung = bool(plant.model.jnt_stiffness[joint])
+        for share in rule.width:
+            width = share * max(s.travel[j], rule.travel)
+            for dahl in (1.0,) if sprung else (0.0, 1.0):  # MJCF has one spring a joint; Dahl's law is a hook
+                yield self._make("hysteresis", self._torque, width, dahl, start=none, shape=rule.shape * width)
+        hinge = plant.model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_HINGE)
+        for n in rule.harmonics if hinge else ():
+            if n * s.travel[j] > np.pi:
+                sizes = (rule.cogging * self._torque, rule.cogging * self._torque, float(n))
+                yield self._make("cogging", *sizes, free=(0, 1), start=none, shape=rule.shape / s.travel[j])
+
+    def _of_any_drive(self) -> Iterator[Candidate]:
+        s, j, rule, soft = self.scales, self.j, self.rules.drive, self.rules.transmission
+        yield self._make("load_dependent_friction", rule.load)
+        yield self._make("command_delay", rule.time)
+        yield self._make("dropped_commands", rule.dropped)
+        if s.peak[j] > 0:
+            for encoder in (0.0, 1.0):  # on the motor, on the joint
+                steps = (self._twist(encoder), encoder, soft.damping, soft.link_share)
+                yield self._make("series_elasticity", *steps, start=(0.0,) * 4, shape=soft.damping_shape)
+                gap = max(soft.backlash * s.travel[j], soft.least_backlash)
+                yield self._make("backlash", gap, encoder, start=(0.0, 0.0))
+
+    def _twist(self, encoder: float) -> float:
+        """Compliance [rad/(N m)] that matters; a servo that reads the joint behind a soft shaft would swing it up."""
+        plant, s, j, rule = self.plant, self.scales, self.j, self.rules.transmission
+        large, a = rule.twist * max(s.travel[j], self.rules.joint.travel) / s.peak[j], plant.actuator[j]
+        gain = abs(plant.model.actuator_gear[a, 0] ** 2 * plant.model.actuator_biasprm[a, 1])
+        return float(min(large, rule.stiff / gain) if encoder and gain else large)
+
+    def _of_servo(self) -> Iterator[Candidate]:
+        rule = self.rules.drive
+        for kind in ("motor_strength", "kp", "kd"):
+            yield self._make(kind, rule.gain)
+        yield self._make("torque_lag", rule.time)
+        yield self._make("encoder_delay", rule.time)
+        for kind in ("strength_drift", "thermal_fade"):
+            yield self._make(kind, rule.fade / max(self.scales.duration, rule.fade_seconds))
+
+    def _saturations(self) -> Iterator[Candidate]:
+        s, j, rule = self.scales, self.j, self.rules.drive
+        limit = declared_values(self.plant, "torque_limit", self.name)[0]
+        for share in rule.limit:
+            if s.peak[j] > 0 and share * s.peak[j] < limit:
+                yield self._make("torque_limit", (share - 1.0) * s.peak[j], start=(min(limit, s.peak[j]),))
+        if np.isfinite(limit):
+            for factor in rule.speed_limit:
+                yield self._make("torque_speed_limit", 1.0 / (factor * s.fastest[j]), start=(0.0,))
 
 
-def _twist(plant: Plant, s: Scales, j: int, encoder: float) -> float:
-    """Compliance [rad/(N m)] that matters; a servo that reads the joint behind a soft shaft would swing it up."""
-    large, a = 0.02 * max(s.travel[j], 0.02) / s.peak[j], plant.actuator[j]
-    gain = abs(plant.model.actuator_gear[a, 0] ** 2 * plant.model.actuator_biasprm[a, 1])
-    return float(min(large, _STIFF / gain) if encoder and gain else large)
-
-
-def _on_whole(plant: Plant) -> list[Candidate]:
-    found = [Candidate("ground_slope", "", (0.0, 0.0), (0.01, 0.01), (0, 1))]
+def _on_whole(plant: Plant, rules: CandidateThresholds) -> list[Candidate]:
+    rule = rules.drive
+    found = [Candidate("ground_slope", "", _AXES, (rules.body.slope, rules.body.slope), (0, 1))]
     driven = plant.actuator >= 0
     if driven.sum() < 2:
         return found
     if np.ptp(plant.delay[plant.actuator[driven]]) == 0:
-        found.append(Candidate("command_delay", "", (float(plant.delay[plant.actuator[driven]][0]),), (0.005,)))
-    found.append(Candidate("dropped_commands", "", (0.0,), (0.2,)))
+        found.append(Candidate("command_delay", "", (float(plant.delay[plant.actuator[driven]][0]),), (rule.time,)))
+    found.append(Candidate("dropped_commands", "", (0.0,), (rule.dropped,)))
     if not plant.torque_input and plant.scalable[driven].all():
-        found += [Candidate("torque_lag", "", (0.0,), (0.005,)), Candidate("encoder_delay", "", (0.0,), (0.005,))]
+        found += [Candidate(kind, "", (0.0,), (rule.time,)) for kind in ("torque_lag", "encoder_delay")]
     return found
 
 
-def _on_body(plant: Plant, body: str, total: float) -> list[Candidate]:
+def _on_body(plant: Plant, body: str, total: float, rule: BodySteps) -> list[Candidate]:
     mass, alone = declared_values(plant, "link_mass", body)
     index = plant.model.body(body).id
     moments = plant.model.body_inertia[index]
     size = float(np.sqrt(1.5 * moments.sum() / mass))  # of a ball of this inertia, twice
-    heavy = max(0.2 * mass, 0.01 * total)
-    weight = 9.81 * heavy
+    heavy = max(rule.mass * mass, rule.least_mass * total)
+    weight, away = 9.81 * heavy, (max(rule.com * size, rule.least_com),) * 3
+    turned = tuple(rule.moments * moments + rule.least_moment)
     return [
         Candidate("link_mass", body, (mass, alone), (heavy, 0.0)),
         Candidate("link_mass", body, (mass, alone), (heavy, 1.0)),
-        Candidate("link_com", body, declared_values(plant, "link_com", body), (max(0.1 * size, 0.01),) * 3, (0, 1, 2)),
-        Candidate("link_inertia", body, tuple(map(float, moments)), tuple(0.3 * moments + 1e-5), (0, 1, 2)),
+        Candidate("link_com", body, declared_values(plant, "link_com", body), away, (0, 1, 2)),
+        Candidate("link_inertia", body, tuple(map(float, moments)), turned, (0, 1, 2)),
         Candidate("external_wrench", body, (0.0,) * 6, (*(weight,) * 3, 0.0, 0.0, 0.0), (0, 1, 2)),
     ]
+
+
+def _under_floating_base(plant: Plant, rule: BodySteps) -> list[Candidate]:
+    """The tilt of a floating base's sensor, and what the ground may be else."""
+    if not plant.floating:
+        return []
+    found = []
+    base = plant.model.body(int(plant.model.jnt_bodyid[plant.model.dof_jntid[plant.base_dof]])).name
+    if base:
+        found.append(Candidate("imu_offset", base, _AXES, (rule.tilt, rule.tilt), (0, 1)))
+    for ground in _grounds(plant):
+        for kind, share in (("ground_friction", rule.ground_friction), ("ground_compliance", rule.ground_compliance)):
+            value = declared_values(plant, kind, ground)[0]
+            if value > 0:
+                found.append(Candidate(kind, ground, (value,), (share * value,)))
+    return found
 
 
 def _carried(plant: Plant, still: Sequence[str]) -> list[str]:

@@ -17,5 +17,5 @@ def is_chosen(c: Candidate, chosen: Sequence[Candidate]) -> bool:
 
 
 def is_like(c: Candidate, others: Sequence[Candidate]) -> bool:
-    """Whether two of the same kind on the same place are already there, in other shapes."""
-    return sum((c.effect, c.where) == (o.effect, o.where) for o in others) >= 2
+    """Whether enough of the same kind on the same place are already there, in other shapes."""
+    return sum((c.effect, c.where) == (o.effect, o.where) for o in others) >= c.limits.shapes

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.simulation import Plant, command_inputs
+from bumblebee.diagnosis.thresholds.candidates import SignalScales
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.servo import servos_of
 
@@ -31,8 +32,11 @@ class Scales:
     """Longest rollout [s]."""
 
 
-def scales_of(plant: Plant, rollouts: Sequence[Rollout], model: mujoco.MjModel | None = None) -> Scales:
+def scales_of(
+    plant: Plant, rollouts: Sequence[Rollout], rule: SignalScales | None = None, model: mujoco.MjModel | None = None
+) -> Scales:
     """Typical sizes by `model`, or by the declared one; floored for joints that rest."""
+    rule = rule or SignalScales()
     servos = servos_of(model or plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
     torques = [
         servos.torque(r.joint_pos - plant.offset, r.joint_vel, servos.controls(command_inputs(plant, r)))
@@ -40,21 +44,21 @@ def scales_of(plant: Plant, rollouts: Sequence[Rollout], model: mujoco.MjModel |
     ]
     rms = np.sqrt(np.mean([(t**2).mean(axis=0) for t in torques], axis=0))
     if (plant.actuator < 0).any():
-        rms = np.where(plant.actuator < 0, np.maximum(rms, _bias(plant, rollouts)), rms)
-    torque = np.maximum(rms, 0.05 * rms.max() + 1e-9)
+        rms = np.where(plant.actuator < 0, np.maximum(rms, _bias(plant, rollouts, rule.rows)), rms)
+    torque = np.maximum(rms, rule.torque * rms.max() + 1e-9)
     speeds = np.sqrt(np.mean([(r.joint_vel**2).mean(axis=0) for r in rollouts], axis=0))
     return Scales(
         torque=torque,
-        peak=np.max([np.quantile(np.abs(t), 0.995, axis=0) for t in torques], axis=0),
-        speed=np.maximum(speeds, 0.1 * speeds.max() + 1e-6),
-        fastest=np.max([np.quantile(np.abs(r.joint_vel), 0.995, axis=0) for r in rollouts], axis=0) + 1e-3,
+        peak=np.max([np.quantile(np.abs(t), rule.peak, axis=0) for t in torques], axis=0),
+        speed=np.maximum(speeds, rule.speed * speeds.max() + 1e-6),
+        fastest=np.max([np.quantile(np.abs(r.joint_vel), rule.peak, axis=0) for r in rollouts], axis=0) + 1e-3,
         travel=np.max([np.ptp(r.joint_pos, axis=0) for r in rollouts], axis=0),
         inertia=_inertia(plant),
         duration=float(max(r.time[-1] - r.time[0] for r in rollouts)),
     )
 
 
-def _bias(plant: Plant, rollouts: Sequence[Rollout], rows: int = 50) -> np.ndarray:
+def _bias(plant: Plant, rollouts: Sequence[Rollout], rows: int) -> np.ndarray:
     """RMS torque (J,) [N m] of gravity and of speeds along the rollouts: what a joint without a drive moves under."""
     data, found = mujoco.MjData(plant.model), []
     for r in rollouts:

@@ -84,7 +84,9 @@ class Holdout:
     def late(self) -> np.ndarray:
         """(B, L, J) what numerical differences do to joint positions after 1 s [rad]; 0 where they diverge."""
         p = self.problem
-        columns = nuisance_columns(p.plant, p.layout, self.long, vary(p.plant, []), p.fine)
+        columns = nuisance_columns(
+            p.plant, p.layout, self.long, vary(p.plant, []), p.fine, p.thresholds.residuals.nuisances
+        )
         return np.nan_to_num(columns[:, :, -1, p.layout.slices["joint_pos"]], posinf=0.0, neginf=0.0)
 
 

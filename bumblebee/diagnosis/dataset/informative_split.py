@@ -17,27 +17,24 @@ from bumblebee.diagnosis.dataset.split import motion_names
 from bumblebee.diagnosis.simulation import choose_starts, cut, residuals, vary
 from bumblebee.sim.effects import Effect
 
-_BUDGET = 300  # windows
-_FAR, _SEVERAL = 4.0, 2  # times as far off as the worst fitted window; windows that are
-_MOST = 2  # rollouts exchanged
-
 
 def informative(session: Session, horizon: float) -> Session:
     """The session with the rollouts exchanged that show what no fitted one does, and a note of each."""
     if len(session.rollouts) < 2:
         return session
-    names = motion_names(session.rollouts)
+    rule = session.thresholds.informative
+    names = motion_names(session.rollouts, session.thresholds.split)
     errors = window_errors(session, [], horizon, session.steps[1])
     worst = {i: some for i, some in errors.items() if _alone(names, i)}
-    for _ in range(_MOST):
+    for _ in range(rule.exchanges):
         fitted = [i for i in session.train if i not in session.accept and i in worst]
         aside = [i for i in worst if i not in fitted]
         if not fitted or not aside:
             break
         most = max(worst[i][0] for i in fitted)
-        shows = {i: worst[i][min(_SEVERAL, len(worst[i])) - 1] for i in aside if len(worst[i]) >= _SEVERAL}
+        shows = {i: worst[i][min(rule.several, len(worst[i])) - 1] for i in aside if len(worst[i]) >= rule.several}
         one = max(shows, key=lambda i: shows[i], default=None)
-        if one is None or shows[one] < _FAR * most:
+        if one is None or shows[one] < rule.far * most:
             break
         session = _exchanged(session, one, min(fitted, key=lambda i: worst[i][0]))
     return session
@@ -71,7 +68,9 @@ def window_errors(session: Session, effects: Sequence[Effect], horizon: float, s
     Every signal is compared with its usual error at the same time after the start; a window that diverged is left out.
     """
     ids = range(len(session.rollouts))
-    starts = choose_starts(session.rollouts, ids, horizon, _BUDGET)
+    starts = choose_starts(
+        session.rollouts, ids, horizon, session.thresholds.informative.windows, session.plant.thresholds.windows
+    )
     if not starts:
         return {}
     windows = cut(session.plant, session.layout, session.rollouts, starts)

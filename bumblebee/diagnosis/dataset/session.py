@@ -1,16 +1,16 @@
 """What diagnose, replay and gap share: the data matched with the model, noise, the split, the steps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.dataset.noise import estimate_noise
-from bumblebee.diagnosis.dataset.smoothing import HALF_SPAN, smooth_rollouts
+from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
 from bumblebee.diagnosis.dataset.split import accepting, split
-from bumblebee.diagnosis.dataset.time_steps import longest_step, step_for
+from bumblebee.diagnosis.dataset.time_steps import steps_of
 from bumblebee.diagnosis.dataset.undriven import undriven_warnings
 from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages
 from bumblebee.diagnosis.simulation import (
@@ -22,18 +22,12 @@ from bumblebee.diagnosis.simulation import (
     make_plant,
     refuse_unlogged,
 )
+from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, Usable
 from bumblebee.errors import BadInput
 from bumblebee.measured.checks_magnitude import beyond
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.measured.usable import review
 
-_FINE, _COARSE = 0.001, 0.005
-# Models of more degrees of freedom than this are searched in steps twice as long, which cost half; the last fit and all
-# that is reported are not. With the integrator free in every test what an effect changes was the same to 0.2 %.
-_SMALL, _SEARCH = 12, 0.002
-# Shorter rollouts hold no window of 0.2 s after the lead that delayed commands need.
-_SHORTEST = 0.35
-_MOST_WARNINGS = 12
 JUDGED_TWICE = "the held-out rollouts decided which effects were accepted, never how large they are"
 
 
@@ -61,13 +55,15 @@ class Session:
     """Rollouts that could not be used, with the reason."""
     warnings: tuple[str, ...] = ()
     """What must not be overlooked in any report of this model and these rollouts."""
+    thresholds: DatasetThresholds = field(default_factory=DatasetThresholds)
+    """What the use of its rollouts goes by."""
 
     def ids(self, which: Sequence[int]) -> list[str]:
         """Rollout ids of indices."""
         return [self.rollouts[i].rollout_id for i in which]
 
 
-def open_session(model: Path, dataset: Path) -> Session:
+def open_session(model: Path, dataset: Path, thresholds: DatasetThresholds | None = None) -> Session:
     """Read and match a model and a dataset."""
     rollouts, errors, warnings = [], [], []
     files = rollout_files(dataset)
@@ -89,7 +85,7 @@ def open_session(model: Path, dataset: Path) -> Session:
             errors.append((file.stem, refused))
     if not rollouts:
         raise errors[0][1]
-    return make_session(spec, rollouts, model, dataset, errors, warnings)
+    return make_session(spec, rollouts, model, dataset, errors, warnings, thresholds)
 
 
 def make_session(
@@ -99,61 +95,80 @@ def make_session(
     dataset: object,
     errors: Sequence[tuple[str, BadInput]] = (),
     warnings: Sequence[str] = (),
+    thresholds: DatasetThresholds | None = None,
 ) -> Session:
     """The same from memory; `model` and `dataset` are names for messages.
 
     A rollout that cannot be used is set aside with its reason, as are those in `errors` (id, error), which could not be
     read; where none is left the first reason ends it.
     """
-    notes: list[str] = []
+    rules = thresholds or DatasetThresholds()
+    long, failed = _sorted_out(rollouts, dataset, errors, rules.usable)
+    spec, folded = fold_dampers(spec)
+    plant = make_plant(spec, long[0], model)
+    refuse_unlogged(plant, model)
+    undriven = tuple(undriven_warnings(plant, long, model))
+    has_pos = all(r.base_pos is not None for r in long)
+    layout = layout_of(plant, has_pos)
+    train, holdout = split(long, rules.split)
+    accept = accepting(long, train, holdout, rules.split)
+    notes = [f"set aside: {error}" for _, error in failed] + _check_notes(warnings, rules.usable.warnings)
+    if folded:
+        notes.append(f"position and velocity actuators taken as one servo of one limit: {', '.join(folded[:6])}")
+    if plant.floating and not has_pos:
+        notes.append("no base_pos: the base's height comes from stance, its error is a nuisance")
+    if set(accept) & set(holdout):
+        notes.append(JUDGED_TWICE)
+    period = float(np.median(np.diff(long[0].time)))
+    steps, search_step = steps_of(period, float(spec.option.timestep), plant.model.nv, rules.time_steps)
+    sigma = estimate_noise(long, layout, rules.noise)
+    if not plant.floating:
+        long, sigma, more = _refined(plant, layout, long, sigma, rules)
+        notes += more
+    aside = [{"rollout": name, "reason": str(error)} for name, error in failed]
+    return Session(
+        spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, undriven, rules
+    )
+
+
+def _sorted_out(
+    rollouts: Sequence[Rollout], dataset: object, errors: Sequence[tuple[str, BadInput]], rule: Usable
+) -> tuple[list[Rollout], list[tuple[str, BadInput]]]:
+    """The rollouts that can be used, and the others' (id, error) after `errors`; `BadInput` where none can."""
     long: list[Rollout] = []
     failed = list(errors)
     for rollout in rollouts:
         try:
-            _usable(dataset, rollout, long[0] if long else None)
+            _usable(dataset, rollout, long[0] if long else None, rule)
             long.append(rollout)
         except BadInput as error:
             failed.append((rollout.rollout_id, error))
     if not long:
         raise failed[0][1]
-    notes += [f"set aside: {error}" for _, error in failed]
-    notes += [f"check: {text}" for text in warnings[:_MOST_WARNINGS]]
-    if len(warnings) > _MOST_WARNINGS:
-        notes.append(f"{len(warnings) - _MOST_WARNINGS} more findings that do not stop a file")
-    spec, folded = fold_dampers(spec)
-    if folded:
-        notes.append(f"position and velocity actuators taken as one servo of one limit: {', '.join(folded[:6])}")
-    plant = make_plant(spec, long[0], model)
-    refuse_unlogged(plant, model)
-    undriven = undriven_warnings(plant, long, model)
-    has_pos = all(r.base_pos is not None for r in long)
-    layout = layout_of(plant, has_pos)
-    if plant.floating and not has_pos:
-        notes.append("no base_pos: the base's height comes from stance, its error is a nuisance")
-    train, holdout = split(long)
-    accept = accepting(long, train, holdout)
-    if set(accept) & set(holdout):
-        notes.append(JUDGED_TWICE)
-    period = float(np.median(np.diff(long[0].time)))
-    declared = float(spec.option.timestep)
-    steps = (step_for(period, min(_FINE, declared)), longest_step(period, _COARSE))
-    small = plant.model.nv <= _SMALL
-    search_step = steps[0] if small else max(steps[0], step_for(period, min(_SEARCH, declared)))
-    sigma = estimate_noise(long, layout)
-    if not plant.floating:
-        ages = velocity_ages(long)
-        notes += filter(None, [age_note(plant.joints, ages)])
-        long = [in_step(rollout, ages) for rollout in long]
-        long, sigma, fast = smooth_rollouts(long, layout, sigma)
-        if fast:
-            notes.append(f"{fast} fast rollouts: joint readings smoothed over +-{1000 * HALF_SPAN:g} ms")
-    aside = [{"rollout": name, "reason": str(error)} for name, error in failed]
-    return Session(
-        spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, tuple(undriven)
-    )
+    return long, failed
 
 
-def _usable(dataset: object, rollout: Rollout, first: Rollout | None) -> None:
+def _check_notes(warnings: Sequence[str], most: int) -> list[str]:
+    """What the checks found that does not stop a file; of more than `most` findings the number."""
+    notes = [f"check: {text}" for text in warnings[:most]]
+    return [*notes, f"{len(warnings) - most} more findings that do not stop a file"] if len(warnings) > most else notes
+
+
+def _refined(
+    plant: Plant, layout: Layout, rollouts: Sequence[Rollout], sigma: np.ndarray, rules: DatasetThresholds
+) -> tuple[list[Rollout], np.ndarray, list[str]]:
+    """Rollouts of a fixed base with velocities in step and readings smoothed, the noise (D,) left, notes on both."""
+    ages = velocity_ages(rollouts, rules.velocity_latency)
+    notes = list(filter(None, [age_note(plant.joints, ages)]))
+    moved = [in_step(rollout, ages) for rollout in rollouts]
+    smooth, left, fast = smooth_rollouts(moved, layout, sigma, rules.smoothing)
+    if fast:
+        span = 1000 * rules.smoothing.half_span
+        notes.append(f"{fast} fast rollouts: joint readings smoothed over +-{span:g} ms")
+    return smooth, left, notes
+
+
+def _usable(dataset: object, rollout: Rollout, first: Rollout | None, rule: Usable) -> None:
     """`BadInput` for a rollout that no window may start in: not a number, too large, too short, other joints."""
     name = f"{dataset}: {rollout.rollout_id}"
     for column in ("time", *rollout.columns):
@@ -171,10 +186,12 @@ def _usable(dataset: object, rollout: Rollout, first: Rollout | None) -> None:
             f"{name}: column time: row {row}: rule increasing", "strictly increasing times", "a step back or a repeat"
         )
     seconds = rollout.time[-1] - rollout.time[0]
-    if seconds < _SHORTEST or rollout.frames < 12:
+    if seconds < rule.seconds or rollout.frames < rule.rows:
         raise BadInput(
-            f"{name}: column time", f"at least {_SHORTEST} s and 12 rows", f"{seconds:.2g} s, {rollout.frames} rows",
+            f"{name}: column time",
+            f"at least {rule.seconds} s and {rule.rows} rows",
+            f"{seconds:.2g} s, {rollout.frames} rows",
             "Record longer runs.",
-        )  # fmt: skip
+        )
     if first is not None and rollout.joints != first.joints:
         raise BadInput(f"{name}: joints", f"those of {first.rollout_id}", "others")

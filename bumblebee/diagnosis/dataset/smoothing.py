@@ -12,26 +12,23 @@ from dataclasses import replace
 import numpy as np
 
 from bumblebee.diagnosis.simulation import Layout
+from bumblebee.diagnosis.thresholds.dataset import Smoothing
 from bumblebee.measured.rollout import Rollout
-
-HALF_SPAN = 0.01  # [s]
-_TERMS = 4  # of the polynomial
-_LEAST = 2  # neighbours on either side from which on there is something to gain
 
 
 def smooth_rollouts(
-    rollouts: Sequence[Rollout], layout: Layout, sigma: np.ndarray
+    rollouts: Sequence[Rollout], layout: Layout, sigma: np.ndarray, rule: Smoothing
 ) -> tuple[list[Rollout], np.ndarray, int]:
     """Smoothed rollouts, the noise (D,) that is left in them, and how many were fast enough to be smoothed."""
     out, left, count = [], [], 0
     parts = layout.slices["joint_pos"], layout.slices["joint_vel"]
     for rollout in rollouts:
-        near = round(HALF_SPAN / float(np.median(np.diff(rollout.time))))
-        if near < _LEAST or rollout.frames < 4 * near:
+        near = round(rule.half_span / float(np.median(np.diff(rollout.time))))
+        if near < rule.neighbours or rollout.frames < rule.spans * near:
             out.append(rollout)
             left.append(sigma**2)
             continue
-        place, speed, variance = _smooth(rollout, near, sigma[parts[0]], sigma[parts[1]])
+        place, speed, variance = _smooth(rollout, near, sigma[parts[0]], sigma[parts[1]], rule)
         out.append(replace(rollout, joint_pos=place, joint_vel=speed))
         mine = sigma**2
         mine[parts[0]], mine[parts[1]] = variance
@@ -41,30 +38,31 @@ def smooth_rollouts(
 
 
 def _smooth(
-    rollout: Rollout, near: int, sigma_pos: np.ndarray, sigma_vel: np.ndarray
+    rollout: Rollout, near: int, sigma_pos: np.ndarray, sigma_vel: np.ndarray, rule: Smoothing
 ) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
     """Positions and velocities (T, J) of the local fits, and the median variances (J,) of both."""
+    span, terms = rule.half_span, rule.terms
     rows = np.clip(np.arange(rollout.frames)[:, None] + np.arange(-near, near + 1), 0, rollout.frames - 1)
     shift = rollout.time[rows] - rollout.time[:, None]
-    inside = np.abs(shift) <= 1.5 * HALF_SPAN  # a gap in the log has no neighbours beyond it
+    inside = np.abs(shift) <= rule.beyond * span  # a gap in the log has no neighbours beyond it
     first = np.arange(rollout.frames)[:, None] + np.arange(-near, near + 1)
     inside &= first == rows
-    u = shift / HALF_SPAN
-    powers = np.stack([u**k for k in range(_TERMS)], axis=-1) * inside[..., None]
-    slopes = np.stack([np.zeros_like(u)] + [k * u ** (k - 1) / HALF_SPAN for k in range(1, _TERMS)], axis=-1)
+    u = shift / span
+    powers = np.stack([u**k for k in range(terms)], axis=-1) * inside[..., None]
+    slopes = np.stack([np.zeros_like(u)] + [k * u ** (k - 1) / span for k in range(1, terms)], axis=-1)
     slopes = slopes * inside[..., None]
     place, speed = np.empty_like(rollout.joint_pos), np.empty_like(rollout.joint_vel)
     variance = np.empty(place.shape[1]), np.empty(place.shape[1])
     for j in range(place.shape[1]):
         rate = max(sigma_vel[j], 1e-9) / max(sigma_pos[j], 1e-12)  # scaled so that a position weighs 1
         normal = np.einsum("tka,tkb->tab", powers, powers) + np.einsum("tka,tkb->tab", slopes, slopes) / rate**2
-        normal = normal + 1e-9 * np.eye(_TERMS)
+        normal = normal + 1e-9 * np.eye(terms)
         right = np.einsum("tka,tk->ta", powers, rollout.joint_pos[rows, j] - rollout.joint_pos[:, None, j])
         right += np.einsum("tka,tk->ta", slopes, rollout.joint_vel[rows, j]) / rate**2
         inverse = np.linalg.inv(normal)
         fitted = np.einsum("tab,tb->ta", inverse, right)
         place[:, j] = rollout.joint_pos[:, j] + fitted[:, 0]
-        speed[:, j] = fitted[:, 1] / HALF_SPAN
+        speed[:, j] = fitted[:, 1] / span
         variance[0][j] = sigma_pos[j] ** 2 * np.median(inverse[:, 0, 0])
-        variance[1][j] = sigma_pos[j] ** 2 * np.median(inverse[:, 1, 1]) / HALF_SPAN**2
+        variance[1][j] = sigma_pos[j] ** 2 * np.median(inverse[:, 1, 1]) / span**2
     return place, speed, variance

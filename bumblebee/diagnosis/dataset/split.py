@@ -7,60 +7,55 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bumblebee.diagnosis.thresholds.dataset import Split
 from bumblebee.measured.rollout import Rollout
 
-_SAMPLES = 200
-_SAME = 0.1  # mean difference of the commands over their mean size
-_LENGTH = 0.1  # relative difference of durations
-# From so many rollouts to fit on, some are put aside to decide which effects are accepted.
-_ENOUGH_TO_SPLIT = 4
 
-
-def motion_names(rollouts: Sequence[Rollout]) -> list[str]:
+def motion_names(rollouts: Sequence[Rollout], rule: Split) -> list[str]:
     """A name for each rollout's motion: its own, or that of an earlier rollout with the same commands."""
     names = [str(r.meta.get("motion")) for r in rollouts]
-    paths = [_path(r) for r in rollouts]
+    paths = [_path(r, rule) for r in rollouts]
     for i, mine in enumerate(paths):
         for k in range(i):
-            if mine is not None and paths[k] is not None and _same(rollouts[i], rollouts[k], mine, paths[k]):
+            if mine is not None and paths[k] is not None and _same(rollouts[i], rollouts[k], mine, paths[k], rule):
                 names[i] = names[k]
                 break
     return names
 
 
-def _path(rollout: Rollout) -> np.ndarray | None:
-    """Commands at equally spaced times (J, 200), about their mean; None where nothing is commanded."""
+def _path(rollout: Rollout, rule: Split) -> np.ndarray | None:
+    """Commands at equally spaced times (J, samples), about their mean; None where nothing is commanded."""
     command = rollout.joint_target if rollout.joint_target is not None else rollout.joint_torque_cmd
-    if command is None or rollout.frames < 10:
+    if command is None or rollout.frames < rule.rows:
         return None
-    at = np.linspace(rollout.time[0], rollout.time[-1], _SAMPLES)
+    at = np.linspace(rollout.time[0], rollout.time[-1], rule.samples)
     path = np.stack([np.interp(at, rollout.time, column) for column in command.T])
     path -= path.mean(axis=1, keepdims=True)
-    return path if np.abs(path).mean() > 1e-9 else None
+    return path if np.abs(path).mean() > rule.commanded else None
 
 
-def _same(a: Rollout, b: Rollout, mine: np.ndarray, other: np.ndarray | None) -> bool:
-    if other is None or mine.shape != other.shape or abs(a.duration - b.duration) > _LENGTH * a.duration:
+def _same(a: Rollout, b: Rollout, mine: np.ndarray, other: np.ndarray | None, rule: Split) -> bool:
+    if other is None or mine.shape != other.shape or abs(a.duration - b.duration) > rule.length * a.duration:
         return False
-    return bool(np.abs(mine - other).mean() < _SAME * np.abs(mine).mean())
+    return bool(np.abs(mine - other).mean() < rule.same * np.abs(mine).mean())
 
 
-def accepting(rollouts: Sequence[Rollout], train: Sequence[int], holdout: Sequence[int]) -> list[int]:
-    """Rollouts to decide on: of four and more to fit every fourth (by motion), else those that are held out."""
-    if len(train) < _ENOUGH_TO_SPLIT:
+def accepting(rollouts: Sequence[Rollout], train: Sequence[int], holdout: Sequence[int], rule: Split) -> list[int]:
+    """Rollouts to decide on: where there are enough to fit every fourth (by motion), else those that are held out."""
+    if len(train) < rule.enough:
         return list(holdout)
-    _, some = split([rollouts[i] for i in train])
+    _, some = split([rollouts[i] for i in train], rule)
     return [train[k] for k in some]
 
 
-def split(rollouts: Sequence[Rollout]) -> tuple[list[int], list[int]]:
+def split(rollouts: Sequence[Rollout], rule: Split) -> tuple[list[int], list[int]]:
     """Indices to fit and to hold out: of each cluster's motions every fourth, with all their repeats.
 
     A repeat of a fitted motion would be no test: the same policy goes the same way again. Where a cluster, or a dataset
     that names no motions, has one motion only, every fourth of its rollouts is held out (the second of two).
     """
     clusters: dict[str, dict[str, list[int]]] = {}
-    names = motion_names(rollouts)
+    names = motion_names(rollouts, rule)
     for i in sorted(range(len(rollouts)), key=lambda i: rollouts[i].rollout_id):
         meta = rollouts[i].meta
         motions = clusters.setdefault(str(meta.get("cluster")), {})
@@ -70,7 +65,7 @@ def split(rollouts: Sequence[Rollout]) -> tuple[list[int], list[int]]:
         groups = [group for _, group in sorted(motions.items())]
         if len(groups) == 1:
             groups = [[i] for i in groups[0]]
-        every = min(4, len(groups))
+        every = min(rule.every, len(groups))
         if len(groups) > 1:
             # Rounded up: 6 motions hold out 2, so that a delta action, too, has something to be judged by.
             count = -(-len(groups) // every)

@@ -15,19 +15,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from bumblebee.diagnosis.thresholds.dataset import VelocityLatency
 from bumblebee.measured.rollout import Rollout
 
-_SPAN = 0.15  # [s] over which velocities are integrated
-_NEAR = 0.02  # [s] around its ends from which the positions' velocities are taken
-_LEAST = 5e-4  # [s] beyond which an age must be, without doubt
-_DOUBT = 4.0  # standard errors
-_MOST = 0.05  # [s]; more is no reading's age
-_ROUNDS = 3  # each with the velocities moved by what was found before
-_PARTS = 6  # of a rollout, which the errors take for independent
-_ENOUGH = 12  # parts in all, below which nothing is said
 
-
-def velocity_ages(rollouts: Sequence[Rollout]) -> np.ndarray:
+def velocity_ages(rollouts: Sequence[Rollout], rule: VelocityLatency) -> np.ndarray:
     """Ages (J,) [s] of the logged joint velocities against the positions; 0 where none is beyond doubt.
 
     Also where any log is of position targets.
@@ -36,11 +28,11 @@ def velocity_ages(rollouts: Sequence[Rollout]) -> np.ndarray:
     ages, sure = np.zeros(joints), np.zeros(joints, dtype=bool)
     if any(rollout.joint_target is not None for rollout in rollouts):
         return ages
-    for _ in range(_ROUNDS):
-        found, error = _ages([in_step(r, ages) for r in rollouts])
+    for _ in range(rule.rounds):
+        found, error = _ages([in_step(r, ages) for r in rollouts], rule)
         ages = ages + found
-        sure = np.abs(ages) - _LEAST > _DOUBT * error
-        ages = np.where(np.abs(ages) <= _MOST, ages, 0.0)
+        sure = np.abs(ages) - rule.least > rule.doubt * error
+        ages = np.where(np.abs(ages) <= rule.most, ages, 0.0)
     return np.where(sure, ages, 0.0)
 
 
@@ -61,10 +53,10 @@ def age_note(joints: Sequence[str], ages: np.ndarray) -> str:
     return f"logged velocities are older than the positions and were moved: {', '.join(late)}" if late else ""
 
 
-def _ages(rollouts: Sequence[Rollout]) -> tuple[np.ndarray, np.ndarray]:
+def _ages(rollouts: Sequence[Rollout], rule: VelocityLatency) -> tuple[np.ndarray, np.ndarray]:
     """Ages (J,) [s] by two-stage least squares over all rollouts, and standard errors (J,) by a jackknife of parts."""
-    parts = [part for r in rollouts for part in _products(r)]
-    if len(parts) < _ENOUGH:
+    parts = [part for r in rollouts for part in _products(r, rule)]
+    if len(parts) < rule.enough:
         return np.zeros(len(rollouts[0].joints)), np.full(len(rollouts[0].joints), np.inf)
     normal, right = (np.array(x) for x in zip(*parts, strict=True))  # (P, J, 2, 2), (P, J, 2)
     whole = _solved(normal.sum(axis=0), right.sum(axis=0))
@@ -80,16 +72,16 @@ def _solved(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.where(np.abs(det) > 1e-30, top / np.where(det == 0, 1.0, det), 0.0)
 
 
-def _products(rollout: Rollout) -> list[tuple[np.ndarray, np.ndarray]]:
+def _products(rollout: Rollout, rule: VelocityLatency) -> list[tuple[np.ndarray, np.ndarray]]:
     """Of each part of a rollout what the instruments make of regressors (J, 2, 2) and of what lacks (J, 2)."""
     time, place, speed = rollout.time, rollout.joint_pos, rollout.joint_vel
     period = float(np.median(np.diff(time)))
-    near, span = max(1, round(_NEAR / period)), max(2, round(_SPAN / period))
+    near, span = max(1, round(rule.near / period)), max(2, round(rule.span / period))
     first = np.arange(near, len(time) - span - near)
-    if len(first) < _PARTS * span:
+    if len(first) < rule.parts * span:
         return []
     last = first + span
-    even = time[last + near] - time[first - near] < 1.3 * (span + 2 * near) * period  # no gap in between
+    even = time[last + near] - time[first - near] < rule.gap * (span + 2 * near) * period  # no gap in between
     first, last = first[even], last[even]
     way = np.concatenate((np.zeros((1, speed.shape[1])), np.cumsum(_trapezes(time, speed), axis=0)))
     made = place[last] - place[first]
@@ -99,7 +91,7 @@ def _products(rollout: Rollout) -> list[tuple[np.ndarray, np.ndarray]]:
     instruments = np.stack((around(last) - around(first), made), axis=-1)
     normal = np.einsum("nji,njk->njik", instruments, regressors)
     right = instruments * lacks[..., None]
-    return [(normal[k].sum(axis=0), right[k].sum(axis=0)) for k in np.array_split(np.arange(len(first)), _PARTS)]
+    return [(normal[k].sum(axis=0), right[k].sum(axis=0)) for k in np.array_split(np.arange(len(first)), rule.parts)]
 
 
 def _trapezes(time: np.ndarray, speed: np.ndarray) -> np.ndarray:

@@ -14,7 +14,14 @@ from dataclasses import dataclass, replace
 
 from bumblebee.diagnosis.budget import Budget
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.comparison import Holdout, compare, drop_redundant, drop_unpaid_saturations, simulated_without, wald
+from bumblebee.diagnosis.comparison import (
+    Holdout,
+    compare,
+    drop_redundant,
+    drop_unpaid_saturations,
+    simulated_without,
+    wald,
+)
 from bumblebee.diagnosis.discrepancy.catalogue_alternative import Offers, catalogue_swap
 from bumblebee.diagnosis.discrepancy.form import DiscrepancyModel, best_model, refitted_model
 from bumblebee.diagnosis.discrepancy.residual_tests import JointActivity, JointLackOfFit, LackOfFit, lack_of_fit

@@ -48,8 +48,8 @@ class Scene:
         else:
             variation = vary(plant, [])
         only = plant.dof if self.joints is None else plant.dof[list(self.joints)]
-        sizes = pulse_sizes(problem, self.torque)
-        answers = answers_of(plant, problem.layout, windows, variation, problem.coarse, sizes, only=only)
+        sizes, segments = pulse_sizes(problem, self.torque), problem.thresholds.sensitivities.impulses.segments
+        answers = answers_of(plant, problem.layout, windows, variation, problem.coarse, sizes, only, segments)
         white = joint_answers(problem, answers)
         evidence = make_evidence(problem, white, self.residual, self.columns, self.weights)
         return evidence, quantities(plant, windows, answers.path, variation.model, problem.thresholds.discrepancy)

@@ -214,7 +214,9 @@ def confirmed(scene: Scene, sought: Sought, validation: Scene | None) -> list[tu
         if validation is not None:
             moved = validation.evidence.column(one.joint, one.function.torque(validation.data, one.joint))
             change = np.tensordot(size, moved, axes=1)
-            if not is_confirmed(left, left - change, gain) and ((change**2).sum() > rule.met or not _repeats(scene, one)):
+            if not is_confirmed(left, left - change, gain) and (
+                (change**2).sum() > rule.met or not _repeats(scene, one)
+            ):
                 continue
             left = left - change
         kept.append((one, size))

@@ -23,7 +23,7 @@ def examples(
     plant, layout, ids = session.plant, session.layout, session.holdout or session.train
     starts: list[tuple[int, int, int]] = []
     for length in rule.lengths:
-        starts = starts or choose_starts(session.rollouts, ids, length, rule.windows)
+        starts = starts or choose_starts(session.rollouts, ids, length, rule.windows, plant.thresholds.windows)
     windows = cut(plant, layout, session.rollouts, starts, outputs=rule.ticks)
     models = [vary(plant, [])] + ([vary(plant, effects)] if effects else [])
     left = residuals(plant, layout, windows, models, session.steps[0])[..., layout.slices["joint_pos"]]

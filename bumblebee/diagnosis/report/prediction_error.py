@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from bumblebee.diagnosis.dataset import Session
-from bumblebee.diagnosis.residuals import Whitener, fit_whitener
+from bumblebee.diagnosis.residuals import NoisyWindows, Whitener, fit_whitener
 from bumblebee.diagnosis.simulation import (
     KINDS,
     Layout,
@@ -52,7 +52,7 @@ def horizon_windows(
     """Windows of the rollouts `ids`, `budget` at most for every horizon."""
     found = {}
     for name in HORIZONS:
-        starts = choose_starts(session.rollouts, ids, float(name), budget)
+        starts = choose_starts(session.rollouts, ids, float(name), budget, session.plant.thresholds.windows)
         if starts:
             found[name] = cut(session.plant, session.layout, session.rollouts, starts, outputs=1)
     return HorizonWindows(session.plant, session.layout, found, rule or PredictionError())
@@ -67,7 +67,8 @@ def horizon_whiteners(
     for name, part in cuts.windows.items():
         count = min(len(part), most[name])
         keep = np.unique(np.linspace(0, len(part) - 1, count).round().astype(int))
-        found[name] = keep, fit_whitener(cuts.plant, cuts.layout, select(part, keep), variation, sigma, step, rng)
+        noisy = NoisyWindows(cuts.plant, cuts.layout, select(part, keep), variation, sigma, step)
+        found[name] = keep, fit_whitener(noisy, rng)
     return found
 
 

@@ -3,10 +3,11 @@
 from bumblebee.diagnosis.residuals.empirical_covariance import by_misfit
 from bumblebee.diagnosis.residuals.nuisances import NAMES, nuisance_columns
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, screening_windows, window_weights
-from bumblebee.diagnosis.residuals.whitening import Whitener, fit_whitener, null_draws
+from bumblebee.diagnosis.residuals.whitening import NoisyWindows, Whitener, fit_whitener, null_draws
 
 __all__ = [
     "NAMES",
+    "NoisyWindows",
     "Problem",
     "Whitener",
     "by_misfit",

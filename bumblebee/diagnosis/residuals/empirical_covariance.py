@@ -13,12 +13,10 @@ import numpy as np
 
 from bumblebee.diagnosis.residuals.problem import Problem
 from bumblebee.diagnosis.simulation import Recall
-
-_ROUNDS = 4  # of covariance and weights
-_FEWEST = 2  # windows for each value of a window, below which a covariance says too little
+from bumblebee.diagnosis.thresholds.residuals import EmpiricalCovariance
 
 
-def metric_of(left: np.ndarray) -> np.ndarray:
+def metric_of(left: np.ndarray, rule: EmpiricalCovariance) -> np.ndarray:
     """Lower triangular (M, M) that makes what is left (W, M), whitened by the noise, white again.
 
     Each window counts as much as the median one at most. The noise itself is added, and correlations are shrunk by
@@ -26,7 +24,7 @@ def metric_of(left: np.ndarray) -> np.ndarray:
     """
     count, size = left.shape
     metric = np.eye(size)
-    for _ in range(_ROUNDS):
+    for _ in range(rule.rounds):
         power = ((left @ metric.T) ** 2).mean(axis=1)
         weights = 1.0 / (1.0 + power / max(float(np.median(power)), 1e-12))
         covariance = np.einsum("wi,wj,w->ij", left, left, weights, optimize=True) / weights.sum()
@@ -41,9 +39,10 @@ def by_misfit(problem: Problem, left: np.ndarray) -> Problem:
 
     As it is where the windows are too few for a covariance of their values.
     """
-    if len(left) < _FEWEST * left.shape[1]:
+    rule = problem.thresholds.residuals.covariance
+    if len(left) < rule.fewest * left.shape[1]:
         return problem
-    metric = metric_of(left)
+    metric = metric_of(left, rule)
 
     def turned(values: np.ndarray) -> np.ndarray:
         return np.matmul(values, metric.T.astype(values.dtype))

@@ -11,32 +11,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.residuals.whitening import displaced, factors_of, sample, start_noise
-from bumblebee.diagnosis.simulation import Layout, Plant, Variation, Windows, residuals
-
-_OUTPUTS = 2  # compared ticks that say where a window started
-_MOST = 2.5  # standard deviations of its noise that a coordinate may move
+from bumblebee.diagnosis.residuals.whitening import NoisyWindows, displaced, factors_of, sample
+from bumblebee.diagnosis.simulation import Layout, Plant, Windows
+from bumblebee.diagnosis.thresholds.residuals import InitialState
 
 
-def start_moves(
-    plant: Plant,
-    layout: Layout,
-    windows: Windows,
-    variation: Variation,
-    sigma: np.ndarray,
-    step: float,
-    rng: np.random.Generator,
-) -> np.ndarray:
+def start_moves(noisy: NoisyWindows, rng: np.random.Generator, rule: InitialState) -> np.ndarray:
     """Displacements (W, C) of measured starts, coordinates as `start_noise` has them; 0 where a simulation diverges."""
-    short = _first_ticks(windows, _OUTPUTS)
-    found = sample(plant, layout, short, variation, sigma, step, rng)
-    raw = residuals(plant, layout, short, [variation], step)[0].reshape(len(windows), -1)
-    factor = factors_of(found, sigma)
+    short = replace(noisy, windows=_first_ticks(noisy.windows, rule.outputs))
+    found = sample(short, rng)
+    raw = short.residuals()[0].reshape(len(short.windows), -1)
+    factor = factors_of(found, noisy.sigma, noisy.rule)
     white = np.matmul(factor, np.nan_to_num(raw)[..., None])[..., 0]
     slopes = np.matmul(found.slopes, factor.transpose(0, 2, 1))
     move = -np.einsum("wcm,wm->wc", slopes, white)
     good = found.valid & np.isfinite(raw).all(axis=1)
-    return np.clip(np.where(good[:, None], move, 0.0), -_MOST, _MOST) * start_noise(plant, layout, sigma)
+    return np.clip(np.where(good[:, None], move, 0.0), -rule.most, rule.most) * noisy.start_noise
 
 
 def restarted(plant: Plant, layout: Layout, windows: Windows, move: np.ndarray) -> Windows:

@@ -18,34 +18,37 @@ from dataclasses import replace
 import numpy as np
 
 from bumblebee.diagnosis.simulation import Layout, Plant, Starts, Variation, Windows, residuals
+from bumblebee.diagnosis.thresholds.residuals import Nuisances
 
 NAMES = ("integrator", "position_loop", "velocity_loop", "velocity_clock", "height")
-_UNIT = 0.001  # [s]
-_HEIGHT = 0.001  # [m]
 
 
-def nuisance_columns(plant: Plant, layout: Layout, windows: Windows, variation: Variation, step: float) -> np.ndarray:
+def nuisance_columns(
+    plant: Plant, layout: Layout, windows: Windows, variation: Variation, step: float, rule: Nuisances | None = None
+) -> np.ndarray:
     """Change of the prediction for coefficient 1 of each nuisance, (4 or 5, W, N, D); diverged windows are NaN."""
-    ticks = windows.out_time
+    rule, ticks = rule or Nuisances(), windows.out_time
     # One simulation, read at the ticks, a little before them, and just after the start.
-    every = residuals(plant, layout, _read_thrice(windows, 2 * step), [variation], step)[0]
+    every = residuals(plant, layout, _read_thrice(windows, 2 * step, rule.unit), [variation], step)[0]
     base, early, first = np.split(every, [ticks.shape[1], 2 * ticks.shape[1]], axis=1)
     double = residuals(plant, layout, windows, [variation], 2 * step)[0]
     # Of what is a small change of the model both sides are simulated in the longer steps.
-    late = residuals(plant, layout, windows, [_late_loop(plant, variation, part) for part in ("kp", "kd")], 2 * step)
-    start = _faster(plant, layout, windows, windows.measured[:, 0] - first[:, 0], 2 * step)
+    loops = [_late_loop(plant, variation, part, rule) for part in ("kp", "kd")]
+    late = residuals(plant, layout, windows, loops, 2 * step)
+    gained = (windows.measured[:, 0] - first[:, 0])[:, layout.slices["joint_vel"]] - windows.qvel[:, plant.dof]
+    start = _faster(plant, windows, rule.unit * gained / (2 * step))
     clock = double - residuals(plant, layout, windows, [variation], 2 * step, start)[0]
     clock[..., layout.slices["joint_vel"]] += (base - early)[..., layout.slices["joint_vel"]]
-    columns = [(base - double) * (_UNIT / step), double - late[0], double - late[1], clock]
+    columns = [(base - double) * (rule.unit / step), double - late[0], double - late[1], clock]
     if plant.floating and "base_pos" not in layout.slices:
         higher = windows.qpos.copy()
-        higher[:, plant.base_qpos + 2] += _HEIGHT
+        higher[:, plant.base_qpos + 2] += rule.height
         starts = Starts(higher[None], windows.qvel[None])
         columns.append(double - residuals(plant, layout, windows, [variation], 2 * step, starts)[0])
     return np.stack(columns)
 
 
-def _late_loop(plant: Plant, variation: Variation, part: str) -> Variation:
+def _late_loop(plant: Plant, variation: Variation, part: str, rule: Nuisances) -> Variation:
     """Torque kp (u - q(t-e)) - kd qd(t-e), to first order in e: less damping by kp e, less inertia by kd e."""
     model, own = copy.copy(variation.model), variation.plant or plant
     for column, a in enumerate(own.actuator):
@@ -54,26 +57,25 @@ def _late_loop(plant: Plant, variation: Variation, part: str) -> Variation:
             kp, kd = -model.actuator_biasprm[a, 1], -model.actuator_biasprm[a, 2]
             gear = model.actuator_gear[a, 0]
             if part == "kp":
-                model.actuator_biasprm[a, 2] += kp * _UNIT
+                model.actuator_biasprm[a, 2] += kp * rule.unit
             else:
-                lighter = model.dof_armature[dof] - kd * gear**2 * _UNIT
-                model.dof_armature[dof] = max(0.1 * model.dof_armature[dof], lighter)
+                lighter = model.dof_armature[dof] - kd * gear**2 * rule.unit
+                model.dof_armature[dof] = max(rule.least_armature * model.dof_armature[dof], lighter)
     return replace(variation, model=model)
 
 
-def _read_thrice(windows: Windows, after: float) -> Windows:
-    """The same windows (N ticks) compared at their ticks, a millisecond before each, and `after` s from the start."""
+def _read_thrice(windows: Windows, after: float, before: float) -> Windows:
+    """The same windows (N ticks) compared at their ticks, `before` s before each, and `after` s from the start."""
     ticks = windows.out_time
-    times = np.concatenate((ticks, ticks - _UNIT, np.full((len(windows), 1), after)), axis=1)
+    times = np.concatenate((ticks, ticks - before, np.full((len(windows), 1), after)), axis=1)
     measured, quat = (
         None if x is None else np.concatenate((x, x, x[:, :1]), axis=1) for x in (windows.measured, windows.quat)
     )
     return replace(windows, out_time=times, measured=measured, quat=quat)
 
 
-def _faster(plant: Plant, layout: Layout, windows: Windows, readings: np.ndarray, after: float) -> Starts:
-    """Starts whose joints are faster by a millisecond of their acceleration, from simulated readings (W, D)."""
+def _faster(plant: Plant, windows: Windows, by: np.ndarray) -> Starts:
+    """Starts whose joints are faster `by` (W, J) [rad/s]."""
     start = windows.qvel.copy()
-    gained = readings[:, layout.slices["joint_vel"]] - start[:, plant.dof]
-    start[:, plant.dof] += _UNIT * gained / after
+    start[:, plant.dof] += by
     return Starts(windows.qpos[None], start[None])

@@ -10,14 +10,13 @@ from bumblebee.diagnosis.candidates import Candidate, rough, without
 from bumblebee.diagnosis.residuals.imu_tilt import angles, retilted, tilt_columns, tilt_of
 from bumblebee.diagnosis.residuals.initial_state import restarted, start_moves
 from bumblebee.diagnosis.residuals.nuisances import nuisance_columns
-from bumblebee.diagnosis.residuals.whitening import Whitener, fit_whitener
+from bumblebee.diagnosis.residuals.whitening import NoisyWindows, Whitener, fit_whitener
 from bumblebee.diagnosis.simulation import Layout, Plant, Recall, Windows, residuals, select, vary
 from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
-_GROUP = 24  # models held at once
-_MANY, _LARGEST = 12, 0.2  # windows; share of the others' power that one may have
+_GROUP = 24  # models held at once: memory, not a decision
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +97,7 @@ class Problem:
         out = self.whitener(raw) if keep is None else self.whitener.on(keep, raw)
         if bad.any():
             good = out[~bad]
-            out[bad] = 10.0 * (np.sqrt((good**2).mean()) if good.size else 1.0)
+            out[bad] = self.thresholds.residuals.outliers.diverged * (np.sqrt((good**2).mean()) if good.size else 1.0)
         return out
 
     def columns(self, candidate: Candidate, base: Sequence[Effect] = ()) -> np.ndarray:
@@ -128,13 +127,13 @@ class Problem:
     def tamed(self, change: np.ndarray) -> np.ndarray:
         """Changes (..., W, M) that were simulated in coarse steps, on a floating base no window far above the others.
 
-        A foot that touches a coarse step earlier moves one window by more than all the others together: an offset of
-        0.010 rad in a hip came out as 0.002.
+        A foot that touches a coarse step earlier moves one window by more than all the others together.
         """
-        if not self.plant.floating or change.shape[-2] < _MANY:
+        rule = self.thresholds.residuals.outliers
+        if not self.plant.floating or change.shape[-2] < rule.many:
             return change
         power = (change**2).sum(axis=-1)
-        most = _LARGEST * np.sort(power, axis=-1)[..., :-2].sum(axis=-1, keepdims=True)
+        most = rule.largest * np.sort(power, axis=-1)[..., :-2].sum(axis=-1, keepdims=True)
         return change * np.sqrt(np.minimum(1.0, most / np.maximum(power, 1e-30)))[..., None]
 
     def relinearised(self, effects: Sequence[Effect]) -> "Problem":
@@ -143,7 +142,8 @@ class Problem:
         What a servo loop a millisecond late does depends on the accelerations, and these on a delay that was found:
         with the declared model's columns a delay of 13 ms came out 0.1 ms short, five standard errors.
         """
-        raw = nuisance_columns(self.plant, self.layout, self.windows, vary(self.plant, effects), self.fine)
+        variation, rule = vary(self.plant, effects), self.thresholds.residuals.nuisances
+        raw = nuisance_columns(self.plant, self.layout, self.windows, variation, self.fine, rule)
         fresh = _columns(self.whitener, raw)
         bad = ~np.isfinite(raw).all(axis=(0, 2, 3))
         fresh[:, bad] = self.nuisance[:, bad]
@@ -176,40 +176,36 @@ def make_problem(
     `steps` [s] are for residuals and for sensitivities, `finest` for residuals of the last fit, if these are shorter.
     The windows start as measured; the problem's start where the readings after that say they did.
     """
-    fine, coarse = steps
+    thresholds, (fine, coarse) = thresholds or Thresholds(), steps
+    rules = thresholds.residuals
     variation, read = vary(plant, effects), windows
     # What a start's move does to a late servo shows in fine steps alone: a delay of 7 ms came out a tenth too short.
     step = coarse if plant.floating or rough(e.effect for e in effects) else fine
-    move = start_moves(plant, layout, read, variation, sigma, step, rng)
+    noisy = NoisyWindows(plant, layout, read, variation, sigma, step, rules.whitening)
+    move = start_moves(noisy, rng, rules.initial_state)
     windows = restarted(plant, layout, read, move)
-    whitener = fit_whitener(plant, layout, windows, variation, sigma, step, rng, move)
-    raw = nuisance_columns(plant, layout, windows, variation, fine)
+    whitener = fit_whitener(replace(noisy, windows=windows), rng, move)
+    raw = nuisance_columns(plant, layout, windows, variation, fine, rules.nuisances)
     keep = whitener.valid & np.isfinite(raw).all(axis=(0, 2, 3))
-    if keep.mean() < 0.5:
+    _refuse_divergent(keep, windows.span, rules.outliers.finite)
+    windows, raw, whitener = select(windows, keep), raw[:, keep], whitener.part(keep)
+    columns = _columns(whitener, raw)
+    finest, read = fine if finest is None else finest, select(read, keep)
+    return Problem(
+        plant, layout, windows, sigma, fine, finest, fine, coarse, whitener, columns, read, tilt_of(effects),
+        thresholds=thresholds,
+    )  # fmt: skip
+
+
+def _refuse_divergent(keep: np.ndarray, span: float, least: float) -> None:
+    """`BadInput` where less than a share `least` of the windows (W,) of `span` s stay finite."""
+    if keep.mean() < least:
         raise BadInput(
             f"declared model, {(~keep).sum()} of {len(keep)} windows",
-            f"simulations that stay finite for {windows.span:.2g} s from the measured states and commands",
+            f"simulations that stay finite for {span:.2g} s from the measured states and commands",
             "simulations that diverge",
             "Look at gains, time step and units of the declared model.",
         )
-    windows, raw, whitener = select(windows, keep), raw[:, keep], whitener.part(keep)
-    columns = _columns(whitener, raw)
-    finest = fine if finest is None else finest
-    return Problem(
-        plant,
-        layout,
-        windows,
-        sigma,
-        fine,
-        finest,
-        fine,
-        coarse,
-        whitener,
-        columns,
-        select(read, keep),
-        tilt_of(effects),
-        thresholds=thresholds or Thresholds(),
-    )
 
 
 def _columns(whitener: Whitener, raw: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ the residual's mean has the opposite sign, and less of it where the true state i
 (feet rest on the floor). How much is left to the fit: the mean is one of its nuisances, it is not subtracted.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import hadamard
@@ -25,18 +25,35 @@ from bumblebee.diagnosis.simulation import (
     Starts,
     Variation,
     Windows,
-    conjugate,
-    from_rotation_vector,
-    multiply,
     residuals,
-    rotate,
 )
+from bumblebee.diagnosis.thresholds.residuals import Whitening
+from bumblebee.quaternions import conjugate, from_rotation_vector, multiply, rotate_by_cross
 
-# Share of the variance that is not linear in the starts that counts. It grows with their variance squared, and what the
-# next readings leave of that is 0.6 to 0.7 on a standing G1.
-_CURVED = 0.5
-# Noise of a base height that is not measured but taken from stance [m].
-_HEIGHT_NOISE = 0.002
+
+@dataclass(frozen=True, eq=False)
+class NoisyWindows:
+    """W windows simulated by one model, and the noise of the readings that they start from."""
+
+    plant: Plant
+    layout: Layout
+    windows: Windows
+    variation: Variation
+    sigma: np.ndarray
+    """(D,) noise of every signal."""
+    step: float
+    """Of the simulation [s]."""
+    rule: Whitening = field(default_factory=Whitening)
+
+    @property
+    def start_noise(self) -> np.ndarray:
+        """Standard deviations (C,) of a start's coordinates: the signals', and the height's if it is not one."""
+        unmeasured = self.plant.floating and "base_pos" not in self.layout.slices
+        return np.concatenate((self.sigma, [self.rule.height_noise])) if unmeasured else self.sigma
+
+    def residuals(self, starts: Starts | None = None) -> np.ndarray:
+        """Raw residuals (1, W, N, D), or (K, W, N, D) from K `starts`."""
+        return residuals(self.plant, self.layout, self.windows, [self.variation], self.step, starts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +96,8 @@ class Whitener:
         return np.stack([flat[..., k, :] @ self.factor[w].T for k, w in enumerate(keep)], axis=-2)
 
 
-def start_noise(plant: Plant, layout: Layout, sigma: np.ndarray) -> np.ndarray:
-    """Standard deviations (C,) of a measured start's coordinates: the signals', and the height's if it is not one."""
-    unmeasured = plant.floating and "base_pos" not in layout.slices
-    return np.concatenate((sigma, [_HEIGHT_NOISE])) if unmeasured else sigma
-
-
 def displaced(plant: Plant, layout: Layout, windows: Windows, move: np.ndarray) -> Starts:
-    """The windows' starts moved by `move` (K, W, C), coordinates as `start_noise` has them: (K, W, .)."""
+    """The windows' starts moved by `move` (K, W, C), coordinates as `NoisyWindows.start_noise` has them: (K, W, .)."""
     parts = {name: move[..., part] for name, part in layout.slices.items()}
     qpos = np.repeat(windows.qpos[None], len(move), axis=0)
     qvel = np.repeat(windows.qvel[None], len(move), axis=0)
@@ -95,10 +106,10 @@ def displaced(plant: Plant, layout: Layout, windows: Windows, move: np.ndarray) 
     if plant.floating:
         q, v = plant.base_qpos, plant.base_dof
         quat = qpos[..., q + 3 : q + 7]
-        speed_b = rotate(conjugate(quat), qvel[..., v : v + 3]) + parts["base_lin_vel"]
+        speed_b = rotate_by_cross(conjugate(quat), qvel[..., v : v + 3]) + parts["base_lin_vel"]
         quat = multiply(quat, from_rotation_vector(parts["base_rot"]))
         qpos[..., q + 3 : q + 7] = quat
-        qvel[..., v : v + 3] = rotate(quat, speed_b)
+        qvel[..., v : v + 3] = rotate_by_cross(quat, speed_b)
         qvel[..., v + 3 : v + 6] += parts["base_ang_vel"]
         if "base_pos" in parts:
             qpos[..., q : q + 3] += parts["base_pos"]
@@ -133,47 +144,30 @@ class Sampled:
         return np.einsum("kwc,kwm->wcm", self.signs, self.moved, optimize=True) / len(self.signs)
 
 
-def sample(
-    plant: Plant,
-    layout: Layout,
-    windows: Windows,
-    variation: Variation,
-    sigma: np.ndarray,
-    step: float,
-    rng: np.random.Generator,
-) -> Sampled:
-    """Simulate perturbed starts of `windows` with sensor noise `sigma` (D,)."""
-    noise = start_noise(plant, layout, sigma)
+def sample(noisy: NoisyWindows, rng: np.random.Generator) -> Sampled:
+    """Simulate perturbed starts of the windows."""
+    windows, noise = noisy.windows, noisy.start_noise
     signs = _balanced_signs(len(windows), len(noise), rng)
-    starts = displaced(plant, layout, windows, signs * noise)
-    base = residuals(plant, layout, windows, [variation], step)[0]
-    moved = residuals(plant, layout, windows, [variation], step, starts) - base
+    starts = displaced(noisy.plant, noisy.layout, windows, signs * noise)
+    base = noisy.residuals()[0]
+    moved = noisy.residuals(starts) - base
     valid = np.isfinite(moved).all(axis=(0, 2, 3)) & np.isfinite(base).all(axis=(1, 2))
     return Sampled(np.nan_to_num(moved).reshape(len(moved), len(windows), -1), signs, valid)
 
 
-def fit_whitener(
-    plant: Plant,
-    layout: Layout,
-    windows: Windows,
-    variation: Variation,
-    sigma: np.ndarray,
-    step: float,
-    rng: np.random.Generator,
-    move: np.ndarray | None = None,
-) -> Whitener:
-    """The whitener of `windows` for the model `variation` and sensor noise `sigma` (D,).
+def fit_whitener(noisy: NoisyWindows, rng: np.random.Generator, move: np.ndarray | None = None) -> Whitener:
+    """The whitener of the windows for their model and their sensors' noise.
 
     `move` (W, C) is by how much their starts have been displaced from the measured ones, if they have.
     """
-    found = sample(plant, layout, windows, variation, sigma, step, rng)
+    found = sample(noisy, rng)
     mean = found.moved.mean(axis=0)
     away = found.moved - mean
-    factor = factors_of(found, sigma)
+    factor = factors_of(found, noisy.sigma, noisy.rule)
     white = np.matmul(factor, away.transpose(1, 2, 0)).transpose(2, 0, 1).astype(np.float32)
     offset, slopes = np.zeros_like(mean), found.slopes
     if move is not None:
-        offset = np.einsum("wc,wcm->wm", move / start_noise(plant, layout, sigma), slopes)
+        offset = np.einsum("wc,wcm->wm", move / noisy.start_noise, slopes)
     slopes = np.matmul(slopes, factor.transpose(0, 2, 1)).astype(np.float32)
     return Whitener(factor, offset, np.matmul(factor, mean[..., None])[..., 0], found.valid, white, slopes)
 
@@ -190,7 +184,7 @@ def null_draws(whitener: Whitener, sigma: np.ndarray, rng: np.random.Generator) 
     return starts + np.matmul(whitener.factor, reading.transpose(1, 2, 0)).transpose(2, 0, 1)
 
 
-def factors_of(found: Sampled, sigma: np.ndarray) -> np.ndarray:
+def factors_of(found: Sampled, sigma: np.ndarray, rule: Whitening) -> np.ndarray:
     """Inverse Cholesky factors (W, M, M) of the covariance of what noise in the starts makes plus that of readings."""
     samples, windows, size = found.moved.shape
     reading = np.tile(sigma**2, size // len(sigma))
@@ -206,7 +200,7 @@ def factors_of(found: Sampled, sigma: np.ndarray) -> np.ndarray:
         diagonal = reading / scale**2
         if free > 0:
             curved = ((x - found.signs[:, w] @ (slopes[w] / scale)) ** 2).sum(axis=0) / free
-            diagonal += _CURVED * curved
+            diagonal += rule.curved * curved
         covariance[np.diag_indices(size)] += diagonal
         out[w] = dtrtri(np.linalg.cholesky(covariance), lower=1)[0] / scale
     return out

@@ -67,11 +67,12 @@ def screen(
     plain = Variation(variation.model, variation.delay, variation.offset) if variation.plant is None else None
     around = plain or vary(problem.plant, [])
     only = _near(problem.plant, before.effects, effects) if before is not None else np.arange(problem.plant.model.nv)
-    answers = answers_of(problem.plant, problem.layout, problem.windows, around, problem.coarse, torque, only=only)
+    rules, scene = problem.thresholds.sensitivities, (problem.plant, problem.layout, problem.windows)
+    answers = answers_of(*scene, around, problem.coarse, torque, only=only, segments=rules.impulses.segments)
     fresh = _whitened(problem, answers, only)
     white = fresh if before is None else before.white.copy()
     white[:, only] = fresh
-    signatures = Signatures(problem.plant, problem.windows, around, answers.path)
+    signatures = Signatures(problem.plant, problem.windows, around, answers.path, rules.signatures)
     ends = np.cumsum([len(c.free) for c in kept]).tolist()
     values = np.empty((ends[-1] if ends else 0, *problem.nuisance.shape[1:]), dtype=np.float32)
     simulated, torques = [], []
@@ -84,13 +85,21 @@ def screen(
     for c, end in zip(kept, ends, strict=True):
         if c.effect == "encoder_delay" and not is_simulated(c, len(problem.plant.joints)):
             values[end - 1] += signatures.late.readings(problem, c.start[0], problem.plant.joints.index(c.where))
-    if simulated:
-        drawn = problem.sensitivities([c for c, _ in simulated], list(effects))
-        first = 0
-        for c, where in simulated:
-            values[where : where + len(c.free)] = drawn[first : first + len(c.free)]
-            first += len(c.free)
+    _simulate(problem, values, simulated, effects)
     return Columns(kept, values), white
+
+
+def _simulate(
+    problem: Problem, values: np.ndarray, simulated: Sequence[tuple[Candidate, int]], effects: Sequence[Effect]
+) -> None:
+    """Set the rows of `values` (., W, M) to the simulated columns of candidates, each from its first row on."""
+    if not simulated:
+        return
+    drawn = problem.sensitivities([c for c, _ in simulated], list(effects))
+    first = 0
+    for c, where in simulated:
+        values[where : where + len(c.free)] = drawn[first : first + len(c.free)]
+        first += len(c.free)
 
 
 def _fill(values: np.ndarray, torques: Sequence[tuple[int, np.ndarray]], white: np.ndarray) -> None:
@@ -136,12 +145,12 @@ def _whitened(problem: Problem, answers: Answers, only: np.ndarray) -> np.ndarra
 
 
 def pulse_sizes(problem: Problem, torque: np.ndarray) -> np.ndarray:
-    """(nv,) pulses of a tenth of the joints' typical torque (J,); a hundredth of the weight on a floating base."""
-    plant = problem.plant
-    out = np.full(plant.model.nv, 0.1 * float(np.median(torque)))
-    out[plant.dof] = 0.1 * torque
+    """(nv,) pulses [N m, N]: shares of the joints' typical torque (J,), on a floating base of the weight."""
+    plant, rule = problem.plant, problem.thresholds.sensitivities.impulses
+    out = np.full(plant.model.nv, rule.torque * float(np.median(torque)))
+    out[plant.dof] = rule.torque * torque
     if plant.floating:
         weight = 9.81 * float(plant.model.body_mass.sum())
-        out[plant.base_dof : plant.base_dof + 3] = 0.01 * weight
-        out[plant.base_dof + 3 : plant.base_dof + 6] = 0.002 * weight
+        out[plant.base_dof : plant.base_dof + 3] = rule.force * weight
+        out[plant.base_dof + 3 : plant.base_dof + 6] = rule.moment * weight
     return np.maximum(out, 1e-9)

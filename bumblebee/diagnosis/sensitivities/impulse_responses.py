@@ -25,8 +25,7 @@ from bumblebee.diagnosis.simulation import (
     with_step,
     without,
 )
-
-SEGMENTS = 5
+from bumblebee.diagnosis.thresholds.sensitivities import Impulses
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +67,7 @@ def answers_of(
     step: float,
     sizes: np.ndarray,
     only: np.ndarray | None = None,
+    segments: int = Impulses.segments,
 ) -> Answers:
     """Simulate pulses of `sizes` (nv,) [N m, N] on every degree of freedom of a plain variation.
 
@@ -76,7 +76,7 @@ def answers_of(
     pushed = np.arange(plant.model.nv) if only is None else only
     count = max(1, int(np.ceil(windows.span / step - 1e-6)))
     control = inputs_of(windows, variation, step, count, {})
-    edges = np.unique(np.linspace(0, count, min(SEGMENTS, count) + 1).round().astype(int))
+    edges = np.unique(np.linspace(0, count, min(segments, count) + 1).round().astype(int))
     model, size, many = with_step(variation.model, step), len(windows), len(pushed)
     qpos = windows.qpos.copy()
     qpos[:, plant.qpos] -= variation.offset

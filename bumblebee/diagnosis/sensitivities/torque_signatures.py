@@ -14,19 +14,20 @@ from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.sensitivities.impulse_responses import Path
 from bumblebee.diagnosis.sensitivities.latency_signatures import LATE, Late
 from bumblebee.diagnosis.simulation import Plant, Variation, Windows, bent_before, inputs_of, remember, yielded
+from bumblebee.diagnosis.thresholds.sensitivities import TorqueSignatures
 from bumblebee.sim.effect_forces import bent
 from bumblebee.sim.effect_hooks import runtime_hooks
 from bumblebee.sim.effect_native import sloped, spread_inertia
 from bumblebee.sim.effects import Effect
 from bumblebee.sim.servo import servos_of
 
-_CREEP = 0.02  # [rad/s]: speeds below are no motion that dry friction could be told by
-
 
 class Signatures:
     """Torques on the W windows' degrees of freedom, mean over each of S segments of their paths."""
 
-    def __init__(self, plant: Plant, windows: Windows, variation: Variation, path: Path) -> None:
+    def __init__(
+        self, plant: Plant, windows: Windows, variation: Variation, path: Path, rule: TorqueSignatures
+    ) -> None:
         self.plant, self.windows, self.path, self._variation = plant, windows, path, variation
         self.servos = servos_of(variation.model, [int(plant.model.joint(name).id) for name in plant.joints])
         self.q = path.qpos[:, :-1, plant.qpos]
@@ -34,7 +35,7 @@ class Signatures:
         self.a = np.diff(path.qvel[:, :, plant.dof], axis=1) / path.step
         self.u = self.servos.controls(path.control)
         self.torque = self.servos.torque(self.q, self.v, self.u)
-        self.sign = np.tanh(self.v / _CREEP)
+        self.sign = np.tanh(self.v / rule.creep)
         memory = remember(plant, windows, runtime_hooks([], plant.model), path.step)
         order = [runtime_hooks([], plant.model).joints.index(name) for name in plant.joints]
         clock = memory.time[:, None] + path.step * np.arange(self.q.shape[1])
@@ -98,7 +99,7 @@ class Signatures:
     def _hysteresis(self, c: Candidate, j: int) -> np.ndarray:
         width, q = c.step[1], self.q[..., j]
         if c.step[2]:
-            z, out = bent_before(self.windows, j, width), np.empty_like(q)
+            z, out = bent_before(self.windows, j, width, self.plant.thresholds.history), np.empty_like(q)
             for k, path in enumerate(np.diff(q, axis=1, append=q[:, -1:]).T):
                 out[:, k] = z
                 z = bent(z, path, width)

@@ -13,17 +13,12 @@ from bumblebee.diagnosis.simulation.actuators import fold_dampers
 from bumblebee.diagnosis.simulation.cache import Changes, Recall
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
 from bumblebee.diagnosis.simulation.declared import declared_values, touching
-from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, refuse_unlogged
+from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, plant_by, refuse_unlogged
 from bumblebee.diagnosis.simulation.readings import (
     Layout,
-    conjugate,
     difference,
-    from_rotation_vector,
     layout_of,
     measured_readings,
-    multiply,
-    rotate,
-    rotation_vector,
     simulated_readings,
 )
 from bumblebee.diagnosis.simulation.simulate import Starts, at_ticks, inputs_of, residuals, threads, with_step
@@ -57,12 +52,10 @@ __all__ = [
     "bent_before",
     "choose_starts",
     "command_inputs",
-    "conjugate",
     "cut",
     "declared_values",
     "difference",
     "fold_dampers",
-    "from_rotation_vector",
     "inputs_of",
     "joint_units",
     "lagged",
@@ -73,18 +66,16 @@ __all__ = [
     "members",
     "mixed_notes",
     "motion_error",
-    "multiply",
     "named",
     "of_joint",
     "out_of_reach",
     "pick",
+    "plant_by",
     "position_rows",
     "read_at",
     "refuse_unlogged",
     "remember",
     "residuals",
-    "rotate",
-    "rotation_vector",
     "rows",
     "select",
     "simulated_readings",

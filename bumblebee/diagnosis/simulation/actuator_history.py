@@ -12,15 +12,12 @@ import numpy as np
 
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.windows import Windows, command_inputs
+from bumblebee.diagnosis.thresholds.simulation import ActuatorHistory
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effect_forces import Memory, bent, history_length
 from bumblebee.sim.effect_hooks import RuntimeHooks
 from bumblebee.sim.effect_states import State, states_of
 from bumblebee.sim.servo import Servos, servos_of
-
-_SMOOTH = 3  # ticks to either side
-_PASSES = 60  # at most, until the heat and the strength that it leaves agree
-_FORGOTTEN = 20.0  # time constants after which a lag knows nothing of its start
 
 
 def plant_servos(plant: Plant) -> Servos:
@@ -78,7 +75,7 @@ def remember(plant: Plant, windows: Windows, hooks: RuntimeHooks, step: float) -
 
     def heat(rollout: Rollout) -> np.ndarray:
         time = rollout.time - rollout.time[0]
-        return heated(time, mean_squares(plant, rollout) / scale**2, thermal, drift)
+        return heated(time, mean_squares(plant, rollout) / scale**2, thermal, drift, plant.thresholds.history)
 
     back = history_length(hooks, step)
     late = bool(hooks.torque_lag.any())
@@ -90,25 +87,26 @@ def remember(plant: Plant, windows: Windows, hooks: RuntimeHooks, step: float) -
         position=None if past is None else past[0] - hooks.encoder_offset,
         velocity=None if past is None else past[1],
         states=_states(plant, windows, hooks, order),
-        bent=_bent(windows, [(order[column], width) for column, _, width in hooks.hysteresis]),
+        bent=_bent(plant, windows, [(order[column], width) for column, _, width in hooks.hysteresis]),
     )
 
 
-def _bent(windows: Windows, columns: Sequence[tuple[int, float]]) -> np.ndarray | None:
+def _bent(plant: Plant, windows: Windows, columns: Sequence[tuple[int, float]]) -> np.ndarray | None:
     """Dahl's z (W, H) of joints (columns in the log) and widths [rad]."""
     if not columns:
         return None
-    return np.stack([bent_before(windows, column, width) for column, width in columns], axis=1)
+    rule = plant.thresholds.history
+    return np.stack([bent_before(windows, column, width, rule) for column, width in columns], axis=1)
 
 
-def bent_before(windows: Windows, column: int, width: float) -> np.ndarray:
+def bent_before(windows: Windows, column: int, width: float, rule: ActuatorHistory) -> np.ndarray:
     """Dahl's z (W,) of one joint (a column in the log) at the windows' starts, its path followed from the first tick.
 
     Positions are means over a few ticks: what a sensor's noise would wind back is no motion.
     """
 
     def place(rollout: Rollout) -> np.ndarray:
-        wide = np.ones(2 * _SMOOTH + 1)
+        wide = np.ones(2 * rule.smooth + 1)
         known = np.convolve(np.ones(len(rollout.time)), wide, mode="same")
         return np.convolve(rollout.joint_pos[:, column], wide, mode="same") / known
 
@@ -146,7 +144,7 @@ def state_before(plant: Plant, windows: Windows, state: State) -> np.ndarray:
     servos = plant_servos(plant)
 
     def of(rollout: Rollout) -> np.ndarray:
-        wide = np.ones(2 * _SMOOTH + 1)
+        wide = np.ones(2 * plant.thresholds.history.smooth + 1)
         known = np.convolve(np.ones(len(rollout.time)), wide, mode="same")
         speed = np.convolve(rollout.joint_vel[:, state.column], wide, mode="same") / known
         target = servos.given(servos.controls(command_inputs(plant, rollout)))[:, state.column]
@@ -156,7 +154,13 @@ def state_before(plant: Plant, windows: Windows, state: State) -> np.ndarray:
     return at_starts(windows, of)
 
 
-def heated(time: np.ndarray, squares: np.ndarray, thermal: np.ndarray, drift: np.ndarray) -> np.ndarray:
+def heated(
+    time: np.ndarray,
+    squares: np.ndarray,
+    thermal: np.ndarray,
+    drift: np.ndarray,
+    rule: ActuatorHistory,
+) -> np.ndarray:
     """Heat (T, J) [s] at the ticks `time` (T,) of a rollout: the integral of the square of what the drives gave.
 
     `squares` (T - 1, J) are mean squares between ticks of torques at full strength, as shares of the limit. A drive of
@@ -165,10 +169,10 @@ def heated(time: np.ndarray, squares: np.ndarray, thermal: np.ndarray, drift: np
     power = squares * np.diff(time)[:, None]
     out = np.concatenate((np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)))
     some = np.flatnonzero((thermal != 0) | (drift != 0))
-    for _ in range(_PASSES if len(some) else 0):
+    for _ in range(rule.passes if len(some) else 0):
         strength = np.clip(1.0 - thermal[some] * out[:-1, some] - drift[some] * time[:-1, None], 0.0, 1.0)
         new = np.cumsum(strength**2 * power[:, some], axis=0)
-        settled = np.abs(new - out[1:, some]).max(initial=0.0) < 1e-9
+        settled = np.abs(new - out[1:, some]).max(initial=0.0) < rule.settled
         out[1:, some] = new
         if settled:
             break
@@ -186,7 +190,7 @@ def lagged(plant: Plant, rollout: Rollout, order: Sequence[int], time: np.ndarra
     keep = np.exp(-dt / safe)
     fed = (1 - keep) * after[:-1] + (before[1:] - after[:-1]) / dt * (dt - safe * (1 - keep))
     out = before.copy()
-    passes = int(np.ceil(_FORGOTTEN * float(safe.max()) / float(np.median(dt))))
+    passes = int(np.ceil(plant.thresholds.history.forgotten * float(safe.max()) / float(np.median(dt))))
     for _ in range(min(passes, len(out))):
         out[1:] = keep * out[:-1] + fed
     return out

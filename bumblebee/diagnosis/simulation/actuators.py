@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.thresholds.simulation import DriveProbe
 from bumblebee.errors import BadInput
 from bumblebee.sim.servo import ON_JOINT
 
-_STEP = 1e-4
 _AFFINE = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
 _AFFINE_BIAS = mujoco.mjtBias.mjBIAS_AFFINE
 
@@ -34,13 +34,11 @@ class DriveLaw:
     simple: np.ndarray
     """(nu,) bool: force = gain * input + affine bias, so that gains can be scaled in gainprm and biasprm."""
 
-    @property
-    def servo(self) -> np.ndarray:
-        """(nu,) whether the actuator takes a position target."""
-        return np.abs(self.stiffness) > 1e-9
+    servo: np.ndarray
+    """(nu,) bool: whether the actuator takes a position target."""
 
 
-def drive_law(model: mujoco.MjModel, where: object) -> DriveLaw:
+def drive_law(model: mujoco.MjModel, where: object, rule: DriveProbe) -> DriveLaw:
     """Probe every actuator of `model`; `where` names it in the error for actuators of several inputs."""
     count = len(model.actuator_trntype)
     if model.nu != count:
@@ -51,16 +49,16 @@ def drive_law(model: mujoco.MjModel, where: object) -> DriveLaw:
     base = _force(model, data, fed, np.zeros(count))
     for a in range(count):
         control = np.zeros(count)
-        control[a] = _STEP
-        gain[a] = (_force(model, data, fed, control)[a] - base[a]) / _STEP
+        control[a] = rule.step
+        gain[a] = (_force(model, data, fed, control)[a] - base[a]) / rule.step
         joint = int(model.actuator_trnid[a, 0])
         if int(model.actuator_trntype[a]) == int(mujoco.mjtTrn.mjTRN_JOINT) and model.jnt_type[joint] > 1:
             mujoco.mj_resetData(model, data)
-            data.qpos[model.jnt_qposadr[joint]] += _STEP
+            data.qpos[model.jnt_qposadr[joint]] += rule.step
             gear = model.actuator_gear[a, 0]
-            stiffness[a] = -(_force(model, data, fed, np.zeros(count), reset=False)[a] - base[a]) / (_STEP * gear)
+            stiffness[a] = -(_force(model, data, fed, np.zeros(count), reset=False)[a] - base[a]) / (rule.step * gear)
     simple = np.isin(model.actuator_gaintype, _AFFINE) & (model.actuator_gainprm[:, 1:3] == 0).all(axis=1)
-    return DriveLaw(gain, stiffness, simple)
+    return DriveLaw(gain, stiffness, simple, np.abs(stiffness) > rule.feedback)
 
 
 def _force(

@@ -8,9 +8,6 @@ import numpy as np
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.measured.rollout import Rollout
 
-# Depth at which a standing robot rests in MuJoCo's soft floor with default contact parameters [m].
-_REST_DEPTH = 0.001
-
 
 def stance_heights(plant: Plant, rollouts: Sequence[Rollout], ids: Iterable[int]) -> dict[int, np.ndarray]:
     """Height of the base (T,) [m] at every tick of the rollouts `ids`, as if the lowest point always touched z = 0."""
@@ -18,7 +15,7 @@ def stance_heights(plant: Plant, rollouts: Sequence[Rollout], ids: Iterable[int]
 
 
 def _heights(plant: Plant, rollout: Rollout) -> np.ndarray:
-    model, data = plant.model, mujoco.MjData(plant.model)
+    model, data, depth = plant.model, mujoco.MjData(plant.model), plant.thresholds.base_height.rest_depth
     geoms = [g for g in range(model.ngeom) if touches(model, g)]
     out = np.zeros(rollout.frames)
     for k in range(rollout.frames):
@@ -27,7 +24,7 @@ def _heights(plant: Plant, rollout: Rollout) -> np.ndarray:
         data.qpos[plant.base_qpos + 3 : plant.base_qpos + 7] = rollout.base_quat[k]
         data.qpos[plant.qpos] = rollout.joint_pos[k]
         mujoco.mj_kinematics(model, data)
-        out[k] = -min((lowest(model, data, g) for g in geoms), default=0.0) - _REST_DEPTH
+        out[k] = -min((lowest(model, data, g) for g in geoms), default=0.0) - depth
     return out
 
 

@@ -14,8 +14,6 @@ from bumblebee.diagnosis.simulation.base_height import lowest, touches
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.windows import Windows
 
-_FASTEST = 2.5  # [m/s] at which a geometry may come down on the mean over a window
-_LEVEL = 1e-6
 _known: WeakKeyDictionary[Windows, np.ndarray] = WeakKeyDictionary()
 
 
@@ -40,14 +38,14 @@ def without(models: Sequence[mujoco.MjModel], geoms: np.ndarray) -> Iterator[Non
 
 
 def _found(plant: Plant, windows: Windows) -> np.ndarray:
-    model, data = plant.model, mujoco.MjData(plant.model)
+    model, data, rule = plant.model, mujoco.MjData(plant.model), plant.thresholds.culling
     moving = [g for g in range(model.ngeom) if touches(model, g)]
     fixed = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == 0 and _collides(model, g)]
     some = [g for g in moving if not any(_meet(model, g, other) for other in moving if other != g)]
     some = [g for g in some if g not in (*model.pair_geom1, *model.pair_geom2)]
     mujoco.mj_kinematics(model, data)
     plane = int(mujoco.mjtGeom.mjGEOM_PLANE)
-    if not some or not all(model.geom_type[g] == plane and data.geom_xmat[g, 8] > 1 - _LEVEL for g in fixed):
+    if not some or not all(model.geom_type[g] == plane and data.geom_xmat[g, 8] > 1 - rule.level for g in fixed):
         return np.empty(0, dtype=int)
     floor = max((data.geom_xpos[g, 2] for g in fixed), default=-np.inf)
     clear = np.full(len(some), np.inf)
@@ -55,7 +53,7 @@ def _found(plant: Plant, windows: Windows) -> np.ndarray:
         data.qpos[:] = qpos
         mujoco.mj_kinematics(model, data)
         clear = np.minimum(clear, [lowest(model, data, g) - floor for g in some])
-    return np.array(some, dtype=int)[clear > _FASTEST * windows.span]
+    return np.array(some, dtype=int)[clear > rule.fastest * windows.span]
 
 
 def _collides(model: mujoco.MjModel, geom: int) -> bool:

@@ -14,7 +14,8 @@ from mujoco.batch import Batch
 from bumblebee.diagnosis.simulation.actuator_history import at_starts, logged_torques, yielded
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.variation import Variation
-from bumblebee.diagnosis.simulation.windows import LEAD, Windows, start_state
+from bumblebee.diagnosis.simulation.windows import Windows, start_state
+from bumblebee.diagnosis.thresholds.simulation import HiddenStates
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effect_native import SUFFIX
 
@@ -22,29 +23,27 @@ Known = tuple[np.ndarray, np.ndarray, np.ndarray]
 """States (W, nq'), (W, nv') of a model with play or shafts, and for which windows (W,) they are to be believed."""
 
 
-def step_share(hidden: Sequence[tuple[str, str, tuple[float, ...]]]) -> float:
-    """What of the step a model with these structural effects needs.
-
-    Behind a shaft the servo's own delay of half a step acts as stiffness: 10 % of it at 1 ms on a joint of an arm.
-    The ends of a gap are met one and a half steps late, which is as if it were wider.
-    """
-    return 0.5 if any(kind == "backlash" or (kind in SUFFIX and values[1]) for kind, _, values in hidden) else 1.0
+def step_share(hidden: Sequence[tuple[str, str, tuple[float, ...]]], rule: HiddenStates) -> float:
+    """What of the step a model with these structural effects (kind, joint, parameters) needs."""
+    finer = any(kind == "backlash" or (kind in SUFFIX and values[1]) for kind, _, values in hidden)
+    return rule.step_share if finer else 1.0
 
 
 def earlier(plant: Plant, windows: Windows) -> tuple[Windows, float, np.ndarray]:
-    """The windows begun `LEAD` before their starts; how much that is [s]; where (W,) the log has it without a gap."""
+    """The windows begun by the lead before their starts; how much [s]; where (W,) the log has it without a gap."""
+    lead = plant.thresholds.windows.lead
     first, ahead = np.empty(len(windows), dtype=int), np.empty(len(windows))
     qpos, qvel = windows.qpos.copy(), windows.qvel.copy()
     for w, (i, k) in enumerate(zip(windows.rollout, windows.start, strict=True)):
         rollout = windows.source[i]
-        first[w] = int(np.searchsorted(rollout.time, rollout.time[k] - LEAD - 1e-6))
+        first[w] = int(np.searchsorted(rollout.time, rollout.time[k] - lead - 1e-6))
         ahead[w] = rollout.time[k] - rollout.time[first[w]]
         height = windows.qpos[w, plant.base_qpos + 2] if plant.floating and rollout.base_pos is None else None
         qpos[w], qvel[w] = start_state(plant, rollout, int(first[w]), height)
     span = float(np.median(ahead))
     time = windows.command_time + ahead[:, None]
     early = replace(windows, start=first, qpos=qpos, qvel=qvel, command_time=time)
-    return early, span, np.abs(ahead - span) < 0.1 * LEAD
+    return early, span, np.abs(ahead - span) < plant.thresholds.hidden.lead_error * lead
 
 
 def restructured(

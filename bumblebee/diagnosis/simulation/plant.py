@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.simulation.actuators import drive_law, take_target, take_torque
+from bumblebee.diagnosis.thresholds.simulation import DriveProbe, SimulationThresholds
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effect_native import is_hidden
@@ -66,6 +67,8 @@ class Plant:
     """A rollout whose columns it matches."""
     compiled: dict[tuple, "Plant"] = field(default_factory=dict, repr=False)
     """Plants of the same robot with play, flexible shafts or yielding springs, by their places."""
+    thresholds: SimulationThresholds = field(default_factory=SimulationThresholds, repr=False)
+    """What it is simulated by."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -88,19 +91,22 @@ def load_spec(path: Path) -> mujoco.MjSpec:
     return spec
 
 
-def make_plant(spec: mujoco.MjSpec, rollout: Rollout, where: object) -> Plant:
+def make_plant(
+    spec: mujoco.MjSpec, rollout: Rollout, where: object, thresholds: SimulationThresholds | None = None
+) -> Plant:
     """Match the model's joints and actuators with the columns of `rollout`; `where` names the model in errors."""
+    rules = thresholds or SimulationThresholds()
     declared, spec = spec, spec.copy()
     delay = np.array([a.delay if a.nsample else 0.0 for a in spec.actuators])
     for actuator in spec.actuators:
         actuator.nsample, actuator.delay = 0, 0.0
-    torque_input = _set_inputs(spec, rollout, where)
+    torque_input = _set_inputs(spec, rollout, where, rules.drive)
     model = spec.compile()
-    # More solver iterations than a training model allows itself: what is compared is physics, not a solver's haste.
-    model.opt.iterations, model.opt.ls_iterations = max(30, model.opt.iterations), max(20, model.opt.ls_iterations)
+    model.opt.iterations = max(rules.solver.iterations, model.opt.iterations)
+    model.opt.ls_iterations = max(rules.solver.line_search, model.opt.ls_iterations)
     free, joints = _match_joints(model, rollout, where)
     actuator = np.array([actuator_of(model, j) for j in joints], dtype=int)
-    law = drive_law(model, where)
+    law = drive_law(model, where, rules.drive)
     offset = np.zeros(len(joints))
     for column, a in enumerate(actuator):
         if a >= 0 and law.simple[a] and model.actuator_biasprm[a, 1] != 0:
@@ -120,7 +126,15 @@ def make_plant(spec: mujoco.MjSpec, rollout: Rollout, where: object) -> Plant:
         scalable=np.array([a >= 0 and bool(law.simple[a]) for a in actuator]),
         spec=declared,
         example=rollout,
+        thresholds=rules,
     )
+
+
+def plant_by(plant: Plant, thresholds: SimulationThresholds) -> Plant:
+    """The plant simulated by other thresholds; itself where they are the same."""
+    if thresholds == plant.thresholds:
+        return plant
+    return make_plant(plant.spec, plant.example, "declared model", thresholds)
 
 
 def _match_joints(model: mujoco.MjModel, rollout: Rollout, where: object) -> tuple[int, np.ndarray]:
@@ -142,13 +156,13 @@ def _match_joints(model: mujoco.MjModel, rollout: Rollout, where: object) -> tup
     return (free[0] if free else -1), np.array([names[n] for n in rollout.joints], dtype=int)
 
 
-def _set_inputs(spec: mujoco.MjSpec, rollout: Rollout, where: object) -> bool:
+def _set_inputs(spec: mujoco.MjSpec, rollout: Rollout, where: object, rule: DriveProbe) -> bool:
     """Make every actuator of `spec` on a logged joint take what was logged; True if that is torque.
 
     Position targets where they were logged and the model has servos (or the gains are known); torques else.
     """
     model = spec.compile()
-    law = drive_law(model, where)
+    law = drive_law(model, where, rule)
     names = {model.joint(j).name: j for j in range(model.njnt)}
     drives = {name: actuator_of(model, names[name]) for name in rollout.joints if name in names}
     drives = {name: a for name, a in drives.items() if a >= 0}

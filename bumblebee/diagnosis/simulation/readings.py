@@ -10,6 +10,7 @@ import numpy as np
 
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.measured.rollout import Rollout
+from bumblebee.quaternions import conjugate, multiply, rotate_by_cross, rotation_vector
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def simulated_readings(
     quat = qpos[..., plant.base_qpos + 3 : plant.base_qpos + 7]
     velocity_w, dof = qvel[..., plant.base_dof : plant.base_dof + 3], plant.base_dof
     out[..., layout.slices["base_ang_vel"]] = qvel[..., dof + 3 : dof + 6]
-    out[..., layout.slices["base_lin_vel"]] = rotate(conjugate(quat), velocity_w)
+    out[..., layout.slices["base_lin_vel"]] = rotate_by_cross(conjugate(quat), velocity_w)
     if "base_pos" in layout.slices:
         out[..., layout.slices["base_pos"]] = qpos[..., plant.base_qpos : plant.base_qpos + 3]
     return out, quat
@@ -79,45 +80,3 @@ def difference(
     if quat is not None and other_quat is not None:
         out[..., layout.slices["base_rot"]] = rotation_vector(multiply(conjugate(other_quat), quat))
     return out
-
-
-def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Hamilton product of wxyz quaternions (..., 4)."""
-    aw, ax, ay, az = np.moveaxis(a, -1, 0)
-    bw, bx, by, bz = np.moveaxis(b, -1, 0)
-    return np.stack(
-        (
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ),
-        axis=-1,
-    )
-
-
-def conjugate(q: np.ndarray) -> np.ndarray:
-    """Inverse of unit quaternions (..., 4)."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
-
-
-def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) turned by unit quaternions (..., 4)."""
-    axis = q[..., 1:]
-    cross = 2.0 * np.cross(axis, v)
-    return v + q[..., :1] * cross + np.cross(axis, cross)
-
-
-def rotation_vector(q: np.ndarray) -> np.ndarray:
-    """Rotation vectors (..., 3) [rad] of unit quaternions (..., 4), the shorter way round."""
-    q = np.where(q[..., :1] < 0, -q, q)
-    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    angle = 2.0 * np.arctan2(sine, q[..., :1])
-    return q[..., 1:] * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 2.0)
-
-
-def from_rotation_vector(v: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
-    angle = np.linalg.norm(v, axis=-1, keepdims=True)
-    scale = np.where(angle > 1e-9, np.sin(angle / 2) / np.maximum(angle, 1e-9), 0.5)
-    return np.concatenate((np.cos(angle / 2), v * scale), axis=-1)

@@ -13,17 +13,10 @@ from bumblebee.diagnosis.simulation.actuator_history import read_at, remember
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
 from bumblebee.diagnosis.simulation.hidden_states import Known, earlier, restructured, set_plastic, step_share
 from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.readings import (
-    Layout,
-    conjugate,
-    difference,
-    from_rotation_vector,
-    multiply,
-    rotate,
-    simulated_readings,
-)
+from bumblebee.diagnosis.simulation.readings import Layout, difference, simulated_readings
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
+from bumblebee.quaternions import conjugate, from_rotation_vector, multiply, rotate_by_cross
 from bumblebee.sim.effect_forces import Memory, StepHooks
 
 THREADS: int | None = None
@@ -40,6 +33,10 @@ class Starts:
 
     qpos: np.ndarray
     qvel: np.ndarray
+
+    def part(self, rows: range) -> "Starts":
+        """Those of a stretch of the first axis."""
+        return Starts(self.qpos[rows.start : rows.stop], self.qvel[rows.start : rows.stop])
 
 
 def threads() -> int:
@@ -72,12 +69,13 @@ def residuals(
     while first < copies:
         part = _together(variations, first, chunk) if starts is None else range(first, min(first + chunk, copies))
         chosen = [variations[0] if starts is not None else variations[v] for v in part]
-        short = step * step_share(chosen[0].hidden)
+        own = None if starts is None else starts.part(part)
+        short = step * step_share(chosen[0].hidden, plant.thresholds.hidden)
         count = int(np.ceil(windows.span / short - 1e-6))
         inputs = [inputs_of(windows, variation, short, count, cache) for variation in chosen]
         models = [] if chosen[0].plant is not None else list({id(v.model): v.model for v in chosen}.values())
         with without(models, far):
-            out[part.start : part.stop] = _run(plant, layout, windows, chosen, inputs, short, count, starts, part)
+            out[part.start : part.stop] = _run(_Chunk(plant, windows, chosen, own, short), layout, inputs)
         first = part.stop
     return out
 
@@ -112,55 +110,81 @@ def inputs_of(
     return cache[key]
 
 
-def _run(
-    plant: Plant,
-    layout: Layout,
-    windows: Windows,
-    chosen: list[Variation],
-    inputs: list[np.ndarray],
-    step: float,
-    count: int,
-    starts: Starts | None,
-    part: range,
-) -> np.ndarray:
-    """One chunk: residuals (len(chosen), W, N, D)."""
-    copies, size = len(chosen), len(windows)
-    lead = chosen[0]
-    models = {id(v.model): with_step(v.model, step) for v in chosen}
-    own = lead.plant or plant
-    batch = Batch(lead.model, copies * size, threads())
-    if lead.plain:
-        batch.set_models([models[id(v.model)] for v in chosen for _ in range(size)])
-    offset = np.stack([v.offset for v in chosen])[:, None, :]
-    if starts is None:
-        qpos = np.repeat(windows.qpos[None], copies, axis=0)
-        qvel = np.repeat(windows.qvel[None], copies, axis=0)
-    else:
-        qpos, qvel = starts.qpos[part.start : part.stop].copy(), starts.qvel[part.start : part.stop]
-    qpos[..., plant.qpos] -= offset
-    late = _late(plant, lead)
-    if late.any():
-        qpos, qvel = _caught_up(plant, windows, qpos, qvel, late)
-    if lead.tilt is not None:
-        qpos, qvel = _righted(plant, qpos, qvel, lead.tilt)
-    if lead.plant is not None:
-        qpos, qvel = restructured(plant, windows, lead, qpos, qvel, _led_in(plant, windows, lead, step))
+@dataclass(frozen=True, eq=False)
+class _Chunk:
+    """Windows of a plant under some variations, or under one from some starts, that run in one batch."""
+
+    plant: Plant
+    windows: Windows
+    chosen: list[Variation]
+    starts: Starts | None
+    """Of this chunk alone."""
+    step: float
+    """[s]"""
+
+    @property
+    def lead(self) -> Variation:
+        """The first variation, which stands for all but in model, delay and offset."""
+        return self.chosen[0]
+
+    @property
+    def own(self) -> Plant:
+        """The plant of the simulated model."""
+        return self.lead.plant or self.plant
+
+    @property
+    def offset(self) -> np.ndarray:
+        """(V, 1, J) what encoders add [rad]."""
+        return np.stack([v.offset for v in self.chosen])[:, None, :]
+
+    def batch(self) -> Batch:
+        """A batch of all windows under all variations, in the chunk's step."""
+        models = {id(v.model): with_step(v.model, self.step) for v in self.chosen}
+        batch = Batch(self.lead.model, len(self.chosen) * len(self.windows), threads())
+        if self.lead.plain:
+            batch.set_models([models[id(v.model)] for v in self.chosen for _ in range(len(self.windows))])
+        return batch
+
+    def begun(self, late: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Start states (V, W, nq), (V, W, nv) of the simulated model; encoders are `late` (J,) [s]."""
+        plant, windows, lead = self.plant, self.windows, self.lead
+        if self.starts is None:
+            qpos = np.repeat(windows.qpos[None], len(self.chosen), axis=0)
+            qvel = np.repeat(windows.qvel[None], len(self.chosen), axis=0)
+        else:
+            qpos, qvel = self.starts.qpos.copy(), self.starts.qvel
+        qpos[..., plant.qpos] -= self.offset
+        if late.any():
+            qpos, qvel = _caught_up(plant, windows, qpos, qvel, late)
+        if lead.tilt is not None:
+            qpos, qvel = _righted(plant, qpos, qvel, lead.tilt)
+        if lead.plant is not None:
+            qpos, qvel = restructured(plant, windows, lead, qpos, qvel, _led_in(plant, windows, lead, self.step))
+        return qpos, qvel
+
+
+def _run(chunk: _Chunk, layout: Layout, inputs: list[np.ndarray]) -> np.ndarray:
+    """Residuals (V, W, N, D) of one chunk under controls (W, count, nu) of each variation."""
+    plant, windows, lead, own = chunk.plant, chunk.windows, chunk.lead, chunk.own
+    copies, size = len(chunk.chosen), len(windows)
+    batch, late = chunk.batch(), _late(plant, lead)
+    qpos, qvel = chunk.begun(late)
     batch.bind("qpos")[:] = qpos.reshape(copies * size, -1)
     batch.bind("qvel")[:] = qvel.reshape(copies * size, -1)
-    control = np.stack(inputs).reshape(copies * size, count, -1)
+    control = np.stack(inputs).reshape(copies * size, inputs[0].shape[1], -1)
     if own.model.na:
         batch.bind("act")[:] = _activation(own.model, control[:, 0])
     set_plastic(batch, plant, windows, lead, copies)
-    path_q, path_v = _roll(batch, plant, windows, lead, control, step, copies)
+    path_q, path_v = _roll(batch, plant, windows, lead, control, chunk.step, copies)
     failed = batch.warning.reshape(copies * size, -1).any(axis=1)
-    at_q = at_ticks(windows, qpos, path_q, step, copies)
-    at_v = at_ticks(windows, qvel, path_v, step, copies)
+    at_q = at_ticks(windows, qpos, path_q, chunk.step, copies)
+    at_v = at_ticks(windows, qvel, path_v, chunk.step, copies)
     for delay in np.unique(late[late > 0]):
         old = replace(windows, out_time=np.maximum(windows.out_time - delay, 0.0))
         for at, start, path, where in ((at_q, qpos, path_q, own.qpos), (at_v, qvel, path_v, own.dof)):
             columns = where[late == delay]
-            at[..., columns] = at_ticks(old, start, path, step, copies)[..., columns]
-    simulated, quat = simulated_readings(own, layout, at_q, at_v, offset[:, :, None, :])
+            at[..., columns] = at_ticks(old, start, path, chunk.step, copies)[..., columns]
+    simulated, quat = simulated_readings(own, layout, at_q, at_v, chunk.offset[:, :, None, :])
     if quat is not None and lead.tilt is not None:
         quat = multiply(quat, from_rotation_vector(lead.tilt))
     measured = np.broadcast_to(windows.measured, simulated.shape)
@@ -237,9 +261,9 @@ def _righted(plant: Plant, qpos: np.ndarray, qvel: np.ndarray, tilt: np.ndarray)
     """Starts whose base stands as it is, not as a tilted sensor says; velocities in the base's frame stay."""
     qpos, qvel = qpos.copy(), qvel.copy()
     at, dof = slice(plant.base_qpos + 3, plant.base_qpos + 7), slice(plant.base_dof, plant.base_dof + 3)
-    speed_b = rotate(conjugate(qpos[..., at]), qvel[..., dof])
+    speed_b = rotate_by_cross(conjugate(qpos[..., at]), qvel[..., dof])
     qpos[..., at] = multiply(qpos[..., at], conjugate(from_rotation_vector(tilt)))
-    qvel[..., dof] = rotate(qpos[..., at], speed_b)
+    qvel[..., dof] = rotate_by_cross(qpos[..., at], speed_b)
     return qpos, qvel
 
 

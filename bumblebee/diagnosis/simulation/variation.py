@@ -124,7 +124,7 @@ def _structure(plant: Plant, effects: Sequence[Effect]) -> Plant:
     if key not in plant.compiled:
         spec = plant.spec.copy()
         add_to_spec(spec, effects)
-        plant.compiled[key] = make_plant(spec, plant.example, "declared model")
+        plant.compiled[key] = make_plant(spec, plant.example, "declared model", plant.thresholds)
     return plant.compiled[key]
 
 

@@ -7,16 +7,11 @@ import numpy as np
 
 from bumblebee.diagnosis.simulation.base_height import stance_heights
 from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.diagnosis.simulation.readings import Layout, measured_readings, rotate
+from bumblebee.diagnosis.simulation.readings import Layout, measured_readings
+from bumblebee.diagnosis.thresholds.simulation import Windowing
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
-
-# A window starts this long after its rollout, so that a delayed command is known from the start [s].
-LEAD = 0.1
-# Nothing is compared sooner after a start [s]: at 500 Hz the next reading says only that the start was read.
-_FIRST = 0.02
-# Periods between two rows from which on a tick is missing between them.
-_GAP = 1.8
+from bumblebee.quaternions import rotate_by_cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +46,11 @@ class Windows:
 
 
 def choose_starts(
-    rollouts: Sequence[Rollout], ids: Sequence[int], horizon: float, budget: int
+    rollouts: Sequence[Rollout],
+    ids: Sequence[int],
+    horizon: float,
+    budget: int,
+    rule: Windowing | None = None,
 ) -> list[tuple[int, int, int]]:
     """At most `budget` windows (rollout, first tick, last tick), apart from each other and spread over the rollouts.
 
@@ -59,7 +58,8 @@ def choose_starts(
     A window is `horizon` s long by its time stamps, to the nearest tick, whatever the rate; none holds a gap in the
     log, for nobody knows what was commanded there.
     """
-    every = [[(i, first, last) for first, last in _stretches(rollouts[i].time, horizon)] for i in ids]
+    rule = rule or Windowing()
+    every = [[(i, first, last) for first, last in _stretches(rollouts[i].time, horizon, rule)] for i in ids]
     quota = _shares([len(part) for part in every], budget)
     picked = []
     for part, count in zip(every, quota, strict=True):
@@ -85,16 +85,16 @@ def _shares(lengths: Sequence[int], budget: int) -> list[int]:
     return shares
 
 
-def _stretches(time: np.ndarray, horizon: float) -> list[tuple[int, int]]:
+def _stretches(time: np.ndarray, horizon: float, rule: Windowing) -> list[tuple[int, int]]:
     """Consecutive stretches (first, last) of `horizon` s within the stamps `time` (T,)."""
     period = float(np.median(np.diff(time)))
-    gaps = np.concatenate(([0], np.cumsum(np.diff(time) > _GAP * period)))
+    gaps = np.concatenate(([0], np.cumsum(np.diff(time) > rule.gap * period)))
     last = np.searchsorted(time, time + horizon + 0.5 * period - 1e-9) - 1
     last = np.maximum(last, np.minimum(np.arange(len(time)) + 1, len(time) - 1))
     off = np.abs(time[last] - time - horizon)
     good = (off <= 0.51 * period + 1e-9) & (gaps[last] == gaps)
     found = []
-    k = int(np.searchsorted(time, time[0] + min(LEAD, 0.25 * (time[-1] - time[0]))))
+    k = int(np.searchsorted(time, time[0] + min(rule.lead, rule.lead_share * (time[-1] - time[0]))))
     while k < len(time) - 1:
         if good[k]:
             found.append((k, int(last[k])))
@@ -105,10 +105,19 @@ def _stretches(time: np.ndarray, horizon: float) -> list[tuple[int, int]]:
 
 
 def cut(
-    plant: Plant, layout: Layout, rollouts: Sequence[Rollout], starts: list[tuple[int, int, int]], outputs: int = 6
+    plant: Plant,
+    layout: Layout,
+    rollouts: Sequence[Rollout],
+    starts: list[tuple[int, int, int]],
+    outputs: int | None = None,
 ) -> Windows:
-    """Cut the windows; at most `outputs` ticks of each are compared, the last among them."""
-    firsts = {i: max(1, round(_FIRST / float(np.median(np.diff(rollouts[i].time))))) for i in {s[0] for s in starts}}
+    """Cut the windows; at most `outputs` ticks of each are compared (the plant's rule's), the last among them."""
+    rule = plant.thresholds.windows
+    outputs = rule.outputs if outputs is None else outputs
+    firsts = {
+        i: max(1, round(rule.first_output / float(np.median(np.diff(rollouts[i].time)))))
+        for i in {s[0] for s in starts}
+    }
     count = min(outputs, *(max(1, last - k - firsts[i] + 1) for i, k, last in starts))
     cache = {i: measured_readings(rollouts[i], layout) for i in {s[0] for s in starts}}
     commands = {i: command_inputs(plant, rollouts[i]) for i in cache}
@@ -179,7 +188,7 @@ def _one(
 ) -> dict[str, np.ndarray | None]:
     signals, quat = readings
     t0 = rollout.time[k]
-    first = max(0, int(np.searchsorted(rollout.time, t0 - 2 * LEAD)))
+    first = max(0, int(np.searchsorted(rollout.time, t0 - 2 * plant.thresholds.windows.lead)))
     stop = k + int(picks[-1]) + 1
     qpos, qvel = start_state(plant, rollout, k, None if heights is None else heights[k])
     return {
@@ -202,7 +211,7 @@ def start_state(plant: Plant, rollout: Rollout, k: int, height: float | None) ->
         quat = rollout.base_quat[k] / np.linalg.norm(rollout.base_quat[k])
         qpos[q : q + 3] = rollout.base_pos[k] if height is None else [0.0, 0.0, height]
         qpos[q + 3 : q + 7] = quat
-        qvel[v : v + 3] = rotate(quat, rollout.base_lin_vel[k])
+        qvel[v : v + 3] = rotate_by_cross(quat, rollout.base_lin_vel[k])
         qvel[v + 3 : v + 6] = rollout.base_ang_vel[k]
     return qpos, qvel
 

@@ -1,8 +1,155 @@
 """Numbers that the candidates go by."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class StillJoints:
+    """Of joints of which nothing can be said."""
+
+    place: float = 2.5
+    """Times its noise that a position must vary to move."""
+    speed: float = 1.5
+    """The same of a velocity."""
+
+
+@dataclass(frozen=True)
+class SignalScales:
+    """Of the typical sizes that first steps follow from."""
+
+    torque: float = 0.05
+    """Share of the largest joint's torque that each has at least: a joint that rests has none of its own."""
+    speed: float = 0.1
+    """The same of speeds."""
+    peak: float = 0.995
+    """Quantile that is the largest torque or speed: a single reading may be wrong."""
+    rows: int = 50
+    """Rows of a rollout at which gravity is asked for on joints without a drive."""
+
+
+@dataclass(frozen=True)
+class JointSteps:
+    """Of first steps on a joint, from the sizes of its own signals."""
+
+    torque: float = 0.1
+    """Share of the typical torque: friction, springs."""
+    inertia: float = 0.1
+    """Share of the joint's inertia: armature."""
+    stribeck: tuple[float, ...] = (0.3, 1.0)
+    """Shares of the typical speed at which Stribeck's friction ends."""
+    shape: float = 0.3
+    """Share of a width or speed that is a change of shape which matters; of cogging over the travel."""
+    spring_travel: float = 0.05
+    """Travel [rad, m] at least that a spring is sized by."""
+    width: tuple[float, ...] = (0.03, 0.2)
+    """Shares of the travel over which hysteresis builds up."""
+    travel: float = 0.02
+    """Travel [rad, m] at least that hysteresis and shafts are sized by."""
+    cogging: float = 0.5
+    """Share of the step of friction: sine and cosine of cogging."""
+    harmonics: tuple[int, ...] = (
+        *range(1, 25), 28, 30, 32, 36, 40, 42, 48, 50, 56, 60, 64, 72, 80, 84, 96, 100, 120, 128, 144,
+    )  # fmt: skip
+    """Periods of cogging in a turn: slots and poles of usual motors, and what gears make of them."""
+    offset: float = 0.01
+    """Encoder offset [rad, m]."""
+
+
+@dataclass(frozen=True)
+class DriveSteps:
+    """Of first steps of what a drive does."""
+
+    load: float = 0.05
+    """Load-dependent friction: share of the torque."""
+    time: float = 0.005
+    """Command delay, torque lag, encoder delay [s]."""
+    dropped: float = 0.2
+    """Share of commands lost."""
+    gain: float = -0.1
+    """Relative change of strength and gains."""
+    fade: float = 0.1
+    """Strength lost over the longest rollout."""
+    fade_seconds: float = 1.0
+    """Length of that at least [s]."""
+    limit: tuple[float, ...] = (0.9, 0.6, 0.35)
+    """Shares of the largest torque at which a limit is tried."""
+    speed_limit: tuple[float, ...] = (0.6, 1.5, 4.0)
+    """Times the largest speed at which a drive has no torque left."""
+
+
+@dataclass(frozen=True)
+class TransmissionSteps:
+    """Of first steps of backlash and flexible shafts."""
+
+    backlash: float = 0.01
+    """Share of the travel."""
+    least_backlash: float = 0.002
+    """Backlash at least [rad, m]."""
+    twist: float = 0.02
+    """Share of the travel that a shaft twists under the largest torque."""
+    stiff: float = 0.03
+    """Share of a servo's own compliance at most: one that reads the joint behind a soft shaft would swing it up."""
+    damping: float = 1e-3
+    """Damping of a shaft over its stiffness [s]."""
+    damping_shape: float = 3e-4
+    """Change of it that matters [s]."""
+    link_share: float = 0.1
+    """Link-side inertia fraction: share of the rotor's inertia behind the shaft."""
+
+
+@dataclass(frozen=True)
+class BodySteps:
+    """Of first steps of bodies, of the ground and of what the robot stands by."""
+
+    mass: float = 0.2
+    """Share of the body's mass."""
+    least_mass: float = 0.01
+    """Share of the robot's mass at least; as a force also that of a wrench."""
+    com: float = 0.1
+    """Share of the body's size by which its centre of mass moves."""
+    least_com: float = 0.01
+    """The same at least [m]."""
+    moments: float = 0.3
+    """Share of the body's moments of inertia."""
+    least_moment: float = 1e-5
+    """Added to that [kg m^2], for a moment may be declared as none."""
+    slope: float = 0.01
+    """Slope of the ground [rad]."""
+    tilt: float = 0.01
+    """Tilt of the base's sensor [rad]."""
+    ground_friction: float = -0.1
+    """Relative change of the ground's friction."""
+    ground_compliance: float = 0.2
+    """The same of its compliance."""
+
+
+@dataclass(frozen=True)
+class CandidateLimits:
+    """Of one candidate: how it is simulated and how far it may go."""
+
+    few_joints: int = 8
+    """Joints up to which lags and shafts are simulated on all; on more a lag is taken for a torque.
+
+    To first order it is a torque and a start that moved, which for the light joints of a stiff servo is a poor
+    likeness.
+    """
+    shapes: int = 2
+    """Shapes of one kind on one place that are tried beside each other."""
+    stiffest: float = 0.02
+    """Share of the first step that a compliance or an inverse speed has at least: as good as absent, while none at all
+    cannot be simulated."""
+    point: float = 0.01
+    """Share of its declared moments that a link keeps: what moments near zero say is lost to their bound."""
 
 
 @dataclass(frozen=True)
 class CandidateThresholds:
     """All of them."""
+
+    still: StillJoints = field(default_factory=StillJoints)
+    scales: SignalScales = field(default_factory=SignalScales)
+    joint: JointSteps = field(default_factory=JointSteps)
+    drive: DriveSteps = field(default_factory=DriveSteps)
+    transmission: TransmissionSteps = field(default_factory=TransmissionSteps)
+    body: BodySteps = field(default_factory=BodySteps)
+    limits: CandidateLimits = field(default_factory=CandidateLimits)

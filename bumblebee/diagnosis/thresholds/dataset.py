@@ -1,8 +1,159 @@
 """Numbers that the use of the logs goes by."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Usable:
+    """Of rollouts that windows can be cut from."""
+
+    seconds: float = 0.35
+    """Length at least [s]: shorter ones hold no window of 0.2 s after the lead that delayed commands need."""
+    rows: int = 12
+    """Rows at least."""
+    warnings: int = 12
+    """Findings of the checks that are listed one by one; of more their number is said."""
+
+
+@dataclass(frozen=True)
+class TimeSteps:
+    """Of the steps of the simulation."""
+
+    fine: float = 0.001
+    """Step for residuals at most [s]."""
+    coarse: float = 0.005
+    """The same for sensitivities."""
+    small_model: int = 12
+    """Degrees of freedom above which the search takes longer steps; the last fit and all that is reported do not."""
+    search: float = 0.002
+    """Step for residuals of the search of larger models at most [s]: it costs half."""
+    uneven: float = 0.02
+    """Share of a step by which it may be longer: a median of uneven stamps is no whole number of milliseconds."""
+
+
+@dataclass(frozen=True)
+class Split:
+    """Of the division into fitted and held-out rollouts."""
+
+    every: int = 4
+    """Every so manieth motion of a cluster is held out."""
+    enough: int = 4
+    """Rollouts to fit from which on some are put aside to decide which effects are accepted."""
+    same: float = 0.1
+    """Mean difference of two rollouts' commands over their mean size, below which one repeats the other."""
+    length: float = 0.1
+    """Relative difference of the durations of repeats at most."""
+    samples: int = 200
+    """Times at which commands are compared."""
+    rows: int = 10
+    """Rows from which on commands are compared."""
+    commanded: float = 1e-9
+    """Mean size of the commands [their unit] above which something is commanded at all."""
+
+
+@dataclass(frozen=True)
+class InformativeSplit:
+    """Of the exchange of rollouts that show what no fitted one does."""
+
+    windows: int = 300
+    """Windows that are compared with the declared model."""
+    far: float = 4.0
+    """Times as far off as the worst fitted window that a rollout's windows must be."""
+    several: int = 2
+    """Windows of the rollout that must be so far off."""
+    exchanges: int = 2
+    """Rollouts exchanged at most."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Of the sensors' noise, estimated from the logs."""
+
+    block: int = 24
+    """Rows of a block that the mean square of the fourth difference is taken over."""
+    freedom: float = 1 / 2.63
+    """Degrees of freedom of a row: successive fourth differences are correlated."""
+    quantile: float = 0.25
+    """Quantile over the blocks, which keeps fast motion and impacts out."""
+    kin: float = 0.3
+    """Share of the median noise of its kind that a channel has at least: a far calmer one was probably still."""
+    least_place: float = 1e-6
+    """Noise of positions [rad, m] and of orientations [rad] at least."""
+    least: float = 1e-5
+    """Noise of all other signals at least [rad/s, m/s]."""
+    moves: float = 1e-7
+    """Change from row to row above which a signal has moved [its unit]."""
+    moved_rows: int = 10
+    """Rows in which a signal must move to be called quantised."""
+    resting: float = 0.95
+    """Share of the rows below which a quantised signal moves: it often repeats itself."""
+    smallest: float = 0.05
+    """Quantile of the moves that is the quantisation step: the smallest itself may be rounding."""
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """Of the local fits that positions and velocities of fast logs are smoothed by."""
+
+    half_span: float = 0.01
+    """Time to either side that a fit is over [s]."""
+    terms: int = 4
+    """Terms of its polynomial: a cubic."""
+    neighbours: int = 2
+    """Neighbours on either side from which on there is something to gain."""
+    spans: int = 4
+    """Times the neighbours on one side that a rollout has rows at least."""
+    beyond: float = 1.5
+    """Half spans within which a neighbour must lie: a gap in the log has no neighbours beyond it."""
+
+
+@dataclass(frozen=True)
+class VelocityLatency:
+    """Of velocities that are older than the positions beside them."""
+
+    span: float = 0.15
+    """Time over which velocities are integrated [s]."""
+    near: float = 0.02
+    """Time around its ends from which the positions' velocities are taken [s]."""
+    least: float = 5e-4
+    """Age beyond which one must be, without doubt [s]: half a step of a millisecond is none."""
+    doubt: float = 4.0
+    """Standard errors that make it beyond doubt."""
+    most: float = 0.05
+    """Age at most [s]; more is no reading's age."""
+    rounds: int = 3
+    """Rounds, each with the velocities moved by what was found before."""
+    parts: int = 6
+    """Parts of a rollout, which the standard errors take for independent."""
+    enough: int = 12
+    """Parts in all, below which nothing is said."""
+    gap: float = 1.3
+    """Times its usual length that a span may have: in a longer one the log has a gap."""
+
+
+@dataclass(frozen=True)
+class Extent:
+    """Of how much of the logs and of time a diagnosis takes."""
+
+    small_model: int = 12
+    """Degrees of freedom up to which the search has the set time; for more it has longer, in proportion."""
+    cheap_model: int = 12
+    """Degrees of freedom below which there are more windows, in inverse proportion: they cost little to simulate."""
+    more: float = 2.5
+    """Times as many windows at most, for the smallest models."""
+    long_window: float = 1.0
+    """Length of the long windows on which an accepted effect must not be worse [s]."""
 
 
 @dataclass(frozen=True)
 class DatasetThresholds:
     """All of them."""
+
+    usable: Usable = field(default_factory=Usable)
+    time_steps: TimeSteps = field(default_factory=TimeSteps)
+    split: Split = field(default_factory=Split)
+    informative: InformativeSplit = field(default_factory=InformativeSplit)
+    noise: Noise = field(default_factory=Noise)
+    smoothing: Smoothing = field(default_factory=Smoothing)
+    velocity_latency: VelocityLatency = field(default_factory=VelocityLatency)
+    extent: Extent = field(default_factory=Extent)

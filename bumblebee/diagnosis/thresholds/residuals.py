@@ -1,8 +1,73 @@
 """Numbers that residuals, whitening and nuisances go by."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """Of what noise in the readings and in the starts does to a residual."""
+
+    curved: float = 0.5
+    """Share of the variance that is not linear in the starts that counts.
+
+    It grows with their variance squared, and what the next readings leave of that is 0.6 to 0.7 on a standing G1.
+    """
+    height_noise: float = 0.002
+    """Noise of a base height that is not measured but taken from stance [m]."""
+
+
+@dataclass(frozen=True)
+class InitialState:
+    """Of starts that are moved to where the readings after them say that they were."""
+
+    outputs: int = 2
+    """Compared ticks that say where a window started."""
+    most: float = 2.5
+    """Standard deviations of its noise that a coordinate may move."""
+
+
+@dataclass(frozen=True)
+class Nuisances:
+    """Of directions in which two correct simulators differ; a coefficient of 1 is also its prior's deviation."""
+
+    unit: float = 0.001
+    """Time that a coefficient of 1 stands for [s]."""
+    height: float = 0.001
+    """Height of the base that a coefficient of 1 stands for [m]."""
+    least_armature: float = 0.1
+    """Share of a joint's armature that a late velocity loop leaves at least: of a small one it would take all."""
+
+
+@dataclass(frozen=True)
+class EmpiricalCovariance:
+    """Of the covariance of what a fit leaves, which takes the noise's place."""
+
+    rounds: int = 4
+    """Rounds of covariance and weights."""
+    fewest: int = 2
+    """Windows for each value of a window, below which a covariance says too little."""
+
+
+@dataclass(frozen=True)
+class Outliers:
+    """Of windows that jump or diverge."""
+
+    many: int = 12
+    """Windows from which on one is held against the others."""
+    largest: float = 0.2
+    """Share of the others' power that one window's change may have in coarse steps, on a floating base."""
+    diverged: float = 10.0
+    """Times the others' root mean square that a window which diverged counts as."""
+    finite: float = 0.5
+    """Share of the windows that the declared model must get through; else it is refused."""
 
 
 @dataclass(frozen=True)
 class ResidualThresholds:
     """All of them."""
+
+    whitening: Whitening = field(default_factory=Whitening)
+    initial_state: InitialState = field(default_factory=InitialState)
+    nuisances: Nuisances = field(default_factory=Nuisances)
+    covariance: EmpiricalCovariance = field(default_factory=EmpiricalCovariance)
+    outliers: Outliers = field(default_factory=Outliers)

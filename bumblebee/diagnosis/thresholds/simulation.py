@@ -1,8 +1,98 @@
 """Numbers that the simulation of windows goes by."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Windowing:
+    """Of the stretches of the logs that are restarted and compared."""
+
+    lead: float = 0.1
+    """A window starts this long after its rollout [s], so that a delayed command is known from the start."""
+    lead_share: float = 0.25
+    """Share of a rollout that the lead may take at most."""
+    first_output: float = 0.02
+    """Nothing is compared sooner after a start [s]: at 500 Hz the next reading says only that the start was read."""
+    gap: float = 1.8
+    """Periods between two rows from which on a tick is missing between them."""
+    outputs: int = 6
+    """Compared ticks of a window, the last among them."""
+
+
+@dataclass(frozen=True)
+class ActuatorHistory:
+    """Of what drives remember from before a window's start."""
+
+    smooth: int = 3
+    """Ticks to either side that a reading is a mean over: what a sensor's noise would wind back is no motion."""
+    passes: int = 60
+    """Passes at most, until a drive's heat and the strength that it leaves agree."""
+    settled: float = 1e-9
+    """Heat [s] by which two passes differ at most in the end."""
+    forgotten: float = 20.0
+    """Time constants after which a lag knows nothing of its start."""
+
+
+@dataclass(frozen=True)
+class BaseHeight:
+    """Of the height of a base that no sensor reads."""
+
+    rest_depth: float = 0.001
+    """Depth at which a standing robot rests in MuJoCo's soft floor with default contact parameters [m]."""
+
+
+@dataclass(frozen=True)
+class CollisionCulling:
+    """Of geometries that can touch nothing within a window."""
+
+    fastest: float = 2.5
+    """Speed at which a geometry may come down on the mean over a window [m/s]."""
+    level: float = 1e-6
+    """By how much the cosine of a floor's slope may lack of 1."""
+
+
+@dataclass(frozen=True)
+class HiddenStates:
+    """Of backlash, flexible shafts and yielding springs, whose states no sensor reads."""
+
+    step_share: float = 0.5
+    """Share of the usual step that backlash and shafts read on the joint need.
+
+    Behind a shaft the servo's own delay of half a step acts as stiffness, and the ends of a gap are met one and a half
+    steps late, which is as if it were wider.
+    """
+    lead_error: float = 0.1
+    """Share of the lead by which that of a window may differ; beyond it the log has a gap there."""
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Of MuJoCo's solver: what is compared is physics, not a solver's haste."""
+
+    iterations: int = 30
+    """Iterations at least, whatever a training model allows itself."""
+    line_search: int = 20
+    """Iterations of its line search at least."""
+
+
+@dataclass(frozen=True)
+class DriveProbe:
+    """Of the force law of an actuator, found by small changes."""
+
+    step: float = 1e-4
+    """Change of input [its unit] and of position [rad, m]."""
+    feedback: float = 1e-9
+    """Stiffness [N m/rad, N/m] above which an actuator feeds a position back, and takes a position target."""
 
 
 @dataclass(frozen=True)
 class SimulationThresholds:
     """All of them."""
+
+    windows: Windowing = field(default_factory=Windowing)
+    history: ActuatorHistory = field(default_factory=ActuatorHistory)
+    base_height: BaseHeight = field(default_factory=BaseHeight)
+    culling: CollisionCulling = field(default_factory=CollisionCulling)
+    hidden: HiddenStates = field(default_factory=HiddenStates)
+    solver: Solver = field(default_factory=Solver)
+    drive: DriveProbe = field(default_factory=DriveProbe)

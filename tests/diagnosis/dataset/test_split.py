@@ -8,6 +8,7 @@ from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.dataset.split import split
 from bumblebee.diagnosis.report.prediction_error import HORIZONS, horizon_windows
 from bumblebee.diagnosis.simulation.windows import choose_starts
+from bumblebee.diagnosis.thresholds.dataset import Split
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import arm
 
@@ -20,7 +21,7 @@ def rollout(name: str, cluster: str | None = None, motion: str | None = None) ->
 
 def test_repeats_of_a_motion_stay_on_one_side() -> None:
     made = [rollout(f"{c}-{m}-{k}", c, m) for c in ("c0", "c1", "c2") for m in "abcdef" for k in range(2)]
-    train, holdout = split(made)
+    train, holdout = split(made, Split())
     assert sorted(train + holdout) == list(range(len(made)))
     sides = [{(made[i].meta["cluster"], made[i].meta["motion"]) for i in side} for side in (train, holdout)]
     assert not sides[0] & sides[1]
@@ -30,7 +31,7 @@ def test_repeats_of_a_motion_stay_on_one_side() -> None:
 
 @pytest.mark.parametrize(("count", "held"), [(1, 0), (2, 1), (3, 1), (4, 1), (6, 2), (40, 10)])
 def test_without_names_every_fourth_rollout_is_held_out(count: int, held: int) -> None:
-    train, holdout = split([rollout(f"r{i:02d}") for i in range(count)])
+    train, holdout = split([rollout(f"r{i:02d}") for i in range(count)], Split())
     assert (len(train), len(holdout)) == (count - held, held)
 
 
@@ -71,5 +72,5 @@ def test_the_same_commands_under_other_names_are_repeats() -> None:
             made.append(
                 Rollout(f"{day}-{k}", ("j",), 50.0, time, sent, sent, joint_target=sent, meta={"motion": f"{day}{k}"})
             )
-    train, holdout = split(made)
+    train, holdout = split(made, Split())
     assert not {i % 4 for i in train} & {i % 4 for i in holdout}

@@ -9,9 +9,11 @@ import pytest
 from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages
 from bumblebee.diagnosis.replay import replay as errors
+from bumblebee.diagnosis.thresholds.dataset import VelocityLatency
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import cart
 
+RULE = VelocityLatency()
 FREQUENCIES = np.array([0.4, 0.9, 1.7])
 
 
@@ -34,25 +36,25 @@ def test_the_age_of_each_joint_is_found_and_taken_out(hz: float, jitter: float) 
     """One is a whole period of the slow log old; one is in step."""
     ages = (0.019, 0.004 if hz > 50 else 0.017, 0.0)
     logs = [log(seed, hz, ages, jitter, step=0.0015) for seed in range(3)]
-    found = velocity_ages(logs)
+    found = velocity_ages(logs, RULE)
     np.testing.assert_allclose(found, ages, atol=6e-4)
     assert found[2] == 0
     after = [in_step(one, found) for one in logs]
     assert all(one.frames < was.frames for one, was in zip(after, logs, strict=True))
-    np.testing.assert_allclose(velocity_ages(after), 0.0, atol=5e-4)
+    np.testing.assert_allclose(velocity_ages(after, RULE), 0.0, atol=5e-4)
     assert age_note(logs[0].joints, found).count("ms") == 2
 
 
 def test_logs_of_targets_are_left_as_they_are() -> None:
     logs = [log(seed, 50.0, (0.019, 0.017, 0.0)) for seed in range(3)]
     aimed = [replace(one, joint_torque_cmd=None, joint_target=one.joint_pos) for one in logs]
-    assert velocity_ages(logs).any() and not velocity_ages(aimed).any()
+    assert velocity_ages(logs, RULE).any() and not velocity_ages(aimed, RULE).any()
 
 
 def test_velocities_in_step_stay_as_logged() -> None:
     logs = [log(seed, 100.0, (0.0, 0.0)) for seed in range(3)]
-    assert not velocity_ages(logs).any()
-    assert in_step(logs[0], velocity_ages(logs)) is logs[0]
+    assert not velocity_ages(logs, RULE).any()
+    assert in_step(logs[0], velocity_ages(logs, RULE)) is logs[0]
     assert age_note(logs[0].joints, np.zeros(2)) == ""
 
 
@@ -67,15 +69,15 @@ def test_half_a_step_of_a_simulation_is_no_age(step: float) -> None:
     every = round(0.01 / step)
     one = Rollout("a", ("j",), 100.0, fine[::every], place[::every, None], speed[::every, None],
                   joint_torque_cmd=place[::every, None])  # fmt: skip
-    assert not velocity_ages([one, one, one]).any()
+    assert not velocity_ages([one, one, one], RULE).any()
 
 
 def test_short_or_still_logs_say_nothing() -> None:
     short = log(0, 50.0, (0.02,))
     few = replace(short, **{k: getattr(short, k)[:30] for k in ("time", "joint_pos", "joint_vel", "joint_torque_cmd")})
-    assert not velocity_ages([few]).any()
+    assert not velocity_ages([few], RULE).any()
     still = replace(short, joint_pos=np.zeros_like(short.joint_pos), joint_vel=np.zeros_like(short.joint_vel))
-    assert not velocity_ages([still, still, still]).any()
+    assert not velocity_ages([still, still, still], RULE).any()
 
 
 def test_a_right_model_with_late_velocities_comes_near_the_noise() -> None:

@@ -1,20 +1,23 @@
 """One basis function in a swap for several effects: it goes before them where it explains more with no more numbers."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.candidates.formula import formula
-from bumblebee.diagnosis.comparison import paired_tests
-from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.compare import compare
+from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.submodel import refitted
 from bumblebee.diagnosis.discrepancy.single_law import groups
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.thresholds.comparison import WindowByWindow
 from tests.diagnosis.discrepancy.test_discover import discovered, prepared
 
+RULE = WindowByWindow()
 COULOMB = Candidate("coulomb_friction", "pole", (0.0,), (0.02,))
 SPRING = Candidate("joint_spring", "pole", (0.0, 0.0), (0.1, 0.02), (0, 1))
 COGGING = Candidate("cogging", "pole", (0.0, 0.0, 2.0), (0.02, 0.02, 0.0), (0, 1))
@@ -61,7 +64,7 @@ def test_a_basis_function_with_more_numbers_than_the_effects_is_never_better() -
 
 def test_a_basis_function_that_saves_two_numbers_and_fits_better_need_not_do_so_beyond_doubt(monkeypatch) -> None:
     _, problem, judge = prepared(cubic=0.6)
-    monkeypatch.setattr(judging, "margin", lambda gain, z=2.0: np.inf)
+    monkeypatch.setattr(sys.modules["bumblebee.diagnosis.comparison.compare"], "margin", lambda gain, z=2.0: np.inf)
     form = refitted(problem, (CUBIC,), np.array([-0.6]))
     for names, start, better in (((SPRING, COULOMB), [0.1, 0.0, 0.01], True), ((COULOMB,), [0.01], False)):
         named = refitted(problem, names, np.array(start))

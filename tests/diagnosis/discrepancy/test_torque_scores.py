@@ -7,7 +7,6 @@ import pytest
 
 from bumblebee.diagnosis.candidates.signal_scales import scales_of
 from bumblebee.diagnosis.comparison.paired_tests import confirmed
-from bumblebee.diagnosis.thresholds.comparison import Confirmed
 from bumblebee.diagnosis.discrepancy.missing_torque import Scene, fitted_scene
 from bumblebee.diagnosis.discrepancy.residual_tests import JointActivity, in_whole, lack_of_fit
 from bumblebee.diagnosis.discrepancy.stepwise_regression import library, seek
@@ -16,6 +15,7 @@ from bumblebee.diagnosis.discrepancy.torque_scores import Evidence
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.estimation.least_squares import cost_of
 from bumblebee.diagnosis.residuals.problem import Problem
+from bumblebee.diagnosis.thresholds.comparison import Confirmed
 from bumblebee.diagnosis.thresholds.discrepancy import TermLibrary
 from bumblebee.sim.effect_terms import read_term
 from tests.diagnosis.discrepancy.test_discover import prepared

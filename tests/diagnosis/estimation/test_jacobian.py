@@ -15,6 +15,7 @@ from bumblebee.diagnosis.estimation.jacobian import taken_over
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.simulation.cache import Changes
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, TimeSteps
 from bumblebee.sim.effects import Effect, single
 from tests.diagnosis import arm
 
@@ -107,10 +108,10 @@ def test_small_models_are_searched_in_the_steps_of_the_last_fit(session: Session
     assert problem.finely().fine == problem.finest
 
 
-def test_large_models_are_searched_in_longer_steps_and_fitted_in_short_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_models_are_searched_in_longer_steps_and_fitted_in_short_ones() -> None:
     rollouts = arm.simulate({("coulomb_friction", "j2"): FRICTION}, count=2, seconds=3.0)
-    monkeypatch.setattr("bumblebee.diagnosis.dataset.session._SMALL", 2)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    rules = DatasetThresholds(time_steps=TimeSteps(small_model=2))
+    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory", thresholds=rules)
     assert (session.steps[0], session.search_step) == pytest.approx((0.001, 0.002))
     windows = cut(session.plant, session.layout, session.rollouts, choose_starts(session.rollouts, [0, 1], 0.2, 16))
     steps, rng = (session.search_step, session.steps[1]), np.random.default_rng(0)

@@ -12,8 +12,8 @@ from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.estimation.covariance import interval
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
-from bumblebee.diagnosis.simulation.readings import from_rotation_vector, multiply
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.quaternions import from_rotation_vector, multiply
 from bumblebee.sim.effects import Effect, single
 from tests.diagnosis import stander
 

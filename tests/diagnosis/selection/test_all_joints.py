@@ -6,10 +6,11 @@ import pytest
 
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.comparison.backward_elimination import certainty
-from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.compare import compare
+from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.submodel import moved_without
 from bumblebee.diagnosis.dataset.session import Session, make_session
+from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints
@@ -33,6 +34,10 @@ def _opened(effects: dict[tuple[str, str], float]) -> tuple[Session, Problem, Pr
         return make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
 
     return session, of([0, 1], 40), of([2], 20)
+
+
+def pays(problem: Problem, holdout: Holdout, before: Fit, after: Fit) -> bool:
+    return compare(problem, holdout, before, after).passes(problem.thresholds.comparison.together)
 
 
 def test_friction_damping_and_inertia_of_all_joints_are_found_together() -> None:

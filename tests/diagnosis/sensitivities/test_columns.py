@@ -40,9 +40,9 @@ def test_columns_beside_what_was_found_elsewhere_hardly_change(
     assert known.on(problem.part(np.arange(5))) is None
     pushed: list[int] = []
 
-    def counted(*args: object, only: np.ndarray) -> Answers:
+    def counted(*args: object, only: np.ndarray, segments: int) -> Answers:
         pushed.extend(only.tolist())
-        return answers_of(*args, only=only)
+        return answers_of(*args, only=only, segments=segments)
 
     monkeypatch.setattr(screening, "answers_of", counted)
     again, taken = screen(problem, every, FOUND, sizes, known)

@@ -43,4 +43,5 @@ def test_dahls_friction_is_followed_from_the_first_tick(session: Session, width:
         for move in np.diff(path):
             z = np.sign(move) + (z - np.sign(move)) * np.exp(-abs(move) / width) if move else z
         expected.append(z)
-    assert bent_before(windows, 1, width) == pytest.approx(np.array(expected), abs=1e-9)
+    found = bent_before(windows, 1, width, session.plant.thresholds.history)
+    assert found == pytest.approx(np.array(expected), abs=1e-9)

@@ -81,7 +81,11 @@ def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Ca
     values = np.concatenate((fit.values, *(c.nominal for c in bodies)))
     larger = _large_residual_fit(problem, [*fit.chosen, *bodies], values, rule.steps_with_links)
     say(f"{len(larger.chosen)} with {bodies[0].effect} on all links: chi-square {larger.power(problem):.3g}")
-    return larger if larger.power(problem) < (1 - problem.thresholds.comparison.together.fall) * fit.power(problem) else fit
+    return (
+        larger
+        if larger.power(problem) < (1 - problem.thresholds.comparison.together.fall) * fit.power(problem)
+        else fit
+    )
 
 
 def _large_residual_fit(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int) -> Fit:

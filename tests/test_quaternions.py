@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from bumblebee.motion import quaternions
+from bumblebee import quaternions
 
 
 @pytest.fixture
