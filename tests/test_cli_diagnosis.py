@@ -7,12 +7,14 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import bumblebee
 from bumblebee import cli
+from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.measured.rollout import Rollout, write_rollout
 
 XML = """<mujoco><compiler angle="radian"/><option timestep="0.005"/><worldbody>
@@ -147,22 +149,21 @@ class Done:
     """A diagnosis that took no time."""
 
     session, effects = None, ()
+    problem = SimpleNamespace(thresholds=Thresholds())
     document = {"schema": 1, "effects": [], "unexplained": {}, "error": {}}  # noqa: RUF012
 
 
 @pytest.fixture
 def at_once(data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """`diagnose` without its minutes of work: what is read, tried and written is the product's own."""
-    from bumblebee.diagnosis import diagnose, output
-    from bumblebee.diagnosis.report import example_windows as example
-    from bumblebee.diagnosis.report import terminal
+    from bumblebee.diagnosis import diagnose, output, report
 
     monkeypatch.setenv("TMPDIR", str(data / "elsewhere"))
     (data / "elsewhere").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", None)
     monkeypatch.setattr(diagnose, "diagnose", lambda session, config, say: Done)
-    monkeypatch.setattr(terminal, "summary", lambda document: "found")
-    monkeypatch.setattr(example, "examples", lambda *_, **__: [])
+    monkeypatch.setattr(report, "summary", lambda *_: "found")
+    monkeypatch.setattr(report, "examples", lambda *_, **__: [])
     files = {name: "x" for name in ("effects.yaml", "model.xml", "report.html")}
     monkeypatch.setattr(output, "contents", lambda made: {"diagnosis.json": json.dumps(made.document), **files})
     return data
@@ -242,13 +243,13 @@ def test_the_output_is_tried_before_the_work(
     at_once: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
     """A full disk, and a folder under a file, end it at once and not after minutes."""
-    from bumblebee.diagnosis.dataset import session
+    from bumblebee.diagnosis import dataset
     from bumblebee.measured import importers
 
     def work(*_: object) -> None:
         raise AssertionError("worked before the output was tried")
 
-    monkeypatch.setattr(session, "open_session", work)
+    monkeypatch.setattr(dataset, "open_session", work)
     monkeypatch.setattr(importers, "import_dataset", work)
     out = at_once / "model.xml" / "out"
     given = (at_once / "model.xml", at_once / "set", "--out") if command != "import" else (at_once / "set",)
@@ -337,12 +338,12 @@ def test_an_unforeseen_error_is_one_line_with_a_log(
     data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Status 1; the traceback is in the file that the line names."""
-    from bumblebee.diagnosis.dataset import session
+    from bumblebee.diagnosis import dataset
 
     def broken_product(*_: object) -> None:
         raise ZeroDivisionError("surprise")
 
-    monkeypatch.setattr(session, "open_session", broken_product)
+    monkeypatch.setattr(dataset, "open_session", broken_product)
     assert run("gap", data / "model.xml", data / "set") == 1
     said = capsys.readouterr().err
     log = Path(said.split("with ")[-1].strip())

@@ -1,6 +1,5 @@
 """What a diagnosis found, as a document, a page and lines for the terminal."""
 
-from bumblebee.diagnosis.report.discrepancy_entries import measured_curve
 from bumblebee.diagnosis.report.document import Findings, document
 from bumblebee.diagnosis.report.effect_entries import effect_entries, loss_entries
 from bumblebee.diagnosis.report.example_windows import examples
@@ -46,7 +45,6 @@ __all__ = [
     "items",
     "line_picture",
     "loss_entries",
-    "measured_curve",
     "nothing_seen",
     "number",
     "plot",
