@@ -1,12 +1,11 @@
 """Which effects the model may lack: every effect of the catalogue in every place, with its size and traits."""
 
 from bumblebee.diagnosis.candidates.candidate import (
-    INVERSE,
-    SHAPED,
     Candidate,
     clipped,
     effects_at,
     is_simulated,
+    label,
     shortlisted,
     without,
 )
@@ -16,24 +15,26 @@ from bumblebee.diagnosis.candidates.formula import Formula, formula
 from bumblebee.diagnosis.candidates.signal_scales import scales_of
 from bumblebee.diagnosis.candidates.traits import (
     ABRUPT,
-    EXPERIMENTS,
     IMU_TILT,
+    INVERSE,
     SATURATIONS,
+    SHAPED,
+    TRAITS,
     USUAL,
     USUAL_OF_BODIES,
     USUAL_OF_ROBOT,
     USUAL_OF_TORQUE,
-    label,
+    naming_order,
     rough,
 )
 
 __all__ = [
     "ABRUPT",
-    "EXPERIMENTS",
     "IMU_TILT",
     "INVERSE",
     "SATURATIONS",
     "SHAPED",
+    "TRAITS",
     "USUAL",
     "USUAL_OF_BODIES",
     "USUAL_OF_ROBOT",
@@ -48,6 +49,7 @@ __all__ = [
     "is_like",
     "is_simulated",
     "label",
+    "naming_order",
     "rough",
     "scales_of",
     "shortlisted",

@@ -2,23 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from bumblebee.diagnosis.candidates.traits import ABRUPT, INVERSE, TRAITS
 from bumblebee.diagnosis.thresholds.candidates import CandidateLimits
 from bumblebee.sim.effect_native import physical_inertia
 from bumblebee.sim.effects import CATALOGUE, Effect, single
-
-# Of these the fit moves the inverse: where the effect is absent the parameter is infinite.
-INVERSE = ("torque_speed_limit", "series_elasticity")
-# Dry friction of a shape, which sits on a level that is dry friction again.
-SHAPED = ("asymmetric_friction", "stribeck_friction")
-# What no torque on the robot's joints can stand for: always simulated, never screened.
-SIMULATED = (
-    "encoder_offset", "imu_offset", "ground_friction", "ground_compliance", "backlash", "series_elasticity",
-)  # fmt: skip
-# To first order a torque and a start that moved, which for the light joints of a stiff servo is a poor likeness.
-_SLOW = ("torque_lag", "encoder_delay")
 
 
 @dataclass(frozen=True)
@@ -81,14 +72,20 @@ class Candidate:
         return values
 
 
+def label(c: Candidate) -> dict[str, Any]:
+    """How the contract names a candidate."""
+    return {"effect": c.effect, "where": [c.where] if c.where else []}
+
+
 def is_simulated(c: Candidate, joints: int) -> bool:
     """Whether a candidate's column is simulated: where it is no torque, or where one can afford it to be exact."""
-    return c.effect in SIMULATED or (c.effect in _SLOW and (not c.where or joints <= c.limits.few_joints))
+    column = TRAITS[c.effect].column
+    return column == "simulated" or (column == "late" and (not c.where or joints <= c.limits.few_joints))
 
 
 def shortlisted(c: Candidate, joints: int) -> bool:
     """Whether a candidate costs too much to be simulated on every joint: only those worst explained are tried."""
-    return c.effect == "backlash" or (c.effect == "series_elasticity" and joints > c.limits.few_joints)
+    return c.effect in ABRUPT or (TRAITS[c.effect].costly and joints > c.limits.few_joints)
 
 
 def without(effects: Sequence[Effect], candidate: Candidate) -> list[Effect]:

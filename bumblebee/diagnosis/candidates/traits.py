@@ -1,68 +1,123 @@
-"""What kinds of effects have in common: which act abruptly, which need fine steps, which every joint has."""
+"""What the diagnosis must know of each effect of the catalogue beside its equation: one row an effect.
+
+A new effect of the catalogue needs a row here and a candidate in `enumerate.py`; without a row nothing is imported.
+"""
 
 from collections.abc import Iterable
-from typing import Any
+from dataclasses import dataclass
+from typing import Literal
 
-from bumblebee.diagnosis.candidates.candidate import Candidate
+from bumblebee.sim.effects import CATALOGUE
 
-# What these do grows with no power of their size, in few windows.
-ABRUPT = ("backlash",)
-# What a person would do to tell an effect from those that look the same.
-EXPERIMENTS = {
-    "viscous_friction": "vary kd, or command a velocity: a servo's damping follows both, a joint's does not",
-    "kd": "vary kd: an error of the gain grows with it, friction does not",
-    "kp": "vary kp and hold a known load",
-    "motor_strength": "hold a known load at rest, and vary kp and kd together",
-    "encoder_offset": "move the joint against a stop of known angle",
-    "joint_spring": "move the joint slowly through its whole range, unpowered",
-    "asymmetric_friction": "move the joint at the same speed both ways, with the joint's axis vertical",
-    "command_delay": "command steps and log the torque",
-    "torque_lag": "command steps and log the torque at 500 Hz",
-    "encoder_delay": "film the joint, or log a second encoder",
-    "dropped_commands": "log the commands as the drive receives them",
-    "coulomb_friction": "move at several speeds under several loads",
-    "stribeck_friction": "creep through zero speed",
-    "load_dependent_friction": "move at the same speed under two loads",
-    "hysteresis": "move to and fro by small angles",
-    "armature": "accelerate the joint with the link taken off or with a known weight on it",
-    "link_mass": "add 2 kg to the link, or weigh it",
-    "link_com": "hold the link still in several poses and log the torque",
-    "link_inertia": "swing the link fast about each axis",
-    "external_wrench": "unplug what is tethered, and repeat in another heading",
-    "ground_slope": "turn the robot by 180 degrees on the spot",
-    "imu_offset": "turn the robot by 180 degrees on the spot, on a levelled floor",
-    "ground_friction": "push a standing robot sideways until it slips",
-    "ground_compliance": "drop the robot's foot on the floor",
-    "torque_limit": "hold a growing load",
-    "torque_speed_limit": "move fast without load and slowly under load",
-    "thermal_fade": "repeat the motion after a pause",
-    "strength_drift": "repeat the motion after a pause, without one",
-    "cogging": "turn the unpowered joint slowly",
-    "backlash": "rock the joint with the motor held",
-    "series_elasticity": "load the joint with the motor held",
-    "encoder_quantisation": "log at rest",
+
+@dataclass(frozen=True)
+class Traits:
+    """Of one kind of effect."""
+
+    experiment: str = ""
+    """What a person would do to tell it from effects that look the same."""
+    column: Literal["torque", "late", "simulated"] = "torque"
+    """Where its sensitivity comes from: from a torque on the robot; from one to first order, which is poor for light
+    joints of stiff servos; or from simulation alone, for no torque stands for it."""
+    fine_steps: bool = False
+    """Whether coarse steps would falsify it: they hit a backlash too softly and a limit too late, let feet touch
+    otherwise, and late feedback, computed beside the integrator, moves a servo by itself. A tilt is not simulated."""
+    inverse: bool = False
+    """Whether the fit moves the inverse of its first parameter: where the effect is absent that is infinite."""
+    costly: bool = False
+    """Whether it is tried on the worst explained joints alone, where there are many."""
+    abrupt: bool = False
+    """Whether what it does grows with no power of its size, in few windows."""
+    saturation: bool = False
+    """Whether it is a limit, which only the windows feel that reach it."""
+    on_dry_friction: bool = False
+    """Whether it is a friction that sits on a level, which is dry friction again."""
+    usual: Literal["", "position", "joint", "torque", "robot", "body"] = ""
+    """Whether every robot has it: every joint (`position`: only where drives are told positions, `torque`: only where
+    they are told torques), the whole robot, or every link. PACE's set (Bjelonic et al. 2025: armature, damping,
+    friction, offset, delay) and the drive's strength. Of a drive that is told its torque gears rub with it, and an
+    offset shows as a centre of mass does."""
+    named_first: int = 0
+    """Of effects that fit the same the one that is met most often is named: its place in that order; 0: after these."""
+
+
+TRAITS: dict[str, Traits] = {
+    "coulomb_friction": Traits("move at several speeds under several loads", usual="joint", named_first=1),
+    "viscous_friction": Traits(
+        "vary kd, or command a velocity: a servo's damping follows both, a joint's does not",
+        usual="joint",
+        named_first=2,
+    ),
+    "stribeck_friction": Traits("creep through zero speed", on_dry_friction=True),
+    "load_dependent_friction": Traits("move at the same speed under two loads", usual="torque"),
+    "armature": Traits(
+        "accelerate the joint with the link taken off or with a known weight on it", usual="joint", named_first=3
+    ),
+    "motor_strength": Traits("hold a known load at rest, and vary kp and kd together", usual="joint", named_first=4),
+    "kp": Traits("vary kp and hold a known load"),
+    "kd": Traits("vary kd: an error of the gain grows with it, friction does not"),
+    "torque_limit": Traits("hold a growing load", fine_steps=True, saturation=True),
+    "torque_speed_limit": Traits(
+        "move fast without load and slowly under load", fine_steps=True, saturation=True, inverse=True
+    ),
+    "command_delay": Traits("command steps and log the torque", usual="robot", named_first=5),
+    "torque_lag": Traits("command steps and log the torque at 500 Hz", column="late", fine_steps=True),
+    "encoder_delay": Traits("film the joint, or log a second encoder", column="late", fine_steps=True),
+    "dropped_commands": Traits("log the commands as the drive receives them"),
+    "encoder_offset": Traits(
+        "move the joint against a stop of known angle", column="simulated", usual="position", named_first=6
+    ),
+    "imu_offset": Traits(
+        "turn the robot by 180 degrees on the spot, on a levelled floor", column="simulated", fine_steps=True
+    ),
+    "encoder_quantisation": Traits("log at rest", fine_steps=True),
+    "joint_spring": Traits("move the joint slowly through its whole range, unpowered"),
+    "asymmetric_friction": Traits(
+        "move the joint at the same speed both ways, with the joint's axis vertical", on_dry_friction=True
+    ),
+    "hysteresis": Traits("move to and fro by small angles"),
+    "cogging": Traits("turn the unpowered joint slowly"),
+    "backlash": Traits("rock the joint with the motor held", column="simulated", fine_steps=True, abrupt=True),
+    "series_elasticity": Traits(
+        "load the joint with the motor held", column="simulated", fine_steps=True, inverse=True, costly=True
+    ),
+    "link_mass": Traits("add 2 kg to the link, or weigh it", usual="body", named_first=7),
+    "link_com": Traits("hold the link still in several poses and log the torque", usual="body"),
+    "link_inertia": Traits("swing the link fast about each axis"),
+    "ground_friction": Traits("push a standing robot sideways until it slips", column="simulated", fine_steps=True),
+    "ground_compliance": Traits("drop the robot's foot on the floor", column="simulated", fine_steps=True),
+    "ground_slope": Traits("turn the robot by 180 degrees on the spot"),
+    "thermal_fade": Traits("repeat the motion after a pause"),
+    "strength_drift": Traits("repeat the motion after a pause, without one"),
+    "external_wrench": Traits("unplug what is tethered, and repeat in another heading"),
+    "discovered": Traits(),
 }
-SATURATIONS = ("torque_limit", "torque_speed_limit")
-# PACE's set (Bjelonic et al. 2025: armature, damping, friction, offset, delay) and the drive's strength.
-USUAL = ("coulomb_friction", "viscous_friction", "armature", "motor_strength", "encoder_offset")
-# Of a drive that is told its torque: its gears rub with it, and an offset shows as a centre of mass does.
-USUAL_OF_TORQUE = (*(kind for kind in USUAL if kind != "encoder_offset"), "load_dependent_friction")
-USUAL_OF_ROBOT = ("command_delay",)
-USUAL_OF_BODIES = ("link_mass", "link_com")
+if missing := CATALOGUE.keys() ^ TRAITS.keys():
+    raise TypeError(
+        f"bumblebee/diagnosis/candidates/traits.py: a row each for the catalogue's effects, not so: {missing}"
+    )
+
+
+def _kinds(*usual: str) -> tuple[str, ...]:
+    return tuple(kind for kind, traits in TRAITS.items() if traits.usual in usual)
+
+
+INVERSE = tuple(kind for kind, traits in TRAITS.items() if traits.inverse)
+ABRUPT = tuple(kind for kind, traits in TRAITS.items() if traits.abrupt)
+SATURATIONS = tuple(kind for kind, traits in TRAITS.items() if traits.saturation)
+SHAPED = tuple(kind for kind, traits in TRAITS.items() if traits.on_dry_friction)
+USUAL = _kinds("joint", "position")
+USUAL_OF_TORQUE = _kinds("joint", "torque")
+USUAL_OF_ROBOT = _kinds("robot")
+USUAL_OF_BODIES = _kinds("body")
 IMU_TILT = "imu_offset"
-# In coarse steps play hits too softly, a limit too late and feet otherwise than they do, and late feedback, computed
-# beside the integrator, moves a servo by itself. A tilt is not simulated.
-_FINE_ONLY = (
-    "torque_lag", "encoder_delay", "encoder_quantisation", "backlash", "series_elasticity", "torque_limit",
-    "torque_speed_limit", "ground_friction", "ground_compliance", IMU_TILT,
-)  # fmt: skip
 
 
-def label(c: Candidate) -> dict[str, Any]:
-    """How the contract names a candidate."""
-    return {"effect": c.effect, "where": [c.where] if c.where else []}
+def naming_order(kind: str) -> int:
+    """The place of a kind among effects that fit the same; the usual ones first."""
+    return TRAITS[kind].named_first or max(traits.named_first for traits in TRAITS.values()) + 1
 
 
 def rough(kinds: Iterable[str]) -> bool:
     """Whether coarse steps do for differences between models with these effects."""
-    return not any(kind in _FINE_ONLY for kind in kinds)
+    return not any(TRAITS[kind].fine_steps for kind in kinds)

@@ -9,25 +9,22 @@ from bumblebee.diagnosis.comparison.backward_elimination import (
     drop_unpaid,
     drop_unpaid_saturations,
     drop_unsure,
-    eliminate,
 )
-from bumblebee.diagnosis.comparison.compare import Comparison, compare, lead
+from bumblebee.diagnosis.comparison.compare import compare, lead
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.information_criterion import criterion, numbers_of, parameters
-from bumblebee.diagnosis.comparison.paired_tests import confirmed, logs, plausible
+from bumblebee.diagnosis.comparison.paired_tests import confirmed, plausible
 from bumblebee.diagnosis.comparison.submodel import (
     columns_without,
     linear_cost,
     linearly_without,
     refitted,
-    refitted_without,
     simulated_without,
 )
 from bumblebee.diagnosis.comparison.wald import Step, costs_more_than, evidence, wald, z_value, z_values
 from bumblebee.diagnosis.comparison.withdrawal import standing
 
 __all__ = [
-    "Comparison",
     "Holdout",
     "Step",
     "certainty",
@@ -42,18 +39,15 @@ __all__ = [
     "drop_unpaid",
     "drop_unpaid_saturations",
     "drop_unsure",
-    "eliminate",
     "evidence",
     "is_physical",
     "lead",
     "linear_cost",
     "linearly_without",
-    "logs",
     "numbers_of",
     "parameters",
     "plausible",
     "refitted",
-    "refitted_without",
     "simulated_without",
     "standing",
     "wald",

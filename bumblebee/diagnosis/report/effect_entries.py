@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from bumblebee.diagnosis.candidates import EXPERIMENTS, INVERSE, SHAPED, Candidate, Formula, label, without
+from bumblebee.diagnosis.candidates import INVERSE, SHAPED, TRAITS, Candidate, Formula, label, without
 from bumblebee.diagnosis.comparison import Holdout, wald
 from bumblebee.diagnosis.discrepancy import Discovery
 from bumblebee.diagnosis.estimation import Fit
@@ -68,7 +68,7 @@ def _entry(
     if others:
         kinds = dict.fromkeys([first.effect, *(o.effect for o in others)])
         most = last.problem.thresholds.report.effects.experiments
-        entry["separate_by"] = [EXPERIMENTS[k] for k in kinds if k in EXPERIMENTS][:most]
+        entry["separate_by"] = [TRAITS[k].experiment for k in kinds if TRAITS[k].experiment][:most]
     return entry
 
 

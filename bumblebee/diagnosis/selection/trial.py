@@ -5,16 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import Candidate, rough
+from bumblebee.diagnosis.candidates import Candidate, naming_order, rough
 from bumblebee.diagnosis.estimation import Fit, LeftOver
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.thresholds.selection import Trials
-
-# Of effects that fit the same the one that is met most often is named; the others are its class.
-_USUAL = (
-    "coulomb_friction", "viscous_friction", "armature", "motor_strength", "command_delay", "encoder_offset",
-    "link_mass",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +75,6 @@ def simplest(tried: Sequence[Trial], before: float, rule: Trials) -> Trial:
         return worse < rule.alike or bool(parallel and worse < rule.share * (before - best.cost))
 
     def rank(t: Trial) -> tuple[int, int, float]:
-        kind = t.candidate.effect
-        return (_USUAL.index(kind) if kind in _USUAL else len(_USUAL), len(t.candidate.free), t.cost)
+        return (naming_order(t.candidate.effect), len(t.candidate.free), t.cost)
 
     return min((t for t in tried if near(t)), key=rank)

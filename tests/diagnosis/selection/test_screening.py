@@ -6,9 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.candidates.candidate import SIMULATED, Candidate
+from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.candidates.signal_scales import scales_of
+from bumblebee.diagnosis.candidates.traits import SATURATIONS, TRAITS
 from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem
@@ -36,7 +37,7 @@ def made() -> tuple[Problem, list[Candidate], Columns]:
 def test_columns_of_torque_answers_are_those_of_simulations(made: tuple) -> None:
     """Same direction and size for every effect that is a torque and that these data feel."""
     problem, candidates, columns = made
-    kinds = [c for c in candidates if c.effect not in (*SIMULATED, "torque_limit", "torque_speed_limit")]
+    kinds = [c for c in candidates if TRAITS[c.effect].column != "simulated" and c.effect not in SATURATIONS]
     simulated, first = problem.sensitivities(kinds), 0
     cosines = {}
     for c in kinds:
