@@ -91,7 +91,7 @@ def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
     """Bring the workspace up to date through the flow."""
     require_own(folder)
     os.environ.update(environment(folder))
-    sections.check_names(params.read(folder / "params.yaml"), folder / "params.yaml")
+    params.check_names(params.read(folder / "params.yaml"), folder / "params.yaml")
     sections.loop(folder / "params.yaml")
     if not to_run(read_stages(folder), changed_stages(folder)):
         print(f"everything in {shown(folder)} is up to date")
