@@ -14,7 +14,8 @@ from bumblebee.deploy.compensation_plan import compensate
 from bumblebee.measured.intake import file_hash
 from bumblebee.ranges import Ranged
 from bumblebee.sim.effects import read_effects
-from tasks.rollouts import parent_round
+from tasks import paths
+from tasks.sections import parent_of
 from tasks.stage import load, log_run, output_folder, run_stage
 
 
@@ -29,10 +30,10 @@ class CompensateConfig(Ranged):
 def main(round: int) -> None:
     """Fill models/compensation/r<round>."""
     config = load("compensate", CompensateConfig)
-    found, target = Path(f"data/diagnosis/r{round}/effects.yaml"), Path(f"models/compensation/r{round}")
-    compensation = undone_after(parent_round(round), found, config.limits)
+    found, target = paths.effects(round), paths.compensation(round)
+    compensation = undone_after(parent_of(round), found, config.limits)
     with output_folder(target) as folder:
-        write_compensation(folder / "compensation.json", compensation)
+        write_compensation(folder / paths.compensation_plan(round).name, compensation)
     undone = sum(bool(step.done) for step in compensation.plan)
     print(table_of(compensation))
     print(f"round {round}: {undone} of {len(compensation.plan)} effects undone at the joint")
@@ -47,7 +48,7 @@ def undone_after(parent: int, found: Path, limits: CompensationLimits) -> Compen
     left out also where a cluster's expert stayed what it was.
     """
     effects = read_effects(found)
-    trained = read_effects(Path(f"data/diagnosis/r{parent}/effects.yaml")) if parent else []
+    trained = read_effects(paths.effects(parent)) if parent else []
     known = {(effect.effect, frozenset(effect.where)) for effect in trained}
     new = [effect for effect in effects if (effect.effect, frozenset(effect.where)) not in known]
     made = compensate(new, None, limits, leave_out=True, where=found, effects_sha256=file_hash(found))

@@ -23,7 +23,7 @@ SECTIONS = {
     "cluster": "bumblebee.clustering.config:ClusterConfig",
     "base": "tasks.base:BaseConfig",
     "experts": "tasks.experts:ExpertsConfig",
-    "rollouts": "tasks.rollouts:RolloutsConfig",
+    "rollouts": "tasks.rollouts_config:RolloutsConfig",
     "ingest": "tasks.ingest:IngestConfig",
     "gate": "bumblebee.measured.gate:GateConfig",
     "diagnose": "tasks.diagnose:DiagnoseConfig",

@@ -10,9 +10,9 @@ from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes
 from bumblebee.last_line import guarded
 from bumblebee.ranges import Few, Name, Range, Ranged, Size, shown
-from tasks import params
+from tasks import params, paths
 
-CHECKED = Path(".scratch/params.checked")
+CHECKED = paths.SCRATCH / "params.checked"
 LONGEST = 64  # signs of a cluster's name, which names folders and models
 
 
@@ -63,6 +63,15 @@ def shape_of(content: dict[str, Any], path: Path) -> Loop:
         known = f"0 to {len(shape.rounds)}, the rounds there are"
         raise BadInput(f"{path}: final_round", known, str(shape.final_round))
     return shape
+
+
+def parent_of(round: int) -> int:
+    """The round whose experts run on the robot in this one, and are refined after it."""
+    listed = params.read().get("rounds", [])
+    for entry in listed:
+        if isinstance(entry, dict) and entry.get("n") == round and "parent" in entry:
+            return int(entry["parent"])
+    raise BadInput(f"{params.FILE}: rounds", f"an entry with n: {round} and its parent", str(listed))
 
 
 def check(path: Path = params.FILE) -> dict[str, Any]:
