@@ -1,4 +1,6 @@
-"""Answer a gate from any terminal: `python -m flows.gate approve --workspace PATH --round 1 --seen HASH --by NAME`.
+"""Answer a gate from any terminal.
+
+`python -m flows.gate_answer approve --workspace PATH --round 1 --seen HASH --by NAME`
 
 The answer is written to data/approvals of the workspace; a run that waits for it on a reachable Prefect server is
 resumed. `python -m tasks.gate --round 1 --show` prints what came, and this command with the hash of it.
@@ -38,7 +40,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
-    made = argparse.ArgumentParser(prog="python -m flows.gate", description=__doc__)
+    made = argparse.ArgumentParser(prog="python -m flows.gate_answer", description=__doc__)
     made.add_argument("answer", choices=["approve", "reject"])
     made.add_argument("--round", type=int, required=True, help="the round that is meant")
     made.add_argument("--by", default="", help="name of the person who answers; needed")

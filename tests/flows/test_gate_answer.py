@@ -1,4 +1,4 @@
-"""`flows.gate` answers in the workspace that is named only what was seen there; the printed command works anywhere."""
+"""A gate is answered in the workspace that is named, for what was seen there only; the printed command works anywhere."""
 
 import json
 import shlex
@@ -10,7 +10,7 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
-from flows import gate as gate_flow
+from flows import gate_answer as gate_flow
 from flows.workspace import HOME
 
 

@@ -11,7 +11,7 @@ from prefect.states import Cancelled
 
 from bumblebee.measured import gate
 from bumblebee.measured.rollout import Rollout, write_rollout
-from flows import gate_page, gates
+from flows import gate_page, gate_question
 from flows.loop import WAITING, outcome
 from flows.stages import Stage
 
@@ -45,10 +45,10 @@ class Page:
 def page(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> Page:
     made = Page()
     caplog.set_level(logging.INFO)
-    monkeypatch.setattr(gates, "suspend_flow_run", made.suspend)
-    monkeypatch.setattr(gates, "answered", made.given.get)
-    monkeypatch.setattr(gates, "create_markdown_artifact", lambda text, **options: "the-artifact")
-    monkeypatch.setattr(gates, "get_run_logger", lambda: logging.getLogger("gates"))
+    monkeypatch.setattr(gate_question, "suspend_flow_run", made.suspend)
+    monkeypatch.setattr(gate_question, "answered", made.given.get)
+    monkeypatch.setattr(gate_question, "create_markdown_artifact", lambda text, **options: "the-artifact")
+    monkeypatch.setattr(gate_question, "get_run_logger", lambda: logging.getLogger("gates"))
     monkeypatch.setenv("PREFECT__RUNTIME__DEPLOYMENT__ID", "here")
     monkeypatch.setenv("PREFECT__RUNTIME__FLOW_RUN__UI_URL", "http://localhost/run")
     return made
@@ -80,13 +80,13 @@ def come_in(place: gate.Gate, accepted: int, motion: str = "wave") -> None:
 
 def ask(place: gate.Gate) -> None:
     with pytest.raises(Suspended):
-        gates.hold(place.workspace, STAGE)
+        gate_question.hold(place.workspace, STAGE)
 
 
 def test_the_dialog_has_no_answer_beforehand_and_shows_the_hash(place: gate.Gate, page: Page) -> None:
     ask(place)
     seen = gate.request(place)["seen"]["sha256"]
-    schema = gates.form(seen[:12], "").model_json_schema()
+    schema = gate_question.form(seen[:12], "").model_json_schema()
     assert "default" not in schema["properties"]["answer"] and "default" not in schema["properties"]["by"]
     assert {"answer", "by"} <= set(schema["required"]) and schema["properties"]["seen"]["default"] == seen[:12]
     (question,) = page.shown.values()
@@ -96,7 +96,7 @@ def test_the_dialog_has_no_answer_beforehand_and_shows_the_hash(place: gate.Gate
 def test_an_answer_on_the_page_is_written_with_how_its_author_was_known(place: gate.Gate, page: Page) -> None:
     ask(place)
     page.answer("approve", "Ada", gate.seen_of(place.summary)["sha256"][:12])
-    assert gates.hold(place.workspace, STAGE) is None
+    assert gate_question.hold(place.workspace, STAGE) is None
     table = gate.read_approval(place.approval)
     assert (table["status"], table["by"]) == ("approved", "Ada") and "login" in table["known_by"]["how"]
 
@@ -108,7 +108,7 @@ def test_an_answer_to_data_that_changed_meanwhile_is_asked_for_anew(place: gate.
     ask(place)
     assert gate.verdict(place) == "pending" and len(page.shown) == 2
     page.answer("reject", "Ada", gate.seen_of(place.summary)["sha256"][:12])
-    assert gates.hold(place.workspace, STAGE) is None
+    assert gate_question.hold(place.workspace, STAGE) is None
     assert gate.verdict(place) == "rejected"
 
 
@@ -120,7 +120,7 @@ def test_an_answer_with_another_hash_is_refused_and_asked_for_anew(
     ask(place)
     assert gate.verdict(place) == "pending" and "the answer of Ada on the page was not taken" in caplog.text
     page.answer("approve", "Ada", gate.seen_of(place.summary)["sha256"][:12])
-    assert gates.hold(place.workspace, STAGE) is None
+    assert gate_question.hold(place.workspace, STAGE) is None
     assert gate.verdict(place) == "approved"
 
 
@@ -131,7 +131,7 @@ def test_an_answer_on_the_page_after_one_in_a_terminal_is_not_taken_and_says_so(
     seen = gate.seen_of(place.summary)["sha256"]
     gate.answer(place, False, gate.unix_user("Bob"), seen)
     page.answer("approve", "Ada", seen[:12])
-    assert gates.hold(place.workspace, STAGE) is None
+    assert gate_question.hold(place.workspace, STAGE) is None
     assert gate.verdict(place) == "rejected" and "too late" in caplog.text and "rejected by Bob" in caplog.text
 
 

@@ -1,4 +1,4 @@
-"""A gate in the flow: show what came, wait for a person, write down the answer."""
+"""The question at a gate: show what came, wait for a person, write down the answer given on Prefect's page."""
 
 from itertools import count
 from pathlib import Path
