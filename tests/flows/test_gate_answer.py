@@ -1,4 +1,4 @@
-"""A gate is answered in the workspace that is named, for what was seen there only; the printed command works anywhere."""
+"""A gate is answered in the workspace that is named, for what was seen there; the printed command works anywhere."""
 
 import json
 import shlex
