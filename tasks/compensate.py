@@ -11,7 +11,7 @@ from bumblebee.deploy.compensation import Compensation, PlannedEffect
 from bumblebee.deploy.compensation_file import table_of, write_compensation
 from bumblebee.deploy.compensation_limits import CompensationLimits
 from bumblebee.deploy.compensation_plan import compensate
-from bumblebee.measured.intake import file_hash
+from bumblebee.io.read import file_hash
 from bumblebee.ranges import Ranged
 from bumblebee.sim.effects import read_effects
 from tasks import paths

@@ -10,11 +10,20 @@ import mujoco
 import pandas as pd
 import torch
 
-from bumblebee.learning.delta import DeltaAction, DeltaConfig, magnitudes, make_network, save_delta
-from bumblebee.learning.delta_env import DeltaEnv
-from bumblebee.learning.delta_gain import Gain, compare, replay_error
-from bumblebee.learning.delta_train import train_delta
-from bumblebee.learning.recordings import Recordings, stack
+from bumblebee.learning.delta import (
+    DeltaAction,
+    DeltaConfig,
+    DeltaEnv,
+    Gain,
+    Recordings,
+    compare,
+    magnitudes,
+    make_network,
+    replay_error,
+    save_delta,
+    stack,
+    train_delta,
+)
 from bumblebee.measured.rollout import read_dataset
 from bumblebee.progress import progress
 from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks

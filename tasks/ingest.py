@@ -10,14 +10,14 @@ from typing import Annotated, Any
 import mujoco
 
 from bumblebee.errors import BadInput
-from bumblebee.io.read import read_json
+from bumblebee.io.read import file_hash, read_json
 from bumblebee.measured import gate, gate_words
-from bumblebee.measured.intake import IntakeSummary, file_hash, incoming_files, intake, merge
+from bumblebee.measured.checks import Thresholds
+from bumblebee.measured.intake import IntakeSummary, incoming_files, intake, merge
 from bumblebee.measured.model_file import copy_model, load_model
 from bumblebee.measured.overview import write_overview
 from bumblebee.measured.rollout import copy_of_cluster, read_rollout
 from bumblebee.measured.summary import summary_table
-from bumblebee.measured.thresholds import Thresholds
 from bumblebee.progress import progress
 from bumblebee.ranges import Line, Name, Range, Ranged
 from bumblebee.robot.model import write_xml

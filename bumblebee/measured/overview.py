@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from bumblebee.io.read import file_hash
 from bumblebee.measured import overview_plots as plots
 from bumblebee.measured.gate_words import SHORT
-from bumblebee.measured.intake import file_hash
 from bumblebee.measured.overview_plots import Trace, tracking
 from bumblebee.measured.rollout import Rollout
 

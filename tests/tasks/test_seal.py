@@ -13,7 +13,7 @@ from bumblebee.deploy.undeclared.kinds import CATALOGUE, KINDS, Place
 from bumblebee.errors import BadInput
 from bumblebee.report.truth import match
 from bumblebee.robot.facts import joint_names
-from bumblebee.sim import effect_catalogue
+from bumblebee.sim.effects import CATALOGUE as EFFECTS
 from tasks import paths, seal
 from tasks.seal import BODIES, OF_G1, SealConfig, draw, region
 from tasks.seal_trial import Trial
@@ -133,7 +133,7 @@ def test_the_largest_faults_are_stated_for_every_kind_and_the_usual_peaks_for_ev
 def test_parameters_have_the_names_of_the_catalogue() -> None:
     for kind in CATALOGUE:
         (effect,) = draw(SealConfig(kinds=(kind.name,), n_effects=1))
-        declared = {parameter.name for parameter in effect_catalogue.CATALOGUE[kind.name].parameters}
+        declared = {parameter.name for parameter in EFFECTS[kind.name].parameters}
         assert set(effect["parameters"]) <= declared, kind.name
 
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bumblebee.sim.effect_native import physical_inertia
-from bumblebee.sim.effects import CATALOGUE, Effect, single
+from bumblebee.sim.effects import CATALOGUE, Effect, physical_inertia, single
 
 # Of these the fit moves the inverse: where the effect is absent the parameter is infinite.
 INVERSE = ("torque_speed_limit", "series_elasticity")

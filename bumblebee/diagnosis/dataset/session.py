@@ -23,7 +23,7 @@ from bumblebee.diagnosis.simulation import (
     refuse_unlogged,
 )
 from bumblebee.errors import BadInput
-from bumblebee.measured.checks_magnitude import beyond
+from bumblebee.measured.checks import beyond
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.measured.usable import review
 

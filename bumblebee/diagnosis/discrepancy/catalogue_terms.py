@@ -7,7 +7,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate, Formula
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.simulation import Plant, declared_values
-from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.effects import read_term
 from bumblebee.sim.servo import servos_of
 
 _STIFF = 2.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from bumblebee.diagnosis.gap.dependence_test import JointStructure, clipped, gain_test, joint_structure, other_joint
 from bumblebee.diagnosis.gap.torque_residual import TorqueResidual
-from bumblebee.sim.effect_terms import Term, read_term
+from bumblebee.sim.effects import Term, read_term
 
 MOST_TERMS = 3
 _Z = 4.5  # of a term over blocks; a hundred terms are looked at

@@ -14,8 +14,7 @@ from bumblebee.diagnosis.report.discrepancy_entries import discovered_entry
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection import Loss, Refined, Search, alike, rivals
 from bumblebee.diagnosis.simulation import Plant, declared_values, unit_on
-from bumblebee.sim.effect_catalogue import is_native
-from bumblebee.sim.effects import CATALOGUE, Effect
+from bumblebee.sim.effects import CATALOGUE, Effect, is_native
 
 _COMPARABLE = 0.25
 

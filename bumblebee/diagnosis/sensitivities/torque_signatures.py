@@ -14,10 +14,7 @@ from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.sensitivities.impulse_responses import Path
 from bumblebee.diagnosis.sensitivities.latency_signatures import LATE, Late
 from bumblebee.diagnosis.simulation import Plant, Variation, Windows, bent_before, inputs_of, remember, yielded
-from bumblebee.sim.effect_forces import bent
-from bumblebee.sim.effect_hooks import runtime_hooks
-from bumblebee.sim.effect_native import sloped, spread_inertia
-from bumblebee.sim.effects import Effect
+from bumblebee.sim.effects import Effect, bent, runtime_hooks, sloped, spread_inertia
 from bumblebee.sim.servo import servos_of
 
 _CREEP = 0.02  # [rad/s]: speeds below are no motion that dry friction could be told by

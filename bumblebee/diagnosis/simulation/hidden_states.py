@@ -16,7 +16,7 @@ from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import LEAD, Windows, start_state
 from bumblebee.measured.rollout import Rollout
-from bumblebee.sim.effect_native import SUFFIX
+from bumblebee.sim.effects import SUFFIX
 
 Known = tuple[np.ndarray, np.ndarray, np.ndarray]
 """States (W, nq'), (W, nv') of a model with play or shafts, and for which windows (W,) they are to be believed."""

@@ -15,7 +15,7 @@ import numpy as np
 from bumblebee.diagnosis.simulation.actuators import drive_law, take_target, take_torque
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
-from bumblebee.sim.effect_native import is_hidden
+from bumblebee.sim.effects import is_hidden
 from bumblebee.sim.servo import ON_JOINT, actuator_of
 
 _FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)

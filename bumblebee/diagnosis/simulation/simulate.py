@@ -24,7 +24,7 @@ from bumblebee.diagnosis.simulation.readings import (
 )
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
-from bumblebee.sim.effect_forces import Memory, StepHooks
+from bumblebee.sim.effects import Memory, StepHooks
 
 THREADS: int | None = None
 """Threads of every simulation; None: see `threads`."""

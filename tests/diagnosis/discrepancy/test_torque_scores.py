@@ -15,7 +15,7 @@ from bumblebee.diagnosis.discrepancy.torque_scores import Evidence
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.estimation.least_squares import cost_of
 from bumblebee.diagnosis.residuals.problem import Problem
-from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.effects import read_term
 from tests.diagnosis.discrepancy.test_discover import prepared
 
 _made: list[tuple[Problem, Scene]] = []
