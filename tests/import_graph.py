@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 PACKAGES = ("bumblebee", "tasks", "flows")
@@ -24,7 +25,21 @@ def graph(home: Path, late: bool) -> Graph:
     `from package import name` is an import of `package.name` where that is a module, else of the package's face.
     """
     known = modules(home)
-    return {name: set(_imported(path, home, known, late)) - {name} for name, path in known.items()}
+    return {name: {module for module, _ in _imported(path, home, known, late)} - {name} for name, path in known.items()}
+
+
+def call_graph(home: Path) -> Graph:
+    """The modules that each module may call: those it imports, late ones too, and those it starts with `python -m`.
+
+    A name that comes through a face counts as imported from where the face has it: the rest of the room is not called.
+    """
+    known = modules(home)
+    faces = {name: _offered(path, home, known) for name, path in known.items() if path.name == "__init__.py"}
+    found = {}
+    for name, path in known.items():
+        called = {faces.get(module, {}).get(item, module) for module, item in _imported(path, home, known, late=True)}
+        found[name] = (called | set(_started(path, known))) - {name}
+    return found
 
 
 def circles(of: Graph) -> list[list[str]]:
@@ -46,16 +61,32 @@ def reached(of: Graph, start: str) -> set[str]:
     return seen
 
 
-def _imported(path: Path, home: Path, known: dict[str, Path], late: bool) -> Iterator[str]:
+def _imported(path: Path, home: Path, known: dict[str, Path], late: bool) -> Iterator[tuple[str, str]]:
+    """(module of ours, the name that is taken from it or ""), for each import."""
     package = path.relative_to(home).with_suffix("").parts[:-1]
     for node in _statements(ast.parse(path.read_text()), late):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name in known)
+            yield from ((alias.name, "") for alias in node.names if alias.name in known)
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level + 1] if node.level else ()
             module = ".".join([*base, *([node.module] if node.module else [])])
-            named = (f"{module}.{alias.name}" for alias in node.names)
-            yield from (name if name in known else module for name in named if name in known or module in known)
+            for alias in node.names:
+                if f"{module}.{alias.name}" in known:
+                    yield f"{module}.{alias.name}", ""
+                elif module in known:
+                    yield module, alias.name
+
+
+def _offered(path: Path, home: Path, known: dict[str, Path]) -> dict[str, str]:
+    """Name -> module that a face has it from."""
+    return {name: module for module, name in _imported(path, home, known, late=False) if name}
+
+
+def _started(path: Path, known: dict[str, Path]) -> Iterator[str]:
+    """The modules that stand after "-m" in a list: a process of their own."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        texts = [getattr(item, "value", None) for item in node.elts] if isinstance(node, ast.List) else []
+        yield from (text for before, text in pairwise(texts) if before == "-m" and text in known)
 
 
 def _statements(node: ast.AST, late: bool) -> Iterator[ast.AST]:

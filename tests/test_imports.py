@@ -133,3 +133,35 @@ def test_a_circle_over_several_modules_is_seen(tmp_path: Path):
         (tmp_path / "bumblebee" / f"{name}.py").write_text(text)
     assert circles(graph(tmp_path, late=False)) == []
     assert circles(graph(tmp_path, late=True)) == [["bumblebee.a", "bumblebee.b", "bumblebee.c"]]
+
+
+# Rooms with a face: who is outside takes names from it alone; the engines are chosen by name in one module.
+FACES = (
+    "bumblebee/sim/effects",
+    "bumblebee/measured/checks",
+    "bumblebee/measured/importers",
+    "bumblebee/learning/delta",
+)
+BEHIND_FACES = {"bumblebee/sim/engines.py"}
+
+
+@pytest.mark.parametrize("room", FACES)
+def test_from_outside_a_room_is_seen_by_its_face(room: str):
+    inside = {f"{path.relative_to(HOME).with_suffix('')}".replace("/", ".") for path in files(room)}
+    found = []
+    for package in ("bumblebee", "tasks", "flows", "benchmarks"):
+        for path in files(package):
+            place = str(path.relative_to(HOME))
+            if not place.startswith(f"{room}/") and place not in BEHIND_FACES:
+                found += [f"{place}:{line} {name}" for line, name in imports(path) if name.rpartition(".")[0] in inside]
+    assert found == []
+
+
+def test_what_the_loop_writes_is_named_in_one_file():
+    found = []
+    for path in (*files("tasks"), *files("flows")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            text = node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+            if text.startswith(("data/", "models/", "reports/")) and path.name != "paths.py":
+                found.append(f"{path.relative_to(HOME)}:{node.lineno} {text}")
+    assert found == []
