@@ -33,8 +33,8 @@ from bumblebee.measured.rollout import Rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.robot.model import write_xml
-from tasks.rollouts import cut
 from tasks.seal import SealConfig, draw
+from tasks.stand_in import cut
 
 SECONDS = 10.0  # of each motion at most
 MOVING = 0.02  # rad: standard deviation of the commands of a joint that moves

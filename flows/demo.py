@@ -17,7 +17,7 @@ from flows.environment import SERVERS, environment
 from flows.owned import require_own
 from flows.servers import Addresses, require_port, servers
 from flows.stages import changed_stages, read_stages, to_run
-from tasks import params, sections
+from tasks import params, paths, sections
 
 EXIT_WAITING = 3
 NULL = "null"  # the seed of a robot without undeclared effects
@@ -91,7 +91,7 @@ def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
     """Bring the workspace up to date through the flow."""
     require_own(folder)
     os.environ.update(environment(folder))
-    sections.check_names(params.read(folder / "params.yaml"), folder / "params.yaml")
+    params.check_names(params.read(folder / "params.yaml"), folder / "params.yaml")
     sections.loop(folder / "params.yaml")
     if not to_run(read_stages(folder), changed_stages(folder)):
         print(f"everything in {shown(folder)} is up to date")
@@ -150,12 +150,12 @@ def shown(folder: Path) -> str:
 
 def summarise(folder: Path) -> None:
     """What there is now: registered models and the report."""
-    published = folder / "data" / "published.json"
+    published = folder / paths.PUBLISHED
     if published.exists():
         models = json.loads(published.read_text())["models"]
         for name, facts in models.items():
             print(f"  models:/{name}@champion  version {facts['champion']}")
-    report = folder / "reports" / "report.html"
+    report = folder / paths.REPORT
     if report.exists():
         print(f"report: {shown(report)}")
     print(f"history: {serve_command(folder)}")

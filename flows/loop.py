@@ -20,7 +20,7 @@ from prefect.states import Cancelled, Completed, Failed, State
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from bumblebee.errors import BadInput
-from flows import gates, progress
+from flows import gate_question, progress
 from flows.environment import SERVERS, environment, without_login
 from flows.owned import require_own
 from flows.runs import recorded
@@ -122,7 +122,7 @@ def walk(folder: Path) -> State[Any]:
             continue
         before = [running[name] for name in sorted(stage.needs) if name in running]
         if stage.kind == "gate" and not any(failed(future) for future in before):
-            question = gates.hold(folder, stage)
+            question = gate_question.hold(folder, stage)
             if question is not None:
                 waiting = stage.name
                 log.warning(question)

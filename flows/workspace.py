@@ -11,7 +11,7 @@ import yaml
 import bumblebee
 from bumblebee.errors import BadInput
 from flows.environment import environment
-from tasks import params
+from tasks import params, paths
 
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")
@@ -60,8 +60,8 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
         _write(folder / "params.yaml", text)
     if edited is None:
         _write(folder / GENERATED, text)
-    (folder / "data" / "incoming").mkdir(parents=True, exist_ok=True)
-    _write(folder / "data" / "incoming" / "README.md", (HOME / "data" / "incoming" / "README.md").read_text())
+    (folder / paths.INCOMING).mkdir(parents=True, exist_ok=True)
+    _write(folder / paths.INCOMING / "README.md", (HOME / paths.INCOMING / "README.md").read_text())
     if not (folder / ".dvc" / "config").exists():
         init = [sys.executable, "-m", "dvc", "init", "--no-scm", "-q"]
         subprocess.run(init, cwd=folder, env=environment(folder), check=True)

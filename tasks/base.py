@@ -1,12 +1,12 @@
 """Train the base policy on all training clips: data/filtered -> models/base (paper, section 3.2)."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from bumblebee.learning import pretrained
 from bumblebee.learning.trial import World
 from bumblebee.sim.sensors import load_model
+from tasks import paths
 from tasks.stage import load, run_stage
 from tasks.training import Job, TrainingConfig, train_policy, training_clips
 
@@ -27,7 +27,7 @@ def main() -> None:
     world = World(load_model(physics_hz=config.env.physics_hz), threads=config.env.threads)
     own = [clip for clip in clips if clip.split == "train"]
     parent = pretrained.FOLDER if config.init == "pretrained" else None
-    train_policy(Job("base", "base", Path("models/base"), own, clips, world, parent=parent), config)
+    train_policy(Job("base", "base", paths.BASE, own, clips, world, parent=parent), config)
 
 
 if __name__ == "__main__":

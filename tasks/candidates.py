@@ -12,6 +12,7 @@ from bumblebee.deploy.policy import read_policy_contract
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.untrained import export_untrained
 from bumblebee.learning.export import export_shipped
+from tasks import paths
 from tasks.control_config import ControlConfig
 from tasks.params import load, read
 
@@ -54,17 +55,17 @@ def candidates(scratch: Path | None, untrained: bool = True) -> tuple[list[Candi
     """
     params = read()
     clusters, rounds = params.get("clusters", []), params.get("rounds", [])
-    wanted = [Candidate("base", "base", Path("models/base"))]
+    wanted = [Candidate("base", "base", paths.BASE)]
     wanted += [expert(cluster, number) for number in (0, *(int(r["n"]) for r in rounds)) for cluster in clusters]
-    wanted.append(Candidate("generalist", "generalist", Path("models/generalist")))
+    wanted.append(Candidate("generalist", "generalist", paths.GENERALIST))
     found = [c for c in wanted if (c.folder / "contract.json").exists()]
     missing = [c.policy for c in wanted if c not in found]
     if not found:
-        raise BadInput("models", "at least one exported policy", "none", "Train first.")
+        raise BadInput(paths.MODELS, "at least one exported policy", "none", "Train first.")
     kinds = load("control", ControlConfig).kinds if rounds else ()
     turns = [(cluster, int(r["n"]), int(r["parent"])) for r in rounds for cluster in clusters]
     found += [c for turn in turns for c in beside(*turn, kinds)]
-    if came_along(Path("models/base")) and scratch is not None:
+    if came_along(paths.BASE) and scratch is not None:
         found.insert(0, Candidate("shipped", "shipped", export_shipped(scratch / "shipped")))
     if untrained and scratch is not None:
         export_untrained(found[0].folder, scratch / "untrained")
@@ -74,9 +75,7 @@ def candidates(scratch: Path | None, untrained: bool = True) -> tuple[list[Candi
 
 def expert(cluster: str, number: int) -> Candidate:
     """A cluster's expert of a round."""
-    return Candidate(
-        f"expert-{cluster}-r{number}", "expert", Path(f"models/experts/r{number}/{cluster}"), number, cluster
-    )
+    return Candidate(f"expert-{cluster}-r{number}", "expert", paths.expert(number, cluster), number, cluster)
 
 
 def beside(cluster: str, number: int, parent: int, kinds: Sequence[str]) -> list[Candidate]:
@@ -85,11 +84,11 @@ def beside(cluster: str, number: int, parent: int, kinds: Sequence[str]) -> list
     The policy that it began from, compensated, and the same training without the diagnosis, of these `kinds`: what
     earlier settings left in the folder is not taken.
     """
-    before, plan = expert(cluster, parent), Path(f"models/compensation/r{number}/compensation.json")
+    before, plan = expert(cluster, parent), paths.compensation_plan(number)
     found = [
         Candidate(f"control-{kind}-{cluster}-r{number}", f"control-{kind}", folder, number, cluster)
         for kind in kinds
-        if (folder := Path(f"models/control/r{number}/{cluster}/{kind}/policy")).exists()
+        if (folder := paths.control(number, cluster, kind) / "policy").exists()
     ]
     if plan.exists() and (before.folder / "contract.json").exists():
         undone = plan if any(step.done for step in read_compensation(plan).plan) else None

@@ -11,10 +11,9 @@ from bumblebee.files import save_tensors
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
 from bumblebee.progress import progress
+from tasks import paths
 from tasks.sections import loop
 from tasks.stage import load, log_run, output_folder, run_stage
-
-FILTERED, CLUSTERS, MODEL = Path("data/filtered"), Path("data/clusters"), Path("models/clustering")
 
 
 def main() -> None:
@@ -23,20 +22,24 @@ def main() -> None:
     clips = kept_clips()
     with progress(config.epochs, "text-motion autoencoder", "epochs") as bar:
         result = cluster_clips(clips, names, config, lambda _, note: bar.update(1, note))
-    with output_folder(MODEL) as folder:
+    with output_folder(paths.CLUSTERING) as folder:
         write_model(folder, result, config)
-    with output_folder(CLUSTERS) as folder:
+    with output_folder(paths.CLUSTERS) as folder:
         write_tables(folder, result)
     tell(result)
-    curve = CLUSTERS / "curve.csv"
-    log_run("cluster", params=config, metrics=metrics(result), curve=curve, artifacts=[CLUSTERS, MODEL])
+    curve = paths.CLUSTERS / "curve.csv"
+    log_run(
+        "cluster", params=config, metrics=metrics(result), curve=curve, artifacts=[paths.CLUSTERS, paths.CLUSTERING]
+    )
 
 
 def kept_clips() -> list[Clip]:
     """The clips that the filter kept."""
-    clips = read_library(FILTERED)
+    clips = read_library(paths.FILTERED)
     if not clips:
-        raise BadInput(FILTERED / "index.parquet", "at least one kept motion", "none", "See data/filtered/drops.csv")
+        raise BadInput(
+            paths.FILTERED / "index.parquet", "at least one kept motion", "none", f"See {paths.FILTERED / 'drops.csv'}"
+        )
     return clips
 
 

@@ -12,11 +12,11 @@ from bumblebee.deploy.compensation_evidence import why_unproven
 from bumblebee.deploy.compensation_file import table_of, write_compensation
 from bumblebee.deploy.compensation_limits import CompensationLimits
 from bumblebee.deploy.compensation_plan import compensate
-from bumblebee.io.read import read_json
-from bumblebee.measured.intake import file_hash
+from bumblebee.io.read import file_hash, read_json
 from bumblebee.ranges import Ranged
 from bumblebee.sim.effects import Effect, read_effects
-from tasks.rollouts import parent_round
+from tasks import paths
+from tasks.sections import parent_of
 from tasks.stage import load, log_run, output_folder, run_stage
 
 
@@ -31,10 +31,10 @@ class CompensateConfig(Ranged):
 def main(round: int) -> None:
     """Fill models/compensation/r<round>."""
     config = load("compensate", CompensateConfig)
-    found, target = Path(f"data/diagnosis/r{round}/effects.yaml"), Path(f"models/compensation/r{round}")
-    compensation = undone_after(parent_round(round), found, config.limits)
+    found, target = paths.effects(round), paths.compensation(round)
+    compensation = undone_after(parent_of(round), found, config.limits)
     with output_folder(target) as folder:
-        write_compensation(folder / "compensation.json", compensation)
+        write_compensation(folder / paths.compensation_plan(round).name, compensation)
     undone = sum(bool(step.done) for step in compensation.plan)
     print(table_of(compensation))
     print(f"round {round}: {undone} of {len(compensation.plan)} effects undone at the joint")
@@ -52,7 +52,7 @@ def undone_after(parent: int, found: Path, limits: CompensationLimits) -> Compen
     effects = read_effects(found)
     document = found.parent / "diagnosis.json"
     unproven = why_unproven(read_json(document)) if document.is_file() else ""
-    trained = read_effects(Path(f"data/diagnosis/r{parent}/effects.yaml")) if parent else []
+    trained = read_effects(paths.effects(parent)) if parent else []
     known = {_key(effect) for effect in trained}
     why = {
         index: f"the experts were trained with it in round {parent}" if _key(effect) in known else unproven

@@ -15,9 +15,11 @@ from bumblebee.learning.trial import World
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.observations import action_scale
+from tasks import paths
 from tasks.control_config import ControlConfig
 from tasks.delta import card, declared, train
-from tasks.refine import RefineConfig, parent_of
+from tasks.refine import RefineConfig
+from tasks.sections import parent_of
 from tasks.stage import load, output_folder, run_stage
 from tasks.training import Job, cluster_clips, train_policy
 
@@ -28,7 +30,7 @@ def main(round: int, cluster: str, kind: str) -> None:
     """Fill models/control/r<round>/<cluster>/<kind>."""
     load("control", ControlConfig)
     config = load("refine", RefineConfig)
-    out = Path(f"models/control/r{round}/{cluster}/{kind}")
+    out = paths.control(round, cluster, kind)
     adapter = delta_alone(round, cluster, out / "action") if kind == "delta" else None
     clips, share, tried = cluster_clips(cluster, config.others)
     job = Job(
@@ -39,7 +41,7 @@ def main(round: int, cluster: str, kind: str) -> None:
         tried=tried,
         world=World(load_model(physics_hz=config.env.physics_hz), None, adapter, config.env.threads),
         share=share,
-        parent=Path(f"models/experts/r{parent_of(round)}") / cluster,
+        parent=paths.expert(parent_of(round), cluster),
         cluster=cluster,
         round=round,
         better_of=False,

@@ -5,17 +5,25 @@ It is trained on the rollouts that the diagnosis fitted and judged on those that
 
 import math
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import mujoco
 import pandas as pd
 import torch
 
-from bumblebee.learning.delta import DeltaAction, DeltaConfig, magnitudes, make_network, save_delta
-from bumblebee.learning.delta_env import DeltaEnv
-from bumblebee.learning.delta_gain import Gain, compare, replay_error
-from bumblebee.learning.delta_train import train_delta
-from bumblebee.learning.recordings import Recordings, stack
+from bumblebee.learning.delta import (
+    DeltaAction,
+    DeltaConfig,
+    DeltaEnv,
+    Gain,
+    Recordings,
+    compare,
+    magnitudes,
+    make_network,
+    replay_error,
+    save_delta,
+    stack,
+    train_delta,
+)
 from bumblebee.measured.rollout import read_dataset
 from bumblebee.progress import progress
 from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
@@ -23,6 +31,7 @@ from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.sim.engines import make_engine
 from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.sim.sensors import load_model
+from tasks import paths
 from tasks.diagnosed import split
 from tasks.stage import load, log_run, output_folder, run_stage
 
@@ -60,7 +69,7 @@ def main(round: int, cluster: str) -> None:
     if trained is None:
         leave_out(round, cluster, config, f"no rollout to train on that lasts {config.episode_seconds:g} s")
         return
-    target = Path(f"models/delta/r{round}/{cluster}")
+    target = paths.delta(round, cluster)
     with output_folder(target) as folder:
         save_delta(folder, trained.delta, config.hidden, card(trained, round, cluster, config))
         trained.curve.to_csv(folder / "curve.csv", index=False)
@@ -76,14 +85,13 @@ def main(round: int, cluster: str) -> None:
 
 def corrected(round: int) -> Simulator:
     """The simulator as the round's diagnosis describes the robot."""
-    found = Path(f"data/diagnosis/r{round}")
-    model = load_model(found / "model.xml")
-    return Simulator(model, runtime_hooks(read_effects(found / "effects.yaml"), model))
+    model = load_model(paths.corrected_model(round))
+    return Simulator(model, runtime_hooks(read_effects(paths.effects(round)), model))
 
 
 def declared(round: int) -> Simulator:
     """The simulator as the rollouts' maker declares the robot: no effect is known."""
-    model = load_model(Path(f"data/measured/r{round}") / "model.xml")
+    model = load_model(paths.measured(round) / "model.xml")
     return Simulator(model, runtime_hooks([], model))
 
 
@@ -123,7 +131,7 @@ def leave_out(round: int, cluster: str, config: DeltaConfig, reason: str) -> Non
     gain = Gain(0, {}, False, reason)
     delta = DeltaAction(make_network(config.hidden, len(config.joints)), config.joints, config.limit)
     card = {"round": round, "cluster": cluster, "promoted": False, "held_out": asdict(gain), "train_rollouts": []}
-    with output_folder(f"models/delta/r{round}/{cluster}") as folder:
+    with output_folder(paths.delta(round, cluster)) as folder:
         save_delta(folder, delta, config.hidden, {**card, "magnitude_rad": {}, "config": asdict(config)})
     print(verdict(round, cluster, gain))
     log_run("delta", cluster=cluster, round=round, params=config, tags={"promoted": "false"})
@@ -134,7 +142,7 @@ def recordings(round: int, cluster: str) -> tuple[Recordings | None, Recordings 
 
     A rollout that names no cluster is nobody's: a delta corrects the simulator for one cluster's motions.
     """
-    folder = Path(f"data/measured/r{round}")
+    folder = paths.measured(round)
     declared = load_model(folder / "model.xml")
     train_ids, held_out_ids = split(round)
     everyones = read_dataset(folder).rollouts

@@ -1,7 +1,6 @@
 """Stage diagnose: what the declared model lacks, from the accepted rollouts of one round."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import mujoco
@@ -12,6 +11,7 @@ from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import fill
 from bumblebee.diagnosis.report import summary
 from bumblebee.ranges import Range, Ranged, Seed
+from tasks import paths
 from tasks.stage import load, log_run, output_folder, run_stage
 
 Windows = Annotated[int, Range(least=8, most=100_000)]
@@ -39,12 +39,12 @@ class DiagnoseConfig(Ranged):
 def main(round: int) -> None:
     """Diagnose data/measured/r<N> against its declared model into data/diagnosis/r<N>."""
     config = load("diagnose", DiagnoseConfig)
-    measured = Path(f"data/measured/r{round}")
+    measured = paths.measured(round)
     mujoco.set_mju_user_warning(lambda text: None)  # what is tried and diverges is judged so, not logged
     diagnosis = DiagnosisConfig(**vars(config))
     session = open_session(measured / "model.xml", measured, diagnosis.thresholds.dataset)
     result = diagnose(session, diagnosis, say=lambda text: print(text, flush=True))
-    with output_folder(f"data/diagnosis/r{round}") as folder:
+    with output_folder(paths.diagnosis(round)) as folder:
         fill(result, folder)
     print(summary(result.document, result.problem.thresholds.report))
     log_run("diagnose", round=round, params=config, metrics=_metrics(result.document))

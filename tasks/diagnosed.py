@@ -1,10 +1,11 @@
 """What later stages read of a round's diagnosis."""
 
 import json
-from pathlib import Path
+
+from tasks import paths
 
 
 def split(round: int) -> tuple[set[str], set[str]]:
     """Ids of the rollouts that the diagnosis fitted, and of those that it held out."""
-    content = json.loads(Path(f"data/diagnosis/r{round}/diagnosis.json").read_text())
+    content = json.loads(paths.diagnosis_document(round).read_text())
     return set(content["train"]), set(content["holdout"])

@@ -30,20 +30,19 @@ from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.observations import action_scale
 from bumblebee.tracking.sampler import ClipShares
+from tasks import paths
 from tasks.sections import loop
 from tasks.stage import load, log_run, output_folder, run_stage
-
-OUT, BASE = Path("models/generalist"), Path("models/base")
 
 
 def main() -> None:
     """Fill models/generalist."""
     config, shape = load("distill", DistillConfig), loop()
     clips, cluster = training_clips(shape.clusters)
-    base = load_policy(BASE)
-    folders = [Path(f"models/experts/r{shape.final_round}/{name}") for name in shape.clusters]
+    base = load_policy(paths.BASE)
+    folders = [paths.expert(shape.final_round, name) for name in shape.clusters]
     experts = {i: load_policy(folder) for i, folder in enumerate(folders)}
-    check_task({BASE: base.shape} | {folder: experts[i].shape for i, folder in enumerate(folders)}, config.env)
+    check_task({paths.BASE: base.shape} | {folder: experts[i].shape for i, folder in enumerate(folders)}, config.env)
     model, hooks = simulator(shape.final_round, config.env.physics_hz)
     env = environment(clips, cluster, shape.final_round, hooks, config)
     env.action_adapter = deltas(env, cluster, shape.clusters, shape.final_round)
@@ -55,7 +54,7 @@ def main() -> None:
         "agreement": agreement(generalist, clips, model, hooks, config),
         "config": asdict(config),
     }
-    with output_folder(OUT) as folder:
+    with output_folder(paths.GENERALIST) as folder:
         generalist.save(folder)
         export_policy(folder, generalist, config.env.physics_hz)
         curve.to_csv(folder / "curve.csv", index=False)
@@ -63,15 +62,15 @@ def main() -> None:
     final = {"kl": float(curve["kl"].iloc[-1]), **{f"success/{k}": v for k, v in card["agreement"].items()}}
     rate = card["agreement"]["all"]
     print(f"generalist: KL to the experts {final['kl']:.3f}, success in the corrected simulator {rate:.0%}")
-    log_run("distill", params=config, metrics=final, curve=OUT / "curve.csv", artifacts=[OUT])
+    log_run("distill", params=config, metrics=final, curve=paths.GENERALIST / "curve.csv", artifacts=[paths.GENERALIST])
 
 
 def training_clips(clusters: tuple[str, ...]) -> tuple[list[Clip], list[int]]:
     """The training clips and the index of each one's cluster."""
-    labels = pd.read_parquet("data/clusters/labels.parquet").set_index("name")["cluster"]
-    clips = [clip for clip in read_library(Path("data/filtered")) if clip.split == "train"]
+    labels = pd.read_parquet(paths.LABELS).set_index("name")["cluster"]
+    clips = [clip for clip in read_library(paths.FILTERED) if clip.split == "train"]
     if not clips:
-        raise BadInput("data/filtered", "training clips", "none")
+        raise BadInput(paths.FILTERED, "training clips", "none")
     return clips, [clusters.index(labels[clip.name]) for clip in clips]
 
 
@@ -102,12 +101,12 @@ def simulator(final_round: int, physics_hz: float) -> tuple[mujoco.MjModel, Runt
     if final_round == 0:
         return load_model(physics_hz=physics_hz), None
     model = load_model(corrected(final_round), physics_hz)
-    return model, runtime_hooks(read_effects(Path(f"data/diagnosis/r{final_round}/effects.yaml")), model)
+    return model, runtime_hooks(read_effects(paths.effects(final_round)), model)
 
 
 def corrected(final_round: int) -> Path | None:
     """MJCF of the robot as the last round corrected it; None before any round."""
-    return Path(f"data/diagnosis/r{final_round}/model.xml") if final_round else None
+    return paths.corrected_model(final_round) if final_round else None
 
 
 def environment(
@@ -127,7 +126,7 @@ def deltas(
     """Each world's motion is run with the delta action that its cluster's expert was refined with, if any was kept."""
     if final_round == 0:
         return None
-    kept = {i: load_delta(Path(f"models/delta/r{final_round}/{name}")) for i, name in enumerate(clusters)}
+    kept = {i: load_delta(paths.delta(final_round, name)) for i, name in enumerate(clusters)}
     adapters = {i: action_adapter(delta, action_scale()) for i, delta in kept.items() if delta is not None}
     if not adapters:
         return None

@@ -38,12 +38,12 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
 from bumblebee.progress import progress
 from bumblebee.ranges import Count, Few, Line, Name, Range, Ranged, Seed, Size
+from tasks import paths
 from tasks.candidates import Candidate, candidates, chain, same
 from tasks.params import FILE
-from tasks.rollouts import FILTERED, SEALED, cut, start_stand_in
 from tasks.stage import load, log_run, output_folder, run_stage
+from tasks.stand_in import cut, start_stand_in
 
-OUT = Path("data/evaluation")
 ENGINES = ("nominal", "stand_in")
 
 
@@ -104,7 +104,7 @@ def main() -> None:
         "results": results(episodes),
         "comparisons": [c | {"unchanged": (c["from"], c["to"]) in same_pairs} for c in comparisons(episodes, pairs)],
     }
-    with output_folder(OUT) as folder:
+    with output_folder(paths.EVALUATION) as folder:
         write_contract(folder / "contract.json", contract)
         episodes.to_parquet(folder / "episodes.parquet", index=False)
         (folder / "summary.json").write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n")
@@ -113,18 +113,18 @@ def main() -> None:
         "evaluate",
         params=config,
         metrics=headline(summary),
-        artifacts=[OUT],
+        artifacts=[paths.EVALUATION],
         tags={"evaluation_contract": contract.sha256},
     )
 
 
 def motions(config: EvaluateConfig) -> tuple[list[Clip], dict[str, str]]:
     """The kept clips, thinned and cut, and the cluster of each."""
-    labels = pd.read_parquet("data/clusters/labels.parquet")
+    labels = pd.read_parquet(paths.LABELS)
     cluster_of = dict(zip(labels["name"], labels["cluster"], strict=True))
-    index = read_index(FILTERED)
+    index = read_index(paths.FILTERED)
     names = thin(index.assign(cluster=index["name"].map(cluster_of).fillna("")), config.max_motions)
-    return [cut(clip, config.max_seconds) for clip in read_library(FILTERED, names)], cluster_of
+    return [cut(clip, config.max_seconds) for clip in read_library(paths.FILTERED, names)], cluster_of
 
 
 def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
@@ -132,8 +132,10 @@ def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
     engines = {name: settings(name) for name in config.engines}
     contract = freeze(clips, config.seeds, config.thresholds, config.start_noise, engines, FALL_RULE)
     if config.contract and config.contract != contract.sha256:
-        if (OUT / "contract.json").exists():
-            require_same(read_contract(OUT / "contract.json"), contract.as_dict(), f"{FILE}: evaluate.contract")
+        if (paths.EVALUATION / "contract.json").exists():
+            require_same(
+                read_contract(paths.EVALUATION / "contract.json"), contract.as_dict(), f"{FILE}: evaluate.contract"
+            )
         raise BadInput(
             f"{FILE}: evaluate.contract",
             config.contract[:12],
@@ -147,12 +149,12 @@ def settings(engine: str) -> dict[str, Any]:
     """What the contract says about an engine, from the model that it runs; of the sealed robot only the file's hash."""
     if engine == "nominal":
         return {**engine_settings(NominalRobots(1, 1).model), "sensor_noise": None}
-    if not SEALED.exists():
-        raise BadInput(SEALED, "the sealed robot", "no such file", "Run the stage seal.")
+    if not paths.SEALED_ROBOT.exists():
+        raise BadInput(paths.SEALED_ROBOT, "the sealed robot", "no such file", "Run the stage seal.")
     told = {
         "sensor_noise": asdict(SensorNoise()),
         "judged_by": "true state",
-        "sealed_file_sha256": sha256(SEALED.read_bytes()).hexdigest(),
+        "sealed_file_sha256": sha256(paths.SEALED_ROBOT.read_bytes()).hexdigest(),
     }
     return {**engine_settings(StandInRobots(1, []).model), **told}
 

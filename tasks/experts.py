@@ -1,13 +1,13 @@
 """Fine-tune an expert from base on its cluster's clips: -> models/experts/r0/<cluster> (paper, section 3.2)."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.trial import World
 from bumblebee.ranges import PartOf
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
+from tasks import paths
 from tasks.stage import load, run_stage
 from tasks.training import Job, TrainingConfig, cluster_clips, train_policy
 
@@ -32,12 +32,12 @@ def main(cluster: str) -> None:
     job = Job(
         stage="experts",
         name=f"expert-{cluster}-r0",
-        out=Path("models/experts/r0") / cluster,
+        out=paths.expert(0, cluster),
         clips=clips,
         tried=tried,
         world=world,
         share=share,
-        parent=Path("models/base"),
+        parent=paths.BASE,
         cluster=cluster,
         round=0,
     )

@@ -16,9 +16,9 @@ from bumblebee.report.page import Block, heading, note, still, text
 from bumblebee.report.page import film as film_block
 from bumblebee.report.results import LoopResults, RoundResults
 from bumblebee.robot.model import build_spec
-from tasks.rollouts import FILTERED, cut, start_stand_in
+from tasks import paths
+from tasks.stand_in import cut, start_stand_in
 
-CLUSTERS, EPISODES = Path("data/clusters"), Path("data/evaluation/episodes.parquet")
 _MOST, _LEAD = 3, 4.0  # candidates that are run; seconds of the film before the failure
 _REAL_SPEED = "True joint angles and base pose at real speed; what has fallen stands still and pale."
 
@@ -31,8 +31,8 @@ def film_blocks(results: LoopResults, asked: str, seed: int) -> list[Block]:
         asked: the motion to show; "" for the liveliest.
         seed: of the start state and the sensor noise where one run is shown alone.
     """
-    episodes = pd.read_parquet(EPISODES)
-    speed = pd.read_csv(CLUSTERS / "statistics.csv").set_index("name")["speed"].to_dict()
+    episodes = pd.read_parquet(paths.EPISODES)
+    speed = pd.read_csv(paths.CLUSTERS / "statistics.csv").set_index("name")["speed"].to_dict()
     if results.rounds:
         turn = results.rounds[-1]
         choices = won_back(episodes, speed, turn.n, turn.parent, asked)[:_MOST]
@@ -48,16 +48,14 @@ def pair_blocks(choices: list[Choice], turn: RoundResults, contract: dict[str, A
     compensations, episodes = {}, []
     for choice in choices:
         folders = {
-            "before": Path(f"models/experts/r{turn.parent}/{choice.cluster}"),
-            choice.after: Path(
-                f"models/experts/r{turn.parent if choice.after == COMPENSATED else turn.n}/{choice.cluster}"
-            ),
+            "before": paths.expert(turn.parent, choice.cluster),
+            choice.after: paths.expert(turn.parent if choice.after == COMPENSATED else turn.n, choice.cluster),
         }
         for side, folder in folders.items():
             key = f"{side}-{choice.cluster}"
             policies[key] = folder
             if side == COMPENSATED:
-                compensations[key] = str(compensation_file(turn.n).resolve())
+                compensations[key] = str(paths.compensation_plan(turn.n).resolve())
             episodes.append(
                 {"rollout_id": f"{side}-{choice.motion}", "policy": key, "motion": choice.motion, "seed": choice.seed}
             )
@@ -98,9 +96,9 @@ def ended(rollout: Rollout, frames: int, fails: float | None) -> str:
 def alone(episodes: pd.DataFrame, speed: dict[str, float], asked: str, seed: int) -> list[Block]:
     """One more episode of the generalist on the stand-in."""
     motion, why = chosen_alone(episodes, speed, asked)
-    clips = read_library(FILTERED, [motion])
+    clips = read_library(paths.FILTERED, [motion])
     episode = {"rollout_id": "film", "policy": "generalist", "motion": motion, "seed": seed}
-    rollout = run({"generalist": Path("models/generalist")}, [episode], clips)["film"]
+    rollout = run({"generalist": paths.GENERALIST}, [episode], clips)["film"]
     said = text(
         f"No motion that failed before the round was won back, so one policy is shown: '{motion}', {why}. It is one "
         "more episode, with its own start and sensor noise, and may end otherwise than those that were counted."
@@ -134,13 +132,8 @@ def chosen_alone(episodes: pd.DataFrame, speed: dict[str, float], asked: str) ->
 def as_evaluated(names: Iterable[str], contract: dict[str, Any]) -> list[Clip]:
     """The clips as long as the evaluation's contract has them."""
     frames = {motion["name"]: motion["frames"] for motion in contract["motions"]}
-    clips = read_library(FILTERED, list(dict.fromkeys(names)))
+    clips = read_library(paths.FILTERED, list(dict.fromkeys(names)))
     return [cut(clip, (frames[clip.name] - 0.5) / clip.fps) for clip in clips]
-
-
-def compensation_file(n: int) -> Path:
-    """What round `n` undoes at the joints."""
-    return Path(f"models/compensation/r{n}/compensation.json")
 
 
 def run(

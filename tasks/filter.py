@@ -1,30 +1,27 @@
 """Drop the motions that break a kinematic rule: data/motions -> data/filtered, with drops.csv saying why."""
 
-from pathlib import Path
-
 import pandas as pd
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.filter import FilterConfig, filter_clips
 from bumblebee.motion.store import read_library, write_library
+from tasks import paths
 from tasks.stage import load, log_run, output_folder, run_stage
-
-MOTIONS, FILTERED = Path("data/motions"), Path("data/filtered")
 
 
 def main() -> None:
     """Filter the library; the result is a library of its own."""
     config = load("filter", FilterConfig)
-    clips = read_library(MOTIONS)
+    clips = read_library(paths.MOTIONS)
     kept, drops = filter_clips(clips, config)
     tell(len(clips), drops)
     if not kept:
         came = f"all {len(clips)} dropped; the first: {drops['motion'].iloc[0]}: {drops['explanation'].iloc[0]}"
-        raise BadInput(MOTIONS, "at least one motion within the limits", came, "Check the limits under `filter`.")
-    with output_folder(FILTERED) as folder:
+        raise BadInput(paths.MOTIONS, "at least one motion within the limits", came, "Check the limits under `filter`.")
+    with output_folder(paths.FILTERED) as folder:
         write_library(folder, kept)
         drops.to_csv(folder / "drops.csv", index=False)
-    log_run("filter", params=config, metrics=metrics(len(clips), drops), artifacts=[FILTERED / "drops.csv"])
+    log_run("filter", params=config, metrics=metrics(len(clips), drops), artifacts=[paths.FILTERED / "drops.csv"])
 
 
 def metrics(before: int, drops: pd.DataFrame) -> dict[str, float]:
@@ -37,7 +34,7 @@ def metrics(before: int, drops: pd.DataFrame) -> dict[str, float]:
 def tell(before: int, drops: pd.DataFrame) -> None:
     """One line of counts, one for each rule broken with its worst case."""
     dropped = drops["motion"].nunique()
-    print(f"{before - dropped} of {before} clips kept, {dropped} dropped -> {FILTERED}")
+    print(f"{before - dropped} of {before} clips kept, {dropped} dropped -> {paths.FILTERED}")
     for rule, group in drops.groupby("rule"):
         worst = group.loc[group["value"].idxmax()]
         print(f"{rule}: {len(group)}; the worst is {worst['motion']}: {worst['explanation']}")

@@ -9,6 +9,7 @@ from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
+from tasks import paths
 from tasks.params import load
 from tasks.stage import run_stage
 
@@ -18,7 +19,7 @@ KEPT = ("round", "status", "by", "known_by", "at", "note", "seen")  # of an answ
 
 def main(round: int) -> None:
     """Write data/gates/round-N.json if the answer is yes; end with status 3 (no answer yet) or 4 (rejected)."""
-    place, passed = gate.Gate(Path.cwd(), round), Path(f"data/gates/round-{round}.json")
+    place, passed = gate.Gate(Path.cwd(), round), paths.gate(round)
     passed.unlink(missing_ok=True)
     table = gate.settle(place, automatic())
     if table["status"] == "pending":

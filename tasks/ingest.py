@@ -10,17 +10,18 @@ from typing import Annotated, Any
 import mujoco
 
 from bumblebee.errors import BadInput
-from bumblebee.io.read import read_json
+from bumblebee.io.read import file_hash, read_json
 from bumblebee.measured import gate, gate_words
-from bumblebee.measured.intake import IntakeSummary, file_hash, incoming_files, intake, merge
+from bumblebee.measured.checks import Thresholds
+from bumblebee.measured.intake import IntakeSummary, incoming_files, intake, merge
 from bumblebee.measured.model_file import copy_model, load_model
 from bumblebee.measured.overview import write_overview
 from bumblebee.measured.rollout import copy_of_cluster, read_rollout
 from bumblebee.measured.summary import summary_table
-from bumblebee.measured.thresholds import Thresholds
 from bumblebee.progress import progress
 from bumblebee.ranges import Line, Name, Range, Ranged
 from bumblebee.robot.model import write_xml
+from tasks import paths
 from tasks.stage import load, log_run, output_folder, run_stage
 
 
@@ -28,7 +29,7 @@ from tasks.stage import load, log_run, output_folder, run_stage
 class IngestConfig(Ranged):
     """Where measured rollouts come from."""
 
-    incoming: Name = "data/rollouts/r{round}"
+    incoming: Name = paths.ROLLOUTS_OF_ROUND
     """Folder of a round: datasets in folders of their own, one a cluster, or one dataset. `{round}` is its number."""
     model: Line = ""
     """The declared MJCF; empty: the model.xml beside the rollouts, or else this project's G1."""
@@ -50,7 +51,7 @@ def main(round: int) -> None:
     config = load("ingest", IngestConfig)
     incoming = Path(incoming_of(config.incoming, round))
     folders = dataset_folders(incoming)
-    with output_folder(f"data/measured/r{round}") as out:
+    with output_folder(paths.measured(round)) as out:
         write_model(folders, config.model, out / "model.xml")
         limits = Thresholds(gains_relative=config.gains_tolerance)
         batch = sort_rollouts(folders, out, policy_contracts(folders, round), limits, incoming)
@@ -58,7 +59,7 @@ def main(round: int) -> None:
         if not batch.accepted:
             kept = keep_rejected(out, round)
             raise BadInput(folders[0].parent, "at least one rollout that can be used", _came(batch), f"See {kept}.")
-    shutil.rmtree(f"data/rejected/r{round}", ignore_errors=True)
+    shutil.rmtree(paths.rejected(round), ignore_errors=True)
     ask(round)
     counts = {key: float(table[key]) for key in ("accepted", "quarantined", "seconds")}
     log_run("ingest", round=round, params=config, metrics=counts)
@@ -101,7 +102,7 @@ def policy_contracts(folders: list[Path], round: int) -> dict[str, dict[str, Any
     """Cluster -> contract of the policy that was deployed: beside the rollouts, or the expert of the round before."""
     contracts = {}
     for folder in folders:
-        for path in (folder / "contract.json", Path(f"models/experts/r{round - 1}/{folder.name}/contract.json")):
+        for path in (folder / "contract.json", paths.expert(round - 1, folder.name) / "contract.json"):
             if folder.name not in contracts and path.is_file():
                 contracts[folder.name] = read_contract(path)
     return contracts
@@ -169,7 +170,7 @@ def write_results(batch: IntakeSummary, round: int, out: Path) -> dict[str, Any]
 
 def keep_rejected(out: Path, round: int) -> Path:
     """Findings, plots and quarantine of a round of which nothing can be used, beside the pipeline: data/rejected/rN."""
-    target = Path(f"data/rejected/r{round}")
+    target = paths.rejected(round)
     with output_folder(target) as folder:
         for name in ("findings.csv", "overview.html", "quarantine"):
             if (out / name).exists():

@@ -11,9 +11,9 @@ from bumblebee.motion.pieces import hold_out
 from bumblebee.motion.store import write_library
 from bumblebee.progress import progress
 from bumblebee.ranges import Name, PartOf, Ranged, Unfit
+from tasks import paths
 from tasks.stage import load, log_run, run_stage
 
-MOTIONS = Path("data/motions")
 EMBEDDED = "embedded"
 CONTROL_HZ = 50.0
 
@@ -43,9 +43,9 @@ def main() -> None:
     config = load("motions", MotionsConfig)
     reading = gather(config)
     clips = hold_out(reading.clips, config.holdout_share)
-    write_library(MOTIONS, clips, reading.skipped)
+    write_library(paths.MOTIONS, clips, reading.skipped)
     tell(clips, reading)
-    log_run("motions", params=config, metrics=metrics(clips, reading), artifacts=[MOTIONS / "skipped.csv"])
+    log_run("motions", params=config, metrics=metrics(clips, reading), artifacts=[paths.MOTIONS / "skipped.csv"])
 
 
 def gather(config: MotionsConfig) -> Reading:
@@ -74,7 +74,7 @@ def metrics(clips: list[Clip], reading: Reading) -> dict[str, float]:
 def tell(clips: list[Clip], reading: Reading) -> None:
     """One line of counts, and one for each reason why files were skipped."""
     counts = metrics(clips, reading)
-    print(f"{counts['clips']} clips, {counts['minutes']:.1f} minutes, {counts['held_out']} held out -> {MOTIONS}")
+    print(f"{counts['clips']} clips, {counts['minutes']:.1f} minutes, {counts['held_out']} held out -> {paths.MOTIONS}")
     for reason, group in reading.skipped.groupby("reason"):
         which = group["file"].iloc[0] + (f" and {len(group) - 1} more" if len(group) > 1 else "")
         print(f"skipped {which}: {reason}")

@@ -1,10 +1,11 @@
-"""One section of params.yaml as the frozen dataclass of its stage: every key known, present and of its type."""
+"""The sections of params.yaml, each as the frozen dataclass of its stage: every key known, present and of its type."""
 
 import difflib
 import math
 import re
 import types
 import typing
+from collections.abc import Iterable
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin
@@ -14,6 +15,28 @@ from bumblebee.io.read import read_yaml
 from bumblebee.ranges import Unfit, annotations, describe, element_kinds, fault, shown
 
 FILE = Path("params.yaml")
+# Which dataclass each section is, by module and name: the module is imported by whoever checks the whole file.
+SECTIONS = {
+    "seal": "tasks.seal:SealConfig",
+    "motions": "tasks.motions:MotionsConfig",
+    "filter": "bumblebee.motion.filter:FilterConfig",
+    "cluster": "bumblebee.clustering.config:ClusterConfig",
+    "base": "tasks.base:BaseConfig",
+    "experts": "tasks.experts:ExpertsConfig",
+    "rollouts": "tasks.rollouts_config:RolloutsConfig",
+    "ingest": "tasks.ingest:IngestConfig",
+    "gate": "bumblebee.measured.gate:GateConfig",
+    "diagnose": "tasks.diagnose:DiagnoseConfig",
+    "compensate": "tasks.compensate:CompensateConfig",
+    "delta": "bumblebee.learning.delta:DeltaConfig",
+    "refine": "tasks.refine:RefineConfig",
+    "control": "tasks.control_config:ControlConfig",
+    "distill": "bumblebee.learning.distill:DistillConfig",
+    "evaluate": "tasks.evaluate:EvaluateConfig",
+    "publish": "tasks.publish:PublishConfig",
+    "report": "tasks.report:ReportConfig",
+}
+LOOP = ("clusters", "rounds", "final_round")
 EXPONENT = re.compile(r"[-+]?[0-9]+e[-+]?[0-9]+", re.IGNORECASE)
 Config = TypeVar("Config")
 
@@ -39,11 +62,22 @@ def load(section: str, kind: type[Config], path: Path = FILE) -> Config:
         BadInput: for an unknown or missing key or a value of the wrong type; the line names file, key, what was
             expected, what came, and the nearest known key.
     """
-    from tasks.sections import check_names
-
     content = read(path)
     check_names(content, path)
     return section_of(content, section, kind, path)
+
+
+def check_names(content: Iterable[str], path: Path) -> None:
+    """Refuse a key at the top of the file that nothing reads.
+
+    Raises:
+        BadInput: naming it and the known key most like it.
+    """
+    known = [*LOOP, *SECTIONS]
+    for section in content:
+        if section not in known:
+            said = shown(section, bare=True)
+            raise BadInput(f"{path}: {said}", "a known section", "an unknown one", nearest(said, known))
 
 
 def section_of(content: dict[str, Any], section: str, kind: type[Config], path: Path) -> Config:
@@ -142,7 +176,7 @@ def _one_of(args: tuple[Any, ...], value: Any, path: Path | str, place: str, kin
     raise BadInput(f"{path}: {place}", describe(kind), _said(value))
 
 
-def nearest(key: str, known: typing.Iterable[str]) -> str:
+def nearest(key: str, known: Iterable[str]) -> str:
     """A question that names the known key most like `key`; empty where none is."""
     near = difflib.get_close_matches(key, list(known), n=1, cutoff=0.5)
     return f"Did you mean {near[0]}?" if near else ""

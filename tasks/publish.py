@@ -13,16 +13,13 @@ from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.summary import compare
 from bumblebee.ranges import Ranged
-from tasks import registry
+from tasks import paths, registry
 from tasks.lineage import path_hash
 from tasks.model_card import Evaluated, licences_of, model_card
 from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both, unchanged
-from tasks.rollouts import RolloutsConfig
+from tasks.rollouts_config import RolloutsConfig
 from tasks.sections import Loop, loop
 from tasks.stage import load, output_file, run_stage
-
-EVALUATION, OUT = Path("data/evaluation"), Path("data/published.json")
-MOTIONS = Path("data/filtered")
 
 
 @dataclass(frozen=True)
@@ -69,8 +66,8 @@ def main() -> None:
     """Register, promote, and write down what is published."""
     config, shape = load("publish", PublishConfig), loop()
     engine = deciding_engine(config.engine)
-    summary = json.loads((EVALUATION / "summary.json").read_text())
-    episodes = pd.read_parquet(EVALUATION / "episodes.parquet")
+    summary = json.loads((paths.EVALUATION / "summary.json").read_text())
+    episodes = pd.read_parquet(paths.EPISODES)
     contract = str(summary["contract_sha256"])
     models: dict[str, Any] = {}
     for candidate in candidates(shape):
@@ -87,21 +84,21 @@ def main() -> None:
         made, champion, reason = (models[name][key] for key in ("version", "champion", "reason"))
         print(f"{name}: version {made}, champion is {champion} ({reason})")
     content = {"schema": 1, "evaluation_contract": contract, "engine": engine, "models": models}
-    with output_file(OUT) as file:
+    with output_file(paths.PUBLISHED) as file:
         file.write_text(json.dumps(content, indent=1) + "\n")
 
 
 def candidates(shape: Loop) -> Iterator[Candidate]:
     """Every policy in the order in which it was trained, so that a later round meets its parent's version."""
-    base = Path("models/base")
+    base = paths.BASE
     yield Candidate("base", "base", base, None)
     for cluster in shape.clusters:
         for number in range(shape.final_round + 1):
-            folder = Path(f"models/experts/r{number}/{cluster}")
+            folder = paths.expert(number, cluster)
             parent = f"expert-{cluster}-r{number - 1}" if number else "base"
-            its_folder = Path(f"models/experts/r{number - 1}/{cluster}") if number else base
+            its_folder = paths.expert(number - 1, cluster) if number else base
             yield Candidate(f"expert-{cluster}", f"expert-{cluster}-r{number}", folder, parent, its_folder)
-    yield Candidate("generalist", "generalist", Path("models/generalist"), None)
+    yield Candidate("generalist", "generalist", paths.GENERALIST, None)
 
 
 def is_unchanged(candidate: Candidate) -> bool:
@@ -142,7 +139,7 @@ def result_of(summary: dict[str, Any], policy: str, engine: str) -> dict[str, An
     """
     results = [entry for entry in summary["results"] if entry["engine"] == engine]
     if not results:
-        raise BadInput(EVALUATION / "summary.json", f"results on {engine}", "none", "Add it to evaluate.engines.")
+        raise BadInput(paths.EVALUATION / "summary.json", f"results on {engine}", "none", "Add it to evaluate.engines.")
     for entry in results:
         if (entry["policy"], entry["split"], entry["group_by"]) == (policy, "all", "all"):
             return dict(entry)
@@ -172,7 +169,7 @@ def publish(candidate: Candidate, result: dict[str, Any], standard: Standard, re
     tags |= {"dvc_policy": path_hash(candidate.folder), "promotion": verdict.reason}
     tags |= {name: f"{value:.6g}" for name, value in metrics.items() if value is not None}
     evaluated = Evaluated(standard.contract, standard.engine, result)
-    licences = licences_of(MOTIONS)
+    licences = licences_of(paths.FILTERED)
     card = model_card(candidate.model, candidate.policy, candidate.folder, candidate.parent, evaluated, licences)
     version = registry.register(candidate.model, candidate.folder, tags, metrics, card)
     if verdict.promoted:

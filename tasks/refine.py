@@ -9,7 +9,6 @@ import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bumblebee.errors import BadInput
 from bumblebee.learning.delta import action_adapter, load_delta
 from bumblebee.learning.ppo import CURVE
 from bumblebee.learning.trial import World
@@ -17,8 +16,9 @@ from bumblebee.sim.effects import read_effects, runtime_hooks
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.observations import action_scale
+from tasks import paths
 from tasks.experts import ExpertsConfig
-from tasks.sections import loop
+from tasks.sections import parent_of
 from tasks.stage import load, log_run, output_folder, run_stage
 from tasks.training import Job, cluster_clips, train_policy
 
@@ -36,7 +36,7 @@ class RefineConfig(ExpertsConfig):
 def main(round: int, cluster: str) -> None:
     """Fill models/experts/r<round>/<cluster>."""
     config = load("refine", RefineConfig)
-    parent, out = Path(f"models/experts/r{parent_of(round)}") / cluster, Path(f"models/experts/r{round}") / cluster
+    parent, out = paths.expert(parent_of(round), cluster), paths.expert(round, cluster)
     if not learned(round, cluster):
         keep(parent, out, round)
         print(f"round {round}, {cluster}: nothing was found that the model lacks: the expert stays what it is")
@@ -54,15 +54,15 @@ def main(round: int, cluster: str) -> None:
         parent=parent,
         cluster=cluster,
         round=round,
-        model=Path(f"data/diagnosis/r{round}/model.xml"),
+        model=paths.corrected_model(round),
     )
     train_policy(job, config)
 
 
 def learned(round: int, cluster: str) -> bool:
     """Whether the round changed the simulator: an effect was found, or the cluster's delta action was kept."""
-    effects = read_effects(Path(f"data/diagnosis/r{round}/effects.yaml"))
-    return bool(effects) or load_delta(Path(f"models/delta/r{round}/{cluster}")) is not None
+    effects = read_effects(paths.effects(round))
+    return bool(effects) or load_delta(paths.delta(round, cluster)) is not None
 
 
 def keep(parent: Path, out: Path, round: int) -> None:
@@ -75,20 +75,11 @@ def keep(parent: Path, out: Path, round: int) -> None:
         (folder / "card.json").write_text(json.dumps(card, indent=1) + "\n")
 
 
-def parent_of(round: int) -> int:
-    """The round whose experts this one refines."""
-    for item in loop().rounds:
-        if item.n == round:
-            return item.parent
-    raise BadInput("params.yaml: rounds", f"round {round}", f"{[item.n for item in loop().rounds]}")
-
-
 def corrected_world(round: int, cluster: str, physics_hz: float, threads: int) -> World:
     """The simulator as the round's diagnosis and delta action describe the robot."""
-    folder = Path(f"data/diagnosis/r{round}")
-    model = load_model(folder / "model.xml", physics_hz)
-    hooks = runtime_hooks(read_effects(folder / "effects.yaml"), model)
-    delta = load_delta(Path(f"models/delta/r{round}/{cluster}"))
+    model = load_model(paths.corrected_model(round), physics_hz)
+    hooks = runtime_hooks(read_effects(paths.effects(round)), model)
+    delta = load_delta(paths.delta(round, cluster))
     adapter = action_adapter(delta, action_scale()) if delta is not None else None
     return World(model, hooks, adapter, threads)
 

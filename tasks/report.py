@@ -22,13 +22,12 @@ from bumblebee.report.results import LoopResults, RoundResults
 from bumblebee.report.round_sections import round_section
 from bumblebee.report.verdict import verdict
 from bumblebee.report.wording import plural
-from tasks.film import compensation_file, film_blocks
+from tasks import paths
+from tasks.film import film_blocks
 from tasks.lineage import git_sha
-from tasks.rollouts import SEALED, RolloutsConfig
+from tasks.rollouts_config import RolloutsConfig
 from tasks.sections import Loop, Round, loop
 from tasks.stage import load, log_run, output_file, run_stage
-
-OUT = Path("reports/report.html")
 
 
 @dataclass(frozen=True)
@@ -56,29 +55,29 @@ def main() -> None:
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     subtitle = f"{when} · code {git_sha()[:12]} · evaluation contract {results.evaluation['contract_sha256'][:12]}"
     page = render(config.title, subtitle, verdict(results), picture(results), sections, opening(results, film))
-    with output_file(OUT) as file:
+    with output_file(paths.REPORT) as file:
         file.write_text(page)
-    print(f"report: {OUT} ({OUT.stat().st_size / 1e6:.1f} MB)")
+    print(f"report: {paths.REPORT} ({paths.REPORT.stat().st_size / 1e6:.1f} MB)")
     for line in opening_lines(results):
         print(f"  {line}")
-    log_run("report", params=config, artifacts=[OUT])
+    log_run("report", params=config, artifacts=[paths.REPORT])
 
 
 def collect(shape: Loop) -> LoopResults:
     """Read what the stages left."""
-    library, evaluation = read_index(Path("data/motions")), _json(Path("data/evaluation/summary.json"))
-    base = _json(Path("models/base/card.json"))
+    library, evaluation = read_index(paths.MOTIONS), _json(paths.EVALUATION / "summary.json")
+    base = _json(paths.BASE / "card.json")
     return LoopResults(
         library=library,
-        skipped=_table(Path("data/motions/skipped.csv"), ("file", "reason")),
-        drops=_table(Path("data/filtered/drops.csv"), ("motion", "rule", "explanation")),
-        labels=pd.read_parquet("data/clusters/labels.parquet"),
-        elbow=pd.read_csv("data/clusters/elbow.csv"),
-        clusters=_json(Path("data/clusters/summary.json")),
+        skipped=_table(paths.MOTIONS / "skipped.csv", ("file", "reason")),
+        drops=_table(paths.FILTERED / "drops.csv", ("motion", "rule", "explanation")),
+        labels=pd.read_parquet(paths.LABELS),
+        elbow=pd.read_csv(paths.CLUSTERS / "elbow.csv"),
+        clusters=_json(paths.CLUSTERS / "summary.json"),
         curves=dict(curves(shape)),
         evaluation=with_reference(evaluation),
-        contract=_json(Path("data/evaluation/contract.json")),
-        published=_json(Path("data/published.json")),
+        contract=_json(paths.EVALUATION / "contract.json"),
+        published=_json(paths.PUBLISHED),
         sealed=sealed_truth(),
         rounds=tuple(round_results(turn, shape.clusters) for turn in shape.rounds if turn.n <= shape.final_round),
         pretrained=base.get("parent") == "pretrained",
@@ -92,7 +91,7 @@ def with_reference(evaluation: dict[str, Any]) -> dict[str, Any]:
     names = list(dict.fromkeys(entry["policy"] for entry in evaluation["results"]))
     there = {(c["from"], c["to"]) for c in evaluation["comparisons"]}
     lacking = [(first, name) for name in names if name not in (first, "untrained") and (first, name) not in there]
-    more = comparisons(pd.read_parquet("data/evaluation/episodes.parquet"), lacking)
+    more = comparisons(pd.read_parquet(paths.EPISODES), lacking)
     unchanged = [{"unchanged": True} if same_files(evaluation, first, c["to"]) else {} for c in more]
     added = [{**c, **mark} for c, mark in zip(more, unchanged, strict=True)]
     return {**evaluation, "comparisons": [*evaluation["comparisons"], *added]}
@@ -100,16 +99,16 @@ def with_reference(evaluation: dict[str, Any]) -> dict[str, Any]:
 
 def sealed_truth() -> dict[str, Any] | None:
     """What was sealed in the stand-in; None where the measured rollouts are of the user's robot."""
-    return _json(SEALED) if load("rollouts", RolloutsConfig).source is None else None
+    return _json(paths.SEALED_ROBOT) if load("rollouts", RolloutsConfig).source is None else None
 
 
 def curves(shape: Loop) -> Iterator[tuple[str, pd.DataFrame]]:
     """Each policy's learning curve, where it has one."""
-    folders = {"base": Path("models/base")}
+    folders = {"base": paths.BASE}
     for number in range(shape.final_round + 1):
         for cluster in shape.clusters:
-            folders[f"expert-{cluster} r{number}"] = Path(f"models/experts/r{number}/{cluster}")
-    folders["generalist"] = Path("models/generalist")
+            folders[f"expert-{cluster} r{number}"] = paths.expert(number, cluster)
+    folders["generalist"] = paths.GENERALIST
     for name, folder in folders.items():
         if (folder / "curve.csv").exists():
             yield name, pd.read_csv(folder / "curve.csv")
@@ -117,13 +116,13 @@ def curves(shape: Loop) -> Iterator[tuple[str, pd.DataFrame]]:
 
 def round_results(turn: Round, clusters: tuple[str, ...]) -> RoundResults:
     """One round's intake, gate, diagnosis, compensation and delta actions."""
-    n, plan = turn.n, compensation_file(turn.n)
-    cards = {cluster: Path(f"models/delta/r{n}/{cluster}/card.json") for cluster in clusters}
+    n, plan = turn.n, paths.compensation_plan(turn.n)
+    cards = {cluster: paths.delta(n, cluster) / "card.json" for cluster in clusters}
     return RoundResults(
         n=n,
-        intake=_json(Path(f"data/measured/r{n}/summary.json")),
-        gate=_json(Path(f"data/gates/round-{n}.json")),
-        diagnosis=_json(Path(f"data/diagnosis/r{n}/diagnosis.json")),
+        intake=_json(paths.measured(n) / "summary.json"),
+        gate=_json(paths.gate(n)),
+        diagnosis=_json(paths.diagnosis_document(n)),
         deltas={cluster: _json(path) for cluster, path in cards.items() if path.exists()},
         parent=turn.parent,
         compensation=_json(plan) if plan.exists() else None,

@@ -5,20 +5,13 @@ The robot is the stand-in, a process of its own, or, where `rollouts.source` nam
 the copy of a file that names none names it, a file that names another is refused.
 """
 
-import json
-import os
 import shutil
-import subprocess
-import sys
 import tempfile
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
 
-import bumblebee
 from bumblebee.deploy.episodes import Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import NominalRobots
@@ -29,50 +22,23 @@ from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.measured.rollout import copy_of_cluster
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
-from bumblebee.ranges import Count, Few, Place, Range, Ranged, Seed
 from bumblebee.robot.model import write_xml
-from tasks.params import FILE, read
+from tasks import paths
+from tasks.rollouts_config import RolloutsConfig
+from tasks.sections import parent_of
 from tasks.stage import load, log_run, output_folder, run_stage
-
-FILTERED, SEALED = Path("data/filtered"), Path("data/sealed/robot.json")
-
-
-@dataclass(frozen=True)
-class RolloutsConfig(Ranged):
-    """What is run on the robot in a round."""
-
-    motions: Count = 6
-    """Motions of the cluster (paper: 20)."""
-    repeats: Few = 2
-    """Rollouts of each motion (paper: 8)."""
-    seed: Seed = 11
-    """Of the choice of motions, the start states and the sensor noise."""
-    source: Place | None = None
-    """Folder of the user's own measured rollouts; nothing: the stand-in robot runs. New files in data/incoming are seen
-    by themselves; with another folder, run `dvc repro -f` for this stage."""
-    threads: Few = 2
-    """CPU threads of the stand-in."""
-    base: Literal["mocap", "odometry", "none"] = "mocap"
-    """What the stand-in knows of its base's place: motion capture of 1 mm; odometry that drifts, as on a robot in the
-    field; none: the policy gets the odometry and the log no base_pos."""
-    max_seconds: Annotated[float, Range(least=0.1, most=3600)] = 10.0
-    """Longer clips are cut to their beginning [s]."""
-    stop_tilt: Annotated[float, Range(above=0, most=180)] = 25.0
-    """The operator stops the stand-in where its pelvis leans so far away from its reference [degrees]: what comes after
-    is a fall, of which the drives' logs say nothing that a model could be fitted to."""
-    stop_drop: Annotated[float, Range(above=0, most=2)] = 0.2
-    """The same where it is so far below [m]."""
+from tasks.stand_in import cut, start_stand_in
 
 
 def main(round: int, cluster: str) -> None:
     """Fill data/rollouts/r<round>/<cluster>."""
     config = load("rollouts", RolloutsConfig)
-    target = Path(f"data/rollouts/r{round}/{cluster}")
+    target = paths.rollouts(round, cluster)
     with output_folder(target) as folder:
         if config.source is not None:
             copy_users(config.source / f"r{round}" / cluster, folder)
         else:
-            policy = Path(f"models/experts/r{parent_round(round)}/{cluster}")
+            policy = paths.expert(parent_of(round), cluster)
             clips = draw(candidates(cluster, config.max_seconds), config, round, cluster)
             chosen = choose(policy, clips, config)
             chosen.to_csv(folder / "chosen.csv", index=False)
@@ -83,15 +49,6 @@ def main(round: int, cluster: str) -> None:
         count = len(list((folder / "rollouts").glob("*.parquet")))
     print(f"round {round}, {cluster}: {count} measured rollouts in {target}")
     log_run("rollouts", cluster=cluster, round=round, params=config, metrics={"rollouts": count})
-
-
-def parent_round(round: int, rounds: list[dict[str, Any]] | None = None) -> int:
-    """The round whose experts are run in this one, from `rounds` in params.yaml."""
-    listed = read().get("rounds", []) if rounds is None else rounds
-    for entry in listed:
-        if isinstance(entry, dict) and entry.get("n") == round and "parent" in entry:
-            return int(entry["parent"])
-    raise BadInput(f"{FILE}: rounds", f"an entry with n: {round} and its parent", str(listed))
 
 
 def draw(clips: list[Clip], config: RolloutsConfig, round: int, cluster: str) -> list[Clip]:
@@ -130,27 +87,20 @@ def followed(policy: Path, clips: list[Clip], threads: int) -> pd.DataFrame:
 
 def candidates(cluster: str, max_seconds: float) -> list[Clip]:
     """Kept clips of the cluster that were trained on, cut to their beginning where they are longer."""
-    labels = pd.read_parquet("data/clusters/labels.parquet")
-    index = read_index(FILTERED)
+    labels = pd.read_parquet(paths.LABELS)
+    index = read_index(paths.FILTERED)
     usable = set(index["name"][index["split"] == "train"])
     names = [name for name in labels["name"][labels["cluster"] == cluster] if name in usable]
     if not names:
-        raise BadInput("data/clusters/labels.parquet", f"motions of {cluster} in the train split", "none")
-    return [cut(clip, max_seconds) for clip in read_library(FILTERED, names)]
-
-
-def cut(clip: Clip, seconds: float) -> Clip:
-    """The beginning of a clip, at most `seconds` long."""
-    frames = min(clip.frames, int(seconds * clip.fps) + 1)
-    arrays = {name: getattr(clip, name)[:frames] for name in ("root_pos", "root_quat", "joint_pos", "key_pos")}
-    return replace(clip, **arrays)
+        raise BadInput(paths.LABELS, f"motions of {cluster} in the train split", "none")
+    return [cut(clip, max_seconds) for clip in read_library(paths.FILTERED, names)]
 
 
 def run_stand_in(
     policy: Path, cluster: str, clips: list[Clip], folder: Path, config: RolloutsConfig, round: int
 ) -> None:
     """Start the stand-in as its own process and wait; its one line of complaint becomes ours."""
-    name, parent = f"expert-{cluster}", parent_round(round)
+    name, parent = f"expert-{cluster}", parent_of(round)
     used = {"name": name, "version": f"r{parent}", "sha256": ExportedPolicy.load(policy).sha256}
     episodes = [
         {
@@ -168,28 +118,6 @@ def run_stand_in(
     with tempfile.TemporaryDirectory() as scratch:
         write_library(Path(scratch) / "clips", clips)
         start_stand_in(plan, Path(scratch) / "clips", folder / "rollouts", Path(scratch), config.threads)
-
-
-def start_stand_in(
-    plan: dict[str, Any], clips: Path, out: Path, work: Path, threads: int, sealed: Path = SEALED
-) -> None:
-    """Run a plan on the stand-in robot, in another process, which alone reads the sealed effects."""
-    if not sealed.exists():
-        raise BadInput(sealed, "the sealed robot", "no such file", "Run the stage seal.")
-    file = work / "plan.json"
-    file.write_text(json.dumps(plan))
-    command = [sys.executable, "-m", "bumblebee.deploy.stand_in", "--sealed", str(sealed), "--clips", str(clips)]
-    command += ["--plan", str(file), "--out", str(out), "--threads", str(threads), "--with-parent"]
-    # The same code as ours, also where it is not installed and the workspace is elsewhere.
-    code = os.pathsep.join(filter(None, (str(Path(bumblebee.__file__).parents[1]), os.environ.get("PYTHONPATH"))))
-    ended = subprocess.run(
-        command, stderr=subprocess.PIPE, text=True, check=False, env={**os.environ, "PYTHONPATH": code}
-    )
-    if ended.returncode:
-        lines = ended.stderr.strip().splitlines()
-        raise BadInput(
-            "stand-in robot", "its process to end with status 0", f"{ended.returncode}: {lines[-1] if lines else ''}"
-        )
 
 
 def copy_users(source: Path, folder: Path) -> None:

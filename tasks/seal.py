@@ -23,11 +23,12 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library
 from bumblebee.ranges import Count, Few, Name, PartOf, Range, Ranged, Seed, Share
 from bumblebee.robot.facts import g1_bodies, joint_names
-from tasks.rollouts import FILTERED, RolloutsConfig, cut
+from tasks import paths
+from tasks.rollouts_config import RolloutsConfig
 from tasks.seal_trial import Trial, followed, try_robot
 from tasks.stage import load, output_file, run_stage
+from tasks.stand_in import cut
 
-OUT = Path("data/sealed/robot.json")
 WORSE = 1.1  # sizes of a draw over those of the draw before
 SMALLEST = 0.4  # share of a kind's largest size that every size has, before `severity`
 LIGHT = 0.25  # kg: bodies below are left out, an effect on them is none
@@ -102,7 +103,7 @@ def main() -> None:
     config = load("seal", SealConfig)
     rehearsed = load("rollouts", RolloutsConfig).source is None
     sealed = found(config) if config.n_effects and rehearsed else sealed_robot(config, 0)
-    with output_file(OUT) as path:
+    with output_file(paths.SEALED_ROBOT) as path:
         path.write_text(json.dumps(sealed, indent=1) + "\n")
     print(f"sealed {len(sealed['effects'])} effects, sha256 {sealed['sha256'][:12]}")
 
@@ -135,10 +136,10 @@ def found(config: SealConfig) -> dict[str, Any]:
 
 def trial_clips(config: SealConfig) -> list[Clip]:
     """Some training motions of every family, cut to their beginning."""
-    index = read_index(FILTERED)
+    index = read_index(paths.FILTERED)
     own = index[index["split"] == "train"]
     names = thin(own.assign(cluster=own["family"]), config.motions)
-    return [cut(clip, config.max_seconds) for clip in read_library(FILTERED, names)]
+    return [cut(clip, config.max_seconds) for clip in read_library(paths.FILTERED, names)]
 
 
 def sealed_robot(config: SealConfig, attempt: int) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import write_library
-from tasks.rollouts import start_stand_in
+from tasks.stand_in import start_stand_in
 
 KEY = "shipped"
 

@@ -1,7 +1,6 @@
-"""Which dataclass each section of params.yaml is: `python -m tasks.sections` checks the whole file at once."""
+"""The whole of params.yaml: the loop's shape, and every section; `python -m tasks.sections` checks it at once."""
 
 import hashlib
-from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -9,31 +8,11 @@ from typing import Annotated, Any
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes
+from bumblebee.last_line import guarded
 from bumblebee.ranges import Few, Name, Range, Ranged, Size, shown
-from tasks import params
+from tasks import params, paths
 
-SECTIONS = {
-    "seal": "tasks.seal:SealConfig",
-    "motions": "tasks.motions:MotionsConfig",
-    "filter": "bumblebee.motion.filter:FilterConfig",
-    "cluster": "bumblebee.clustering.config:ClusterConfig",
-    "base": "tasks.base:BaseConfig",
-    "experts": "tasks.experts:ExpertsConfig",
-    "rollouts": "tasks.rollouts:RolloutsConfig",
-    "ingest": "tasks.ingest:IngestConfig",
-    "gate": "bumblebee.measured.gate:GateConfig",
-    "diagnose": "tasks.diagnose:DiagnoseConfig",
-    "compensate": "tasks.compensate:CompensateConfig",
-    "delta": "bumblebee.learning.delta:DeltaConfig",
-    "refine": "tasks.refine:RefineConfig",
-    "control": "tasks.control_config:ControlConfig",
-    "distill": "bumblebee.learning.distill:DistillConfig",
-    "evaluate": "tasks.evaluate:EvaluateConfig",
-    "publish": "tasks.publish:PublishConfig",
-    "report": "tasks.report:ReportConfig",
-}
-LOOP = ("clusters", "rounds", "final_round")
-CHECKED = Path(".scratch/params.checked")
+CHECKED = paths.SCRATCH / "params.checked"
 LONGEST = 64  # signs of a cluster's name, which names folders and models
 
 
@@ -70,7 +49,7 @@ def loop(path: Path = params.FILE) -> Loop:
 
 def shape_of(content: dict[str, Any], path: Path) -> Loop:
     """The same from the content of the file."""
-    shape = params.build(Loop, {key: content[key] for key in LOOP if key in content}, path, "")
+    shape = params.build(Loop, {key: content[key] for key in params.LOOP if key in content}, path, "")
     if not shape.clusters or len({name.casefold() for name in shape.clusters}) < len(shape.clusters):
         raise BadInput(f"{path}: clusters", "distinct names, at least one", shown(list(shape.clusters)))
     for name in shape.clusters:
@@ -86,17 +65,13 @@ def shape_of(content: dict[str, Any], path: Path) -> Loop:
     return shape
 
 
-def check_names(content: Iterable[str], path: Path) -> None:
-    """Refuse a key at the top of the file that nothing reads.
-
-    Raises:
-        BadInput: naming it and the known key most like it.
-    """
-    known = [*LOOP, *SECTIONS]
-    for section in content:
-        if section not in known:
-            said = shown(section, bare=True)
-            raise BadInput(f"{path}: {said}", "a known section", "an unknown one", params.nearest(said, known))
+def parent_of(round: int) -> int:
+    """The round whose experts run on the robot in this one, and are refined after it."""
+    listed = params.read().get("rounds", [])
+    for entry in listed:
+        if isinstance(entry, dict) and entry.get("n") == round and "parent" in entry:
+            return int(entry["parent"])
+    raise BadInput(f"{params.FILE}: rounds", f"an entry with n: {round} and its parent", str(listed))
 
 
 def check(path: Path = params.FILE) -> dict[str, Any]:
@@ -110,9 +85,9 @@ def check(path: Path = params.FILE) -> dict[str, Any]:
 
 def check_content(content: dict[str, Any], path: Path) -> dict[str, Any]:
     """The same from the content of the file."""
-    check_names(content, path)
+    params.check_names(content, path)
     found: dict[str, Any] = {"": shape_of(content, path)}
-    for section, place in SECTIONS.items():
+    for section, place in params.SECTIONS.items():
         module, _, name = place.partition(":")
         found[section] = params.section_of(content, section, getattr(import_module(module), name), path)
     import_module("tasks.sources").check_sources(found, path)
@@ -137,7 +112,10 @@ def check_once(path: Path = params.FILE) -> None:
     CHECKED.write_text(digest)
 
 
-if __name__ == "__main__":
-    from tasks.stage import run_stage
+def main() -> None:
+    """Check the params.yaml of this folder."""
+    check()
 
-    run_stage(lambda: check(), logs=False)
+
+if __name__ == "__main__":
+    raise SystemExit(guarded(main))

@@ -5,8 +5,7 @@ from typing import Any
 
 from bumblebee.clustering.text import encoder_folder
 from bumblebee.errors import BadInput
-
-MADE_HERE = "data"  # what the loop itself fills
+from tasks import paths
 
 
 def check_sources(found: dict[str, Any], path: Path) -> None:
@@ -32,7 +31,7 @@ def check_sources(found: dict[str, Any], path: Path) -> None:
     if rollouts.source is not None:
         _require(rollouts.source, f"{path}: rollouts.source", "a folder of measured rollouts")
     before = _before_round(ingest.incoming)
-    if before.parts[:1] != (MADE_HERE,):
+    if before.parts[:1] != paths.DATA.parts:
         _require(before, f"{path}: ingest.incoming", "a folder of measured rollouts")
     if ingest.model and not Path(ingest.model).is_file():
         raise BadInput(f"{path}: ingest.model", "an MJCF file", f"{ingest.model}: no such file")

@@ -4,7 +4,7 @@ A stage's module reads:
 
     def main(cluster: str, round: int) -> None:      # options --cluster and --round; no parameters, no options
         config = load("experts", ExpertConfig)       # the section of params.yaml, checked
-        with output_folder(f"models/experts/r{round}/{cluster}") as folder:
+        with output_folder(paths.expert(round, cluster)) as folder:
             ...                                      # write into `folder`; it is renamed at the end
         log_run("experts", cluster=cluster, round=round, params=config, metrics={...}, curve=..., artifacts=[...])
 
@@ -24,14 +24,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bumblebee.last_line import disk_line, guarded
-from tasks import recorder
+from tasks import paths, recorder
 from tasks.params import load
 from tasks.parent import end_with_parent
 from tasks.sections import check_once
 
 __all__ = ["disk_line", "load", "log_run", "output_file", "output_folder", "run_stage", "scratch"]
 
-SCRATCH = Path(".scratch")
 _used_scratch: set[Path] = set()
 
 
@@ -127,7 +126,7 @@ def scratch(stage: str, *inputs: object) -> Path:
         stage: a name of its own for each instance, such as "experts-r0-c1".
         inputs: paths or configurations that the checkpoint depends on, where DVC does not say so.
     """
-    folder = SCRATCH / stage
+    folder = paths.SCRATCH / stage
     key = _inputs_key(inputs)
     stamp = folder / ".inputs"
     if folder.exists() and (not stamp.exists() or stamp.read_text() != key):

@@ -28,9 +28,9 @@ from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.sampler import ClipShares
+from tasks import paths
 from tasks.stage import log_run, output_folder, scratch
 
-FILTERED, LABELS = Path("data/filtered"), Path("data/clusters/labels.parquet")
 BEFORE = "before.parquet"
 
 
@@ -89,9 +89,11 @@ def training_clips() -> list[Clip]:
     Raises:
         BadInput: if none is to train on.
     """
-    clips = read_library(FILTERED)
+    clips = read_library(paths.FILTERED)
     if not any(clip.split == "train" for clip in clips):
-        raise BadInput(FILTERED / "index.parquet", "at least one motion to train on", "none", "Keep more motions.")
+        raise BadInput(
+            paths.FILTERED / "index.parquet", "at least one motion to train on", "none", "Keep more motions."
+        )
     return clips
 
 
@@ -106,11 +108,11 @@ def cluster_clips(cluster: str, others: float) -> tuple[list[Clip], ClipShares, 
         the training clips, the shares of the draws of its own and of the others', and the clips to try the expert on:
         all of its cluster.
     """
-    labels = pd.read_parquet(LABELS).set_index("name")["cluster"]
+    labels = pd.read_parquet(paths.LABELS).set_index("name")["cluster"]
     clips = [clip for clip in training_clips() if clip.name in labels.index]
     own = [clip for clip in clips if labels[clip.name] == cluster]
     if not any(clip.split == "train" for clip in own):
-        raise BadInput(LABELS, f"motions to train on in cluster {cluster}", "none", "Check `clusters`.")
+        raise BadInput(paths.LABELS, f"motions to train on in cluster {cluster}", "none", "Check `clusters`.")
     used = [clip for clip in clips if clip.split == "train" and (others > 0 or labels[clip.name] == cluster)]
     group = torch.tensor([int(labels[clip.name] != cluster) for clip in used])
     return used, ClipShares(group, torch.tensor([1 - others, others])), own
@@ -125,7 +127,7 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
         BadInput: if there are fewer GPUs, or the engine has no use for them.
     """
     torch.set_num_threads(config.env.threads)
-    folder = scratch(f"{job.stage}-{job.name}", job.parent or FILTERED, config)
+    folder = scratch(f"{job.stage}-{job.name}", job.parent or paths.FILTERED, config)
     own = config.env
     if config.gpus > 1 and "RANK" not in os.environ:
         return _train_together(job, config)

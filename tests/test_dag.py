@@ -3,12 +3,14 @@
 Renew with: python -m tests.test_dag
 """
 
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 import yaml
 
 from flows.stages import read_stages
-from tests.test_imports import imports
+from tests.import_graph import Graph, call_graph, modules, reached
 
 HOME = Path(__file__).parent.parent
 SNAPSHOT = Path(__file__).parent / "dag.txt"
@@ -44,24 +46,123 @@ def test_the_sealed_effects_are_read_by_the_stand_in_and_the_report_only():
     assert readers == {"rollouts", "evaluate", "report"}
 
 
-# Shared by all stages, and changed without changing what any of them finds.
-NO_RESULT = ("bumblebee/errors", "bumblebee/files", "bumblebee/progress", "bumblebee/motion/store")
+# What stages call and need not depend on, by the beginning of its path, each with the reason why its change may leave
+# their outputs as they are.
+NO_RESULT = {
+    "bumblebee/errors.py": "how a refusal reads",
+    "bumblebee/last_line.py": "how a command ends",
+    "bumblebee/progress.py": "bars on the terminal",
+    "bumblebee/files.py": "writes whole or not at all",
+    "bumblebee/io/": "reads within limits and writes whole: it refuses or passes, and changes no value",
+    "bumblebee/ranges.py": "refuses settings; those that pass are among the parameters",
+    "bumblebee/learning/checkpoint.py": "what a killed training goes on from",
+    "bumblebee/learning/curve.py": "the learning curve, to be looked at",
+    "bumblebee/measured/metadata.py": "reads and writes files of rollouts: it refuses or passes",
+    "bumblebee/measured/tables.py": "the same",
+    **{
+        f"bumblebee/motion/{name}.py": "reads and writes the library of clips: it refuses or passes"
+        for name in ("captions", "checks", "clip_facts", "parquet", "raw", "store", "texts")
+    },
+    "tasks/stage.py": "starts a stage and stores what it made",
+    "tasks/paths.py": "where that lies; dvc.yaml says it too",
+    "tasks/params.py": "reads parameters; what they are is a dependency of its own",
+    "tasks/sections.py": "the same",
+    "tasks/parent.py": "ends with the process that started it",
+    "tasks/recorder.py": "what MLflow is told",
+    "tasks/registry.py": "the same",
+    "tasks/run_form.py": "the same",
+    "tasks/lineage.py": "the same",
+}
+_PAGE = "draws the page for people, which no later stage reads"
+_NETWORK = "of learning/ppo.py it takes the algorithm; the task of policies and their motions are not its own"
+_CONTRACT = "of an exported policy it reads the contract and the hash, of which this is no part"
+NO_RESULT_OF = {
+    "ingest": {f"bumblebee/measured/{name}.py": _PAGE for name in ("gate_words", "overview", "overview_plots")},
+    "diagnose": {
+        **{
+            f"bumblebee/diagnosis/report/{name}.py": _PAGE
+            for name in ("example_windows", "html", "page", "svg", "terminal")  # html also rounds the numbers in notes
+        },
+        "bumblebee/diagnosis/gap/": "another command writes it",
+        "bumblebee/diagnosis/places.py": "refuses a folder that is in use",
+    },
+    "compensate": {"bumblebee/measured/model_file.py": "loads a user's model; the loop's is the G1"},
+    "delta": {
+        path: _NETWORK
+        for path in (
+            "bumblebee/tracking/",
+            "bumblebee/motion/",
+            "bumblebee/learning/policy.py",
+            "bumblebee/learning/ranks.py",
+        )
+    },
+    "publish": {f"bumblebee/{room}/": _CONTRACT for room in ("motion", "robot", "sim", "tracking")},
+}
 
 
-def test_a_stage_depends_on_the_code_that_it_calls():
-    """Every library module that a stage imports itself is among its dependencies: a change there makes it stale."""
-    described = yaml.safe_load((HOME / "dvc.yaml").read_text())["stages"]
+def described() -> dict[str, dict[str, list[str]]]:
+    """The stages of dvc.yaml as they stand there."""
+    return yaml.safe_load((HOME / "dvc.yaml").read_text())["stages"]
+
+
+@cache
+def called_files(stage: str) -> frozenset[str]:
+    """The files of the stage's module and of all that it calls."""
+    start, known = f"tasks.{stage}", modules(HOME)
+    return frozenset(str(known[name].relative_to(HOME)) for name in {start} | reached(calls(), start))
+
+
+@cache
+def calls() -> Graph:
+    """Who calls whom; read once."""
+    return call_graph(HOME)
+
+
+def covered(path: str, deps: Iterable[str]) -> bool:
+    """Whether a file is one of the dependencies or lies in one."""
+    return any(path == dep or path.startswith(f"{dep}/") for dep in deps)
+
+
+def test_a_stage_depends_on_all_code_that_it_calls():
+    """However far away: a change there makes it stale, or it is said above why not."""
     missing = []
-    for name, stage in described.items():
-        code = [dep for dep in stage["deps"] if dep.startswith(("bumblebee", "tasks"))]
-        for _, module in imports(HOME / "tasks" / f"{name}.py"):
-            path = "/".join(module.split(".")[:3])
-            found = next((p for p in (f"{path}.py", path) if (HOME / p).exists()), None)
-            if not module.startswith("bumblebee.") or found is None or found.startswith(NO_RESULT):
-                continue
-            if not any(found == dep or found.startswith(f"{dep}/") for dep in code):
-                missing.append(f"{name}: {found}")
+    for name, stage in described().items():
+        spared = tuple([*NO_RESULT, *NO_RESULT_OF.get(name, ())])
+        called = {path for path in called_files(name) if not path.endswith("__init__.py")}  # faces pass names on
+        wanting = (path for path in called if not path.startswith(spared))
+        missing += [f"{name}: {path}" for path in sorted(wanting) if not covered(path, stage["deps"])]
     assert missing == []
+
+
+def test_a_stage_depends_on_no_code_that_it_does_not_call():
+    for name, stage in described().items():
+        called = called_files(name)
+        code = [dep for dep in stage["deps"] if dep.startswith(("bumblebee/", "tasks/"))]
+        assert [dep for dep in code if not any(covered(path, [dep]) for path in called)] == [], name
+
+
+def test_no_reason_is_given_for_what_no_stage_calls():
+    files = {name: called_files(name) for name in described()}
+    everywhere = set().union(*files.values())
+    assert [path for path in NO_RESULT if not any(f.startswith(path) for f in everywhere)] == []
+    for name, reasons in NO_RESULT_OF.items():
+        assert [path for path in reasons if not any(f.startswith(path) for f in files[name])] == [], name
+
+
+def test_a_new_style_sheet_of_a_page_makes_nothing_stale_but_the_report():
+    def stale(page: str) -> set[str]:
+        assert (HOME / page).is_file(), page
+        return {name for name, stage in described().items() if covered(page, stage["deps"])}
+
+    for page in ("diagnosis/report/html.py", "diagnosis/report/page.py", "measured/overview.py"):
+        assert stale(f"bumblebee/{page}") == set()
+    assert stale("bumblebee/report/page.py") == {"report"}
+
+
+def test_what_follows_a_diagnosis_does_not_read_its_page():
+    for name, stage in described().items():
+        deps = [dep for dep in stage["deps"] if dep.startswith("data/diagnosis")]
+        assert all(dep.endswith(("/diagnosis.json", "/effects.yaml", "/model.xml")) for dep in deps), name
 
 
 if __name__ == "__main__":

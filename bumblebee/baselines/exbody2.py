@@ -19,9 +19,10 @@ from bumblebee.learning.config import PpoConfig
 from bumblebee.robot.facts import joint_names, stand_pose
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import rotate_inverse
-from bumblebee.tracking.config import EnvConfig, ObservationConfig, RewardConfig
+from bumblebee.tracking.config import EnvConfig, ObservationConfig
 from bumblebee.tracking.library import ReferenceFrame
 from bumblebee.tracking.presets import PAPER_RANDOMISATION
+from bumblebee.tracking.rewards import RewardConfig
 from bumblebee.tracking.terminations import fallen
 
 NAME = "exbody2"

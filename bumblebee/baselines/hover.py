@@ -12,8 +12,9 @@ from bumblebee.baselines.omnih2o import POSITIVE, PPO, PROPRIOCEPTION, ROWS, TEA
 from bumblebee.baselines.omnih2o import WEIGHTS as OMNIH2O_WEIGHTS
 from bumblebee.baselines.scoring import Curriculum, Scoring
 from bumblebee.baselines.spec import Baseline, StudentConfig, tilted
-from bumblebee.tracking.config import EnvConfig, ObservationConfig, RewardConfig
+from bumblebee.tracking.config import EnvConfig, ObservationConfig
 from bumblebee.tracking.presets import PAPER_RANDOMISATION
+from bumblebee.tracking.rewards import RewardConfig
 
 NAME = "hover"
 COMMAND = ("hover_command", "hover_mask")

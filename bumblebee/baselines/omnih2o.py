@@ -8,8 +8,9 @@ from bumblebee.baselines import h2o_rows as rows
 from bumblebee.baselines.scoring import Curriculum, Row, Scoring
 from bumblebee.baselines.spec import Baseline, StudentConfig, tilted
 from bumblebee.learning.config import PpoConfig
-from bumblebee.tracking.config import EnvConfig, ObservationConfig, RewardConfig
+from bumblebee.tracking.config import EnvConfig, ObservationConfig
 from bumblebee.tracking.presets import PAPER_RANDOMISATION
+from bumblebee.tracking.rewards import RewardConfig
 
 NAME = "omnih2o"
 TEACHER = (

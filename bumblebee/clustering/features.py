@@ -10,7 +10,8 @@ from math import ceil
 
 import numpy as np
 
-from bumblebee.motion.clip import Clip, foot_contacts
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.contacts import foot_contacts
 from bumblebee.robot.facts import FEET, KEY_BODIES
 
 # The G1 has no head among its keypoints and its torso_link starts at the waist: the middle of the shoulders stands in.

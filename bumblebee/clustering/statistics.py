@@ -7,7 +7,8 @@ import pandas as pd
 from sklearn.feature_extraction.text import ENGLISH_STOP_WORDS, TfidfVectorizer
 
 from bumblebee.clustering.text import FILLERS, plain_text
-from bumblebee.motion.clip import Clip, foot_contacts, velocities
+from bumblebee.motion.clip import Clip, velocities
+from bumblebee.motion.contacts import foot_contacts
 from bumblebee.robot.facts import joint_names
 
 LOWER = tuple(i for i, name in enumerate(joint_names()) if any(part in name for part in ("hip", "knee", "ankle")))

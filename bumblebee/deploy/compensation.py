@@ -84,7 +84,7 @@ class Compensation:
     hysteresis: tuple[tuple[int, float, float, float], ...]
     """(joint, amplitude [N m], width [rad], 1 for Dahl's law, 0 for a spring that yields)."""
     terms: tuple[tuple[int, float, str], ...]
-    """(joint, coefficient, formula of `sim.effect_terms`)."""
+    """(joint, coefficient, formula of `sim.effects.terms`)."""
     loads: tuple[Load, ...]
     """Whose gravity is carried."""
     limits: CompensationLimits

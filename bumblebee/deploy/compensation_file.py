@@ -19,7 +19,7 @@ from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output, write
 from bumblebee.ranges import Unfit
 from bumblebee.robot.facts import g1_bodies, joint_names
 from bumblebee.robot.model import build_model
-from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.effects import read_term
 
 _LIMITS = Limits(text_bytes=4 << 20, nodes=60_000)
 _ROBOT, _AGAIN = "g1_23dof", "Make it again with `bumblebee compensate`."

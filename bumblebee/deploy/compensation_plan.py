@@ -14,8 +14,7 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.model_file import load_model
 from bumblebee.robot.facts import g1_bodies, joint_names
 from bumblebee.robot.model import build_model
-from bumblebee.sim.effect_terms import read_term
-from bumblebee.sim.effects import CATALOGUE, Effect, effects_yaml, read_effects
+from bumblebee.sim.effects import CATALOGUE, Effect, effects_yaml, read_effects, read_term
 
 LEAVE_OUT = "Take it out, or pass --leave-out to start without it."
 

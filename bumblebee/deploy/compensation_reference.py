@@ -11,7 +11,7 @@ from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip, differences, velocities
 from bumblebee.robot.facts import joint_names, joints
 from bumblebee.robot.model import build_model
-from bumblebee.sim.effect_forces import bent
+from bumblebee.sim.effects import bent
 from bumblebee.tracking.feed_forward import static_torques
 from bumblebee.tracking.library import MotionLibrary
 

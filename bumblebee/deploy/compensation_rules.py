@@ -10,8 +10,7 @@ import numpy as np
 
 from bumblebee.deploy.compensation import Load
 from bumblebee.deploy.compensation_draft import Draft
-from bumblebee.sim.effect_terms import read_term
-from bumblebee.sim.effects import Effect
+from bumblebee.sim.effects import Effect, read_term
 
 Rule = Callable[[Draft, Effect, Sequence[int]], tuple[str, str]]
 """(draft, effect, columns of its joints) -> what is done, with which numbers."""

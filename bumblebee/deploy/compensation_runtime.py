@@ -13,7 +13,7 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from bumblebee.robot.facts import joints
 from bumblebee.robot.model import gains
-from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.effects import read_term
 from bumblebee.tracking.library import MotionLibrary
 
 

@@ -4,6 +4,7 @@ Every function raises `BadInput` in one line (what, where, expected, came) and n
 or allocates more than `Limits` allow.
 """
 
+import hashlib
 import io
 import json
 import os
@@ -237,3 +238,14 @@ def require_within(where: object, values: np.ndarray, most: float, unit: str = "
 
 def _true(mask: np.ndarray) -> Iterator[tuple[int, ...]]:
     yield from (tuple(int(i) for i in index) for index in np.argwhere(mask)[:1])
+
+
+def file_hash(path: Path) -> str:
+    """sha256 of a file's bytes."""
+    if not Path(path).is_file():  # a pipe would be waited for
+        raise BadInput(path, "a file", "a folder" if Path(path).is_dir() else "none")
+    try:
+        with Path(path).open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise BadInput(path, "a file that can be read", error.strerror or str(error)) from None

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from bumblebee.motion.clip import Clip
 from bumblebee.ranges import Factor, Few, Ranged, Seed
-from bumblebee.sim.effect_hooks import RuntimeHooks
+from bumblebee.sim.effects import RuntimeHooks
 from bumblebee.sim.engines import make_engine
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import ActionAdapter

@@ -19,10 +19,9 @@ from typing import Any, Literal
 
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import LIMITS
-from bumblebee.io.read import read_json
+from bumblebee.io.read import file_hash, read_json
 from bumblebee.io.write import unwritable, write_file
 from bumblebee.measured import gate_words as words
-from bumblebee.measured.intake import file_hash
 from bumblebee.ranges import Ranged
 
 AUTOMATIC = "automatic (gate.mode: auto)"

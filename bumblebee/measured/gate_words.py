@@ -24,7 +24,7 @@ def show_command(workspace: Path, round: int) -> str:
 def answer_command(workspace: Path, table: dict[str, Any], approve: bool) -> str:
     """Answers what the request shows and nothing else; NAME is to be filled in."""
     verb = "approve" if approve else "reject"
-    return f"{_python('flows.gate', workspace, verb)} --round {table['round']} --seen {short(table)} --by NAME"
+    return f"{_python('flows.gate_answer', workspace, verb)} --round {table['round']} --seen {short(table)} --by NAME"
 
 
 def _python(module: str, workspace: Path, *more: str) -> str:

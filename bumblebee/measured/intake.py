@@ -5,7 +5,6 @@ there already is skipped, a file of the same name with other content is a findin
 """
 
 import contextlib
-import hashlib
 import json
 import os
 import shutil
@@ -21,10 +20,9 @@ import pandas as pd
 
 from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
-from bumblebee.measured.checks import check_rollout
-from bumblebee.measured.finding import Finding
+from bumblebee.io.read import file_hash
+from bumblebee.measured.checks import Finding, Thresholds, check_rollout
 from bumblebee.measured.rollout import BadRollout, Rollout, read_rollout
-from bumblebee.measured.thresholds import Thresholds
 
 UNFORESEEN = "check-failed"  # the rule of a file over which a check itself broke
 LONGEST_NAME = 220  # bytes: `<name>.findings.json` lies beside it, and file systems take 255
@@ -114,17 +112,6 @@ def merge(summaries: Iterable[IntakeSummary]) -> IntakeSummary:
     tables = [summary.findings for summary in summaries if len(summary.findings)]
     items = tuple(item for summary in summaries for item in summary.items)
     return IntakeSummary(items, pd.concat(tables, ignore_index=True) if tables else findings_table([]))
-
-
-def file_hash(path: Path) -> str:
-    """sha256 of a file's bytes."""
-    if not Path(path).is_file():  # a pipe would be waited for
-        raise BadInput(path, "a file", "a folder" if Path(path).is_dir() else "none")
-    try:
-        with Path(path).open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise BadInput(path, "a file that can be read", error.strerror or str(error)) from None
 
 
 def _take(

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from bumblebee.io.read import file_hash
 from bumblebee.measured import overview_plots as plots
 from bumblebee.measured.gate_words import SHORT
-from bumblebee.measured.intake import file_hash
 from bumblebee.measured.overview_plots import Trace, tracking
 from bumblebee.measured.rollout import Rollout
 
@@ -86,7 +86,8 @@ def _asked(summary: dict[str, Any], sha256: str) -> str:
         f"<code>{sha256[:SHORT]}</code>. On Prefect's page of the run, choose Resume at the top right "
         "(in the menu ⋮ where it is no button); "
         "or in the workspace's folder:</p>"
-        f"<pre>python -m flows.gate approve {command}</pre><pre>python -m flows.gate reject {command}</pre>"
+        f"<pre>python -m flows.gate_answer approve {command}</pre>"
+        f"<pre>python -m flows.gate_answer reject {command}</pre>"
         f"<p class=note>Whole commands, for any folder: <code>python -m tasks.gate --round {int(summary['round'])} "
         f"--show</code>. SHA-256 of summary.json: {sha256}</p></div>"
     )

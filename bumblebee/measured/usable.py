@@ -3,8 +3,7 @@
 import mujoco
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.checks import check_rollout
-from bumblebee.measured.finding import Finding
+from bumblebee.measured.checks import Finding, check_rollout
 from bumblebee.measured.rollout import Rollout
 
 

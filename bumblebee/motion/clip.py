@@ -1,13 +1,10 @@
-"""A motion of the robot as arrays, and what follows from them: velocities and foot contacts."""
+"""A motion of the robot as arrays, and the velocities that follow from them."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from bumblebee import quaternions
-
-_CONTACT_HEIGHT = 0.03  # m: a sole lower than this may touch the floor
-_CONTACT_SPEED = 0.5  # m/s: and does, if it moves slower than this
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +82,3 @@ def angular_velocity(quat: np.ndarray, fps: float) -> np.ndarray:
     after = np.minimum(np.arange(len(quat)) + 1, len(quat) - 1)
     turn = quaternions.rotation_vector(quaternions.multiply(quaternions.conjugate(quat[before]), quat[after]))
     return turn * fps / np.maximum(after - before, 1)[:, None]
-
-
-def foot_contacts(clip: Clip) -> np.ndarray:
-    """Which foot stands on the floor, (T, 2) bool (left, right): a sole point that is low and slow."""
-    from bumblebee.motion.kinematics import sole_points  # kinematics builds clips: it comes after this file
-
-    points = sole_points(clip.root_pos, clip.root_quat, clip.joint_pos)  # (T, 2, 4, 3)
-    speed = np.linalg.norm(differences(points, clip.fps), axis=-1)
-    return np.any((points[..., 2] < _CONTACT_HEIGHT) & (speed < _CONTACT_SPEED), axis=-1)

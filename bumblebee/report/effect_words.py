@@ -5,7 +5,7 @@ from itertools import zip_longest
 from typing import Any
 
 from bumblebee.report.figures import short_joint
-from bumblebee.sim.effect_catalogue import CATALOGUE
+from bumblebee.sim.effects import CATALOGUE
 
 Json = dict[str, Any]
 _MOST_PLACES = 3

@@ -1,6 +1,6 @@
 """Torch tensors that NumPy's functions accept, so that a law written for arrays also runs on a GPU.
 
-`sim.effect_forces` is written in NumPy. Given `DeviceArray`s instead of arrays it does the same with torch, through
+`sim.effects.forces` is written in NumPy. Given `DeviceArray`s instead of arrays it does the same with torch, through
 NumPy's own protocols (NEP 13 and 18): every function in the two tables below, operators, indexing and assignment.
 Arrays of constants that meet a DeviceArray are copied to its device once and kept by their content, so that the work
 may be recorded as a CUDA graph after it was done once. What is not in the tables is a TypeError.

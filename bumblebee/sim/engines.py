@@ -4,8 +4,8 @@ from typing import Literal
 
 import mujoco
 
-from bumblebee.sim.effect_engine import EffectsCpu, needs_effects
-from bumblebee.sim.effect_hooks import RuntimeHooks
+from bumblebee.sim.effects import RuntimeHooks
+from bumblebee.sim.effects.cpu_engine import EffectsCpu, needs_effects
 from bumblebee.sim.engine import Engine
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.warp_limits import Buffers
@@ -30,8 +30,8 @@ def make_engine(
     if name == "mujoco":
         on_cpu = EffectsCpu if needs_effects(model, hooks) else MujocoCpu
         return on_cpu(model, num_worlds, threads=threads, hooks=hooks)
+    from bumblebee.sim.effects.warp_engine import EffectsWarp
     from bumblebee.sim.mujoco_warp import MujocoWarp
-    from bumblebee.sim.warp_effects import EffectsWarp
 
     on_gpu = EffectsWarp if needs_effects(model, hooks) else MujocoWarp
     return on_gpu(model, num_worlds, hooks=hooks, buffers=buffers, device=device)

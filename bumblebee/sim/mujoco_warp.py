@@ -14,7 +14,7 @@ from torch import Tensor
 
 from bumblebee.errors import BadInput
 from bumblebee.robot.facts import FEET, KEY_BODIES
-from bumblebee.sim.effect_hooks import RuntimeHooks
+from bumblebee.sim.effects import RuntimeHooks
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.mujoco_cpu import foot_sensor_columns, history_template, substeps_of
 from bumblebee.sim.rotations import rotate_inverse
@@ -32,7 +32,7 @@ class MujocoWarp:
         num_worlds: how many robots.
         control_hz: rate of the policy; a whole number of physics steps must fit.
         hooks: effects outside the model, see `bumblebee.sim.effects.runtime_hooks`; here the encoders' offset alone,
-            the others are those of `sim.warp_effects.EffectsWarp`.
+            the others are those of `sim.effects.warp_engine.EffectsWarp`.
         device: a CUDA device ("cuda", "cuda:1"), or "cpu".
         buffers: room for contacts and constraints.
 

@@ -3,33 +3,12 @@
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from bumblebee.ranges import Factor, Few, Name, PartOf, Range, Ranged, Seconds, Seed, Share, Size, Unfit, Weight
+from bumblebee.ranges import Factor, Few, Name, PartOf, Range, Ranged, Seconds, Seed, Share, Size, Unfit
 from bumblebee.sim.engines import Name as EngineName
 from bumblebee.sim.warp_limits import Buffers
 from bumblebee.tracking.library import AHEAD
+from bumblebee.tracking.rewards import RewardConfig
 from bumblebee.tracking.terms import SETS, TERMS
-
-
-@dataclass(frozen=True)
-class RewardConfig(Ranged):
-    """Which weights and kernels the reward has; docs/decisions/rewards.md says why there are two sets."""
-
-    preset: Literal["demo", "paper"] = "demo"
-    """`paper`: the table's weights and sharpness; `demo`: the same terms, tuned for minutes on a CPU."""
-    weights: dict[Name, Weight] = field(default_factory=dict)
-    """Weights that replace the preset's, by term."""
-    sharpness: dict[Name, Factor] = field(default_factory=dict)
-    """Factors in exp(-factor * error) that replace the preset's, by term."""
-    soft_limit: Annotated[float, Range(above=0, most=1)] = 0.95
-    """Share of a torque, position or velocity limit beyond which it counts as exceeded."""
-
-    def __post_init__(self) -> None:
-        """Refuse terms that there are not."""
-        super().__post_init__()
-        from bumblebee.tracking.rewards import ERRORS, PENALTIES  # late: it reads this class
-
-        self.require_names("weights", [*PENALTIES, *ERRORS])
-        self.require_names("sharpness", ERRORS)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from functools import cache
 import mujoco
 import numpy as np
 
-from bumblebee.motion.clip import Clip, foot_contacts
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.contacts import foot_contacts
 from bumblebee.motion.kinematics import sole_points
 from bumblebee.robot.facts import joints
 from bumblebee.robot.model import build_model, gains

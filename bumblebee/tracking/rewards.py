@@ -6,14 +6,15 @@ the mean distance of the 14 key bodies. What the table leaves open is decided in
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
 import torch
 from torch import Tensor
 
+from bumblebee.ranges import Factor, Name, Range, Ranged, Weight
 from bumblebee.robot.facts import joints
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import angle_between, length3, rotate
-from bumblebee.tracking.config import RewardConfig
 from bumblebee.tracking.library import ReferenceFrame
 
 
@@ -217,6 +218,26 @@ DEMO_SHARPNESS = {
     "dof_position": 1.0,
     "dof_velocity": 0.1,
 }
+
+
+@dataclass(frozen=True)
+class RewardConfig(Ranged):
+    """Which weights and kernels the reward has; docs/decisions/rewards.md says why there are two sets."""
+
+    preset: Literal["demo", "paper"] = "demo"
+    """`paper`: the table's weights and sharpness; `demo`: the same terms, tuned for minutes on a CPU."""
+    weights: dict[Name, Weight] = field(default_factory=dict)
+    """Weights that replace the preset's, by term."""
+    sharpness: dict[Name, Factor] = field(default_factory=dict)
+    """Factors in exp(-factor * error) that replace the preset's, by term."""
+    soft_limit: Annotated[float, Range(above=0, most=1)] = 0.95
+    """Share of a torque, position or velocity limit beyond which it counts as exceeded."""
+
+    def __post_init__(self) -> None:
+        """Refuse terms that there are not."""
+        super().__post_init__()
+        self.require_names("weights", [*PENALTIES, *ERRORS])
+        self.require_names("sharpness", ERRORS)
 
 
 class Reward:

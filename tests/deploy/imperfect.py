@@ -10,8 +10,7 @@ from bumblebee import quaternions
 from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.sensors import Sensors
 from bumblebee.deploy.servo_command import ServoCommand
-from bumblebee.sim.effect_forces import StepHooks
-from bumblebee.sim.effects import Effect, add_to_spec, runtime_hooks
+from bumblebee.sim.effects import Effect, StepHooks, add_to_spec, runtime_hooks
 from bumblebee.sim.mujoco_cpu import history_template
 from bumblebee.sim.sensors import load_spec
 

@@ -113,7 +113,7 @@ def test_a_gate_that_nobody_answered_stops_both_ways_with_the_line_that_says_how
     assert loop.waiting.returncode == demo.EXIT_WAITING, loop.waiting.stderr
     assert loop.stopped.returncode != 0
     for output in (loop.waiting.stderr, loop.stopped.stdout + loop.stopped.stderr):
-        assert printed_answer(output)[:3] == ["flows.gate", "approve", "--workspace"]
+        assert printed_answer(output)[:3] == ["flows.gate_answer", "approve", "--workspace"]
 
 
 def test_an_answer_from_another_process_lets_it_go_on(loop: Loop):

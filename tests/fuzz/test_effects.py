@@ -9,9 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bumblebee.errors import BadInput
-from bumblebee.sim.effect_catalogue import CATALOGUE
-from bumblebee.sim.effect_terms import read_term
-from bumblebee.sim.effects import read_effects
+from bumblebee.sim.effects import CATALOGUE, read_effects, read_term
 from tests.fuzz.budget import SECONDS, rounds
 from tests.fuzz.motion_files import EFFECTS
 

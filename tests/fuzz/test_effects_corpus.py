@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.sim.effect_terms import read_term
-from bumblebee.sim.effects import read_effects
+from bumblebee.sim.effects import read_effects, read_term
 from tests.fuzz.effects_corpus import EFFECTS_FILES, TERMS
 
 

@@ -19,14 +19,14 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
-from bumblebee.measured.asap_npz import import_asap
-from bumblebee.measured.column_map import ColumnMap, read_map
-from bumblebee.measured.csv_map import import_csv
+from bumblebee.measured.importers.asap_npz import import_asap
+from bumblebee.measured.importers.column_map import ColumnMap, read_map
+from bumblebee.measured.importers.csv_map import import_csv
+from bumblebee.measured.importers.so101 import import_so101
+from bumblebee.measured.importers.sysid_npz import import_sysid
 from bumblebee.measured.intake import UNFORESEEN, intake
 from bumblebee.measured.metadata import METADATA_KEY
 from bumblebee.measured.rollout import read_rollout, write_rollout
-from bumblebee.measured.so101 import import_so101
-from bumblebee.measured.sysid_npz import import_sysid
 from tests.fuzz.budget import rounds
 from tests.measured.simulated import arm_model, arm_rollout, g1_model, g1_rollout
 

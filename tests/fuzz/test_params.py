@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import parse_yaml
-from tasks import sections
+from tasks import params, sections
 from tests.fuzz.budget import rounds
 from tests.tasks.settings import HOME, shipped
 
@@ -131,7 +131,7 @@ PLAIN = st.recursive(
 
 
 @settings(max_examples=60, deadline=None, derandomize=True, database=None)
-@given(section=st.sampled_from(list(sections.SECTIONS)), value=PLAIN)
+@given(section=st.sampled_from(list(params.SECTIONS)), value=PLAIN)
 @example(section="seal", value={"seed": 10**5000})
 @example(section="base", value={10**5000: 1})
 @example(section="filter", value={"joint_speed": 10**400})

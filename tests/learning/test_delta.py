@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from bumblebee.errors import BadInput
-from bumblebee.learning import delta_rewards as rewards
-from bumblebee.learning.delta import (
+from bumblebee.learning.delta import DeltaEnv, Recordings, compare, replay_error, rewards, stack
+from bumblebee.learning.delta.action import (
     DeltaAction,
     DeltaConfig,
     action_adapter,
@@ -17,9 +17,6 @@ from bumblebee.learning.delta import (
     make_network,
     save_delta,
 )
-from bumblebee.learning.delta_env import DeltaEnv
-from bumblebee.learning.delta_gain import compare, replay_error
-from bumblebee.learning.recordings import Recordings, stack
 from bumblebee.measured.rollout import Rollout
 from bumblebee.robot.facts import ANKLE_JOINTS, joint_names, stand_pose
 from bumblebee.sim.engine import RobotState

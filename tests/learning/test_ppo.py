@@ -17,10 +17,10 @@ from bumblebee.learning.curve import CurveWriter
 from bumblebee.learning.ppo import CHECKPOINT, CURVE, BoundedPpo, Trainer, runner_config
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.config import EnvConfig, RewardConfig
+from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.rewards import ERRORS, PENALTIES
+from bumblebee.tracking.rewards import ERRORS, PENALTIES, RewardConfig
 from tests.tracking.clips import waving
 
 ENV = EnvConfig(num_worlds=8, threads=1, physics_hz=100)

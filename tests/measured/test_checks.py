@@ -7,8 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.measured.checks import check_rollout
-from bumblebee.measured.finding import Finding
+from bumblebee.measured.checks import Finding, check_rollout
 from bumblebee.measured.rollout import Rollout
 from bumblebee.measured.usable import review
 from tests.measured.simulated import arm_model, arm_rollout, g1_model, g1_rollout

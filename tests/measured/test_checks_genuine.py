@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bumblebee.measured.checks import check_rollout
-from bumblebee.measured.finding import Finding
+from bumblebee.measured.checks import Finding, Thresholds, check_rollout
 from bumblebee.measured.rollout import Rollout
-from bumblebee.measured.thresholds import Thresholds
 from tests.measured.simulated import clip_and_lead, clip_rollout, g1_model, g1_rollout, tracked_rollout
 
 FAULTS = ("", "weak", "friction", "delay", "offset")

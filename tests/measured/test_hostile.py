@@ -16,8 +16,8 @@ import pytest
 from bumblebee.diagnosis.dataset.session import open_session
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
-from bumblebee.measured.asap_npz import import_asap
 from bumblebee.measured.importers import import_dataset
+from bumblebee.measured.importers.asap_npz import import_asap
 from bumblebee.measured.intake import UNFORESEEN, intake
 from bumblebee.measured.metadata import METADATA_KEY
 from bumblebee.measured.rollout import BadRollout, read_rollout, write_rollout

@@ -13,8 +13,8 @@ from mujoco import sysid
 from bumblebee.errors import BadInput
 from bumblebee.measured.checks import check_rollout
 from bumblebee.measured.importers import import_dataset, read_rollouts
+from bumblebee.measured.importers.source import open_source
 from bumblebee.measured.rollout import Rollout, read_dataset
-from bumblebee.measured.source import open_source
 from bumblebee.quaternions import rotate_by_cross
 from bumblebee.robot.facts import joint_names
 from tests.measured.simulated import ARM, arm_model, arm_rollout, g1_model, g1_rollout

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.intake import IntakeSummary, file_hash, findings_table, intake, merge
+from bumblebee.io.read import file_hash
+from bumblebee.measured.intake import IntakeSummary, findings_table, intake, merge
 from bumblebee.measured.overview import write_overview
 from bumblebee.measured.rollout import Rollout, read_rollout, write_rollout
 from bumblebee.measured.summary import summary_table

@@ -35,7 +35,7 @@ def test_the_page_names_the_hash_that_an_answer_needs_and_no_folder_of_this_mach
     seen = seen_of(page.with_name("summary.json"))["sha256"]
     text = page.read_text()
     for verb in ("approve", "reject"):
-        assert f"python -m flows.gate {verb} --round 1 --seen {seen[:12]} --by NAME" in text
+        assert f"python -m flows.gate_answer {verb} --round 1 --seen {seen[:12]} --by NAME" in text
     assert str(page.parent) not in text
 
 

@@ -4,7 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.motion.clip import angular_velocity, foot_contacts, velocities
+from bumblebee.motion.clip import angular_velocity, velocities
+from bumblebee.motion.contacts import foot_contacts
 from bumblebee.motion.kinematics import forward_bodies, lowest_heights, make_clip, sole_points
 from bumblebee.robot.facts import FEET, KEY_BODIES, joints
 from bumblebee.robot.model import RobotConfig, build_model

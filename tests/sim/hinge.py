@@ -9,8 +9,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from bumblebee.sim.effect_forces import StepHooks
-from bumblebee.sim.effects import Effect, add_to_spec, runtime_hooks
+from bumblebee.sim.effects import Effect, StepHooks, add_to_spec, runtime_hooks
 
 INERTIA, KP, KD, MASS, ARM, LIMIT = 0.05, 20.0, 1.0, 0.8, 0.3, 15.0
 TOTAL = INERTIA + MASS * ARM**2

@@ -6,8 +6,8 @@ import pytest
 import torch
 
 from bumblebee.robot.model import build_spec
-from bumblebee.sim.effect_engine import EffectsCpu, needs_effects
 from bumblebee.sim.effects import Effect, add_to_spec, runtime_hooks, single
+from bumblebee.sim.effects.cpu_engine import EffectsCpu, needs_effects
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import add_foot_sensors
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from bumblebee.sim.effect_states import State, states_of
-from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.effects import State, read_term, states_of
 
 REST, SLEW = State(0, "rested(0.3, 0.02)", (0.3, 0.02)), State(0, "slewed(2, 0.02)", (2.0, 0.02))
 

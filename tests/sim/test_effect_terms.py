@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.effects import read_term
 
 RNG = np.random.default_rng(0)
 VALUES = {name: RNG.uniform(-2, 2, 50) for name in ("q", "v", "u", "tau", "t", "q[knee]", "v[left knee]")}

@@ -7,11 +7,11 @@ import torch
 pytest.importorskip("mujoco_warp", reason="the extra `gpu` is not installed")
 
 from bumblebee.robot.model import build_spec
-from bumblebee.sim.effect_engine import EffectsCpu
 from bumblebee.sim.effects import Effect, add_to_spec, runtime_hooks, single
+from bumblebee.sim.effects.cpu_engine import EffectsCpu
+from bumblebee.sim.effects.warp_engine import EffectsWarp
 from bumblebee.sim.mujoco_warp import MujocoWarp
 from bumblebee.sim.sensors import add_foot_sensors
-from bumblebee.sim.warp_effects import EffectsWarp
 from bumblebee.tracking.config import Randomisation
 from bumblebee.tracking.randomisation import randomise_worlds
 from tests.sim.test_mujoco_warp import GPU, STAND, STEPS, WORLDS, compare, converged, started, targets

@@ -17,7 +17,7 @@ HOME = Path(sections.__file__).parents[1]
 def classes() -> list[type]:
     """Every settings class, each once."""
     waiting: list[Any] = [sections.Loop]
-    for place in sections.SECTIONS.values():
+    for place in params.SECTIONS.values():
         module, _, name = place.partition(":")
         waiting.append(getattr(import_module(module), name))
     found: list[type] = []

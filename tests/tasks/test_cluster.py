@@ -14,6 +14,7 @@ from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.store import write_library
 from bumblebee.robot.facts import stand_pose
 from tasks import cluster as stage
+from tasks import paths
 from tasks.stage import run_stage
 
 PARAMS = """
@@ -48,30 +49,30 @@ def run() -> None:
 
 def test_every_kept_clip_has_a_cluster_and_the_weights_load(capsys):
     clips = [gliding(f"m{i}", 0.3 * i, "test" if i == 5 else "train") for i in range(6)]
-    write_library(stage.FILTERED, clips)
+    write_library(paths.FILTERED, clips)
     run()
-    labels = pd.read_parquet(stage.CLUSTERS / "labels.parquet")
+    labels = pd.read_parquet(paths.CLUSTERS / "labels.parquet")
     assert labels["name"].tolist() == [clip.name for clip in clips]
     assert set(labels["cluster"]) == {"slow", "quick"} and np.isfinite(labels[["x", "y"]]).all(axis=None)
-    summary = json.loads((stage.CLUSTERS / "summary.json").read_text())
+    summary = json.loads((paths.CLUSTERS / "summary.json").read_text())
     assert list(summary["clusters"]) == ["slow", "quick"]
     assert summary["clusters"]["slow"]["speed"] < summary["clusters"]["quick"]["speed"]
-    assert pd.read_csv(stage.CLUSTERS / "elbow.csv")["k"].tolist() == [1, 2, 3]
-    assert len(pd.read_csv(stage.CLUSTERS / "curve.csv")) == 3
-    facts = json.loads((stage.MODEL / "config.json").read_text())["autoencoder"]
+    assert pd.read_csv(paths.CLUSTERS / "elbow.csv")["k"].tolist() == [1, 2, 3]
+    assert len(pd.read_csv(paths.CLUSTERS / "curve.csv")) == 3
+    facts = json.loads((paths.CLUSTERING / "config.json").read_text())["autoencoder"]
     model = TextMotionAutoencoder(AutoencoderConfig(**facts))
-    model.load_state_dict(torch.load(stage.MODEL / "autoencoder.pt", weights_only=True))
+    model.load_state_dict(torch.load(paths.CLUSTERING / "autoencoder.pt", weights_only=True))
     assert "slow" in capsys.readouterr().out
 
 
 def test_too_few_motions_end_in_one_line_and_leave_nothing(capsys):
-    write_library(stage.FILTERED, [gliding("a", 0.0), gliding("b", 1.0), gliding("c", 1.0)])
+    write_library(paths.FILTERED, [gliding("a", 0.0), gliding("b", 1.0), gliding("c", 1.0)])
     with pytest.raises(SystemExit) as ended:
         run()
     assert ended.value.code == 2
     said = capsys.readouterr().err.strip()
     assert said.count("\n") == 0 and "2 x 2 training clips" in said and "3 training clips" in said
-    assert not stage.CLUSTERS.exists() and not stage.MODEL.exists()
+    assert not paths.CLUSTERS.exists() and not paths.CLUSTERING.exists()
 
 
 def test_unknown_setting_is_named(capsys):

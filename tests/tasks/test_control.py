@@ -9,8 +9,7 @@ import pytest
 import torch
 import yaml
 
-from bumblebee.learning.delta import DeltaAction, DeltaConfig, make_network
-from bumblebee.learning.delta_gain import Gain
+from bumblebee.learning.delta import DeltaAction, DeltaConfig, Gain, make_network
 from bumblebee.motion.store import write_library
 from bumblebee.robot.model import write_xml
 from bumblebee.sim.effects import Effect, single, write_effects

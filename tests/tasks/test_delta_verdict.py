@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from bumblebee.learning.delta_gain import Gain
+from bumblebee.learning.delta import Gain
 from tasks.delta import verdict
 
 NAN = math.nan

@@ -15,6 +15,7 @@ from bumblebee.motion.kinematics import lowest, make_clip
 from bumblebee.motion.store import read_library, write_library
 from bumblebee.robot.facts import stand_pose
 from tasks import filter as stage
+from tasks import paths
 from tasks.stage import run_stage
 
 
@@ -35,15 +36,15 @@ def standing(name: str, height: float = 0.0) -> Clip:
 
 
 def run(clips: list[Clip]) -> None:
-    write_library(stage.MOTIONS, clips)
+    write_library(paths.MOTIONS, clips)
     run_stage(stage.main, [])
 
 
 def test_what_floats_is_left_out_and_explained(capsys):
     run([standing("good"), standing("high", 0.3), standing("higher", 0.4)])
-    (kept,) = read_library(stage.FILTERED)
+    (kept,) = read_library(paths.FILTERED)
     assert (kept.name, kept.split, kept.family) == ("good", "test", "stand")
-    drops = pd.read_csv(stage.FILTERED / "drops.csv")
+    drops = pd.read_csv(paths.FILTERED / "drops.csv")
     assert tuple(drops.columns) == DROP_COLUMNS
     assert drops["motion"].tolist() == ["high", "higher"]
     assert set(drops["rule"]) == {"floating"}
@@ -63,7 +64,7 @@ def test_no_motion_left_ends_in_one_line_and_leaves_nothing(capsys):
     assert caught.value.code == 2
     line = capsys.readouterr().err.strip()
     assert len(line.splitlines()) == 1 and "all 1 dropped; the first: high" in line
-    assert not stage.FILTERED.exists()
+    assert not paths.FILTERED.exists()
 
 
 def test_a_full_disk_leaves_the_old_result(capsys, monkeypatch):
@@ -72,10 +73,10 @@ def test_a_full_disk_leaves_the_old_result(capsys, monkeypatch):
     def full(path: Path, clip: Clip) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
-    write_library(stage.MOTIONS, [standing("new")])
+    write_library(paths.MOTIONS, [standing("new")])
     monkeypatch.setattr(store, "write_clip", full)
     with pytest.raises(SystemExit) as caught:
         run_stage(stage.main, [])
     assert caught.value.code == 2
-    assert [clip.name for clip in read_library(stage.FILTERED)] == ["good"]
+    assert [clip.name for clip in read_library(paths.FILTERED)] == ["good"]
     assert sorted(path.name for path in Path("data").iterdir()) == ["filtered", "motions"]

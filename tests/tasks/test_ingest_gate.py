@@ -309,7 +309,7 @@ def test_a_look_from_another_folder_prints_commands_for_this_workspace(
     assert gate_task.command(["--round", "1", "--show", "--workspace", str(folder)]) == 0
     shown = capsys.readouterr().out
     for verb in ("approve", "reject"):
-        assert f"-m flows.gate {verb} --workspace {folder} --round 1 --seen " in shown
+        assert f"-m flows.gate_answer {verb} --workspace {folder} --round 1 --seen " in shown
     assert sys.executable in shown and not list(Path.cwd().iterdir())
 
 

@@ -34,7 +34,7 @@ def line_of(path: Path) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("section", [*sections.LOOP, *sections.SECTIONS])
+@pytest.mark.parametrize("section", [*params.LOOP, *params.SECTIONS])
 def test_a_wrong_value_is_refused_in_one_line_that_names_its_key(section: str):
     content = shipped()
     for key, value, named in WRONG:
@@ -48,7 +48,7 @@ def test_a_wrong_value_is_refused_in_one_line_that_names_its_key(section: str):
 
 def test_the_table_of_wrong_values_covers_every_section():
     assert len(WRONG) >= 100
-    assert {key.partition(".")[0] for key, *_ in WRONG} >= set(sections.SECTIONS) | set(sections.LOOP)
+    assert {key.partition(".")[0] for key, *_ in WRONG} >= set(params.SECTIONS) | set(params.LOOP)
 
 
 @pytest.mark.parametrize("kind", classes())
@@ -97,7 +97,7 @@ def test_what_is_shipped_is_within_the_ranges(tmp_path: Path, profile: str):
     content = shipped()
     if profile:
         content = merge(content, params.read(HOME / "profiles" / f"{profile}.yaml"))
-    assert set(sections.check(written(tmp_path, content))) == {"", *sections.SECTIONS}
+    assert set(sections.check(written(tmp_path, content))) == {"", *params.SECTIONS}
 
 
 def test_presets_and_methods_of_the_benchmarks_are_within_the_ranges():

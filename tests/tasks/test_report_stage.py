@@ -12,7 +12,7 @@ from bumblebee.report.film_choice import Choice
 from bumblebee.report.filmstrip import Film
 from bumblebee.report.results import RoundResults
 from bumblebee.robot.facts import joint_names, stand_pose
-from tasks import film, report
+from tasks import film, paths, report
 
 
 @pytest.mark.parametrize(("rollouts", "expected"), [("{}", {"effects": []}), ("{source: mine}", None)])
@@ -21,8 +21,8 @@ def test_the_seal_is_not_taken_for_the_truth_about_a_real_robot(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("params.yaml").write_text(f"rollouts: {rollouts}\n")
-    report.SEALED.parent.mkdir(parents=True)
-    report.SEALED.write_text('{"effects": []}')
+    paths.SEALED_ROBOT.parent.mkdir(parents=True)
+    paths.SEALED_ROBOT.write_text('{"effects": []}')
     assert report.sealed_truth() == expected
 
 

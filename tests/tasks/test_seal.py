@@ -13,8 +13,8 @@ from bumblebee.deploy.undeclared.kinds import CATALOGUE, KINDS, Place
 from bumblebee.errors import BadInput
 from bumblebee.report.truth import match
 from bumblebee.robot.facts import joint_names
-from bumblebee.sim import effect_catalogue
-from tasks import seal
+from bumblebee.sim.effects import CATALOGUE as EFFECTS
+from tasks import paths, seal
 from tasks.seal import BODIES, OF_G1, SealConfig, draw, region
 from tasks.seal_trial import Trial
 
@@ -93,7 +93,7 @@ def test_a_robot_is_drawn_again_until_the_policy_loses_a_third_and_yet_can_be_me
 ) -> None:
     trials += [Trial(0.2, 5.0), Trial(1.0, 0.4), Trial(0.5, 3.0)]
     seal.main()
-    sealed = json.loads(seal.OUT.read_text())
+    sealed = json.loads(paths.SEALED_ROBOT.read_text())
     assert sealed["attempt"] == 2 and sealed["effects"] == draw(SealConfig(seed=4), 2)
     assert sealed["trial"]["lost"] == 0.5
     said = capsys.readouterr().out
@@ -106,7 +106,7 @@ def test_where_no_draw_will_do_the_one_that_loses_most_and_stands_is_sealed_and_
 ) -> None:
     trials += [Trial(0.1, 5.0), Trial(0.25, 5.0), Trial(1.0, 0.3)]
     seal.main()
-    assert json.loads(seal.OUT.read_text())["attempt"] == 1
+    assert json.loads(paths.SEALED_ROBOT.read_text())["attempt"] == 1
     assert "none of 3 draws loses 33%: the one that loses 25% is sealed" in capsys.readouterr().out
 
 
@@ -115,7 +115,7 @@ def test_motions_that_the_policy_does_not_follow_at_all_are_no_reason_to_stop(
 ) -> None:
     monkeypatch.setattr(seal, "followed", lambda *_: [])
     seal.main()
-    assert json.loads(seal.OUT.read_text())["attempt"] == 0
+    assert json.loads(paths.SEALED_ROBOT.read_text())["attempt"] == 0
     assert "nothing to lose" in capsys.readouterr().out
 
 
@@ -123,7 +123,7 @@ def test_motions_that_the_policy_does_not_follow_at_all_are_no_reason_to_stop(
 def test_nothing_is_tried_for_a_null_robot_or_beside_a_real_one(trials: list[Trial], line: str) -> None:
     Path("params.yaml").write_text(line + "\n")
     seal.main()
-    assert json.loads(seal.OUT.read_text())["attempt"] == 0
+    assert json.loads(paths.SEALED_ROBOT.read_text())["attempt"] == 0
 
 
 def test_the_largest_faults_are_stated_for_every_kind_and_the_usual_peaks_for_every_joint() -> None:
@@ -133,7 +133,7 @@ def test_the_largest_faults_are_stated_for_every_kind_and_the_usual_peaks_for_ev
 def test_parameters_have_the_names_of_the_catalogue() -> None:
     for kind in CATALOGUE:
         (effect,) = draw(SealConfig(kinds=(kind.name,), n_effects=1))
-        declared = {parameter.name for parameter in effect_catalogue.CATALOGUE[kind.name].parameters}
+        declared = {parameter.name for parameter in EFFECTS[kind.name].parameters}
         assert set(effect["parameters"]) <= declared, kind.name
 
 

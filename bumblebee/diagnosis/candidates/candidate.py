@@ -8,8 +8,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates.traits import ABRUPT, INVERSE, TRAITS
 from bumblebee.diagnosis.thresholds.candidates import CandidateLimits
-from bumblebee.sim.effect_native import physical_inertia
-from bumblebee.sim.effects import CATALOGUE, Effect, single
+from bumblebee.sim.effects import CATALOGUE, Effect, physical_inertia, single
 
 
 @dataclass(frozen=True)

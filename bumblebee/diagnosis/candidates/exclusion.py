@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.sim.effect_native import SUFFIX
+from bumblebee.sim.effects import SUFFIX
 
 _SPRINGS = {"joint_spring", "asymmetric_friction"}
 

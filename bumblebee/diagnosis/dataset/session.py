@@ -24,7 +24,7 @@ from bumblebee.diagnosis.simulation import (
 )
 from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, Usable
 from bumblebee.errors import BadInput
-from bumblebee.measured.checks_magnitude import beyond
+from bumblebee.measured.checks import beyond
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.measured.usable import review
 

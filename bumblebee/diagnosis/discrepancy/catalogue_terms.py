@@ -8,7 +8,7 @@ from bumblebee.diagnosis.candidates import Candidate, Formula
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.simulation import Plant, declared_values
 from bumblebee.diagnosis.thresholds.discrepancy import CatalogueTerms
-from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.effects import read_term
 from bumblebee.sim.servo import servos_of
 
 # Effects of the catalogue of one family with a basis function: its constant part, linear part, first harmonic.

@@ -14,8 +14,7 @@ import numpy as np
 from bumblebee.diagnosis.sensitivities import Path
 from bumblebee.diagnosis.simulation import Plant, Windows, at_starts, state_before
 from bumblebee.diagnosis.thresholds.discrepancy import DiscrepancyThresholds
-from bumblebee.sim.effect_states import State
-from bumblebee.sim.effect_terms import Term
+from bumblebee.sim.effects import State, Term
 from bumblebee.sim.servo import servos_of
 
 
@@ -49,7 +48,7 @@ class Quantities:
         return float(np.median(np.diff(self.windows.command_time, axis=1)))
 
     def values(self, joint: int) -> Mapping[str, np.ndarray]:
-        """The names of `sim.effect_terms` as a joint sees them, each (W, K)."""
+        """The names of `sim.effects.terms` as a joint sees them, each (W, K)."""
         return _Values(self, joint)
 
     def torque(self, term: Term, joint: int) -> np.ndarray:
@@ -66,7 +65,7 @@ class Quantities:
         return self._known["against", joint]
 
     def state(self, joint: int, key: str, numbers: tuple[float, ...]) -> np.ndarray:
-        """(W, K) of what a joint remembers, see `sim.effect_states`."""
+        """(W, K) of what a joint remembers, see `sim.effects.states`."""
         if (joint, key) not in self._known:
             state = State(joint, key, numbers)
             now, out = state_before(self.plant, self.windows, state), np.empty(self.t.shape)

@@ -1,4 +1,4 @@
-"""The basis functions of a missing torque: terms of `sim.effect_terms` that belong together, simplest first.
+"""The basis functions of a missing torque: terms of `sim.effects.terms` that belong together, simplest first.
 
 Some of them are effects of the catalogue in other words (dry and viscous friction, springs, one harmonic of cogging,
 gains ...). They compete with the others, so that what the search did not accept is not taken for something new, but no
@@ -13,7 +13,7 @@ import numpy as np
 
 from bumblebee.diagnosis.discrepancy.regressors import Quantities
 from bumblebee.diagnosis.thresholds.discrepancy import TermLibrary
-from bumblebee.sim.effect_terms import Term, read_term
+from bumblebee.sim.effects import Term, read_term
 
 QUANTITIES = ("position", "velocity", "target", "torque", "time", "history")
 _POSITION, _VELOCITY, _TARGET, _TORQUE, _TIME, _HISTORY = ((name,) for name in QUANTITIES)

@@ -15,7 +15,7 @@ import numpy as np
 from bumblebee.diagnosis.gap.dependence_test import JointStructure, clipped, gain_test, joint_structure, other_joint
 from bumblebee.diagnosis.gap.torque_residual import TorqueResidual
 from bumblebee.diagnosis.thresholds.gap import GapThresholds, Library
-from bumblebee.sim.effect_terms import Term, read_term
+from bumblebee.sim.effects import Term, read_term
 
 
 def _uses(*names: str) -> Callable[[Term], bool]:

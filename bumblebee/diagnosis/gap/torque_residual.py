@@ -61,7 +61,7 @@ class TorqueResidual:
         return len(self.rollout)
 
     def values(self, joint: int) -> dict[str, np.ndarray]:
-        """The names of `sim.effect_terms` as this joint sees them."""
+        """The names of `sim.effects.terms` as this joint sees them."""
         own = {name: getattr(self, name)[:, joint] for name in ("q", "v", "u", "tau")}
         others = {f"{s}[{n}]": getattr(self, s)[:, k] for s in ("q", "v") for k, n in enumerate(self.joints)}
         return own | {"t": self.t} | others

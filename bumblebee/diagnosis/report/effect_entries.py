@@ -15,8 +15,7 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection import Loss, Refined, Search, alike, rivals
 from bumblebee.diagnosis.simulation import Plant, declared_values, unit_on
 from bumblebee.diagnosis.thresholds.report import Effects
-from bumblebee.sim.effect_catalogue import is_native
-from bumblebee.sim.effects import CATALOGUE, Effect
+from bumblebee.sim.effects import CATALOGUE, Effect, is_native
 
 
 def effect_entries(found: Search, last: Refined, holdout: Holdout, beyond: Discovery | None) -> list[dict[str, Any]]:

@@ -15,10 +15,7 @@ from bumblebee.diagnosis.sensitivities.impulse_responses import Path
 from bumblebee.diagnosis.sensitivities.latency_signatures import LATE, Late
 from bumblebee.diagnosis.simulation import Plant, Variation, Windows, bent_before, inputs_of, remember, yielded
 from bumblebee.diagnosis.thresholds.sensitivities import TorqueSignatures
-from bumblebee.sim.effect_forces import bent
-from bumblebee.sim.effect_hooks import runtime_hooks
-from bumblebee.sim.effect_native import sloped, spread_inertia
-from bumblebee.sim.effects import Effect
+from bumblebee.sim.effects import Effect, bent, runtime_hooks, sloped, spread_inertia
 from bumblebee.sim.servo import servos_of
 
 

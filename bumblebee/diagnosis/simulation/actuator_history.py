@@ -14,9 +14,7 @@ from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.windows import Windows, command_inputs
 from bumblebee.diagnosis.thresholds.simulation import ActuatorHistory
 from bumblebee.measured.rollout import Rollout
-from bumblebee.sim.effect_forces import Memory, bent, history_length
-from bumblebee.sim.effect_hooks import RuntimeHooks
-from bumblebee.sim.effect_states import State, states_of
+from bumblebee.sim.effects import Memory, RuntimeHooks, State, bent, history_length, states_of
 from bumblebee.sim.servo import Servos, servos_of
 
 

@@ -4,8 +4,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.sim import effect_native as native
-from bumblebee.sim.effect_catalogue import CATALOGUE
+from bumblebee.sim.effects import CATALOGUE, native
 
 
 def touching(model: mujoco.MjModel, ground: int) -> list[int]:

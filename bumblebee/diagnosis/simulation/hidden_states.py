@@ -17,7 +17,7 @@ from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, start_state
 from bumblebee.diagnosis.thresholds.simulation import HiddenStates
 from bumblebee.measured.rollout import Rollout
-from bumblebee.sim.effect_native import SUFFIX
+from bumblebee.sim.effects import SUFFIX
 
 Known = tuple[np.ndarray, np.ndarray, np.ndarray]
 """States (W, nq'), (W, nv') of a model with play or shafts, and for which windows (W,) they are to be believed."""

@@ -16,7 +16,7 @@ from bumblebee.diagnosis.simulation.actuators import drive_law, take_target, tak
 from bumblebee.diagnosis.thresholds.simulation import DriveProbe, SimulationThresholds
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
-from bumblebee.sim.effect_native import is_hidden
+from bumblebee.sim.effects import is_hidden
 from bumblebee.sim.servo import ON_JOINT, actuator_of
 
 _FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)

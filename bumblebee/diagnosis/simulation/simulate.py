@@ -17,7 +17,7 @@ from bumblebee.diagnosis.simulation.readings import Layout, difference, simulate
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
 from bumblebee.quaternions import conjugate, from_rotation_vector, multiply, rotate_by_cross
-from bumblebee.sim.effect_forces import Memory, StepHooks
+from bumblebee.sim.effects import Memory, StepHooks
 
 THREADS: int | None = None
 """Threads of every simulation; None: see `threads`."""

@@ -9,10 +9,16 @@ import numpy as np
 
 from bumblebee.diagnosis.simulation.declared import touching
 from bumblebee.diagnosis.simulation.plant import Plant, make_plant
-from bumblebee.sim import effect_native as native
-from bumblebee.sim.effect_catalogue import CATALOGUE, STICTION_SOLIMP, STICTION_SOLREF, Effect
-from bumblebee.sim.effect_hooks import RuntimeHooks, runtime_hooks
-from bumblebee.sim.effects import add_to_spec
+from bumblebee.sim.effects import (
+    CATALOGUE,
+    STICTION_SOLIMP,
+    STICTION_SOLREF,
+    Effect,
+    RuntimeHooks,
+    add_to_spec,
+    native,
+    runtime_hooks,
+)
 
 _ORDER = tuple(CATALOGUE)
 # Effects that change the layout of MuJoCo's state: they are compiled, once for each set of places.
@@ -46,7 +52,7 @@ class Variation:
 
 
 def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
-    """The plant with `effects`; the same meaning as `sim.effect_spec.add_to_spec`, without compiling again."""
+    """The plant with `effects`; the same meaning as `sim.effects.spec.add_to_spec`, without compiling again."""
     if not effects:
         return Variation(plant.model, plant.delay, plant.offset)
     structural = [e for e in effects if _is_structural(e)]

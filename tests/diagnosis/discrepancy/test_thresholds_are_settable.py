@@ -23,7 +23,7 @@ from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem
 from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.diagnosis.thresholds import discrepancy as of
-from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.effects import read_term
 from tests.diagnosis.discrepancy.test_discover import prepared
 
 _made: list[tuple[Session, Problem, Problem]] = []

@@ -17,7 +17,7 @@ from bumblebee.diagnosis.estimation.least_squares import cost_of
 from bumblebee.diagnosis.residuals.problem import Problem
 from bumblebee.diagnosis.thresholds.comparison import Confirmed
 from bumblebee.diagnosis.thresholds.discrepancy import TermLibrary
-from bumblebee.sim.effect_terms import read_term
+from bumblebee.sim.effects import read_term
 from tests.diagnosis.discrepancy.test_discover import prepared
 
 _made: list[tuple[Problem, Scene]] = []

@@ -1,0 +1,111 @@
+"""Checks of units and gains: degrees given for radians, gains that are not the declared model's."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from bumblebee.measured.checks.view import View
+
+DEGREE = np.pi / 180
+
+
+def check_degrees(view: View) -> None:
+    """Positions or targets that fit the model's ranges, or each other, only after division by 57.3."""
+    ranges = view.ranges()
+    for column in ("joint_pos", "joint_target"):
+        values = getattr(view.rollout, column)
+        if values is not None and _fits_only_as_degrees(values, ranges):
+            joint = int(np.argmax(_excess(values, ranges).max(axis=0)))
+            row = int(np.argmax(_excess(values, ranges)[:, joint]))
+            _add(view, column, joint, row, f"{values[row, joint]:.4g}, within the range only as degrees")
+    target, place = view.rollout.joint_target, view.rollout.joint_pos
+    if target is None or view.found("degrees"):
+        return
+    for column, ratio in (("joint_target", _rms(target) / _rms(place)), ("joint_pos", _rms(place) / _rms(target))):
+        if 40 < ratio < 80 and _rms(getattr(view.rollout, column)) > 3:
+            joint = int(np.argmax(np.abs(getattr(view.rollout, column)).max(axis=0)))
+            _add(view, column, joint, None, f"values {ratio:.0f} times those of the other column")
+
+
+def _add(view: View, column: str, joint: int, row: int | None, came: str) -> None:
+    view.add(view.label(column, joint), row, "degrees", "radians", came, fatal=True)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt((values**2).mean())) + 1e-12
+
+
+def _excess(values: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """How far each value lies beyond its range, (T, J); unlimited joints are never beyond."""
+    return np.maximum(ranges[:, 0] - values, values - ranges[:, 1])
+
+
+def _fits_only_as_degrees(values: np.ndarray, ranges: np.ndarray) -> bool:
+    """Several rows of the file are far outside as they are and all of them inside as degrees."""
+    limited = np.isfinite(ranges).all(axis=1)
+    if not limited.any():
+        return False
+    values, ranges = values[:, limited], ranges[limited]
+    if np.abs(values).max() < 2 * np.pi:
+        return False  # 0.11 rad at most if these were degrees: rather a reversed joint or another zero
+    outside = (_excess(values, ranges) > 1.0).any(axis=1).mean() > 0.2
+    jumps = np.abs(np.diff(values, axis=0)).max()
+    if abs(jumps - 2 * np.pi) < 0.3 and np.abs(values).max() < 4 * np.pi:
+        return False  # radians that were wrapped
+    return bool(outside and (_excess(values * DEGREE, ranges) < 0.1).all())
+
+
+def driven_joints(model: mujoco.MjModel) -> tuple[str, ...]:
+    """Names of the joints that actuators turn directly, in the actuators' order; tendons and sites are left out."""
+    return tuple(model.joint(int(model.actuator_trnid[i, 0])).name for i in range(model.nu) if at_joint(model, i))
+
+
+def at_joint(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether an actuator acts on a joint."""
+    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    return int(model.actuator_trntype[actuator]) in kinds
+
+
+def servo_gains(model: mujoco.MjModel) -> dict[str, tuple[float, float]]:
+    """Joint name -> (kp, kd) of the position servos of a model; other actuators are left out."""
+    gains = {}
+    for actuator in range(model.nu):
+        affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
+        kp = float(model.actuator_gainprm[actuator, 0])
+        if at_joint(model, actuator) and affine and kp > 0 and np.isclose(-model.actuator_biasprm[actuator, 1], kp):
+            name = model.joint(int(model.actuator_trnid[actuator, 0])).name
+            gains[name] = (kp, float(-model.actuator_biasprm[actuator, 2]))
+    return gains
+
+
+def check_gains(view: View) -> None:
+    """The gains that were in force against the declared model's and the policy contract's."""
+    declared = servo_gains(view.model)
+    named = {"kp": {name: pair[0] for name, pair in declared.items()}}
+    named["kd"] = {name: pair[1] for name, pair in declared.items()}
+    for key, wanted in named.items():
+        values = view.rollout.meta.get(key)
+        if values is None:
+            continue
+        _compare(view, key, dict(zip(view.rollout.joints, values, strict=True)), wanted, "the declared model's")
+        theirs = _contract_gains(view.contract, key)
+        _compare(view, key, dict(zip(view.rollout.joints, values, strict=True)), theirs, "the policy contract's")
+
+
+def _contract_gains(contract: dict[str, Any] | None, key: str) -> dict[str, float]:
+    if not contract or key not in contract or len(contract[key]) != len(contract.get("joints", [])):
+        return {}
+    return dict(zip(contract["joints"], contract[key], strict=True))
+
+
+def _compare(view: View, key: str, values: dict[str, float], wanted: dict[str, float], whose: str) -> None:
+    wrong = [
+        name
+        for name, value in values.items()
+        if name in wanted and abs(value - wanted[name]) > view.limits.gains_relative * max(abs(wanted[name]), 1e-6)
+    ]
+    if wrong:
+        first = wrong[0]
+        came = f"{values[first]:g} ({len(wrong)} joints differ)"
+        view.add(f"{key}[{first}]", None, "gains", f"{whose} {wanted[first]:.6g}", came, fatal=True)

@@ -1,0 +1,125 @@
+"""Checks of values: NaN, dead channels, steps that no joint can make, positions beyond the range."""
+
+import numpy as np
+
+from bumblebee.measured.checks.view import View
+
+
+def check_finite(view: View) -> None:
+    """NaN and infinities, one finding a column."""
+    for column in ("time", *view.rollout.columns):
+        values = getattr(view.rollout, column)
+        bad = ~np.isfinite(values.reshape(len(values), -1))
+        if not bad.any():
+            continue
+        row = int(np.argmax(bad.any(axis=1)))
+        place = int(np.argmax(bad[row]))
+        per_joint = values.ndim == 2 and values.shape[1] == len(view.rollout.joints)
+        name = view.label(column, place) if per_joint else column
+        came = f"{values.reshape(len(values), -1)[row, place]} ({int(bad.sum())} such values)"
+        view.add(name, row, "finite", "finite numbers", came, fatal=True)
+
+
+def longest_run(same: np.ndarray) -> tuple[int, int]:
+    """Start and length of the longest run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    if len(edges) == 0:
+        return 0, 0
+    lengths = edges[1::2] - edges[::2]
+    longest = int(np.argmax(lengths))
+    return int(edges[2 * longest]), int(lengths[longest])
+
+
+def check_frozen(view: View) -> None:
+    """A channel whose reading stays exactly the same while its command or the motion itself goes on."""
+    rollout, limits = view.rollout, view.limits
+    if view.found("degrees"):
+        return
+    need = max(10, round(limits.freeze_seconds / view.period))
+    ranges = view.ranges()
+    for joint in range(len(rollout.joints)):
+        place = rollout.joint_pos[:, joint]
+        at_stop = (place < ranges[joint, 0] + 0.02) | (place > ranges[joint, 1] - 0.02)
+        start, length = longest_run((np.diff(place) == 0) & ~at_stop[1:])
+        rows = slice(start, start + length + 1)
+        speed = float(np.abs(rollout.joint_vel[rows, joint]).mean()) if length else 0.0
+        moved = np.ptp(rollout.joint_target[rows, joint]) if rollout.joint_target is not None and length else 0.0
+        if length >= need and (moved > limits.freeze_command or speed > limits.freeze_speed):
+            came = f"{length + 1} equal rows; the command moved {moved:.3g} rad, joint_vel said {speed:.3g} rad/s"
+            fatal = speed > limits.freeze_speed or not _may_stall(place, start, length, limits.freeze_share)
+            view.add(view.label("joint_pos", joint), start, "frozen", "a reading that follows", came, fatal=fatal)
+        _check_frozen_rate(view, joint, need)
+    _check_frozen_base(view, need)
+
+
+def _may_stall(place: np.ndarray, start: int, length: int, share: float) -> bool:
+    """Whether equal readings may be a stalled joint: a coarse encoder, equal elsewhere too, that moves again."""
+    outside = np.delete(np.diff(place), np.s_[start : start + length])
+    moves_again = start + length < len(place) - 1
+    return bool(len(outside) and (outside == 0).mean() > 0.05 and moves_again and length < share * len(place))
+
+
+def _check_frozen_rate(view: View, joint: int, need: int) -> None:
+    rollout, limits = view.rollout, view.limits
+    start, length = longest_run(np.diff(rollout.joint_vel[:, joint]) == 0)
+    if length < need:
+        return
+    rows = slice(start, start + length + 1)
+    travelled = np.ptp(rollout.joint_pos[rows, joint])
+    seconds = rollout.time[start + length] - rollout.time[start]
+    said = abs(float(rollout.joint_vel[start, joint])) * seconds
+    if abs(travelled - said) > limits.freeze_command and abs(travelled - said) > 0.3 * max(travelled, said):
+        came = f"{length + 1} equal rows in which the joint travelled {travelled:.3g} rad"
+        view.add(view.label("joint_vel", joint), start, "frozen", "a reading that follows", came, fatal=True)
+
+
+def _check_frozen_base(view: View, need: int) -> None:
+    rollout = view.rollout
+    for column in ("base_quat", "base_ang_vel", "base_lin_vel", "base_pos"):
+        values = getattr(rollout, column)
+        if values is None:
+            continue
+        start, length = longest_run((np.diff(values, axis=0) == 0).all(axis=1))
+        moved = np.ptp(rollout.joint_pos[start : start + length + 1], axis=0).max()
+        if length >= need and moved > 2 * view.limits.freeze_command:
+            came = f"{length + 1} equal rows while a joint moved {moved:.3g} rad"
+            view.add(column, start, "frozen", "a reading that changes as the robot moves", came, fatal=True)
+
+
+def check_steps(view: View) -> None:
+    """Jumps of joint_pos that neither joint_vel nor an impact between two rows explains."""
+    rollout, limits = view.rollout, view.limits
+    if view.found("degrees"):
+        return
+    times = np.diff(rollout.time)[:, None]
+    jumps = np.abs(np.diff(rollout.joint_pos, axis=0))
+    speed = np.abs(np.pad(rollout.joint_vel, ((1, 1), (0, 0)), mode="edge"))
+    near = np.maximum.reduce([speed[:-3], speed[1:-2], speed[2:-1], speed[3:]])
+    allowed = 1.5 * near * times + np.maximum(limits.step_floor, limits.step_speed * times)
+    for joint in np.flatnonzero(((jumps > allowed) | (jumps > limits.speed_limit * times)).any(axis=0)):
+        excess = jumps[:, joint] / np.minimum(allowed[:, joint], limits.speed_limit * times[:, 0])
+        row = int(np.argmax(excess))
+        size = jumps[row, joint]
+        turn = ", a whole turn: the angle was wrapped" if abs(size - 2 * np.pi) < 0.3 else ""
+        came = f"{size:.3g} rad in {times[row, 0]:.3g} s ({int((excess > 1).sum())} such steps){turn}"
+        expected = f"at most {min(allowed[row, joint], limits.speed_limit * times[row, 0]):.3g} rad"
+        view.add(view.label("joint_pos", joint), row + 1, "step", expected, came, fatal=True)
+
+
+def check_range(view: View) -> None:
+    """Positions beyond the model's range."""
+    limits, ranges, place = view.limits, view.ranges(), view.rollout.joint_pos
+    if view.found("degrees", "joint_pos"):
+        return
+    excess = np.maximum(ranges[:, 0] - place, place - ranges[:, 1])
+    held = max(3, round(0.5 / view.period))
+    for joint in range(excess.shape[1]):
+        start, length = longest_run(excess[:, joint] > limits.range_held)
+        row = int(np.argmax(excess[:, joint]))
+        if excess[row, joint] <= limits.range_brief and length < held:
+            continue
+        low, high = ranges[joint]
+        expected = f"within the model's range {low:.4g} to {high:.4g}"
+        came = f"{place[row, joint]:.4g} (beyond it for {length} rows from row {start})"
+        fatal = excess[row, joint] > limits.range_fatal
+        view.add(view.label("joint_pos", joint), row, "range", expected, came, fatal=fatal)

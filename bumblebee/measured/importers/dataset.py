@@ -1,0 +1,79 @@
+"""`import_dataset`: any known layout of logs as a dataset of the contract, with the declared model beside it."""
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+
+from bumblebee.errors import BadInput
+from bumblebee.io.names import distinct_stems
+from bumblebee.io.write import new_folder, try_output
+from bumblebee.measured.importers.asap_npz import import_asap
+from bumblebee.measured.importers.column_map import DOUBLE_PENDULUM, read_map
+from bumblebee.measured.importers.csv_map import import_csv
+from bumblebee.measured.importers.so101 import import_so101
+from bumblebee.measured.importers.sysid_npz import import_sysid
+from bumblebee.measured.model_file import copy_model, load_model
+from bumblebee.measured.rollout import Rollout, write_rollout
+
+KINDS = ("so101", "csv", "double_pendulum", "asap", "sysid")
+
+
+def read_rollouts(
+    source: Path, kind: str, model: mujoco.MjModel | None = None, column_map: Path | None = None
+) -> list[Rollout]:
+    """The rollouts of a source in one of the layouts `KINDS`.
+
+    Args:
+        source: folder, zip archive or file.
+        kind: so101, csv (needs `column_map`), double_pendulum, asap or sysid (both need `model`).
+        model: the declared model.
+        column_map: YAML file with the fields of `ColumnMap`.
+    """
+    if kind in ("asap", "sysid") and model is None:
+        raise BadInput(kind, "the declared model, by whose joints the file is read", "none", "Give a model.xml.")
+    if kind == "csv" and column_map is None:
+        raise BadInput(kind, "a column map", "none", "Give a YAML file with joints and columns.")
+    readers: dict[str, Callable[[], list[Rollout]]] = {
+        "so101": lambda: import_so101(source),
+        "csv": lambda: import_csv(source, [read_map(column_map or Path())]),
+        "double_pendulum": lambda: import_csv(source, DOUBLE_PENDULUM),
+        "asap": lambda: import_asap(source, model),
+        "sysid": lambda: import_sysid(source, model),
+    }
+    if kind not in readers:
+        raise BadInput(kind, f"one of {', '.join(KINDS)}", repr(kind))
+    return _distinct(readers[kind]())
+
+
+def import_dataset(
+    source: Path, kind: str, out: Path, model_path: Path | None = None, column_map: Path | None = None
+) -> list[str]:
+    """Write `out`/rollouts/*.parquet and `out`/model.xml; `out` appears whole and must not exist. Returns the ids."""
+    out = Path(out)
+    if os.path.lexists(out):
+        raise BadInput(out, "a new folder", "one that exists", "Choose another name.")
+    try_output(out)
+    model = load_model(model_path) if model_path else None
+    rollouts = read_rollouts(Path(source), kind, model, column_map)
+    with new_folder(out) as folder:
+        for rollout in rollouts:
+            write_rollout(folder / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)
+        if model_path:
+            copy_model(model_path, folder / "model.xml")
+    return [rollout.rollout_id for rollout in rollouts]
+
+
+def _distinct(rollouts: list[Rollout]) -> list[Rollout]:
+    """The rollouts under names that can be files' and of which no two are alike; none is lost."""
+    names = distinct_stems([rollout.rollout_id for rollout in rollouts], "rollout")
+    return [_renamed(rollout, name) for rollout, name in zip(rollouts, names, strict=True)]
+
+
+def _renamed(rollout: Rollout, name: str) -> Rollout:
+    if name == rollout.rollout_id:
+        return rollout
+    motion = {"motion": name} if rollout.meta.get("motion") == rollout.rollout_id else {}
+    return replace(rollout, rollout_id=name, meta=rollout.meta | motion)

@@ -1,0 +1,46 @@
+"""Effects that a model may lack: the catalogue, `effects.yaml`, native MJCF, and what acts beside MuJoCo at run time.
+
+Values are absolute (N m, kg, s, rad ...), so that the effects applied to the declared model *are* the corrected
+model; `motor_strength`, `kp` and `kd` alone are factors on the declared gains. The engines that run with them are
+`cpu_engine` and `warp_engine`; `sim.engines` chooses.
+"""
+
+from bumblebee.sim.effects import native
+from bumblebee.sim.effects.catalogue import CATALOGUE, STICTION_SOLIMP, STICTION_SOLREF, Effect, Kind, is_native, single
+from bumblebee.sim.effects.file import effects_yaml, read_effects, write_effects
+from bumblebee.sim.effects.forces import Memory, StepHooks, bent, history_length
+from bumblebee.sim.effects.hooks import RuntimeHooks, runtime_hooks
+from bumblebee.sim.effects.native import SUFFIX, is_hidden, physical_inertia, sloped, spread_inertia
+from bumblebee.sim.effects.spec import add_to_spec
+from bumblebee.sim.effects.states import State, states_of
+from bumblebee.sim.effects.terms import Term, read_term
+
+__all__ = [
+    "CATALOGUE",
+    "STICTION_SOLIMP",
+    "STICTION_SOLREF",
+    "SUFFIX",
+    "Effect",
+    "Kind",
+    "Memory",
+    "RuntimeHooks",
+    "State",
+    "StepHooks",
+    "Term",
+    "add_to_spec",
+    "bent",
+    "effects_yaml",
+    "history_length",
+    "is_hidden",
+    "is_native",
+    "native",
+    "physical_inertia",
+    "read_effects",
+    "read_term",
+    "runtime_hooks",
+    "single",
+    "sloped",
+    "spread_inertia",
+    "states_of",
+    "write_effects",
+]

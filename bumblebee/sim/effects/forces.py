@@ -1,0 +1,276 @@
+"""The equations of effects that act at every physics step, for many worlds at once, beside `mujoco.batch`.
+
+Dry friction that depends on speed or load is a friction loss written anew each step, and strength that fades is a gain
+written anew, so that MuJoCo's implicit treatment of both stays. The others are torques added to `qfrc_applied`:
+
+| effect | what is written before a step |
+|---|---|
+| stribeck_friction | frictionloss + stiction exp(-(v / velocity)^2) |
+| load_dependent_friction | frictionloss + coefficient abs(servo torque) |
+| torque_speed_limit | forcerange: limit (1 - v / speed) in the direction of motion |
+| thermal_fade, strength_drift | gains times 1 - rate int (torque / limit)^2 dt - rate t |
+| encoder_delay, encoder_quantisation | the servo's torque at the old, rounded reading instead of the present one |
+| torque_lag | the servo's torque after dx/dt = (torque - x) / time, instead of the present one |
+| cogging | sine sin(periods q) + cosine cos(periods q) |
+| external_wrench | xfrc_applied |
+| hysteresis by Dahl's law | -amplitude z; dz/dt = v / width (1 - sgn(v) z) |
+| backlash, series_elasticity, encoder on the joint | the servo's torque also turns the rotor on its own hinge |
+| discovered | the terms' sum, as torque or, for `friction(...)`, as frictionloss |
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from bumblebee.sim.effects.hooks import RuntimeHooks, hook_joints
+from bumblebee.sim.effects.states import states_of
+from bumblebee.sim.servo import servos_of
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """What n worlds remember at their start, where it is not what a world at rest would remember."""
+
+    time: np.ndarray
+    """(n,) [s] since the rollout began."""
+    heat: np.ndarray
+    """(n, J) [s]: integral of (torque / limit)^2."""
+    torque: np.ndarray | None = None
+    """(n, J) [N m]: state of the torque's lag."""
+    position: np.ndarray | None = None
+    """(n, L, J): readings at the steps before, the newest last."""
+    velocity: np.ndarray | None = None
+    """(n, L, J)."""
+    states: np.ndarray | None = None
+    """(n, C): those of discovered terms, see `effects.states.states_of`."""
+    bent: np.ndarray | None = None
+    """(n, H): z of Dahl's law on the H joints that have it."""
+
+
+_REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states", "bent")
+
+
+def bent(z: np.ndarray, path: np.ndarray, width: float) -> np.ndarray:
+    """Dahl's z (n,) after a `path` (n,) [rad] one way: it goes to the path's sign over the `width` [rad]."""
+    way = np.sign(path)
+    return np.where(way != 0, way + (z - way) * np.exp(-np.abs(path) / width), z)
+
+
+def history_length(hooks: RuntimeHooks, step: float) -> int:
+    """L: how many steps of readings the longest encoder delay looks back."""
+    longest = float(hooks.encoder_delay.max(initial=0.0))
+    return int(np.ceil(longest / step - 1e-9)) + 1 if longest > 0 else 0
+
+
+class StepHooks:
+    """Hooks that run beside one batch; call `reset` after its worlds were reset and `apply` before each step."""
+
+    def __init__(self, hooks: RuntimeHooks, model: mujoco.MjModel, batch: Batch) -> None:
+        self._h, self._batch = hooks, batch
+        self.servos = servos_of(model, hook_joints(model))
+        self._step = float(model.opt.timestep)
+        count, joints = batch.nsim, len(hooks.joints)
+        self._time, self._heat = np.zeros(count), np.zeros((count, joints))
+        self._lagged = np.zeros((count, joints))
+        self._fresh = np.ones(count, dtype=bool)
+        self._back = history_length(hooks, self._step)
+        self._past_q = np.zeros((count, self._back, joints))
+        self._past_v = np.zeros((count, self._back, joints))
+        self._kept = states_of(hooks.terms)
+        self._states = np.zeros((count, len(self._kept)))
+        self._bent = np.zeros((count, len(hooks.hysteresis)))
+        self._fading = bool(hooks.thermal.any() or hooks.drift.any())
+        self._rubbing = bool(hooks.stiction[:, 0].any() or hooks.load_friction.any())
+        self._rubbing |= any(term.rubs for _, _, term in hooks.terms)
+        self._driving = any(term.drives for _, _, term in hooks.terms)
+        self._running_out = bool(np.isfinite(hooks.speed_limit).any())
+        self._late = bool(hooks.encoder_delay.any() or hooks.encoder_step.any() or hooks.torque_lag.any())
+        self._pushing = self._late or bool(hooks.cogging) or any(not term.rubs for _, _, term in hooks.terms)
+        self._pushing |= bool(hooks.hysteresis)
+        if self._fading:
+            self._gain, self._bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
+        if self._rubbing:
+            self._loss = batch.expand("dof_frictionloss")
+        if self._running_out:
+            self._range = batch.expand("actuator_forcerange")
+        self.rebase(("dof_frictionloss", "actuator_gainprm", "actuator_biasprm"))
+
+    def rebase(self, fields: Iterable[str]) -> None:
+        """Take the worlds' present values of some fields (randomised ones, say) as those that the hooks act upon."""
+        for name in fields:
+            if name == "dof_frictionloss" and self._rubbing:
+                self._loss0 = self._loss[:, self.servos.dof].copy()
+            elif name == "actuator_gainprm" and self._fading:
+                self._gain0 = self._gain.copy()
+            elif name == "actuator_biasprm" and self._fading:
+                self._bias0 = self._bias.copy()
+
+    def reset(self, ids: np.ndarray, memory: Memory | None = None) -> None:
+        """Worlds `ids` (n,) begin anew, with a memory (n worlds) or at rest."""
+        self._time[ids] = 0.0 if memory is None else memory.time
+        self._heat[ids] = 0.0 if memory is None else memory.heat
+        q, v = self._readings()
+        self._past_q[ids], self._past_v[ids] = q[ids][:, None], v[ids][:, None]
+        if memory is not None and memory.position is not None and self._back > 0:
+            self._past_q[ids], self._past_v[ids] = memory.position, memory.velocity
+        target = self.servos.given(self.servos.controls(self._batch.bind("ctrl")))[ids]
+        for k, s in enumerate(self._kept):
+            self._states[ids, k] = s.first(target[:, s.column])
+        if memory is not None and memory.states is not None:
+            self._states[ids] = memory.states
+        self._bent[ids] = 0.0 if memory is None or memory.bent is None else memory.bent
+        self._fresh[ids] = memory is None or memory.torque is None
+        if memory is not None and memory.torque is not None:
+            self._lagged[ids] = memory.torque
+        for body, wrench in self._h.wrench:
+            self._batch.bind("xfrc_applied")[ids, body] = wrench
+
+    def read(self) -> np.ndarray:
+        """Positions (n, J) as the encoders read them now: late, off and rounded."""
+        h, back = self._h, self._back
+        q = self._readings()[0]
+        if back:
+            path, at = np.concatenate((self._past_q, q[:, None]), axis=1), h.encoder_delay / self._step
+            low, share, columns = np.floor(at).astype(int), at - np.floor(at), np.arange(q.shape[1])
+            newer, older = path[:, back - low, columns], path[:, np.maximum(back - low - 1, 0), columns]
+            q = newer + share * (older - newer)
+        q = q + h.encoder_offset
+        size = np.where(h.encoder_step > 0, h.encoder_step, 1.0)
+        return np.where(h.encoder_step > 0, np.round(q / size) * size, q)
+
+    @property
+    def applied(self) -> np.ndarray:
+        """Torque (n, J) [N m] beside MuJoCo's own servo in the last step."""
+        return self._batch.bind("qfrc_applied")[:, self.servos.dof]
+
+    def state_dict(self) -> dict[str, np.ndarray]:
+        """All that it remembers."""
+        return {name: np.copy(getattr(self, f"_{name}")) for name in _REMEMBERED}
+
+    def load_state_dict(self, saved: dict[str, np.ndarray]) -> None:
+        """Go on from what `state_dict` gave."""
+        for name in _REMEMBERED:
+            getattr(self, f"_{name}")[:] = saved[name]
+
+    def _readings(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._batch.bind("qpos")[:, self.servos.qpos], self._batch.bind("qvel")[:, self.servos.dof]
+
+    def apply(self) -> None:
+        """Write everything that the next physics step needs."""
+        h, servos = self._h, self.servos
+        q, v = self._readings()
+        u = servos.controls(self._batch.bind("ctrl"))
+        for k, s in enumerate(self._kept):
+            self._states[:, k] = s.at(self._states[:, k], servos.given(u)[:, s.column], self._time, self._step)
+        strength = self._fade() if self._fading else 1.0
+        limit = self._torque_limit(v) if self._running_out else servos.limit
+        now = strength * servos.torque(q, v, u, limit / np.maximum(strength, 1e-9))
+        torque = self._delayed(q, v, u, strength, limit, now) if self._late else now
+        if self._rubbing:
+            extra = h.stiction[:, 0] * np.exp(-((v / h.stiction[:, 1]) ** 2)) + h.load_friction * np.abs(torque)
+            loss = self._loss0 + extra + self._discovered(q, v, u, torque, rubs=True)
+            self._loss[:, servos.dof] = np.maximum(loss, 0.0)
+        if self._pushing:
+            applied = torque - now + self._discovered(q, v, u, torque, rubs=False)
+            if self._driving:
+                wanted = self.servos.torque(q, v, u, limit + np.inf)
+                asked = wanted + self._discovered(q, v, u, torque, rubs=False, drives=True)
+                applied += np.clip(asked, -limit, limit) - np.clip(wanted, -limit, limit)
+            for column, sine, cosine, periods in h.cogging:
+                angle = periods * q[:, column]
+                applied[:, column] += sine * np.sin(angle) + cosine * np.cos(angle)
+            for k, (column, amplitude, _) in enumerate(h.hysteresis):
+                applied[:, column] -= amplitude * self._bent[:, k]
+            self._batch.bind("qfrc_applied")[:, servos.dof] = applied
+        for column, dof in h.rotors:
+            self._batch.bind("qfrc_applied")[:, dof] = torque[:, column]
+        for k, (column, _, width) in enumerate(h.hysteresis):
+            self._bent[:, k] = bent(self._bent[:, k], self._step * v[:, column], width)
+        for k, s in enumerate(self._kept):
+            self._states[:, k] = s.after(self._states[:, k], v[:, s.column], self._step)
+        self._time += self._step
+        self._heat += self._step * (torque / np.where(np.isfinite(servos.limit), servos.limit, 1.0)) ** 2
+
+    def _discovered(
+        self, q: np.ndarray, v: np.ndarray, u: np.ndarray, torque: np.ndarray, rubs: bool, drives: bool = False
+    ) -> np.ndarray:
+        """Sum (n, J) of the discovered terms that are losses, of those that act in the drive, or of other torques."""
+        out = np.zeros_like(q)
+        given = self.servos.given(u)
+        names = self._h.joints
+        for column, coefficient, term in self._h.terms:
+            if (term.rubs, term.drives) != (rubs, drives):
+                continue
+            values = {"q": q[:, column], "v": v[:, column], "u": given[:, column], "tau": torque[:, column]}
+            values["t"] = self._time
+            values |= {s.key: self._states[:, k] for k, s in enumerate(self._kept) if s.column == column}
+            for other in term.others:
+                k = names.index(other)
+                values |= {f"q[{other}]": q[:, k], f"v[{other}]": v[:, k], f"tau[{other}]": torque[:, k]}
+            out[:, column] += coefficient * term(values)
+        return out
+
+    def _fade(self) -> np.ndarray:
+        h, servos = self._h, self.servos
+        strength = np.maximum(1.0 - h.drift * self._time[:, None] - h.thermal * self._heat, 0.0)
+        has = servos.actuator >= 0
+        a = servos.actuator[has]
+        self._gain[:, a, 0] = strength[:, has] * self._gain0[:, a, 0]
+        self._bias[:, a, :3] = strength[:, has, None] * self._bias0[:, a, :3]
+        return strength
+
+    def _torque_limit(self, v: np.ndarray) -> np.ndarray:
+        """Limits (n, J) of torques that drive the motion; those that brake keep the full one."""
+        servos, speed = self.servos, self._h.speed_limit
+        some = np.isfinite(speed) & np.isfinite(servos.limit) & (servos.actuator >= 0)
+        left = np.clip(1.0 - np.abs(v) / speed, 0.0, 1.0)
+        forward, backward = np.where(v > 0, left, 1.0), np.where(v < 0, left, 1.0)
+        a, force = servos.actuator[some], (servos.limit / np.maximum(np.abs(servos.gear), 1e-12))[some]
+        self._range[:, a, 0], self._range[:, a, 1] = -force * backward[:, some], force * forward[:, some]
+        return np.where(some, servos.limit * left, servos.limit)
+
+    def _delayed(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        u: np.ndarray,
+        strength: np.ndarray | float,
+        limit: np.ndarray,
+        now: np.ndarray,
+    ) -> np.ndarray:
+        """The servo's torque from old and rounded readings, after its lag, (n, J)."""
+        h = self._h
+        seen_q, seen_v = self._feedback(q, v)
+        rounded = h.encoder_step > 0
+        if rounded.any():
+            size = np.where(rounded, h.encoder_step, 1.0)
+            seen_q = np.where(rounded, np.round((seen_q + h.encoder_offset) / size) * size - h.encoder_offset, seen_q)
+        wanted = now
+        if rounded.any() or self._back:
+            wanted = strength * self.servos.torque(seen_q, seen_v, u, limit / np.maximum(strength, 1e-9))
+        if not h.torque_lag.any():
+            return wanted
+        self._lagged[self._fresh] = wanted[self._fresh]
+        self._fresh[:] = False
+        keep = np.exp(-self._step / np.maximum(h.torque_lag, 1e-9))
+        self._lagged = keep * self._lagged + (1.0 - keep) * wanted
+        return np.where(h.torque_lag > 0, self._lagged, wanted)
+
+    def _feedback(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and velocities (n, J) as old as the encoders' delay; linear between steps."""
+        if not self._back:
+            return q, v
+        at = self._h.encoder_delay / self._step
+        low, share = np.floor(at).astype(int), at - np.floor(at)
+        columns = np.arange(len(at))
+        out = []
+        for past, present in ((self._past_q, q), (self._past_v, v)):
+            path = np.concatenate((past, present[:, None]), axis=1)
+            newer = path[:, self._back - low, columns]
+            older = path[:, np.maximum(self._back - low - 1, 0), columns]
+            out.append(newer + share * (older - newer))
+            past[:] = path[:, 1:]
+        return out[0], out[1]

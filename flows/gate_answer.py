@@ -1,0 +1,104 @@
+"""Answer a gate from any terminal.
+
+`python -m flows.gate_answer approve --workspace PATH --round 1 --seen HASH --by NAME`
+
+The answer is written to data/approvals of the workspace; a run that waits for it on a reachable Prefect server is
+resumed. `python -m tasks.gate --round 1 --show` prints what came, and this command with the hash of it.
+"""
+
+import argparse
+import asyncio
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from bumblebee.errors import BadInput
+from bumblebee.last_line import guarded
+from bumblebee.measured import gate
+from bumblebee.measured import gate_words as words
+from flows import servers
+from flows import workspace as workspaces
+from flows.environment import environment
+from tasks.gate import automatic
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Write the answer; resume the run that waits for it."""
+    options = parser().parse_args(argv)
+    place = gate.Gate(chosen(options), options.round)
+    gate.request(place, automatic(place.workspace))
+    author = gate.unix_user(options.by)
+    table = gate.answer(place, options.answer == "approve", author, options.seen, options.note, options.change)
+    where = f"round {options.round} of {place.workspace}"
+    print(f"{where}: {words.said(table)}; it answers {words.what(table)}", flush=True)
+    addresses = servers.running(place.workspace)
+    if not (addresses and resume(place.workspace, addresses.prefect, table)):
+        print("start the loop again (or `dvc repro`): it goes on from here")
+    return 0
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    made = argparse.ArgumentParser(prog="python -m flows.gate_answer", description=__doc__)
+    made.add_argument("answer", choices=["approve", "reject"])
+    made.add_argument("--round", type=int, required=True, help="the round that is meant")
+    made.add_argument("--by", default="", help="name of the person who answers; needed")
+    made.add_argument("--seen", default="", help="the hash that `tasks.gate --show` printed; needed")
+    made.add_argument("--change", action="store_true", help="replace an answer that stands; it stays in the history")
+    made.add_argument("--note", default="", help="why")
+    where = made.add_mutually_exclusive_group()
+    where.add_argument("--workspace", type=Path, help="folder of the workspace; by default this folder")
+    where.add_argument("--name", default="", help="workspace under runs/")
+    return made
+
+
+def chosen(options: argparse.Namespace) -> Path:
+    """The workspace that is meant; never one that nobody named and that is not this folder."""
+    if options.name:
+        return workspaces.named(options.name).resolve()
+    folder = (options.workspace or Path()).resolve()
+    if not (folder / "params.yaml").is_file():
+        do = "Give --workspace PATH, or --name for one under runs/."
+        raise BadInput(folder, "a workspace, with params.yaml", "none", do)
+    return folder
+
+
+def resume(folder: Path, server: str, table: dict[str, Any]) -> list[str]:
+    """Resume every run that is suspended at this round's gate; the names of those that go on."""
+    os.environ.update(environment(folder))
+    os.environ["PREFECT_API_URL"] = f"{server}/api"
+    try:
+        return asyncio.run(_resume(table))
+    except Exception as error:  # the answer is written: whatever the server says, it stands
+        said = words.one_line(f"{type(error).__name__}: {error}")[:200]
+        print(f"Prefect could not resume a run ({said})", file=sys.stderr)
+        return []
+
+
+async def _resume(table: dict[str, Any]) -> list[str]:
+    from prefect.client.orchestration import get_client
+    from prefect.client.schemas.filters import FlowRunFilter
+    from prefect.client.schemas.objects import StateType
+    from prefect.client.schemas.responses import SetStateStatus
+
+    answer = "approve" if table["status"] == "approved" else "reject"
+    values = {"answer": answer, "by": table["by"], "seen": words.short(table), "note": table["note"]}
+    resumed = []
+    async with get_client() as client:
+        paused = FlowRunFilter.model_validate({"state": {"type": {"any_": [StateType.PAUSED.value]}}})
+        for run in await client.read_flow_runs(flow_run_filter=paused):
+            details = run.state.state_details if run.state else None
+            if details and (details.pause_key or "").startswith(f"gate-{table['round']}-"):
+                result = await client.resume_flow_run(run.id, run_input=values)
+                if result.status == SetStateStatus.ACCEPT:
+                    print(f"resumed on Prefect: {run.name}")
+                    resumed.append(run.name)
+                else:
+                    reason = words.one_line(str(getattr(result.details, "reason", "")))
+                    print(f"Prefect did not resume {run.name}: {reason}", file=sys.stderr)
+    return resumed
+
+
+if __name__ == "__main__":
+    raise SystemExit(guarded(main))

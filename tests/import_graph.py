@@ -1,0 +1,99 @@
+"""Who imports whom, read from the source files and without running them."""
+
+import ast
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+PACKAGES = ("bumblebee", "tasks", "flows")
+Graph = dict[str, set[str]]
+
+
+def modules(home: Path) -> dict[str, Path]:
+    """Every module of the packages: full name -> path."""
+    found = {}
+    for package in PACKAGES:
+        for path in sorted((home / package).rglob("*.py")):
+            parts = path.relative_to(home).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def graph(home: Path, late: bool) -> Graph:
+    """The modules that each module imports itself; `late`: inside functions and for type checkers too.
+
+    `from package import name` is an import of `package.name` where that is a module, else of the package's face.
+    """
+    known = modules(home)
+    return {name: {module for module, _ in _imported(path, home, known, late)} - {name} for name, path in known.items()}
+
+
+def call_graph(home: Path) -> Graph:
+    """The modules that each module may call: those it imports, late ones too, and those it starts with `python -m`.
+
+    A name that comes through a face counts as imported from where the face has it: the rest of the room is not called.
+    """
+    known = modules(home)
+    faces = {name: _offered(path, home, known) for name, path in known.items() if path.name == "__init__.py"}
+    found = {}
+    for name, path in known.items():
+        called = {faces.get(module, {}).get(item, module) for module, item in _imported(path, home, known, late=True)}
+        found[name] = (called | set(_started(path, known))) - {name}
+    return found
+
+
+def circles(of: Graph) -> list[list[str]]:
+    """The groups of modules each of which imports, over whatever modules, each other one; those of two and more."""
+    reach = {name: reached(of, name) for name in of}
+    groups = {tuple(sorted({name, *(other for other in reach[name] if name in reach[other])})) for name in of}
+    return sorted(list(group) for group in groups if len(group) > 1)
+
+
+def reached(of: Graph, start: str) -> set[str]:
+    """All modules that a module imports, its imports' imports too; without itself unless they lead back to it."""
+    seen: set[str] = set()
+    waiting = [*of[start]]
+    while waiting:
+        name = waiting.pop()
+        if name not in seen:
+            seen.add(name)
+            waiting += of[name]
+    return seen
+
+
+def _imported(path: Path, home: Path, known: dict[str, Path], late: bool) -> Iterator[tuple[str, str]]:
+    """(module of ours, the name that is taken from it or ""), for each import."""
+    package = path.relative_to(home).with_suffix("").parts[:-1]
+    for node in _statements(ast.parse(path.read_text()), late):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, "") for alias in node.names if alias.name in known)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            for alias in node.names:
+                if f"{module}.{alias.name}" in known:
+                    yield f"{module}.{alias.name}", ""
+                elif module in known:
+                    yield module, alias.name
+
+
+def _offered(path: Path, home: Path, known: dict[str, Path]) -> dict[str, str]:
+    """Name -> module that a face has it from."""
+    return {name: module for module, name in _imported(path, home, known, late=False) if name}
+
+
+def _started(path: Path, known: dict[str, Path]) -> Iterator[str]:
+    """The modules that stand after "-m" in a list: a process of their own."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        texts = [getattr(item, "value", None) for item in node.elts] if isinstance(node, ast.List) else []
+        yield from (text for before, text in pairwise(texts) if before == "-m" and text in known)
+
+
+def _statements(node: ast.AST, late: bool) -> Iterator[ast.AST]:
+    """The statements that run when the module is imported; with `late` all."""
+    for child in ast.iter_child_nodes(node):
+        function = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+        types_only = isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)
+        if late or not (function or types_only):
+            yield child
+            yield from _statements(child, late)
