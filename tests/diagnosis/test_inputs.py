@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.gap.reported_torque import reported_torque
@@ -18,12 +17,9 @@ from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import cart
+from tests.diagnosis.cart import session
 
 SMALL = DiagnosisConfig(max_windows=30, max_holdout_windows=15, report_windows=6, grow=False, beyond=False)
-
-
-def session(rollouts: list[Rollout], actuators: str = "motor") -> Session:
-    return make_session(mujoco.MjSpec.from_string(cart.xml(actuators)), rollouts, "cart", "memory")
 
 
 def chi2(rollouts: list[Rollout], actuators: str = "motor") -> float:
