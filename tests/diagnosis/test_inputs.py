@@ -105,7 +105,11 @@ def test_smoothing_leaves_the_noise_that_it_says() -> None:
     assert count == 0 and same is slow and sigma.tolist() == [1e-3, 0.07]
 
 
-@pytest.mark.parametrize(("friction", "where"), [((3.0, 0.0), "cart"), ((0.0, 0.15), "pole")], ids=["slide", "hinge"])
+@pytest.mark.parametrize(
+    ("friction", "where"),
+    [pytest.param((3.0, 0.0), "cart", marks=pytest.mark.slow), ((0.0, 0.15), "pole")],
+    ids=["slide", "hinge"],
+)
 def test_friction_is_found_in_uneven_fast_torque_driven_logs(friction: tuple[float, float], where: str) -> None:
     """A slide's friction in N, a hinge's in N m, at 300 Hz with a third of jitter and the drive's torque beside it."""
     rollouts = cart.record(count=3, hz=300.0, jitter=0.3, seconds=3.0, friction=friction, reported=True)
