@@ -67,7 +67,7 @@ test-all: setup check  ## every test, the slow suites too; a job runs it each ni
 	$(BIN)/python -m tests.halves
 
 unit: setup  ## the tests without the end-to-end run and the slow suites
-	$(BIN)/python -m pytest -q -m "not e2e and not slow"
+	$(BIN)/python -m tests.halves -m "not e2e and not slow"
 
 e2e: setup  ## the end-to-end run alone
 	$(BIN)/python -m pytest -q -m e2e

@@ -1,8 +1,8 @@
 """All tests in two processes side by side, for two cores: python -m tests.halves [pytest's options].
 
-Tests share no port, file or database: each writes to a folder of its own, and servers take a free port. The end-to-end
-run and all folders that nobody names here are the first half, shown as it goes; `SECOND` is the other, shown after it.
-The exit status is 0 only if both halves are.
+Tests share no port, file or database: each writes to a folder of its own, and servers take a free port. `PROCESSES`
+is the one half, kept and shown at the end; every other folder, those too that nobody has thought of yet, is the other,
+shown as it goes. The exit status is 0 only if both halves' are.
 """
 
 import subprocess
@@ -11,31 +11,27 @@ import tempfile
 from pathlib import Path
 
 HOME = Path(__file__).parent.parent
-SECOND = ("tests/diagnosis", "tests/fuzz", "tests/measured", "tests/sim")
-"""What takes as long as the rest, about."""
+PROCESSES = ("tests/e2e", "tests/flows")
+"""Where programs and servers are started and waited for: about as long as all that computes."""
 
 
 def commands(options: list[str]) -> tuple[list[str], list[str]]:
-    """Both halves; what is not in the second is in the first, whatever folders are added."""
+    """Both halves; what is not in `PROCESSES` is in the second. Each has a cache of its own."""
     pytest = [sys.executable, "-m", "pytest", "-q", *options]
-    first = [*pytest, *(f"--ignore={path}" for path in SECOND), "tests"]
-    return first, [*pytest, "-o", "cache_dir=.pytest_cache/second", *SECOND]
+    apart = [*pytest, "-o", "cache_dir=.pytest_cache/processes", *PROCESSES]
+    return apart, [*pytest, *(f"--ignore={path}" for path in PROCESSES), "tests"]
 
 
 def main(options: list[str]) -> int:
     """Run both to their end; an interrupt reaches both, as they stand in one group of processes."""
-    first, second = commands(options)
-    with (
-        tempfile.TemporaryFile("w+") as kept,
-        subprocess.Popen(second, cwd=HOME, stdout=kept, stderr=subprocess.STDOUT) as other,
-    ):
-        status = [subprocess.run(first, cwd=HOME, check=False).returncode]
-        print(f"The other half, {' '.join(SECOND)}:", flush=True)
-        status.append(other.wait())
+    apart, rest = commands(options)
+    with tempfile.TemporaryFile("w+") as kept:
+        with subprocess.Popen(apart, cwd=HOME, stdout=kept, stderr=subprocess.STDOUT) as other:
+            status = [subprocess.run(rest, cwd=HOME, check=False).returncode, other.wait()]
         kept.seek(0)
-        print(kept.read(), end="", flush=True)
+        print(f"{' and '.join(PROCESSES)}, beside the above:\n{kept.read()}", end="", flush=True)
     if any(status):
-        print(f"Tests failed: pytest ended with status {status[0]} and {status[1]}.", file=sys.stderr)
+        print(f"Tests failed: pytest ended with status {status[0]} above and {status[1]} beside.", file=sys.stderr)
     return int(any(status))
 
 

@@ -1,8 +1,11 @@
 """What `make test` leaves to `make test-all` is only what is listed here, and both halves together are all tests."""
 
 import ast
+import sys
 import tomllib
 from pathlib import Path
+
+import pytest
 
 from tests import halves
 
@@ -51,9 +54,19 @@ def test_only_make_test_leaves_the_slow_ones_out_and_the_nightly_job_runs_all():
 
 
 def test_both_halves_together_are_all_tests():
-    first, second = halves.commands([])
-    assert set(halves.SECOND) == set(second[-len(halves.SECOND) :])
-    assert first[-1] == "tests" and {word for word in first if word.startswith("--ignore")} == {
-        f"--ignore={path}" for path in halves.SECOND
-    }
-    assert all((HOME / path).is_dir() for path in halves.SECOND)
+    apart, rest = halves.commands([])
+    assert tuple(apart[-len(halves.PROCESSES) :]) == halves.PROCESSES
+    assert rest[-1] == "tests" and {word.partition("=")[2] for word in rest if "--ignore" in word} == set(
+        halves.PROCESSES
+    )
+    assert all((HOME / path).is_dir() for path in halves.PROCESSES)
+
+
+def test_a_half_that_fails_fails_both_and_what_it_said_is_shown(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    good, bad = ([sys.executable, "-c", f"print('said {n}'); raise SystemExit({n})"] for n in (0, 1))
+    for both, wanted in (((good, good), 0), ((good, bad), 1), ((bad, good), 1)):
+        monkeypatch.setattr(halves, "commands", lambda options, both=both: both)
+        assert halves.main([]) == wanted
+        assert capfd.readouterr().out.count("said") == 2
