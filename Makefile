@@ -28,10 +28,10 @@ else
 PIP_TORCH = --require-hashes -r requirements-torch.lock
 endif
 
-.PHONY: help setup demo smoke serve test unit e2e fuzz kills format check type lock clean
+.PHONY: help setup demo smoke serve test test-all unit e2e fuzz kills format check type lock clean
 
 help:  ## these lines
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
 setup: $(STAMP)  ## a virtual environment with the locked packages; does nothing when it is up to date
 
@@ -60,11 +60,14 @@ smoke: setup  ## the loop with tiny budgets, in runs/smoke
 serve: setup  ## open both servers again, with runs started and resumed from Prefect's pages; NAME=<workspace under runs/>
 	@$(BIN)/python -m flows.serve $(if $(NAME),--name "$(NAME)") $(PORTS)
 
-test: setup check  ## everything: style, import rule, unit tests, the loop end to end
-	$(BIN)/python -m pytest -q
+test: setup check  ## style, import rule, unit tests, the loop end to end; the slow suites are left to test-all
+	$(BIN)/python -m tests.halves -m "not slow"
 
-unit: setup  ## the tests without the end-to-end run
-	$(BIN)/python -m pytest -q -m "not e2e"
+test-all: setup check  ## every test, the slow suites too; a job runs it each night
+	$(BIN)/python -m tests.halves
+
+unit: setup  ## the tests without the end-to-end run and the slow suites
+	$(BIN)/python -m tests.halves -m "not e2e and not slow"
 
 e2e: setup  ## the end-to-end run alone
 	$(BIN)/python -m pytest -q -m e2e

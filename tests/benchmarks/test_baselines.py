@@ -106,7 +106,7 @@ def test_a_call_that_is_over_goes_on_to_the_end(tmp_path: Path, capsys: pytest.C
     command += ["--engine", "mujoco", "--worlds", "4", "--threads", "1", "--jobs", "1", "--minutes", "0.05"]
     command += ["--variety", "1", "--snapshots", "0.00001", "9"]
     command += ["--set", "ppo.hidden=[8]", "ppo.steps=4", "student.hidden=[8]"]
-    assert run(parse([*command, "--call-minutes", "0.01"])) == 0
+    assert run(parse([*command, "--call-minutes", "0.025"])) == 0
     assert "the same command goes on" in capsys.readouterr().out
     first = torch.load(tmp_path / "out" / RESUME, weights_only=True)
     assert not (tmp_path / "out" / TABLE).exists()

@@ -1,10 +1,19 @@
-"""A three-joint arm whose truth is computed apart from the product: 1 ms steps, its own servo, its own effects."""
+"""A three-joint arm whose truth is computed apart from the product: 1 ms steps, its own servo, its own effects.
+
+And what every test of a room does first with rollouts, whatever robot made them: `session_of`, `problem_of`.
+"""
+
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.dataset import Session, make_session
+from bumblebee.diagnosis.residuals import Problem, make_problem
+from bumblebee.diagnosis.simulation import choose_starts, cut
 from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effects import Effect
 
 SMALL = DiagnosisConfig(max_windows=50, max_holdout_windows=25, report_windows=10)
 JOINTS = ("j1", "j2", "j3")
@@ -18,6 +27,26 @@ XML = """<mujoco model="arm"><compiler angle="radian"/><option timestep="0.005" 
 <actuator><position name="j1" joint="j1" kp="40" kv="3" forcerange="-40 40"/>
 <position name="j2" joint="j2" kp="60" kv="4" forcerange="-40 40"/>
 <position name="j3" joint="j3" kp="30" kv="2" forcerange="-20 20"/></actuator></mujoco>"""
+
+
+def session_of(rollouts: list[Rollout], xml: str = XML) -> Session:
+    """The rollouts matched with the declared model `xml`, the arm's if none is given."""
+    return make_session(mujoco.MjSpec.from_string(xml), rollouts, "declared", "memory")
+
+
+def problem_of(
+    session: Session,
+    ids: Sequence[int],
+    budget: int,
+    effects: Sequence[Effect] = (),
+    seed: int = 0,
+    seconds: float = 0.2,
+) -> Problem:
+    """The whitened residuals of at most `budget` windows of `seconds` out of the rollouts `ids`."""
+    starts = choose_starts(session.rollouts, ids, seconds, budget)
+    windows = cut(session.plant, session.layout, session.rollouts, starts)
+    rng = np.random.default_rng(seed)
+    return make_problem(session.plant, session.layout, windows, session.sigma, session.steps, effects, rng)
 
 
 def simulate(

@@ -3,7 +3,9 @@
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.dataset import Session
 from bumblebee.measured.rollout import Rollout
+from tests.diagnosis.arm import session_of
 
 JOINTS = ("cart", "pole")
 KP, KD = (300.0, 12.0), (20.0, 1.0)  # N/m and N m/rad, N s/m and N m s/rad
@@ -28,6 +30,11 @@ ACTUATORS = {
 def xml(actuators: str = "motor") -> str:
     """The declared model with one of the kinds of `ACTUATORS`."""
     return f"{BODIES}{ACTUATORS[actuators]}</actuator></mujoco>"
+
+
+def session(rollouts: list[Rollout], actuators: str = "motor") -> Session:
+    """The rollouts matched with the declared model."""
+    return session_of(rollouts, xml(actuators))
 
 
 def stamps(hz: float, seconds: float, jitter: float, rng: np.random.Generator) -> np.ndarray:

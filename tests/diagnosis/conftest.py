@@ -1,11 +1,9 @@
 """Small diagnoses of the arm, each made once."""
 
-import mujoco
 import pytest
 
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import Diagnosis, diagnose
-from tests.diagnosis.arm import SMALL, XML, simulate
+from tests.diagnosis.arm import SMALL, session_of, simulate
 
 _made: dict[tuple, Diagnosis] = {}
 
@@ -20,7 +18,7 @@ def diagnosed():
         key = (tuple(effects.items()), seed, count, still)
         if key not in _made:
             rollouts = simulate(effects, count=count, seed=seed, still=still)
-            _made[key] = diagnose(make_session(mujoco.MjSpec.from_string(XML), rollouts, "arm", "memory"), SMALL)
+            _made[key] = diagnose(session_of(rollouts), SMALL)
         return _made[key]
 
     return make

@@ -2,11 +2,9 @@
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.selection.proposals.encoder_resolution import grids
 from bumblebee.sim.effects import CATALOGUE
@@ -18,8 +16,8 @@ CASES = [
     ("command_delay", "", (0.012,), "delay", 0.03),
     ("strength_drift", "j2", (0.04,), "rate", 0.1),
     ("cogging", "j1", (0.3, 0.2, 12.0), "periods", 0.01),
-    ("hysteresis", "j2", (0.5, 0.05), "amplitude", 0.1),
-    ("backlash", "j2", (0.03,), "gap", 0.25),
+    pytest.param("hysteresis", "j2", (0.5, 0.05), "amplitude", 0.1, marks=pytest.mark.slow),
+    pytest.param("backlash", "j2", (0.03,), "gap", 0.25, marks=pytest.mark.slow),
 ]
 
 
@@ -29,8 +27,7 @@ def test_an_effect_is_named_up_to_its_class(
 ) -> None:
     """The first in the list is the effect, or lists it as the same to these data."""
     rollouts = simulate({(kind, place): values}, seed=5)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
-    found = diagnose(session, CONFIG).document["effects"]
+    found = diagnose(arm.session_of(rollouts), CONFIG).document["effects"]
     same = [(e["effect"], e["where"]) for e in (found[0], *found[0]["equivalent"])]
     assert (kind, [place] if place else []) in same
     if found[0]["effect"] == kind:
@@ -42,8 +39,7 @@ def test_hysteresis_is_found_on_a_joint_with_a_declared_spring() -> None:
     """MJCF has one spring a joint, so only Dahl's law can be named there; the truth yields at a width."""
     declared = arm.XML.replace('<joint name="j2"', '<joint name="j2" stiffness="5"')
     rollouts = simulate({("joint_spring", "j2"): (5.0, 0.0), ("hysteresis", "j2"): (0.8, 0.05)}, seed=5)
-    session = make_session(mujoco.MjSpec.from_string(declared), rollouts, "arm", "memory")
-    found = diagnose(session, CONFIG).document["effects"][0]
+    found = diagnose(arm.session_of(rollouts, declared), CONFIG).document["effects"][0]
     assert (found["effect"], found["where"], found["parameters"]["dahl"]["value"]) == ("hysteresis", ["j2"], 1.0)
     assert found["parameters"]["amplitude"]["value"] == pytest.approx(0.8, rel=0.4)
 

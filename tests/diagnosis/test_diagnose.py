@@ -10,7 +10,7 @@ SINGLES = [
     ("coulomb_friction", "j2", 0.3, 0.05),
     ("viscous_friction", "j1", 0.3, 0.05),
     ("motor_strength", "j3", 0.85, 0.01),
-    ("command_delay", "j2", 0.013, 0.05),
+    pytest.param("command_delay", "j2", 0.013, 0.05, marks=pytest.mark.slow),
     ("encoder_offset", "j2", 0.03, 0.15),
     ("link_mass", "l3", 0.9, 0.02),
 ]

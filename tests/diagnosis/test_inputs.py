@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.gap.reported_torque import reported_torque
@@ -20,12 +19,9 @@ from bumblebee.diagnosis.thresholds.simulation import DriveProbe
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import cart
+from tests.diagnosis.cart import session
 
 SMALL = DiagnosisConfig(max_windows=30, max_holdout_windows=15, report_windows=6, grow=False, beyond=False)
-
-
-def session(rollouts: list[Rollout], actuators: str = "motor") -> Session:
-    return make_session(mujoco.MjSpec.from_string(cart.xml(actuators)), rollouts, "cart", "memory")
 
 
 def chi2(rollouts: list[Rollout], actuators: str = "motor") -> float:
@@ -111,7 +107,11 @@ def test_smoothing_leaves_the_noise_that_it_says() -> None:
     assert count == 0 and same is slow and sigma.tolist() == [1e-3, 0.07]
 
 
-@pytest.mark.parametrize(("friction", "where"), [((3.0, 0.0), "cart"), ((0.0, 0.15), "pole")], ids=["slide", "hinge"])
+@pytest.mark.parametrize(
+    ("friction", "where"),
+    [pytest.param((3.0, 0.0), "cart", marks=pytest.mark.slow), ((0.0, 0.15), "pole")],
+    ids=["slide", "hinge"],
+)
 def test_friction_is_found_in_uneven_fast_torque_driven_logs(friction: tuple[float, float], where: str) -> None:
     """A slide's friction in N, a hinge's in N m, at 300 Hz with a third of jitter and the drive's torque beside it."""
     rollouts = cart.record(count=3, hz=300.0, jitter=0.3, seconds=3.0, friction=friction, reported=True)

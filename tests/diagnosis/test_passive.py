@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.measured.rollout import Rollout
+from tests.diagnosis.arm import session_of
 
 _XML = """<mujoco><option timestep="0.002"/><worldbody><body name="a" pos="0 0 1"><joint name="j1" axis="0 1 0"/>
 <geom type="capsule" fromto="0 0 0 0 0 -.3" size=".02" mass=".5"/><body name="b" pos="0 0 -.3">
@@ -38,7 +38,7 @@ def _swing(seed: int) -> Rollout:
 
 
 def test_a_free_double_pendulum_tells_its_mass_and_its_friction() -> None:
-    session = make_session(mujoco.MjSpec.from_string(_XML), [_swing(seed) for seed in range(4)], "pendulum", "memory")
+    session = session_of([_swing(seed) for seed in range(4)], _XML)
     config = DiagnosisConfig(max_windows=40, max_holdout_windows=20, report_windows=6, grow=False, beyond=False)
     found = diagnose(session, config).document["effects"]
     assert [(e["effect"], e["where"]) for e in found] == [("link_mass", ["b"]), ("viscous_friction", ["j1"])]

@@ -24,6 +24,7 @@ def test_friction_that_differs_by_direction_is_one_entry() -> None:
     assert found["explains"] > 0.9 and found["native"]
 
 
+@pytest.mark.slow
 def test_a_difference_that_is_small_beside_the_friction_stays_apart() -> None:
     found = entries({("coulomb_friction", "j2"): (1.2,), ("asymmetric_friction", "j2"): (0.24,)})
     assert [(e["effect"], list(e["parameters"])) for e in found] == [

@@ -24,7 +24,11 @@ def test_lost_commands_are_found_with_a_share_that_covers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "value", "parameter"), [("torque_limit", 13.0, "limit"), ("torque_speed_limit", 6.0, "speed")]
+    ("kind", "value", "parameter"),
+    [
+        pytest.param("torque_limit", 13.0, "limit", marks=pytest.mark.slow),
+        ("torque_speed_limit", 6.0, "speed"),
+    ],
 )
 def test_a_limit_that_few_windows_reach_is_found(kind: str, value: float, parameter: str) -> None:
     rollouts = simulate({(kind, "j2"): (value,)}, seed=3)

@@ -1,0 +1,72 @@
+"""What `make test` leaves to `make test-all` is only what is listed here, and both halves together are all tests."""
+
+import ast
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests import halves
+
+HOME = Path(__file__).parent.parent
+ALL_SLOW: set[str] = set()
+"""Files of which nothing runs in `make test`."""
+
+
+def marked(node: ast.expr) -> bool:
+    return ast.unparse(node).startswith("pytest.mark.slow")
+
+
+def unmarked_tests(path: Path) -> list[str]:
+    """Tests of a file that run without being asked for; one with slow cases beside others counts."""
+    tree = ast.parse(path.read_text())
+    marks = [n.value for n in tree.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "pytestmark"]
+    if any("mark.slow" in ast.unparse(mark) for mark in marks):
+        return []
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    return [f.name for f in functions if f.name.startswith("test_") and not any(map(marked, f.decorator_list))]
+
+
+def test_every_file_of_tests_runs_in_make_test_but_for_those_listed():
+    files = {str(path.relative_to(HOME)): path for path in (HOME / "tests").rglob("test_*.py")}
+    assert {name for name, path in files.items() if not unmarked_tests(path)} == ALL_SLOW
+
+
+def test_the_marker_is_seen(tmp_path: Path):
+    path = tmp_path / "test_x.py"
+    path.write_text("@pytest.mark.slow\ndef test_a(): pass\n\n@pytest.mark.parametrize('b', [])\ndef test_b(b): pass\n")
+    assert unmarked_tests(path) == ["test_b"]
+    path.write_text("pytestmark = [pytest.mark.slow]\ndef test_a(): pass\n")
+    assert unmarked_tests(path) == []
+
+
+def test_only_make_test_leaves_the_slow_ones_out_and_the_nightly_job_runs_all():
+    options = tomllib.loads((HOME / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
+    assert " -m" not in options["addopts"] and "--ignore" not in options["addopts"]
+    lines = (HOME / "Makefile").read_text().splitlines()
+    recipe = {
+        line.partition(":")[0]: lines[k + 1] for k, line in enumerate(lines) if line.startswith(("test:", "test-all:"))
+    }
+    assert recipe["test"].endswith('tests.halves -m "not slow"')
+    assert recipe["test-all"].endswith("tests.halves")
+    assert "make test-all" in (HOME / ".github" / "workflows" / "nightly.yml").read_text()
+
+
+def test_both_halves_together_are_all_tests():
+    apart, rest = halves.commands([])
+    assert tuple(apart[-len(halves.PROCESSES) :]) == halves.PROCESSES
+    assert rest[-1] == "tests" and {word.partition("=")[2] for word in rest if "--ignore" in word} == set(
+        halves.PROCESSES
+    )
+    assert all((HOME / path).is_dir() for path in halves.PROCESSES)
+
+
+def test_a_half_that_fails_fails_both_and_what_it_said_is_shown(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    good, bad = ([sys.executable, "-c", f"print('said {n}'); raise SystemExit({n})"] for n in (0, 1))
+    for both, wanted in (((good, good), 0), ((good, bad), 1), ((bad, good), 1)):
+        monkeypatch.setattr(halves, "commands", lambda options, both=both: both)
+        assert halves.main([]) == wanted
+        assert capfd.readouterr().out.count("said") == 2
