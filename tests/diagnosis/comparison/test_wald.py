@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
-from bumblebee.diagnosis.comparison.holdout import _there
+from bumblebee.diagnosis.comparison.paired_tests import there
 from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.estimation.integrator_error import explained_share
@@ -28,8 +28,8 @@ def _windows(rng: np.random.Generator, size: float) -> tuple[np.ndarray, np.ndar
 def test_a_hundredth_of_chi_square_is_seen_and_noise_is_not() -> None:
     """An effect of a tenth of the noise in amplitude is accepted every time; one that is not there hardly ever."""
     rng = np.random.default_rng(0)
-    there = [_there(*_windows(rng, 1.0), np.ones(30), 2.0) for _ in range(40)]
-    absent = [_there(*_windows(rng, 0.0), np.ones(30), 2.0) for _ in range(40)]
+    there = [there(*_windows(rng, 1.0), np.ones(30), 2.0) for _ in range(40)]
+    absent = [there(*_windows(rng, 0.0), np.ones(30), 2.0) for _ in range(40)]
     assert all(there)
     assert not any(absent)
 
