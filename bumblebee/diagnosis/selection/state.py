@@ -164,7 +164,7 @@ class SearchState:
         few = rules.where_felt if candidate.effect in (*SATURATIONS, *ABRUPT) else rules.where_rare
         if not (gain.passes(rules.validation) or gain.passes(few)):
             return self.refuse(candidate)
-        if is_physical(self.problem, self.fit, fit, candidate, weights):
+        if not is_physical(self.problem, self.fit, fit, candidate, weights):
             return self.refuse(candidate)
         self.steps.append(evidence(candidate, z, len(self.candidates)))
         self.say(f"found {candidate.effect} on {candidate.where or 'the whole robot'}: {fit.of(candidate).round(5)}")
