@@ -23,7 +23,7 @@ from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.robot.facts import KEY_BODIES
-from bumblebee.sim.engines import make_engine
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary

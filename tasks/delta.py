@@ -28,11 +28,11 @@ from bumblebee.measured.rollout import read_dataset
 from bumblebee.progress import progress
 from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
 from bumblebee.sim.engine import Engine, RobotState
-from bumblebee.sim.engines import make_engine
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.sim.sensors import load_model
 from tasks import paths
-from tasks.diagnosed import split
+from tasks.diagnosis_split import split
 from tasks.stage import load, log_run, output_folder, run_stage
 
 _WORLDS_TO_JUDGE = 64

@@ -22,7 +22,7 @@ from bumblebee.motion.store import read_library
 from bumblebee.progress import progress
 from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
 from bumblebee.sim.engine import RobotState
-from bumblebee.sim.engines import make_engine
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv

@@ -22,7 +22,7 @@ from bumblebee.learning.trial import Trials, World, success_by_family, try_polic
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
 from bumblebee.ranges import Few, Ranged, Seed
-from bumblebee.sim.engines import make_engine
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary

@@ -142,7 +142,7 @@ FACES = (
     "bumblebee/measured/importers",
     "bumblebee/learning/delta",
 )
-BEHIND_FACES = {"bumblebee/sim/engines.py"}
+BEHIND_FACES = {"bumblebee/sim/engine_choice.py"}
 
 
 @pytest.mark.parametrize("room", FACES)

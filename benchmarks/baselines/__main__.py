@@ -35,7 +35,7 @@ from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.learning.ppo import CURVE, Trainer
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.pieces import motion_of
-from bumblebee.sim.engines import make_engine
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary

@@ -19,7 +19,7 @@ from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.ppo import Trainer
 from bumblebee.learning.ranks import Ranks
 from bumblebee.sim.effects import Effect, add_to_spec, runtime_hooks
-from bumblebee.sim.engines import make_engine
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_spec
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv

@@ -18,7 +18,7 @@ from bumblebee.baselines.library import MovingLibrary
 from bumblebee.learning.policy import Policy
 from bumblebee.motion.clip import Clip
 from bumblebee.sim.engine import Engine, RobotState
-from bumblebee.sim.engines import make_engine
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import ObservationConfig, Randomisation
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import ReferenceFrame

@@ -14,7 +14,7 @@ from bumblebee.learning.distill import PAPER_DAGGER, DistillConfig, distill
 from bumblebee.learning.policy import Policy
 from bumblebee.learning.ppo import Trainer
 from bumblebee.motion.clip import Clip
-from bumblebee.sim.engines import make_engine
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import EnvConfig, ObservationConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary

@@ -11,7 +11,7 @@ from torch import Tensor
 from bumblebee.motion.clip import Clip
 from bumblebee.ranges import Factor, Few, Ranged, Seed
 from bumblebee.sim.effects import RuntimeHooks
-from bumblebee.sim.engines import make_engine
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import ActionAdapter
 from bumblebee.tracking.groups import Group

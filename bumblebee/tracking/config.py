@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from bumblebee.ranges import Factor, Few, Name, PartOf, Range, Ranged, Seconds, Seed, Share, Size, Unfit
-from bumblebee.sim.engines import Name as EngineName
+from bumblebee.sim.engine_choice import Name as EngineName
 from bumblebee.sim.warp_limits import Buffers
 from bumblebee.tracking.library import AHEAD
 from bumblebee.tracking.rewards import RewardConfig

@@ -16,7 +16,7 @@ from bumblebee.learning.policy import Policy, new_actor, shape_of
 from bumblebee.learning.ppo import Trainer
 from bumblebee.motion.clip import differences
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
-from bumblebee.sim.engines import make_engine
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.rotations import from_rotation_vector
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.model import task_model

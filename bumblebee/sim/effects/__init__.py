@@ -2,7 +2,7 @@
 
 Values are absolute (N m, kg, s, rad ...), so that the effects applied to the declared model *are* the corrected
 model; `motor_strength`, `kp` and `kd` alone are factors on the declared gains. The engines that run with them are
-`cpu_engine` and `warp_engine`; `sim.engines` chooses.
+`cpu_engine` and `warp_engine`; `sim.engine_choice` chooses.
 """
 
 from bumblebee.sim.effects import native
