@@ -74,3 +74,10 @@ def test_play_leaves_the_link_free_between_its_ends(degrees: bool) -> None:
     plain, without = both()
     change = (two_masses(between) - without)[:150, 0]  # impacts are as sharp as their solver: positions only
     assert np.abs((mine - plain)[:150, 0] - change).max() < 0.1 * np.abs(change).max()
+
+
+def test_a_backlash_of_no_width_is_a_model_all_the_same() -> None:
+    """As a fit leaves one that is not there."""
+    model = model_with(single("backlash", "j", 0.0))
+    low, high = model.joint("j_play").range
+    assert low < high and high - low < 1e-6

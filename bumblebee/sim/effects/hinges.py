@@ -16,6 +16,9 @@ from bumblebee.errors import BadInput
 from bumblebee.sim.effects import native
 
 
+_LEAST_GAP = 1e-9  # [rad]: MuJoCo takes no range of no width
+
+
 def joint_of(spec: mujoco.MjSpec, name: str) -> Any:
     """The joint of this name; `BadInput` where there is none."""
     joint = spec.joint(name)
@@ -103,7 +106,7 @@ def _filled_keys(spec: mujoco.MjSpec, declared: mujoco.MjModel) -> list[Any]:
 def add_backlash(spec: mujoco.MjSpec, name: str, gap: float, encoder: float) -> None:
     """Play of `gap` [rad] between motor and link; `encoder` 0: on the motor, 1: on the joint."""
     play = _second_hinge(spec, name, "backlash", encoder)
-    half = 0.5 * gap * angle_of(spec, play)
+    half = 0.5 * max(gap, _LEAST_GAP) * angle_of(spec, play)
     play.range, play.limited = [-half, half], mujoco.mjtLimited.mjLIMITED_TRUE
     play.solref_limit = native.PLAY_SOLREF
     play.solimp_limit = [*native.PLAY_SOLIMP, *play.solimp_limit[3:]]

@@ -28,9 +28,9 @@ def _windows(rng: np.random.Generator, size: float) -> tuple[np.ndarray, np.ndar
 def test_a_hundredth_of_chi_square_is_seen_and_noise_is_not() -> None:
     """An effect of a tenth of the noise in amplitude is accepted every time; one that is not there hardly ever."""
     rng = np.random.default_rng(0)
-    there = [there(*_windows(rng, 1.0), np.ones(30), 2.0) for _ in range(40)]
+    present = [there(*_windows(rng, 1.0), np.ones(30), 2.0) for _ in range(40)]
     absent = [there(*_windows(rng, 0.0), np.ones(30), 2.0) for _ in range(40)]
-    assert all(there)
+    assert all(present)
     assert not any(absent)
 
 
