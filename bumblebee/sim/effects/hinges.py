@@ -15,7 +15,6 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import native
 
-
 _LEAST_GAP = 1e-9  # [rad]: MuJoCo takes no range of no width
 
 

@@ -17,7 +17,7 @@ from bumblebee.diagnosis.report.discrepancy_entries import discovered_entry, str
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.diagnosis.thresholds.discrepancy import CatalogueTerms
-from bumblebee.diagnosis.thresholds.report import Unexplained
+from bumblebee.diagnosis.thresholds.report import MeasuredCurve, Unexplained
 from tests.diagnosis import arm, cart
 
 
@@ -53,7 +53,7 @@ def test_a_cubic_spring_is_found_with_its_form_and_size() -> None:
 def test_a_complete_model_leaves_nothing() -> None:
     found = discovered()
     assert found.fit.chosen == () and not unexplained(found, Unexplained())["significant"]
-    assert not any(row["significant"] for row in structure_table(found).values())
+    assert not any(row["significant"] for row in structure_table(found, MeasuredCurve()).values())
 
 
 def test_a_name_that_half_explains_a_strange_effect_is_withdrawn() -> None:
