@@ -7,6 +7,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.sensitivities.columns import Columns
+from bumblebee.diagnosis.thresholds import Thresholds
 
 _WINDOWS, _VALUES = 40, 60
 
@@ -16,7 +17,8 @@ def _z(sizes: np.ndarray, there: float, seed: int, factor: float = 1.0) -> float
     rng = np.random.default_rng(seed)
     column = rng.standard_normal((1, _WINDOWS, _VALUES)) * sizes[None, :, None] / np.sqrt(_VALUES)
     residual = there * column[0] + factor * rng.standard_normal((_WINDOWS, _VALUES))
-    problem = SimpleNamespace(nuisance=rng.standard_normal((2, _WINDOWS, _VALUES)))
+    nuisance = rng.standard_normal((2, _WINDOWS, _VALUES))
+    problem = SimpleNamespace(nuisance=nuisance, thresholds=Thresholds())
     fit = SimpleNamespace(residual=residual, columns=np.empty((0, _WINDOWS, _VALUES)))
     candidate = Candidate("coulomb_friction", "j", (0.0,), (1.0,))
     columns = Columns([candidate], column.astype(np.float32))
