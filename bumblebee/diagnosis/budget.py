@@ -35,6 +35,6 @@ class Budget:
         if not self.left_out:
             return []
         return [
-            f"the search {self.search} was cut after {self.seconds:.0f} s (`{self.setting}`); not tried: "
+            f"the search {self.search} ended at its time limit of {self.seconds:.0f} s (`{self.setting}`); not tried: "
             + "; ".join(self.left_out)
         ]

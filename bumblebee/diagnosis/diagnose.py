@@ -84,7 +84,13 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
     effects = [*effects, *steps, *losses]
     entries = [*entries, *(rounded if steps else []), *lost]
     if found.beyond is not None:
-        notes = [*(f"withdrawn for what explains more: {name}" for name in found.beyond.withdrawn), *notes]
+        notes = [
+            *(
+                f"replaced by a discrepancy model or effect that explains more: {name}"
+                for name in found.beyond.withdrawn
+            ),
+            *notes,
+        ]
     notes = [
         *notes,
         *(n for b in found.budgets for n in b.notes()),

@@ -25,10 +25,8 @@ def test_the_note_says_which_search_was_cut_and_by_what_setting() -> None:
     now[0] = 61.0
     assert not budget.has_time_for("more effects")
     (note,) = budget.notes()
-    assert (
-        note
-        == "the search among the catalogue's effects was cut after 60 s (`search_seconds`); not tried: more effects"
-    )
+    ended = "the search among the catalogue's effects ended at its time limit of 60 s"
+    assert note == f"{ended} (`search_seconds`); not tried: more effects"
 
 
 def test_a_search_without_time_ends_and_says_so() -> None:

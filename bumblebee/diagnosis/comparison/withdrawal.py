@@ -47,4 +47,4 @@ def standing(
 
 def _note(effects: Sequence[Effect]) -> str:
     names = ", ".join(f"{e.effect} on {', '.join(e.where) or 'the whole robot'}" for e in effects)
-    return f"withdrawn, for the windows that judge were further off with it: {names}"
+    return f"withdrawn, for its error on the validation windows was larger: {names}"

@@ -52,7 +52,7 @@ def _exchanged(session: Session, one: int, other: int) -> Session:
         return sorted({one: other, other: one}.get(i, i) for i in ids)
 
     name, old = session.ids([one, other])
-    note = f"{name} shows what no fitted rollout does: it is fitted in the place of {old}"
+    note = f"{name} contains excitation that no fitted rollout has: it is fitted instead of {old}"
     return replace(
         session,
         train=swapped(session.train),

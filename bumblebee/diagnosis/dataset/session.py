@@ -28,7 +28,7 @@ from bumblebee.measured.checks import beyond
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.measured.usable import review
 
-JUDGED_TWICE = "the held-out rollouts decided which effects were accepted, never how large they are"
+JUDGED_TWICE = "the held-out rollouts decided which effects were accepted (model selection), never how large they are"
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,9 +114,11 @@ def make_session(
     accept = accepting(long, train, holdout, rules.split)
     notes = [f"set aside: {error}" for _, error in failed] + _check_notes(warnings, rules.usable.warnings)
     if folded:
-        notes.append(f"position and velocity actuators taken as one servo of one limit: {', '.join(folded[:6])}")
+        notes.append(
+            f"position and velocity actuators combined into one servo with one torque limit: {', '.join(folded[:6])}"
+        )
     if plant.floating and not has_pos:
-        notes.append("no base_pos: the base's height comes from stance, its error is a nuisance")
+        notes.append("no base_pos: the base's height is estimated from stance, its error is a nuisance parameter")
     if set(accept) & set(holdout):
         notes.append(JUDGED_TWICE)
     period = float(np.median(np.diff(long[0].time)))

@@ -29,4 +29,6 @@ def undriven_warnings(plant: Plant, rollouts: list[Rollout], where: object) -> l
             f"{where}: actuator", f"one on a joint that the logs command ({listed})", "a model without actuators",
             "Declare its motors or servos: without them every command does nothing.",
         )  # fmt: skip
-    return [f"no actuator in the model, yet commanded in the logs: {listed}. Their commands do nothing here."]
+    return [
+        f"no actuator in the model, yet commanded in the logs: {listed}. These commands have no effect in the model."
+    ]

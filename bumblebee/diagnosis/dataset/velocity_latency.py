@@ -50,7 +50,7 @@ def in_step(rollout: Rollout, ages: np.ndarray) -> Rollout:
 def age_note(joints: Sequence[str], ages: np.ndarray) -> str:
     """What a person should know of ages (J,) that were found; empty where there are none."""
     late = [f"{name} {1e3 * age:.1f} ms" for name, age in zip(joints, ages, strict=True) if age]
-    return f"logged velocities are older than the positions and were moved: {', '.join(late)}" if late else ""
+    return f"logged velocities lag the positions; their timestamps were aligned: {', '.join(late)}" if late else ""
 
 
 def _ages(rollouts: Sequence[Rollout], rule: VelocityLatency) -> tuple[np.ndarray, np.ndarray]:

@@ -118,10 +118,10 @@ def _with_models(
     tried, rules = list(single), state.problem.thresholds.discrepancy
     for _ in range(rules.discover.joints if len(state.fit.chosen) <= rules.form.many_effects else 1):
         worst = state.left.worst(tried)
-        if worst is None or not means.budget.has_time_for(f"a law on {worst.joint}"):
+        if worst is None or not means.budget.has_time_for(f"a discrepancy model of {worst.joint}"):
             break
         tried.append(worst.joint)
-        means.say(f"looking for a law on {worst.joint}")
+        means.say(f"looking for a discrepancy model of {worst.joint}")
         model = best_model(state.problem, state.fit, state.left, worst.joint, means.budget)
         if model is None:
             continue
@@ -146,13 +146,13 @@ def _swapped_for_single_functions(state: _State, means: _Means) -> tuple[_State,
     if len(state.fit.chosen) > state.problem.thresholds.discrepancy.form.many_effects:
         return state, kinds
     for joint in dict.fromkeys(c.where for c in state.fit.chosen if c.where in state.problem.plant.joints):
-        if not means.budget.has_time_for(f"one law in the place of the names on {joint}"):
+        if not means.budget.has_time_for(f"one basis function instead of the catalogue effects on {joint}"):
             break
         model = _swap_for_one_function(state, joint, means.offers)
         if model is not None:
             state = state.around(model.fit)
             kinds[joint] = model.kind
-            means.say(f"in the place of names on {joint}: {model}")
+            means.say(f"instead of catalogue effects on {joint}: {model}")
     return state, kinds
 
 

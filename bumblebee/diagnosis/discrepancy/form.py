@@ -57,7 +57,7 @@ def _growing(
     strange = [f for f in found if not f.function.effect or f.function.effect in there]
     best, start = None, criterion(problem, base)
     for count in range(1, min(len(strange), rule.functions) + 1):
-        if not budget.has_time_for(f"all forms on {joint}"):
+        if not budget.has_time_for(f"all discrepancy models of {joint}"):
             break
         model = refitted_model(problem, base, joint, strange[:count])
         if model is None:
@@ -76,7 +76,7 @@ def _climbed(
     """The discrepancy model at the best of the basis function's two inner numbers, from neighbour to neighbour."""
     rule = problem.thresholds.discrepancy.term_library
     seen, function = {one.function.texts}, one.function
-    while budget.has_time_for(f"the best inner numbers of a form on {joint}"):
+    while budget.has_time_for(f"the nonlinear parameters of a model of {joint}"):
         tried = {}
         for other in neighbours(function, rule):
             if other.texts not in seen:

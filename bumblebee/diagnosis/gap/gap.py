@@ -63,7 +63,8 @@ def gap(
         "reported_torque": reported_torque(session.plant, session.rollouts, rules.reported_torque),
         "motions": _by_motion(session, cuts.windows),
         "unidentifiable": [
-            {"where": [name], "why": "the joint moves no more than its sensor's noise"} for name in still
+            {"where": [name], "why": "the joint is not excited: it moves no more than its sensor's noise"}
+            for name in still
         ],
         "warnings": [*session.warnings, *([] if session.accept else [ALONE])],
         "notes": [*(n for n in session.notes if n != JUDGED_TWICE), *mixed_notes(session.plant)],

@@ -16,7 +16,7 @@ from bumblebee.diagnosis.simulation import joint_units
 from bumblebee.diagnosis.thresholds.report import MeasuredCurve, Unexplained
 
 NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
-_NOWHERE = "no joint's torque stands out, but the windows' chi-square is {:.2f} of what sensor noise gives"
+_NOWHERE = "no single joint has a significant residual torque, but the reduced chi-square is {:.2f}"
 _TABLE = re.compile(r"(curve)\(([^,()]+),[^()]*\)")  # its points are for diagnosis.json
 
 
@@ -32,14 +32,16 @@ def discovered_entry(
         for text, v, h in zip(c.texts, values, half, strict=True)
     ]
     p = float(2 * norm.sf(z))
-    test = f"{kind} sought among thousands in the whitened windows; Wald test in the joint fit, z = {z:.1f}; better on "
+    test = (
+        f"{kind} selected among thousands of candidate terms; Wald test in the joint fit, z = {z:.1f}; lower error on "
+    )
     return {
         "effect": c.effect,
         "where": [c.where],
         "parameters": {"terms": terms},
         "equivalent": [],
         "explains": explains,
-        "evidence": {"p": p, "test": test + "windows that took no part"},
+        "evidence": {"p": p, "test": test + "validation windows"},
         "native": False,
     }
 
@@ -75,7 +77,7 @@ def _described(
     lines = []
     for j in left[:most]:
         on = ", ".join(_depends_on(j, forms)) or "no single quantity"
-        line = f"{j.joint}: torques that depend on {on}"
+        line = f"{j.joint}: residual torque depends on {on}"
         if j.functions:
             share = 100 * j.rms / max(j.typical, 1e-12)
             unit = units[j.joint]["torque"]
@@ -84,7 +86,7 @@ def _described(
         if j.joint in forms:
             terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in forms[j.joint].items())
             terms = _TABLE.sub(r"\1(\2, ...)", terms)
-            line += f"; near {terms}, which was not confirmed"
+            line += f"; approximately {terms}, not confirmed on validation windows"
         lines.append(line)
     if len(left) > most:
         lines.append(f"and {len(left) - most} joints more")

@@ -17,7 +17,7 @@ from bumblebee.diagnosis.simulation import joint_units, mixed_notes, vary
 from bumblebee.diagnosis.thresholds.report import Verdicts
 from bumblebee.sim.effects import Effect
 
-_STILL = "the joint moves no more than its sensor's noise"
+_STILL = "the joint is not excited: it moves no more than its sensor's noise"
 
 
 @dataclass(frozen=True)

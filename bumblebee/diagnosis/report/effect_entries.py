@@ -134,8 +134,8 @@ def loss_entries(loss: Loss | None) -> tuple[list[dict[str, Any]], list[Effect]]
         "explains": loss.explains,
         "evidence": {
             "p": float(chi2.sf(2.0 * loss.gain, 1)),
-            "test": f"log-likelihood over all patterns of losses: {loss.gain:.1f} more on the fitted windows, "
-            + (f"{loss.paid:.1f} on the held-out ones" if np.isfinite(loss.paid) else "nothing held out"),
+            "test": f"packet-loss log-likelihood ratio: {loss.gain:.1f} on the fitted windows, "
+            + (f"{loss.paid:.1f} on the validation windows" if np.isfinite(loss.paid) else "nothing held out"),
         },
         "native": False,
     }

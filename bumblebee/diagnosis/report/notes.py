@@ -57,8 +57,8 @@ def latency_notes(effects: Sequence[dict[str, Any]], driven: Sequence[str], rule
         return []
     size = 1e3 * sum(values) / len(values)
     return [
-        f"all joints are {size:.1f} ms late: a delay of the robot, or a logger whose states are that old; commands "
-        "that do not follow from the states cannot tell. To separate: log a step with the drive's torque"
+        f"all joints share a latency of {size:.1f} ms: the robot's, or that of the logger's timestamps; commands that "
+        "do not follow from the states cannot distinguish them. To distinguish: log a step with the drive's torque"
     ]
 
 
@@ -73,8 +73,9 @@ def factor_notes(effects: Sequence[dict[str, Any]], driven: Sequence[str]) -> li
     if not driven or not set(driven) <= found:
         return []
     return [
-        "the strength of every drive was fitted: strengths, friction and inertias are known up to one common factor, "
-        "which the declared masses set; their intervals hold for these. To separate: weigh a link, or log the torque"
+        "the strength of every drive was fitted: strengths, friction and inertias are identifiable only up to one "
+        "common scale, which the declared masses fix; their intervals are conditional on it. To fix it: weigh a link, "
+        "or log the torque"
     ]
 
 
@@ -94,9 +95,9 @@ def unseen_notes(
         if far:
             times = errors[i][0] / bound * rule.unseen
             notes.append(
-                f"{session.ids([i])[0]}: {far} of {len(errors[i])} windows up to {times:.0f} times further off "
-                "than any fitted one. Something acts there that no fitted rollout shows: it is neither named nor ruled "
-                "out. Record more of such motion."
+                f"{session.ids([i])[0]}: {far} of {len(errors[i])} windows with up to {times:.0f} times the "
+                "largest error of the fitted ones. An effect acts there that the fitted rollouts do not excite: it is "
+                "neither identified nor excluded. Record more of such motion."
             )
     return notes
 
@@ -136,9 +137,9 @@ def unexplained_error(document: Mapping[str, Any], rule: Verdicts) -> list[str]:
         if value is None or not noise or value <= rule.large * noise:
             continue
         times = number(value / noise, 2)
-        size = f"{number(scale * value)} {unit} in its {what} after {horizon} s, {times} times what noise leaves"
+        size = f"{number(scale * value)} {unit} in its {what} after {horizon} s, {times} times the noise floor"
         if document["effects"]:
-            lines.append(f"The corrected model still errs by {size}: what was found does not explain that.")
+            lines.append(f"The corrected model still errs by {size}: the effects found do not explain that.")
         else:
             lines.append(f"The model errs by {size}, and no effect of the catalogue explains it.")
     return lines

@@ -68,9 +68,9 @@ def search(
     if find_packet_loss(run):
         _select(run, config, budget)
     for _ in range(problem.thresholds.selection.forward.swaps):
-        if not budget.has_time_for("other names in the place of those found"):
+        if not budget.has_time_for("swap steps"):
             break
-        say("each name against its rivals")
+        say("each effect against its rivals")
         if not (swap(run) or add_stribeck_friction(run)):
             break
         _select(run, config, budget)

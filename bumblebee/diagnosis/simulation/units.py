@@ -17,7 +17,7 @@ _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 KINDS = {"hinge": False, "slide": True}
 _THOUSANDTH = {"hinge": "mrad", "slide": "mm"}
 MIXED = (
-    "hinges and slides: they are told apart here; where one number stands for all joints (joint_pos_rmse, "
+    "hinges and slides: they are reported separately; where one number stands for all joints (joint_pos_rmse, "
     "joint_vel_rmse), 1 mm counts as 1 mrad"
 )
 MEASURES = {

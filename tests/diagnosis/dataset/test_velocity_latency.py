@@ -92,7 +92,7 @@ def test_a_right_model_with_late_velocities_comes_near_the_noise() -> None:
     right, notes = after(logs)
     assert not any("older" in note for note in notes)
     moved, notes = after(late)
-    assert any("older than the positions" in note and "cart 4.4 ms" in note for note in notes)
+    assert any("lag the positions" in note and "cart 4.4 ms" in note for note in notes)
     assert moved < 2 * right  # 13 mrad as logged, 1.4 with velocities in step
 
 

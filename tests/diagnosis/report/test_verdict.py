@@ -45,7 +45,7 @@ def test_a_large_error_without_an_effect_is_said_and_nothing_comforts():
 
 
 def test_a_large_error_beside_effects_is_said_too():
-    assert "what was found does not explain that" in unexplained_error(document(5.0, effects=True), Verdicts())[0]
+    assert "the effects found do not explain that" in unexplained_error(document(5.0, effects=True), Verdicts())[0]
 
 
 def test_an_error_at_the_noise_warns_of_nothing():
