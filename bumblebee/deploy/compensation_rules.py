@@ -10,7 +10,7 @@ import numpy as np
 
 from bumblebee.deploy.compensation import Load
 from bumblebee.deploy.compensation_draft import Draft
-from bumblebee.sim.effects import Effect, read_term
+from bumblebee.sim.effects import CATALOGUE, Effect, read_term
 
 Rule = Callable[[Draft, Effect, Sequence[int]], tuple[str, str]]
 """(draft, effect, columns of its joints) -> what is done, with which numbers."""
@@ -220,3 +220,5 @@ _RULES: dict[str, Rule] = {
     "encoder_delay": _late("encoder_delay", _CARRIED),
     "discovered": _discovered,
 }
+if missing := CATALOGUE.keys() ^ (_RULES.keys() | NOT_UNDONE.keys()):
+    raise TypeError(f"compensation_rules.py needs a rule or a reason for each effect; not so: {sorted(missing)}")
