@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 HOME = Path(__file__).parent.parent
-PROCESSES = ("tests/e2e", "tests/flows", "tests/learning")
+PROCESSES = ("tests/e2e", "tests/flows", "tests/learning", "tests/tasks")
 """Where programs, servers and ranks are started and waited for: about as long as all that computes."""
 
 
