@@ -21,18 +21,18 @@ def why_unproven(document: Mapping[str, Any]) -> str:
 
     It does where the 95 % interval of the corrected model's joint error after 0.2 s lies below the declared model's.
     """
-    if not document.get("effects"):
-        return ""
     try:
+        if not document["effects"]:
+            return ""
         before, after = (document["error"][part][HORIZON]["joint_pos_rmse"] for part in ("before", "after"))
         first, last = before["ci95"], after["ci95"]
-    except (KeyError, TypeError):
-        return "its document has no error before and after on held-out rollouts"
-    said = f"{_said(before)} mrad with the declared model, {_said(after)} with the corrected one"
-    if first is None or last is None:
-        return f"too few held-out rollouts for an interval of the joint error after {HORIZON} s: {said}"
-    if last[1] >= first[0]:
-        return f"the joint error after {HORIZON} s on held-out rollouts is not shown to be smaller: {said}"
+        said = f"{_said(before)} mrad with the declared model, {_said(after)} with the corrected one"
+        if first is None or last is None:
+            return f"too few held-out rollouts for an interval of the joint error after {HORIZON} s: {said}"
+        if not last[1] < first[0]:
+            return f"the joint error after {HORIZON} s on held-out rollouts is not shown to be smaller: {said}"
+    except (KeyError, TypeError, ValueError, IndexError):
+        return "its diagnosis.json has no error before and after on held-out rollouts"
     return ""
 
 

@@ -66,6 +66,18 @@ def test_nothing_is_undone_where_held_out_rollouts_show_no_better_model(
     assert undone or "held-out rollouts" in made.plan[0].why_not
 
 
+@pytest.mark.parametrize(
+    "text", ["[]", "{}", '{"effects": [{}]}', '{"effects": [{}], "error": {"before": 1, "after": 2}}',
+             json.dumps(error(["a"], [])), json.dumps(error([0.1, "b"], [0.2, 0.3]))],
+)  # fmt: skip
+def test_a_diagnosis_of_any_other_form_shows_nothing(diagnosed: Path, text: str) -> None:
+    folder = Path("data/diagnosis/r1")
+    write_effects(folder / "effects.yaml", [single("encoder_offset", "left_knee_joint", 0.05)])
+    (folder / "diagnosis.json").write_text(text)
+    with pytest.raises(BadInput, match="--unproven"):
+        run(["compensate", str(folder / "effects.yaml"), "--out", "c.json"])
+
+
 def test_the_command_refuses_them_in_one_line_unless_told_to(diagnosed: Path) -> None:
     folder = Path("data/diagnosis/r1")
     write_effects(folder / "effects.yaml", [single("encoder_offset", "left_knee_joint", 0.05)])

@@ -4,7 +4,7 @@ A drive reaches its limit, or loses strength, in few moments of few runs. Where 
 aside, nothing that is fitted can tell of them, however plainly they show. So all rollouts are compared once with the
 declared model, restarted every 0.2 s; a run with windows that are far further off than any of a fitted run is exchanged
 for a fitted one. The runs that are put aside then lack such moments, too: what happens in few windows is judged by
-these (`limits.pays_where_felt`). Repeats of one motion stay together.
+these (`comparison`'s rule `WhereFelt`). Repeats of one motion stay together.
 """
 
 from collections.abc import Sequence

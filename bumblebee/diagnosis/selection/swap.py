@@ -7,7 +7,7 @@ It takes the place if the fitted windows are clearly better with it for its para
 The search then goes on, since what a wrong name had hidden can now be seen.
 
 What a shaft's swing passes for (a lag, an old reading, a rotor) is tried against shafts of many stiffnesses, which no
-test at one of them would show (`diagnosis/shafts.py`).
+test at one of them would show (`proposals/joint_elasticity.py`).
 
 Friction that grows at rest is felt by the few windows that creep through zero speed. Beside the dry friction that
 explains the rest, its score varies too much between windows to be significant; the joint fit tells. Where it was found
