@@ -15,11 +15,11 @@ import pandas as pd
 from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
 from bumblebee.io.read import read_bytes
-from bumblebee.motion.asap_pickle import read_asap_pickle
 from bumblebee.motion.captions import caption_from_name, family_of, find_captions
 from bumblebee.motion.checks import check_clip, check_raw
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.g1_csv import read_g1_csv
+from bumblebee.motion.formats.asap_pickle import read_asap_pickle
+from bumblebee.motion.formats.g1_csv import read_g1_csv
 from bumblebee.motion.grounding import GroundingConfig, ground
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.licences import licence_of

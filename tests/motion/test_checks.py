@@ -5,7 +5,7 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.checks import check_raw
-from bumblebee.motion.g1_csv import read_g1_csv
+from bumblebee.motion.formats.g1_csv import read_g1_csv
 from bumblebee.motion.kinematics import lowest
 from bumblebee.quaternions import from_axis_angle, multiply
 from bumblebee.robot.facts import joint_names

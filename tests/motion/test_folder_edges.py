@@ -122,7 +122,7 @@ def test_an_hour_and_more_is_refused_before_it_is_resampled(motions, tmp_path):
 
 
 def test_an_array_made_again_and_again_is_counted_each_time(tmp_path, monkeypatch):
-    from bumblebee.motion import safe_pickle
+    from bumblebee.motion.formats import safe_pickle
 
     monkeypatch.setattr(safe_pickle, "MAX_BYTES", 100_000)
     call = b"cnumpy.core.numeric\n_frombuffer\n"

@@ -7,7 +7,7 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import require_real
-from bumblebee.motion import safe_pickle
+from bumblebee.motion.formats import safe_pickle
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.texts import shown
 from bumblebee.robot.facts import joint_names

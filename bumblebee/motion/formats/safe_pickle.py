@@ -19,7 +19,7 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes
-from bumblebee.motion.pickle_values import CALLABLE, KNOWN, MAX_BYTES, Array, DType, JoblibWrapper, RefusedError
+from bumblebee.motion.formats.pickle_values import CALLABLE, KNOWN, MAX_BYTES, Array, DType, JoblibWrapper, RefusedError
 
 MAX_STEPS = 2_000_000  # instructions of the pickle's program: a motion has a few dozen
 _MAX_DICTIONARY = 256 << 20  # bytes that an xz or lzma stream may ask for itself; xz -9 asks for 65 MiB

@@ -5,7 +5,7 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.folder import ReadConfig, read_file
-from bumblebee.motion.g1_csv import read_g1_csv
+from bumblebee.motion.formats.g1_csv import read_g1_csv
 from bumblebee.robot.facts import joint_names
 
 

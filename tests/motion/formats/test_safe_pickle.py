@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion import safe_pickle
+from bumblebee.motion.formats import safe_pickle
 
 CONTENT = {
     "plain": {"fps": 30, "name": "walk", "flag": True, "none": None, "ratio": 0.5},

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.asap_pickle import read_asap_pickle
+from bumblebee.motion.formats.asap_pickle import read_asap_pickle
 from bumblebee.robot.facts import joint_names
 
 
