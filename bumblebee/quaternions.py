@@ -84,6 +84,19 @@ def from_rotation_vector(vector: FloatArray) -> FloatArray:
     return np.concatenate((np.cos(angle / 2), vector * scale), axis=-1)
 
 
+def to_matrices(quat: ArrayLike) -> FloatArray:
+    """Rotation matrices (..., 3, 3), whose columns are the turned axes."""
+    return np.stack([rotate(quat, unit) for unit in np.eye(3)], axis=-1)
+
+
+def from_matrices(matrix: FloatArray) -> FloatArray:
+    """Unit quaternions (..., 4) with w >= 0 of rotation matrices (..., 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    flat = Rotation.from_matrix(matrix.reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    return flat.reshape(*matrix.shape[:-2], 4)
+
+
 def slerp(start: ArrayLike, end: ArrayLike, share: ArrayLike) -> FloatArray:
     """Spherical interpolation (..., 4) from `start` (share 0) to `end` (share 1), the shorter way round."""
     start, share = np.asarray(start), np.asarray(share)

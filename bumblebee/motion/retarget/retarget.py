@@ -1,0 +1,77 @@
+"""A person's motion onto a robot: low-passed, scaled, fitted over the whole trajectory."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from bumblebee import quaternions
+from bumblebee.errors import BadInput
+from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.retarget.config import RetargetConfig
+from bumblebee.motion.retarget.mapping import Robot, g1
+from bumblebee.motion.retarget.solve import Trajectory, solve
+from bumblebee.motion.retarget.targets import at_rate, targets
+from bumblebee.robot.facts import joint_names
+
+VERSION = 1
+"""Of the method: a cached result of another version is made again."""
+_LEAST = 5  # frames: an acceleration needs three
+_LONGEST = 3000  # frames fitted at once, about 0.3 GB
+_OVERLAP = 100  # frames that neighbouring parts share, faded from one to the other
+
+
+def retarget(motion: HumanMotion, fps: float = 50.0, config: RetargetConfig | None = None) -> RawMotion:
+    """A person's motion on the G1 at `fps` [Hz].
+
+    Raises:
+        BadInput: fewer frames than an acceleration needs, legs without length.
+    """
+    at = fit(motion, g1(), fps, config or RetargetConfig())
+    assert g1().tree.joints == joint_names()
+    return RawMotion(motion.name, fps, at.root, root_quat(at), at.joint, motion.file, motion.first_row, motion.part)
+
+
+def fit(motion: HumanMotion, robot: Robot, fps: float, config: RetargetConfig) -> Trajectory:
+    """The trajectory of any robot at `fps` [Hz]."""
+    positions = at_rate(motion, fps, config.cutoff)
+    if len(positions) < _LEAST:
+        raise BadInput(motion.where, f"at least {_LEAST} frames at {fps:g} Hz", str(len(positions)))
+    target = targets(positions, fps, robot, config)
+    parts = [solve(target.part(start, end), robot, config) for start, end in _parts(len(positions))]
+    return _joined(parts)
+
+
+def root_quat(at: Trajectory) -> np.ndarray:
+    """The root's orientation (T, 4) wxyz."""
+    return quaternions.continuous(quaternions.from_matrices(at.turn))
+
+
+def _parts(frames: int) -> list[tuple[int, int]]:
+    """Where parts of about `_LONGEST` frames start and end; each shares `_OVERLAP` frames with the next."""
+    count = max(1, int(np.ceil((frames - _OVERLAP) / (_LONGEST - _OVERLAP))))
+    edges = np.linspace(0, max(frames - _OVERLAP, 0), count + 1).round().astype(int)
+    return [(int(start), min(int(end) + _OVERLAP, frames)) for start, end in pairwise(edges)]
+
+
+def _joined(parts: list[Trajectory]) -> Trajectory:
+    """One trajectory, faded where two parts overlap."""
+    whole = parts[0]
+    for after in parts[1:]:
+        share = np.linspace(0, 1, _OVERLAP)[:, None]
+        share = share * share * (3 - 2 * share)
+        turn = quaternions.slerp(
+            *(quaternions.from_matrices(t) for t in (whole.turn[-_OVERLAP:], after.turn[:_OVERLAP])), share[:, 0]
+        )
+        middle = Trajectory(
+            (1 - share) * whole.root[-_OVERLAP:] + share * after.root[:_OVERLAP],
+            quaternions.to_matrices(turn),
+            (1 - share) * whole.joint[-_OVERLAP:] + share * after.joint[:_OVERLAP],
+        )
+        pieces = (
+            Trajectory(*(a[:-_OVERLAP] for a in whole.arrays())),
+            middle,
+            Trajectory(*(a[_OVERLAP:] for a in after.arrays())),
+        )
+        whole = Trajectory(*(np.concatenate(rows) for rows in zip(*(p.arrays() for p in pieces), strict=True)))
+    return whole
