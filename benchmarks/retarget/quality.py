@@ -1,7 +1,7 @@
 """Quality of sets of motions on the robot: `python -m benchmarks.retarget.quality FOLDER ... --out table.json`.
 
-A set is a folder with motion files, one file, or a motion library. `NAME=FOLDER` names it in the table; a name that ends in
-`:raw` has its folder read without our floor correction.
+A set is a folder with motion files, one file, or a motion library. `NAME=FOLDER` names it in the table; a name that
+ends in `:raw` has its folder read without our floor correction.
 """
 
 import argparse
@@ -35,7 +35,7 @@ def measured(name: str, clips: list[Clip]) -> dict[str, dict[str, float]]:
 def main() -> None:
     """Measure the sets named on the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("sets", nargs="+", help="a folder, or NAME=folder; name:raw=folder leaves heights as read")
+    parser.add_argument("sets", nargs="+", help="a folder, NAME=folder, or NAME:raw=folder")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--csv-fps", type=float, default=60.0)
     options = parser.parse_args()

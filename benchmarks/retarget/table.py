@@ -46,6 +46,8 @@ def _measure(values: Mapping[str, float]) -> Row:
     worst = max(held, key=lambda name: held[name])
     numbers = np.array(list(held.values()))
     low, high = (float(bound) if np.isfinite(bound) else None for bound in bootstrap_mean(numbers))
+    if low is not None and numbers.min() >= 0:
+        low = max(low, 0.0)  # widened for few motions, an interval may leave what can be
     mean = float(numbers.mean())
     return {"mean": mean, "low": low, "high": high, "n": len(held), "worst": held[worst], "worst_motion": worst}
 
