@@ -91,9 +91,9 @@ def _shapes(robot: Robot) -> Shapes:
 def _foot(robot: Robot, side: int) -> tuple[int, np.ndarray, float, bool]:
     """One capsule as wide as the sole, along its middle."""
     corners = robot.sole[side * CORNERS : (side + 1) * CORNERS]
-    radius = float(np.linalg.norm(corners[0] - corners[1])) / 2
+    radius = robot.radius + float(np.linalg.norm(corners[0] - corners[1])) / 2
     heel, toe = corners[:2].mean(axis=0), corners[2:].mean(axis=0)
-    return int(robot.sole_body[side * CORNERS]), np.stack([heel, toe]) + [0, 0, radius], radius, True
+    return int(robot.sole_body[side * CORNERS]), np.stack([heel, toe]) + np.array([0, 0, radius - robot.radius]), radius, True
 
 
 def _hops(parent: np.ndarray) -> np.ndarray:

@@ -56,7 +56,7 @@ class RetargetConfig(Ranged):
     """Links that meet [m]."""
     margin: Annotated[float, Range(least=0, most=0.1)] = 0.005
     """Nearer than this, links meet [m]."""
-    iterations: Count = 25
+    iterations: Count = 80
     """Most Gauss-Newton steps."""
     converged: Small = 0.001
     """A step that lowers the sum of squares by less than this share of it ends the search."""

@@ -21,7 +21,7 @@ LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 POINTS = (*(f"{side}_{limb}" for side in SIDES for limb in LIMBS), "neck")
 """Landmarks that a mapping places on the robot, in the order of `Robot.body`."""
 CORNERS = 4
-_KEYS = ("robot", "points", "soles", "joint_speed", "rest")
+_KEYS = ("robot", "points", "soles", "sole_radius", "joint_speed", "rest")
 _JOINT_SPEED = 20.0  # rad/s, where a mapping states none: what the slower of the G1's motors reach
 
 
@@ -41,6 +41,8 @@ class Robot:
     local: np.ndarray
     sole_body: np.ndarray
     sole: np.ndarray
+    radius: float
+    """Of the spheres at the soles' corners [m]."""
     fastest: np.ndarray
     rest: np.ndarray
 
@@ -96,6 +98,7 @@ def make_robot(
         np.array([local for _, local in points]),
         np.array([body for body, _ in corners]),
         np.array([local for _, local in corners]),
+        _radius(f"{where}: sole_radius", mapping.get("sole_radius", 0.0)),
         fastest,
         rest,
     )
@@ -122,6 +125,12 @@ def _sole(where: str, value: Any, tree: Tree) -> list[tuple[int, np.ndarray]]:
         wanted = "[body, [heel left, heel right, toe left, toe right]], each corner [x, y, z]"
         raise BadInput(where, wanted, repr(value)[:80])
     return [_point(where, [value[0], corner], tree) for corner in value[1]]
+
+
+def _radius(where: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < 0.5:
+        raise BadInput(where, "a radius from 0 to 0.5 m", repr(value)[:40])
+    return float(value)
 
 
 def _vector(where: str, value: Any) -> np.ndarray:

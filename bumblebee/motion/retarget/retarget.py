@@ -17,8 +17,8 @@ from bumblebee.robot.facts import joint_names
 VERSION = 1
 """Of the method: a cached result of another version is made again."""
 _LEAST = 5  # frames: an acceleration needs three
-_LONGEST = 3000  # frames fitted at once, about 0.3 GB
-_OVERLAP = 100  # frames that neighbouring parts share, faded from one to the other
+_LONGEST = 600  # frames fitted at once: a hard place then holds up its own part only
+_OVERLAP = 60  # frames that neighbouring parts share, faded from one to the other
 
 
 def retarget(motion: HumanMotion, fps: float = 50.0, config: RetargetConfig | None = None) -> RawMotion:

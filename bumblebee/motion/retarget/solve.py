@@ -122,7 +122,7 @@ def _feet(normal: Normal, at: Poses, target: Targets, robot: Robot, config: Reta
         along = (where[:, toe : toe + 2] - where[:, heel : heel + 2]).mean(axis=1) - target.feet[:, side]
         rows = (slope[:, toe : toe + 2] - slope[:, heel : heel + 2]).mean(axis=1)
         normal.add(rows, along, np.full((frames, 3), config.foot**-2.0))
-    height = where[..., 2]
+    height = where[..., 2] - robot.radius
     weight = np.where(height < 0, config.clearance**-2.0, target.contact * config.sole**-2.0)
     normal.add(slope[:, :, 2], height, weight)
     held = np.minimum(target.contact[1:], target.contact[:-1])

@@ -100,7 +100,7 @@ def _leg_scale(robot: Robot, of: dict[str, np.ndarray]) -> tuple[float, float]:
         pairs = ((f"{side}_hip", f"{side}_knee"), (f"{side}_knee", f"{side}_ankle"))
         return float(sum(np.median(np.linalg.norm(where[b] - where[a], axis=-1)) for a, b in pairs))
 
-    ankle = float(np.mean([at[f"{side}_ankle"][2] - at[f"{side}_sole"][2] for side in SIDES]))
+    ankle = robot.radius + float(np.mean([at[f"{side}_ankle"][2] - at[f"{side}_sole"][2] for side in SIDES]))
     return float(np.mean([leg(at, s) for s in SIDES]) / np.mean([leg(of, s) for s in SIDES])), ankle
 
 
