@@ -7,9 +7,9 @@ from bumblebee.motion.captions import parse_caption
 LEAST_OVERLAP = 0.5
 """Of the shorter of caption and window: how much of it both must share.
 
-With less, a window shows more of something else than of what the caption says, or lacks most of it: a pair that teaches
-the wrong word. With more, a caption that the cut between two windows halves would go to neither. Of the shorter, so that
-"kicks" (1 s) describes the 8 s in which the kick lies, and "walks in a circle" (40 s) each 8 s of it.
+With less, a window shows more of something else than of what the caption says, or lacks most of it: a pair that
+teaches the wrong word. With more, a caption that the cut between two windows halves would go to neither. Of the
+shorter, so that "kicks" (1 s) describes the 8 s in which the kick lies, and "walks in a circle" (40 s) each 8 s of it.
 """
 
 
@@ -27,6 +27,24 @@ def captions_in(
         least_overlap: share of the shorter of both that they must have in common.
     """
     return tuple(line for line in captions if _describes(*parse_caption(line)[2:], start, end, least_overlap))
+
+
+def within(captions: Sequence[str], start: float, end: float) -> tuple[str, ...]:
+    """The captions of a motion that describe its part from `start` to `end` [s], times counted from `start`.
+
+    By the same rule as `captions_in`: a caption that the part has only the end of would say of it what is not there.
+    """
+    moved = (_moved(line, start, end) for line in captions_in(captions, start, end))
+    return tuple(line for line in moved if line)
+
+
+def _moved(line: str, start: float, end: float) -> str:
+    text, tokens, since, until = parse_caption(line)
+    if since == until == 0.0:
+        return line
+    until = f"{min(until, end) - start:.3f}"
+    # A moment at the part's very start would read as the whole of it.
+    return "" if float(until) == 0.0 else f"{text}#{tokens}#{max(since - start, 0.0):.3f}#{until}"
 
 
 def _describes(since: float, until: float, start: float, end: float, least: float) -> bool:

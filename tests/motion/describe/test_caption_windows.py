@@ -2,7 +2,7 @@
 
 import pytest
 
-from bumblebee.motion.describe.windows import captions_in
+from bumblebee.motion.describe.windows import captions_in, within
 
 
 def _line(since: float, until: float) -> str:
@@ -34,3 +34,10 @@ def test_captions_come_as_they_are_in_their_order_and_the_share_can_be_set():
     lines = [_line(0, 4), _line(6, 20), _line(0, 0)]
     assert captions_in(lines, 0, 8) == (lines[0], lines[2])
     assert captions_in(lines, 0, 8, least_overlap=0.2) == tuple(lines)
+
+
+def test_a_part_keeps_the_captions_that_describe_it_with_their_times_moved():
+    lines = (_line(0.0, 0.0), _line(0.5, 2.0), _line(3.0, 9.0), _line(3.8, 9.0))
+    assert within(lines, 1.0, 5.0) == (lines[0], _line("0.000", "1.000"), _line("2.000", "4.000"))
+    assert within(lines[1:2], 2.5, 4.0) == ()
+    assert within((_line(3, 3),), 3.0, 5.0) == ()  # a moment at its start, which would read 0 and 0: all of it
