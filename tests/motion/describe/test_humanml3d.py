@@ -172,6 +172,17 @@ def test_entries_that_climb_out_or_come_twice_are_never_read(humanml3d, tmp_path
     assert {path.name for path in tmp_path.rglob("*")} == {"humanml3d", "index.csv", "texts.zip"}
 
 
+def test_an_entry_without_a_name_costs_no_other(humanml3d):
+    with zipfile.ZipFile(humanml3d / "texts.zip", "a") as archive:
+        archive.writestr("Q", "")
+    data = bytearray((humanml3d / "texts.zip").read_bytes())
+    at = data.rindex(b"Q") - 46  # its entry in the list: no byte of name, one of extra data
+    data[at + 28 : at + 32] = b"\0\0\1\0"
+    (humanml3d / "texts.zip").write_bytes(data)
+    opened = HumanML3D.open(humanml3d)
+    assert len(opened.captions(WALK, 30.0).captions) == 3 and "1 files in it" in opened.notes[0]
+
+
 def test_a_folder_without_texts_is_one_line(tmp_path):
     (tmp_path / "index.csv").write_text(INDEX)
     with pytest.raises(BadInput, match=r"texts\.zip or a folder texts"):
