@@ -74,7 +74,7 @@ class HumanML3D:
         """
         found = self._motions.find(source_path, motion_name)
         if found.key is None:
-            return Described(notes=(f"{source_path}: {found.note}",) if found.note else ())
+            return Described(notes=(_note(source_path, found.note),) if found.note else ())
         cut = CUT_AT_START.get(found.key[0], 0)
         items: list[str | Dropped] = []
         for segment in self.segments[found.key]:
@@ -85,7 +85,7 @@ class HumanML3D:
         return Described(
             captions,
             "humanml3d" if captions else "",
-            tuple(f"{source_path}: {drop.line}" for drop in dropped),
+            tuple(_note(source_path, drop.line) for drop in dropped),
             tuple(drop.kind for drop in dropped),
             self.licence if captions else "",
         )
@@ -110,10 +110,15 @@ def _of_another_rate(source_path: Path, count: int) -> Described:
     lie at wrong times.
     """
     note = (
-        f"{source_path}: its frame rate cannot be that of HumanML3D's index (segments lie beyond its end), as in many "
+        "its frame rate cannot be that of HumanML3D's index (segments lie beyond its end), as in many SMPL-X files of "
     )
-    note += "SMPL-X files of AMASS: none of its texts is used. The same motion's SMPL-H file has the right rate."
-    return Described(notes=(note,), dropped=(ANOTHER_RATE,) * count)
+    note += "AMASS: none of its texts is used. The same motion's SMPL-H file has the right rate."
+    return Described(notes=(_note(source_path, note),), dropped=(ANOTHER_RATE,) * count)
+
+
+def _note(source_path: Path, line: str) -> str:
+    """One line about a motion; names of members are not ours."""
+    return shown(f"{source_path}: {line}", 1000)
 
 
 def read_index(path: Path) -> tuple[dict[Key, tuple[Segment, ...]], tuple[str, ...]]:
