@@ -84,7 +84,7 @@ def family_beside_text(clip: Clip) -> str:
 
 
 def texts_by_source(clips: Sequence[Clip]) -> dict[str, int]:
-    """How many clips have their texts from where: "file", "made", "name", "none" or "unknown"."""
+    """How many clips have their texts from where: "file", "csv", "humanml3d", "made", "name", "none" or "unknown"."""
     sources = ["none" if not clip.captions else clip.caption_source or "unknown" for clip in clips]
     return {source: sources.count(source) for source in sorted(set(sources))}
 

@@ -37,8 +37,8 @@ def plain_text(caption: str) -> str:
     return caption.split("#", 1)[0].strip()
 
 
-TEXT_SOURCES = ("file", "made")
-"""Of `Clip.caption_source`: what somebody wrote about the motion, the user or the embedded library."""
+TEXT_SOURCES = ("file", "csv", "humanml3d", "made")
+"""Of `Clip.caption_source`: what somebody wrote about the motion: the user, HumanML3D, the embedded library."""
 _FILLERS = (
     "person man woman someone somebody human humanoid figure robot character subject actor "
     "perform performs performing performed execute executes executing do does doing make makes making "

@@ -148,7 +148,7 @@ def count(where: object, content: Any, limits: Limits = LIMITS) -> None:
 
 def members(where: object, archive: zipfile.ZipFile, limits: Limits = LIMITS) -> list[zipfile.ZipInfo]:
     """The files of an archive, after a look at what they say they unpack to."""
-    found = [info for info in archive.infolist() if not info.is_dir()]
+    found = [info for info in archive.infolist() if not info.filename.endswith("/")]  # is_dir() fails on an empty name
     if len(found) > limits.members:
         raise BadInput(where, f"at most {limits.members:,} files in an archive", f"{len(found):,}")
     total = sum(info.file_size for info in found)

@@ -86,15 +86,3 @@ def family_of(name: str) -> str:
     """The kind of motion that a file's name suggests, "" if none."""
     found = set(words(name))
     return next((family for family, signs in _FAMILIES if found & set(signs)), "")
-
-
-def within(captions: tuple[str, ...], start: float, end: float) -> tuple[str, ...]:
-    """The captions that hold for the part from `start` to `end` [s] of a motion, times counted from `start`."""
-    kept = []
-    for line in captions:
-        text, tokens, since, until = parse_caption(line)
-        if since == until == 0.0:
-            kept.append(line)
-        elif since < end and until > start:
-            kept.append(f"{text}#{tokens}#{max(since - start, 0.0):.3f}#{min(until, end) - start:.3f}")
-    return tuple(kept)

@@ -34,7 +34,8 @@ class Clip:
     split: str = "train"
     """"train", or "test" if held out."""
     caption_source: str = ""
-    """Where the captions come from: "file", "name" (derived from the file's name), "made"; "" without captions."""
+    """Where the captions come from: "file" (beside the motion), "csv" (the user's table), "humanml3d", "made" (with the
+    motion), "name" (words of the file's name, which are no text in any evidence); "" without captions."""
 
     @property
     def frames(self) -> int:

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from bumblebee.motion.captions import within
 from bumblebee.motion.clip import Clip
+from bumblebee.motion.describe.windows import within
 
 FAMILY_MINIMUM = 4  # motions: a family of so many has at least one held out
 

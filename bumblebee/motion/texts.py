@@ -1,7 +1,11 @@
 """Lines of text that come with motions: captions, sources, licences, names of files."""
 
+import re
+
 from bumblebee.errors import BadInput
 
+# Control characters but the tab, halves of surrogate pairs, Unicode's line breaks.
+_UNSHOWN = re.compile(r"[\x00-\x08\x0a-\x1f\x7f-\x9f\ud800-\udfff\u2028\u2029]")
 LONGEST = 4000  # characters: a caption with its tokens has a few hundred
 
 
@@ -11,16 +15,11 @@ def require_line(where: object, text: object, most: int = LONGEST) -> str:
         raise BadInput(where, "text", f"a {type(text).__name__}")
     if len(text) > most:
         raise BadInput(where, f"at most {most:,} characters", f"{len(text):,}")
-    if any(_unshown(sign) for sign in text):
+    if _UNSHOWN.search(text):
         raise BadInput(where, "one line of text without control characters", repr(text[:60]))
     return text
 
 
 def shown(text: str, most: int = 300) -> str:
     """The text with a mark in place of what is no text (bytes of a name that are not UTF-8, control characters)."""
-    return "".join("\ufffd" if _unshown(sign) else sign for sign in text[:most])
-
-
-def _unshown(sign: str) -> bool:
-    code = ord(sign)
-    return (code < 32 and sign != "\t") or 127 <= code < 160 or 0xD800 <= code < 0xE000 or code in (0x2028, 0x2029)
+    return _UNSHOWN.sub("\ufffd", text[:most])

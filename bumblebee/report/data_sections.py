@@ -8,6 +8,8 @@ from bumblebee.report.wording import plural, signed
 _MOST_ROWS = 12
 _TEXTS = {
     "file": "written by you beside the motion",
+    "csv": "written by you in a table of captions",
+    "humanml3d": "HumanML3D's, of the segments that people described",
     "made": "the embedded library's own, written with its motions",
     "name": "a template filled with the file's name",
     "none": "none",

@@ -3,7 +3,7 @@
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.captions import caption_from_name, family_of, find_captions, parse_caption, read_captions, within
+from bumblebee.motion.captions import caption_from_name, family_of, find_captions, parse_caption, read_captions
 
 LINE = "a person walks forward.#a/DET person/NOUN walk/VERB forward/ADV#0.5#2.0"
 
@@ -45,9 +45,3 @@ def test_a_name_becomes_a_caption_and_a_family(name, said, family):
     assert [token.split("/")[0] for token in tokens.split()] == ["a", "person", "perform", *said.split()]
     assert (start, end) == (0.0, 0.0)
     assert family_of(name) == family
-
-
-def test_a_part_keeps_the_captions_that_hold_in_it_with_their_times_moved():
-    whole = "a#b/X#0.0#0.0"
-    assert within((whole, LINE), 1.0, 4.0) == (whole, LINE.replace("#0.5#2.0", "#0.000#1.000"))
-    assert within((LINE,), 2.5, 4.0) == ()
