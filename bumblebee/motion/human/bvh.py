@@ -4,7 +4,6 @@ Any order of channels, 3 or 6 (or any others) for a joint, positions in any join
 here: BVH states neither.
 """
 
-import math
 import re
 import warnings
 from dataclasses import dataclass, field
@@ -21,6 +20,7 @@ MAX_FRAMES = 500_000  # of one motion of a person: 69 minutes at 120 Hz
 _MAX_JOINTS = 1000
 _MAX_HEADER = 1 << 20  # characters; 31 joints have 5,000
 _CHANNELS = {f"{axis}{kind}": (kind, "xyz".index(axis)) for axis in "xyz" for kind in ("position", "rotation")}
+_LARGEST = 1e7  # of a number: 10 km in millimetres
 _AGAIN = "Export or copy the file again."
 
 
@@ -142,7 +142,7 @@ def _set(where: str, joints: _Joints, joint: int, key: str, words: list[str]) ->
     where = f"{where}, joint {joints.names[joint]}"
     if key == "OFFSET":
         values = [_number(word) for word in words]
-        if len(values) != 3 or not all(value is not None and math.isfinite(value) for value in values):
+        if len(values) != 3 or not all(value is not None and _fits(value) for value in values):
             hint = " (with commas for decimal points)" if any("," in word for word in words) else ""
             raise BadInput(where, "OFFSET and three finite numbers", shown(" ".join(words), 60) + hint, _AGAIN)
         joints.offsets[joint] = tuple(float(value) for value in values if value is not None)
@@ -195,7 +195,7 @@ def _table(path: Path, lines: list[str], frames: int, columns: int) -> np.ndarra
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 values = np.loadtxt(lines, dtype=np.float64, comments=None, ndmin=2)
-            if values.shape == (frames, columns) and np.isfinite(values).all():
+            if values.shape == (frames, columns) and (np.abs(values) <= _LARGEST).all():
                 return values
         except ValueError:
             pass
@@ -209,12 +209,17 @@ def _wrong_row(path: Path, lines: list[str], frames: int, columns: int) -> BadIn
         where = f"{path}, frame {number}"
         for column, word in enumerate(words, 1):
             value = _number(word)
-            if value is None or not math.isfinite(value):
+            if value is None or not _fits(value):
                 hint = "Decimal points must be points, not commas." if "," in word else ""
-                return BadInput(f"{where}, value {column}", "a finite number", repr(shown(word, 40)), hint)
+                return BadInput(f"{where}, value {column}", f"a number up to {_LARGEST:g}", repr(shown(word, 40)), hint)
         if len(words) != columns:
             return BadInput(where, f"{columns} values, as many as channels", str(len(words)), _AGAIN)
     return BadInput(path, f"{frames:,} frames, as its line Frames: says", f"{len(lines):,}", _AGAIN)
+
+
+def _fits(value: float) -> bool:
+    """Whether a number is finite and not too large; NaN is not."""
+    return abs(value) <= _LARGEST
 
 
 def _number(word: str) -> float | None:

@@ -75,12 +75,9 @@ def find_up(where: object, moving: str, resting: str, stated: str) -> tuple[str,
         return stated, ()
     told = {axis for axis in (moving, resting) if axis}
     if len(told) != 1:
-        came = (
-            f"{moving} by the motion, {resting} by the skeleton's own pose"
-            if told
-            else "a head above the feet in neither"
-        )
-        raise BadInput(where, "y or z as the up axis, along which the head is above the feet", came, "State it: `up`.")
+        both = f"{moving} by the motion, {resting} by the skeleton's own pose"
+        wanted = "y or z as the up axis, along which the head is above the feet"
+        raise BadInput(where, wanted, both if told else "a head above the feet along neither", "State it: `up`.")
     (axis,) = told
     by = "the motion" if moving else "the skeleton's own pose alone"
     return axis, (f"{axis} is up, by {by}",)

@@ -52,9 +52,7 @@ def read_human(path: Path, data: bytes, options: HumanConfig | None = None) -> l
     else:
         raise BadInput(path, "poses and trans, as AMASS's files have them", "an .npz file without them")
     if not (np.abs(positions) < _FAR).all():
-        raise BadInput(
-            path, f"a person within {_FAR:g} m of the origin", "one farther away, or positions that are no numbers"
-        )
+        raise BadInput(path, f"a person within {_FAR:g} m of the origin", "one farther away")
     cut = t_pose_frames(positions, fps)
     if cut:
         positions = positions[cut:]

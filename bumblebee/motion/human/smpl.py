@@ -59,7 +59,8 @@ def read_smpl(path: Path, data: bytes, fps: float = 0.0) -> Smpl:
         raise BadInput(path, "as many frames in poses and trans", f"{len(poses)} and {len(trans)}")
     if not 1 <= len(trans) <= MAX_FRAMES:
         raise BadInput(path, f"1 to {MAX_FRAMES:,} frames", f"{len(trans):,}")
-    model = {"smplx": "smplx", "smplh": "smplh", "smpl": "smpl"}.get(_text(arrays, "surface_model_type"), model)
+    said = _text(arrays, "surface_model_type")
+    model = said if said in _WIDTHS.values() else model
     stated, notes = _rate(path, arrays, fps)
     betas = _betas(path, arrays)
     gender = _text(arrays, "gender")
@@ -113,11 +114,10 @@ def _rate(path: Path, arrays: dict[str, np.ndarray], fps: float) -> tuple[float,
             raise BadInput(path, f"a frame rate ({', '.join(RATES[:3])})", "none", "State it: `fps`.")
         return fps, (f"{fps:g} Hz, as the settings say",)
     values = arrays[found]
-    rate = float(values.reshape(())) if values.size == 1 and values.dtype.kind in "iuf" else float("nan")
+    is_number = values.size == 1 and values.dtype.kind in "iuf"
+    rate = float(values.reshape(())) if is_number else float("nan")
     if not 1 <= rate <= 1000:
-        came = (
-            f"{rate:g}" if values.size == 1 and values.dtype.kind in "iuf" else f"shape {values.shape}, {values.dtype}"
-        )
+        came = f"{rate:g}" if is_number else f"shape {values.shape}, {values.dtype}"
         raise BadInput(f"{path}: {found}", "a number of frames a second from 1 to 1000", came)
     return rate, ()
 

@@ -1,8 +1,8 @@
 """Where the joints of an SMPL body lie at rest: from the licensed model where it is there, else from public figures.
 
 The model is looked for under the folder that the environment's `SMPL_MODEL_DIR` names. With it the joints follow from
-the person's shape: `J_regressor @ (v_template + shapedirs @ betas)`. Without it they are those of the mean body; a shape
-that the file states cannot be applied then, and the notes say so.
+the person's shape: `J_regressor @ (v_template + shapedirs @ betas)`. Without it they are those of the mean body; a
+shape that the file states cannot be applied then, and the notes say so.
 """
 
 import os
@@ -24,9 +24,10 @@ FOLDER = "SMPL_MODEL_DIR"
 GENDERS = ("neutral", "male", "female")
 
 # Places in the model's frame [m]: x to the person's left, y up, z ahead; first the pelvis, then each joint from its
-# parent. Both as the joints' `pos` in public models of the neutral body: SMPL from phc/data/assets/mjcf/smpl_humanoid.xml
-# of ZhengyiLuo/PHC, SMPL-X from protomotions/data/assets/mjcf/smplx_humanoid.xml of NVlabs/ProtoMotions (there with x
-# ahead, y left, z up, but for the pelvis). SMPL-H's body is SMPL's with other hands.
+# parent. Both are the bodies' `pos` in public models of the neutral body. SMPL: ZhengyiLuo/PHC,
+# phc/data/assets/mjcf/smpl_humanoid.xml @557d6c0. SMPL-X: NVlabs/ProtoMotions,
+# protomotions/data/assets/mjcf/smplx_humanoid.xml @1faa3be (there x ahead, y left, z up, but for the pelvis).
+# SMPL-H's body is taken as SMPL's, with other hands.
 _SMPL = (
     (-0.0018, -0.2233, 0.0282),
     (0.0695, -0.0914, -0.0068),
@@ -105,10 +106,8 @@ def find_body(model: str, gender: str, betas: np.ndarray) -> Body:
     figures, source = _MEAN[model]
     notes = [f"joints of the mean {model.upper()} body, from {source}"]
     if np.abs(betas).max(initial=0) > 0:
-        place = os.environ.get(FOLDER, "")
-        reason = (
-            f"no {model.upper()} model of gender {gender or 'unknown'} in {FOLDER}" if place else f"{FOLDER} is not set"
-        )
+        lacks = f"no {model.upper()} model of gender {gender or 'unknown'} in {FOLDER}"
+        reason = lacks if os.environ.get(FOLDER) else f"{FOLDER} is not set"
         notes.append(f"the person's shape (betas) is not applied: {reason}")
     return Body(np.array(figures), tuple(notes))
 
@@ -161,9 +160,7 @@ def _pickled(file: Path, data: bytes) -> dict[str, object]:
     try:
         content = safe_pickle.load(file, data)
     except BadInput as error:
-        do = (
-            "Convert it to .npz with J_regressor, v_template and shapedirs as plain arrays. Nothing of it was executed."
-        )
+        do = "Nothing of it was executed. Convert it to .npz with J_regressor, v_template, shapedirs as plain arrays."
         raise BadInput(file, "a model of plain arrays", error.came, do) from None
     return content if isinstance(content, dict) else {}
 
