@@ -90,7 +90,7 @@ def test_a_licence_file_named_after_an_archive_is_that_of_its_members(tmp_path):
 
 
 def test_a_licence_in_an_archive_is_that_of_its_folder_and_those_below(tmp_path):
-    path = archive(tmp_path / "walks.zip", LICENSE="MIT License", in__LICENCE__txt="x", in__deep__COPYING="All mine")
+    path = archive(tmp_path / "walks.zip", LICENSE="MIT License", in__deep__COPYING="All mine")
     assert licences(path) == {"a.bvh": "MIT", "b.bvh": "MIT", "c.bvh": "see COPYING"}
 
 

@@ -25,16 +25,17 @@ _INDEX = {name: i for i, name in enumerate(LANDMARKS)}
 def t_pose_frames(positions: np.ndarray, fps: float) -> int:
     """How many frames at the start are a T-pose, and the passage from it, that do not belong to the motion.
 
-    Converters put the skeleton's own pose in front. It is known by level, straight arms and a first step that nobody
-    moves; behind it some files hold a few frames that were never set, or the ringing of a filter: they go up to the
-    last step that is too fast for the motion that follows.
+    Converters put the skeleton's own pose in front. It is known by level, straight arms and a step out of it that
+    nobody moves; behind it some files hold a few frames that were never set, or the ringing of a filter: they go up to
+    the last step that is too fast for the motion that follows.
     """
     if len(positions) < _LEAD + 3 or not _arms_level(positions[0]):
         return 0
     near = positions[: _LEAD + _USUAL + 1]
     speed = np.linalg.norm(np.diff(near, axis=0), axis=2).mean(axis=1) * fps
     limit = max(_TIMES * float(np.median(speed[_LEAD:])), _SLOW)
-    if speed[0] < max(limit, _FLING):
+    flung = np.flatnonzero(speed[:_LEAD] > max(limit, _FLING))
+    if not len(flung) or not _arms_level(positions[flung[0]]):
         return 0
     return int(np.flatnonzero(speed[:_LEAD] > limit)[-1]) + 1
 

@@ -93,14 +93,17 @@ def z_up(positions: np.ndarray, up: str) -> np.ndarray:
 def require_right_handed(where: object, positions: np.ndarray) -> None:
     """Refuse a body whose feet point backwards: left and right are exchanged, or the axes are left-handed.
 
-    With z up, what is in front of a person is to the right-hand side of the way from the right hip to the left one.
+    Ahead is across the way from the right hip to the left one and up the shank, in right-handed axes, however the
+    person stands or lies; the foot points there.
 
     Raises:
         BadInput: in most frames the toes are behind the ankles.
     """
     across = positions[:, _INDEX["left_hip"]] - positions[:, _INDEX["right_hip"]]
-    ahead = np.stack([across[:, 1], -across[:, 0]], axis=1)
-    feet = sum(positions[:, _INDEX[f"{s}_toe"]] - positions[:, _INDEX[f"{s}_ankle"]] for s in ("left", "right"))
-    if np.median(np.einsum("ti,ti->t", ahead, feet[:, :2])) < 0:
+    forward = np.zeros(len(positions))
+    for side in ("left", "right"):
+        knee, ankle, toe = (positions[:, _INDEX[f"{side}_{joint}"]] for joint in ("knee", "ankle", "toe"))
+        forward += np.einsum("ti,ti->t", np.cross(across, knee - ankle), toe - ankle)
+    if np.median(forward) < 0:
         came = "toes that point backwards: left and right exchanged, or left-handed axes"
         raise BadInput(where, "right-handed axes, and left joints on the left", came, "Export the file again.")
