@@ -2,16 +2,18 @@
 
 import re
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes
+from bumblebee.motion.archives import SUFFIXES, list_archive
+from bumblebee.motion.sources import Source
+from bumblebee.motion.sources_table import row_of
 from bumblebee.motion.texts import shown
 
 UNKNOWN = "unknown"
 _MAX_BYTES = 4 << 20  # of a licence or a table
 _LONGEST = 200  # characters of a licence's name
-_LEVELS = 4  # folders up from the file in which SOURCES.md is looked for
 
 # A phrase in the licence's text -> its SPDX name; the first that is found decides.
 _TEXTS = (
@@ -26,37 +28,100 @@ _TEXTS = (
 )
 
 
-def licence_of(file: Path) -> str:
-    """The licence under which a motion file comes."""
-    return _of_folder(file.resolve().parent)
+_FILES = ("LICENSE", "LICENCE", "LICENSE.txt", "LICENCE.txt", "LICENSE.md", "LICENCE.md", "COPYING")
+_RATE = re.compile(r"(?:(\d+(?:\.\d+)?)\s*(?:to|and|or|[-/,\u2013])\s*)?\b(\d+(?:\.\d+)?)\s*Hz\b")
+
+# What licences that forbid commercial use are called, and those that allow it.
+_NONCOMMERCIAL = re.compile(
+    r"non-?\s?commercial|\bby-nc\b|\bcc[ -]by[ -]nc|\b(research|academic)( use| purposes)? only", re.IGNORECASE
+)
+_COMMERCIAL = re.compile(
+    r"\b(mit|isc|apache|bsd|0bsd|zlib|unlicense|cc0|cc[ -]by|public domain|[al]?gpl|mpl)\b", re.IGNORECASE
+)
+
+
+def licence_of(file: Path | Source) -> str:
+    """The licence under which a motion file, or a member of an archive, comes.
+
+    A file: its row in SOURCES.md, else a licence file in its folder. A member: the row that names the archive, else
+    `<stem>.LICENCE.txt` beside the archive, else a licence file in it, the nearest to the member, else that of the
+    archive's folder.
+    """
+    if isinstance(file, Path):
+        return _from_table(file) or _from_folder(file.resolve().parent) or UNKNOWN
+    if file.archive is None:
+        return licence_of(file.path)
+    return _from_table(file.archive) or _beside(file.archive) or _inside(file) or licence_of(file.archive)
+
+
+def stated_rate(source: Path | Source) -> float | None:
+    """The frame rate [Hz] that SOURCES.md states for a file, its folder or its archive, where it states exactly one."""
+    place = source if isinstance(source, Path) else source.archive or source.path
+    row = row_of(place)
+    if row is None:
+        return None
+    said = [rate for cell in row.cells.values() for pair in _RATE.findall(cell) for rate in pair if rate]
+    rates = {float(rate) for rate in said}
+    (rate,) = rates if len(rates) == 1 else (0.0,)
+    return rate if 1 <= rate <= 1000 else None
+
+
+def noncommercial(licence: str) -> bool | None:
+    """Whether a licence forbids commercial use; None where its name does not tell."""
+    if _NONCOMMERCIAL.search(licence):
+        return True
+    return False if _COMMERCIAL.search(licence) else None
+
+
+def _from_table(file: Path) -> str:
+    """The cell in the column `licence` of the row of SOURCES.md that names the file or its folder."""
+    row = row_of(file)
+    cells = row.cells if row else {}
+    return shown(cells.get("licence") or cells.get("license") or "", _LONGEST)
 
 
 @cache
-def _of_folder(folder: Path) -> str:
-    return _from_table(folder) or _from_text(folder) or UNKNOWN
+def _from_folder(folder: Path) -> str:
+    """What the licence file of a folder is the text of."""
+    return next((found for name in _FILES if (found := _named(name, _text(folder / name)))), "")
 
 
-def _from_table(folder: Path) -> str:
-    """The cell in the column `licence` of the row of SOURCES.md whose first cell names the folder."""
-    for level in [folder, *folder.parents][:_LEVELS]:
-        table = level / "SOURCES.md"
-        column = None
-        for line in _text(table).splitlines():
-            cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
-            heads = [cell.lower() for cell in cells]
-            if column is None:
-                column = next((heads.index(word) for word in ("licence", "license") if word in heads), None)
-            elif len(cells) > column and folder.name in re.split(r"[`/\s]+", cells[0]):
-                return shown(cells[column], _LONGEST)
-    return ""
+def _beside(archive: Path) -> str:
+    """The same of a file that is named after an archive."""
+    stem = archive.name[: len(archive.name) - len(next(end for end in SUFFIXES if archive.name.lower().endswith(end)))]
+    names = [f"{stem}.{word}{end}" for word in ("LICENCE", "LICENSE") for end in (".txt", ".md", "")]
+    return next((found for name in names if (found := _named(name, _text(archive.parent / name)))), "")
 
 
-def _from_text(folder: Path) -> str:
-    for name in ("LICENSE", "LICENCE", "LICENSE.txt", "LICENCE.txt", "LICENSE.md", "LICENCE.md", "COPYING"):
-        text = " ".join(_text(folder / name).lower().split())
-        if text:
-            return next((spdx for phrase, spdx in _TEXTS if phrase in text), f"see {name}")
-    return ""
+def _inside(source: Source) -> str:
+    """The same of a licence file in a member's folder or one above it in the archive."""
+    archive = source.archive
+    texts = _archived(archive) if archive else {}
+    folders = source.path.relative_to(archive).parents if archive and texts else []
+    return next((texts[str(folder)] for folder in folders if str(folder) in texts), "")
+
+
+@cache
+def _archived(archive: Path) -> dict[str, str]:
+    """The licence of each folder of an archive that has a licence file."""
+    found: dict[str, str] = {}
+    for member in list_archive(archive):
+        path = PurePosixPath(member.name)
+        if member.bad or path.name not in _FILES or str(path.parent) in found:
+            continue
+        try:
+            text = member.read(_MAX_BYTES).decode("utf-8", errors="replace")
+        except BadInput:
+            continue
+        if licence := _named(path.name, text):
+            found[str(path.parent)] = licence
+    return found
+
+
+def _named(name: str, text: str) -> str:
+    """The SPDX name of a licence's text, or where it stands; "" of an empty one."""
+    plain = " ".join(text.lower().split())
+    return next((spdx for phrase, spdx in _TEXTS if phrase in plain), f"see {name}") if plain else ""
 
 
 def _text(path: Path) -> str:

@@ -1,8 +1,13 @@
 """Where a motion's bytes come from: a file, or a member of an archive."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+
+from bumblebee.io.read import read_bytes
+from bumblebee.motion.archives import list_archive
+from bumblebee.motion.texts import shown
 
 
 @dataclass(frozen=True)
@@ -15,3 +20,23 @@ class Source:
     """Its bytes; refuses (BadInput) more than the given number of them."""
     archive: Path | None = None
     """The archive that it is a member of."""
+
+
+def file_source(path: Path) -> Source:
+    """A file on disk."""
+    return Source(path, partial(read_bytes, path))
+
+
+def archive_sources(path: Path, is_motion: Callable[[Path], bool]) -> Iterator[Source]:
+    """The motions in an archive, and what is wrong with it or its members: a source that can only refuse.
+
+    Args:
+        path: the archive.
+        is_motion: whether a member of that name is asked for.
+    """
+    for member in list_archive(path):
+        name = Path(shown(member.name.replace("\\", "/"), 1000))
+        if member.bad or is_motion(name):
+            # A bad name (`..`, absolute) must not lead elsewhere in `path` either: only its last part is shown.
+            place = path / name.name if member.bad and member.name else path / name
+            yield Source(place if member.name else path, member.read, path)

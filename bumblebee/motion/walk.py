@@ -1,8 +1,11 @@
-"""Which files below a folder are taken for motions."""
+"""Which files below a folder, and which members of archives, are taken for motions."""
 
 import os
 from collections.abc import Iterator
 from pathlib import Path
+
+from bumblebee.motion.archives import is_archive
+from bumblebee.motion.sources import Source, archive_sources, file_source
 
 INDEX = "index.parquet"
 # No motions: notes, licences, pictures.
@@ -12,6 +15,24 @@ _NO_MOTION = {"", ".txt", ".md", ".pdf", ".png", ".jpg", ".gif", ".mp4", ".html"
 def motion_files(path: Path) -> list[Path]:
     """The files that `read_folder` tries, in its order."""
     return [path] if path.is_file() else list(_walk(path))
+
+
+def motion_sources(path: Path) -> Iterator[Source]:
+    """What is to be read below a folder, or of a file: files, and the members of archives, in the order of names.
+
+    An archive, or a member of one, that cannot be used is a source whose `read` says why.
+    """
+    for file in motion_files(path):
+        if is_archive(file) and file.is_file():
+            yield from archive_sources(file, _may_be_motion)
+        else:
+            yield file_source(file)
+
+
+def _may_be_motion(name: Path) -> bool:
+    """Whether a member is taken for a motion by its name; hidden files and macOS' own are not."""
+    hidden = any(part.startswith(".") or part == "__MACOSX" for part in name.parts)
+    return not hidden and name.suffix.lower() not in _NO_MOTION
 
 
 def _walk(top: Path) -> Iterator[Path]:

@@ -1,8 +1,12 @@
 """The licence is found beside the file, or said to be unknown."""
 
+import zipfile
+from pathlib import Path
+
 import pytest
 
-from bumblebee.motion.licences import licence_of
+from bumblebee.motion.licences import licence_of, noncommercial, stated_rate
+from bumblebee.motion.walk import motion_sources
 
 
 @pytest.mark.parametrize(
@@ -29,3 +33,93 @@ def test_a_row_of_sources_md_goes_before_the_file(tmp_path):
     assert licence_of(tmp_path / "m/walks/a.csv") == "CC BY 4.0: name us"
     (tmp_path / "m/runs").mkdir()
     assert licence_of(tmp_path / "m/runs/a.csv") == "unknown"
+
+
+TABLE = """# Where it is from
+
+| folder | what | licence |
+|---|---|---|
+| `m/other` | 30 Hz, written at 60 Hz | MIT |
+| `m/walks` | CSV at 60 Hz, 36 columns | CC BY 4.0 |
+| `m/all.zip` | marker mocap, 120 Hz; 106 files | free, not to resell |
+| `m/walks/one.csv` | cut out of it; 29.97 Hz | Apache-2.0 |
+| `m/range` | 30 to 60 Hz | MIT |
+
+| other | 50 Hz |
+"""
+
+
+def archive(path: Path, **files: str) -> Path:
+    with zipfile.ZipFile(path, "w") as out:
+        for name in ("a.bvh", "in/b.bvh", "in/deep/c.bvh"):
+            out.writestr(name, "x")
+        for name, text in files.items():
+            out.writestr(name.replace("__", "/"), text)
+    return path
+
+
+def licences(path: Path) -> dict[str, str]:
+    return {source.path.name: licence_of(source) for source in motion_sources(path)}
+
+
+def test_the_row_that_names_a_folder_file_or_archive_is_its_own(tmp_path):
+    (tmp_path / "SOURCES.md").write_text(TABLE)
+    for folder in ("m/walks/deep", "m/other", "m/range", "m/new"):
+        (tmp_path / folder).mkdir(parents=True)
+    archive(tmp_path / "m/all.zip")
+    files = ("walks/a.csv", "walks/deep/a.csv", "walks/one.csv", "other/a.csv", "range/a.csv", "new/a.csv", "a.csv")
+    found = {name: (licence_of(tmp_path / "m" / name), stated_rate(tmp_path / "m" / name)) for name in files}
+    assert found == {
+        "walks/a.csv": ("CC BY 4.0", 60),
+        "walks/deep/a.csv": ("CC BY 4.0", 60),
+        "walks/one.csv": ("Apache-2.0", 29.97),
+        "other/a.csv": ("MIT", None),
+        "range/a.csv": ("MIT", None),
+        "new/a.csv": ("unknown", None),
+        "a.csv": ("unknown", None),
+    }
+    for source in motion_sources(tmp_path / "m/all.zip"):
+        assert (licence_of(source), stated_rate(source)) == ("free, not to resell", 120)
+
+
+def test_a_licence_file_named_after_an_archive_is_that_of_its_members(tmp_path):
+    archive(tmp_path / "walks.zip", LICENSE="Apache License")
+    (tmp_path / "walks.LICENCE.txt").write_text("MIT License")
+    (tmp_path / "LICENSE").write_text("CC0")
+    assert set(licences(tmp_path / "walks.zip").values()) == {"MIT"}
+
+
+def test_a_licence_in_an_archive_is_that_of_its_folder_and_those_below(tmp_path):
+    path = archive(tmp_path / "walks.zip", LICENSE="MIT License", in__deep__COPYING="All mine")
+    assert licences(path) == {"a.bvh": "MIT", "b.bvh": "MIT", "c.bvh": "see COPYING"}
+
+
+def test_a_member_of_an_archive_without_any_has_the_licence_of_the_folder(tmp_path):
+    (tmp_path / "LICENSE").write_text("Creative Commons Attribution-NonCommercial")
+    assert set(licences(archive(tmp_path / "walks.zip")).values()) == {"CC-BY-NC-4.0"}
+
+
+@pytest.mark.parametrize(
+    ("licence", "forbids"),
+    [
+        ("CC-BY-NC-4.0", True),
+        ("CC BY-NC-SA 4.0: name us", True),
+        ("AMASS licence: non-commercial scientific research", True),
+        ("NonCommercial", True),
+        ("free for research use only", True),
+        ("MIT", False),
+        ("Apache-2.0 / BSD-3; facts, free to carry over", False),
+        ("CC BY 4.0 (as its card says)", False),
+        ("CC-BY-SA-4.0", False),
+        ("CC0-1.0", False),
+        ("public domain", False),
+        ("GPL-3.0", False),
+        ("unknown", None),
+        ("see LICENSE", None),
+        ("free to use and redistribute, not to resell", None),
+        ("permitted", None),
+        ("", None),
+    ],
+)
+def test_whether_a_licence_forbids_commercial_use(licence, forbids):
+    assert noncommercial(licence) is forbids

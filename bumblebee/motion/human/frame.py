@@ -1,0 +1,109 @@
+"""The unit and the up axis of a skeleton: read off the body, or asked for where the body does not tell.
+
+A person's legs have one length whatever the file: hip to knee to ankle from `LEGS[0]` to `LEGS[1]` (men and women of
+1.40 to 2.10 m have 0.65 to 1.1 m). A unit that puts them there is the file's unit where it is the only one.
+"""
+
+import numpy as np
+
+from bumblebee.errors import BadInput
+from bumblebee.motion.human.motion import LANDMARKS
+
+UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "cmu": 0.0254 / 0.45}
+"""Metres in a unit; `cmu` is that of CMU's files and their conversion by cgspeed (1 / 0.45 inch)."""
+LEGS = (0.65, 1.1)
+_POSSIBLE = (0.2, 1.5)  # legs of a child, of a stylised figure [m]: beyond, a stated unit is wrong
+_UPRIGHT = 0.7  # of the vector from the feet to the head, the share along an axis that is up: within 45 degrees
+
+_INDEX = {name: i for i, name in enumerate(LANDMARKS)}
+
+
+def leg_length(positions: np.ndarray) -> float:
+    """Hip to knee to ankle, the mean of both sides, the median over the frames; of (T, 18, 3)."""
+    both = []
+    for side in ("left", "right"):
+        chain = positions[:, [_INDEX[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle")]]
+        both.append(np.linalg.norm(np.diff(chain, axis=1), axis=2).sum(axis=1))
+    return float(np.median(np.mean(both, axis=0)))
+
+
+def find_unit(where: object, legs: float, stated: str) -> tuple[float, tuple[str, ...]]:
+    """Metres in the file's unit, and a note where it was found and not stated.
+
+    Args:
+        where: the file.
+        legs: length of a leg in the file's unit.
+        stated: the unit as the user says it; "" if they do not.
+
+    Raises:
+        BadInput: no unit fits, or the stated one cannot be.
+    """
+    if stated:
+        if not _POSSIBLE[0] <= legs * UNITS[stated] <= _POSSIBLE[1]:
+            came = f"legs of {legs * UNITS[stated]:.4g} m with the unit {stated}"
+            raise BadInput(where, f"legs of {_POSSIBLE[0]} to {_POSSIBLE[1]} m", came, "Set another `unit`.")
+        return UNITS[stated], ()
+    fitting = [name for name, metres in UNITS.items() if LEGS[0] <= legs * metres <= LEGS[1]]
+    if len(fitting) != 1:
+        came = f"legs of {legs:.4g} units, which {' and '.join(fitting) or 'none'} would explain"
+        wanted = f"a unit (of {', '.join(UNITS)}) with legs of {LEGS[0]} to {LEGS[1]} m"
+        raise BadInput(where, wanted, came, "State it: `unit`.")
+    return UNITS[fitting[0]], (f"unit {fitting[0]}, by legs of {legs:.4g} units = {legs * UNITS[fitting[0]]:.3f} m",)
+
+
+def upright_axis(positions: np.ndarray) -> str:
+    """The axis along which the head is above the feet, `y` or `z`; "" if it is neither, in most of the frames."""
+    feet = positions[:, [_INDEX["left_ankle"], _INDEX["right_ankle"]]].mean(axis=1)
+    rise = positions[:, _INDEX["head"]] - feet
+    middle = np.median(rise / np.maximum(np.linalg.norm(rise, axis=1, keepdims=True), 1e-9), axis=0)
+    return next((name for name, axis in (("y", 1), ("z", 2)) if middle[axis] > _UPRIGHT), "")
+
+
+def find_up(where: object, moving: str, resting: str, stated: str) -> tuple[str, tuple[str, ...]]:
+    """The up axis, and a note where it was found and not stated.
+
+    Args:
+        where: the file.
+        moving: what the motion shows (`upright_axis`).
+        resting: what the skeleton's own pose shows.
+        stated: the axis as the user says it; "" if they do not.
+
+    Raises:
+        BadInput: the body tells neither or both: a person who lies, or a rig that stands another way.
+    """
+    if stated:
+        return stated, ()
+    told = {axis for axis in (moving, resting) if axis}
+    if len(told) != 1:
+        both = f"{moving} by the motion, {resting} by the skeleton's own pose"
+        wanted = "y or z as the up axis, along which the head is above the feet"
+        raise BadInput(where, wanted, both if told else "a head above the feet along neither", "State it: `up`.")
+    (axis,) = told
+    by = "the motion" if moving else "the skeleton's own pose alone"
+    return axis, (f"{axis} is up, by {by}",)
+
+
+def z_up(positions: np.ndarray, up: str) -> np.ndarray:
+    """Positions turned so that z is up; a turn, no mirror: left stays left."""
+    if up == "z":
+        return positions
+    return np.stack([positions[..., 0], -positions[..., 2], positions[..., 1]], axis=-1)
+
+
+def require_right_handed(where: object, positions: np.ndarray) -> None:
+    """Refuse a body whose feet point backwards: left and right are exchanged, or the axes are left-handed.
+
+    Ahead is across the way from the right hip to the left one and up the shank, in right-handed axes, however the
+    person stands or lies; the foot points there.
+
+    Raises:
+        BadInput: in most frames the toes are behind the ankles.
+    """
+    across = positions[:, _INDEX["left_hip"]] - positions[:, _INDEX["right_hip"]]
+    forward = np.zeros(len(positions))
+    for side in ("left", "right"):
+        knee, ankle, toe = (positions[:, _INDEX[f"{side}_{joint}"]] for joint in ("knee", "ankle", "toe"))
+        forward += np.einsum("ti,ti->t", np.cross(across, knee - ankle), toe - ankle)
+    if np.median(forward) < 0:
+        came = "toes that point backwards: left and right exchanged, or left-handed axes"
+        raise BadInput(where, "right-handed axes, and left joints on the left", came, "Export the file again.")

@@ -1,0 +1,93 @@
+"""Reads a motion of a person from a file's bytes: BVH or SMPL .npz, brought to landmarks in metres with z up."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+
+from bumblebee.errors import BadInput
+from bumblebee.motion.human.bvh import Bvh, parse_bvh
+from bumblebee.motion.human.floor import on_floor, t_pose_frames
+from bumblebee.motion.human.forward import adds_positions, bvh_positions, rest_positions
+from bumblebee.motion.human.frame import find_unit, find_up, leg_length, require_right_handed, upright_axis, z_up
+from bumblebee.motion.human.landmarks import find_landmarks
+from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.human.npz import npz_keys
+from bumblebee.motion.human.smpl import is_smpl, read_smpl
+from bumblebee.ranges import Range, Ranged
+
+SUFFIXES = (".bvh", ".npz")
+_FAR = 1000.0  # m from the origin: beyond is damage
+
+
+@dataclass(frozen=True)
+class HumanConfig(Ranged):
+    """What a file of human motion does not say, for those of which the body does not tell it either."""
+
+    unit: Literal["", "m", "dm", "cm", "mm", "inch", "cmu"] = ""
+    """Unit of BVH files; empty: by the length of the legs. `cmu` is 1 / 0.45 inch."""
+    up: Literal["", "y", "z"] = ""
+    """The up axis; empty: BVH's by the body, that of SMPL files z, where the body stands so."""
+    fps: Annotated[float, Range(least=0, most=1000)] = 0.0
+    """Frame rate of SMPL files that state none; 0: such a file is refused [Hz]."""
+
+
+def read_human(path: Path, data: bytes, options: HumanConfig | None = None) -> list[HumanMotion]:
+    """The motions of a file, of suffix .bvh or .npz.
+
+    Args:
+        path: as it is shown; its stem names the motion.
+        data: the file's bytes.
+        options: what the file does not say.
+
+    Raises:
+        BadInput: one line about what cannot be used, or must be stated.
+    """
+    options = options or HumanConfig()
+    if path.suffix.lower() == ".bvh":
+        fps, positions, notes = _from_bvh(path, data, options)
+    elif is_smpl(npz_keys(path, data)):
+        fps, positions, notes = _from_smpl(path, data, options)
+    else:
+        raise BadInput(path, "poses and trans, as AMASS's files have them", "an .npz file without them")
+    if not (np.abs(positions) < _FAR).all():
+        raise BadInput(path, f"a person within {_FAR:g} m of the origin", "one farther away")
+    cut = t_pose_frames(positions, fps)
+    if cut:
+        positions = positions[cut:]
+        notes += (f"{cut} frame{'s' * (cut > 1)} at the start cut: a T-pose that does not belong to the motion",)
+    if len(positions) < 2:
+        raise BadInput(path, "a motion of at least 2 frames", f"{len(positions)}")
+    require_right_handed(path, positions)
+    positions, floor = on_floor(positions, fps)
+    return [HumanMotion(path.stem, fps, positions, path, first_row=1 + cut, notes=(*notes, *floor))]
+
+
+def _from_bvh(path: Path, data: bytes, options: HumanConfig) -> tuple[float, np.ndarray, tuple[str, ...]]:
+    """Frame rate, positions (T, 18, 3) [m, z up] and notes."""
+    bvh = parse_bvh(path, data)
+    joints, table = find_landmarks(path, bvh.names, bvh.offsets)
+    places = bvh_positions(bvh, joints)
+    metres, by_legs = find_unit(path, leg_length(places), options.unit)
+    resting = upright_axis(rest_positions(bvh, joints)[None])
+    up, by_body = find_up(path, upright_axis(places), resting, options.up)
+    notes = (f"skeleton: {table.name}", *by_legs, *by_body, *_added(bvh))
+    return bvh.fps, z_up(metres * places, up), notes
+
+
+def _added(bvh: Bvh) -> tuple[str, ...]:
+    """A note on joints whose positions were taken as added to their offsets."""
+    names = [bvh.names[joint] for joint in range(len(bvh.names)) if adds_positions(bvh, joint)]
+    return (f"positions of {len(names)} joints are near 0: added to their OFFSET",) if names else ()
+
+
+def _from_smpl(path: Path, data: bytes, options: HumanConfig) -> tuple[float, np.ndarray, tuple[str, ...]]:
+    """The same of an SMPL file: AMASS's have z up, and another axis is not assumed for one that looks so."""
+    motion = read_smpl(path, data, options.fps)
+    shown = upright_axis(motion.positions)
+    if shown == "y" and not options.up:
+        came = "a head above the feet along y: y up, or a person who lies"
+        raise BadInput(path, "z up, as AMASS has it", came, "State it: `up`, y or z.")
+    doubt = ("z is up, as AMASS has it: the body does not stand so",) if not shown and not options.up else ()
+    return motion.fps, z_up(motion.positions, options.up or "z"), (*motion.notes, *doubt)
