@@ -31,6 +31,7 @@ _FIELDS = {
     "root_quat": ("root_rot", "root_quat"),
     "joint_pos": ("dof", "dof_pos"),
 }
+JOINT_FIELDS = _FIELDS["joint_pos"]
 
 
 def read_asap_pickle(path: Path, data: bytes | None = None) -> list[RawMotion]:

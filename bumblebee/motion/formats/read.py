@@ -1,12 +1,14 @@
 """Which format of robot motion a file has, and its motions: the one function that others call."""
 
+import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import npz_arrays
-from bumblebee.motion.formats.asap_pickle import is_motion, read_asap_pickle, read_fields
+from bumblebee.motion.formats.asap_pickle import JOINT_FIELDS, is_motion, read_asap_pickle, read_fields
 from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.g1_csv import read_g1_csv
 from bumblebee.motion.formats.mjlab_npz import is_mjlab, read_mjlab_npz
@@ -41,13 +43,14 @@ def read_robot(path: Path, data: bytes, options: RobotConfig | None = None) -> l
     raise BadInput(path, f"a motion of the G1 ({', '.join(SUFFIXES)})", f"a file with suffix {suffix[:20]!r}")
 
 
-def is_robot_npz(path: Path, data: bytes) -> bool:
-    """Whether an `.npz` file has the keys of a robot's motion; false for SMPL's and for damaged ones."""
+def is_robot_npz(data: bytes) -> bool:
+    """Whether an `.npz` file's list of arrays is that of a robot's motion; false for SMPL's and for damaged files."""
     try:
-        arrays = npz_arrays(path, data)
-    except BadInput:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            names = {name.removesuffix(".npy") for name in archive.namelist()}
+    except Exception:  # a damaged list raises anything from BadZipFile to UnicodeDecodeError
         return False
-    return is_mjlab(arrays) or is_motion(arrays)
+    return not names.isdisjoint({"joint_pos", *JOINT_FIELDS})
 
 
 def format_of(path: Path) -> str:
