@@ -86,7 +86,7 @@ def convert(
     print(f"{done.files:,} files: {done.written:,} motions written, {len(done.skipped):,} skipped, in {took:.1f} s")
     print(f"written: {out}, {rates} Hz" + ("" if to == LIBRARY else f"; licences: {out / 'LICENCES.csv'}"))
     if to != LIBRARY and not FORMATS[to].holds_rate:
-        print(f"These files hold no rate: read them with --csv-fps {rates}")
+        print(f"These files hold no rate: LICENCES.csv says {rates} Hz, other programs must be told")
     given = None if to == LIBRARY else FORMATS[to].fps
     if given and fps and fps != given:
         print(

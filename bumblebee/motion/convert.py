@@ -1,8 +1,6 @@
 """Motions of any format that is read, written in one that other trainers take, with the licence of each."""
 
-import csv
 import hashlib
-import io
 import itertools
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -11,7 +9,6 @@ from pathlib import Path
 
 from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
-from bumblebee.io.read import read_text
 from bumblebee.io.write import new_folder, refuse_overlap, try_output
 from bumblebee.motion.captions import find_captions
 from bumblebee.motion.checks import check_clip, check_raw
@@ -20,6 +17,7 @@ from bumblebee.motion.formats.read import RobotConfig
 from bumblebee.motion.formats.write import FORMATS, write_motion
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.kinematics import make_clip
+from bumblebee.motion.licence_table import LICENCES, Stated, read_table, stated_of, table_of
 from bumblebee.motion.licences import licence_of
 from bumblebee.motion.listing import Found, Motion, Readers, find_motions, reason_of
 from bumblebee.motion.raw import RawMotion
@@ -30,8 +28,6 @@ from bumblebee.motion.walk import INDEX
 
 LIBRARY = "library"
 KINDS = (*FORMATS, LIBRARY)
-LICENCES = "LICENCES.csv"
-_HEAD = ("file", "motion", "fps", "source", "licence")
 _LIBRARY_FPS = 50.0  # Hz: the policy's
 _OWN = {INDEX, "clips", "skipped.csv"}  # names in a library
 
@@ -121,11 +117,8 @@ def _ours(out: Path, to: str) -> bool:
     names = set(os.listdir(out))
     if to == LIBRARY:
         return INDEX in names and names <= _OWN
-    try:
-        rows = list(csv.reader(io.StringIO(read_text(out / LICENCES))))
-    except (BadInput, csv.Error):
-        return False
-    return bool(rows) and tuple(rows[0]) == _HEAD and names <= {LICENCES, *(row[0] for row in rows[1:] if row)}
+    written = read_table(out)
+    return bool(written) and names <= {LICENCES, *written}
 
 
 def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> Clip:
@@ -136,7 +129,7 @@ def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> Clip:
     """
     check_raw(raw)
     raw = resample(raw, fps or raw.fps)
-    captions = find_captions(raw.file, "")
+    captions, before = find_captions(raw.file, ""), stated_of(raw.file)
     clip = make_clip(
         safe_stem(raw.name, "motion"),
         raw.fps,
@@ -145,8 +138,8 @@ def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> Clip:
         raw.joint_pos,
         captions=captions,
         caption_source="file" if captions else "",
-        source=shown(str(Path(raw.file.parent.name) / raw.file.name)),
-        licence=licence_of(raw.file),
+        source=before.source if before else shown(str(Path(raw.file.parent.name) / raw.file.name)),
+        licence=before.licence if before else licence_of(raw.file),
         sha256=digest,
     )
     check_clip(raw.where, clip)
@@ -222,9 +215,7 @@ def _counted(clips: Iterable[Clip], done: Converted) -> Iterator[Clip]:
 
 
 def _write(out: Path, clips: Iterable[Clip], config: ConvertConfig) -> None:
-    table = io.StringIO()
-    rows = csv.writer(table, lineterminator="\n")
-    rows.writerow(_HEAD)
+    rows: list[Stated] = []
     rate = None
     with new_folder(out) as folder:
         for clip in clips:
@@ -233,5 +224,5 @@ def _write(out: Path, clips: Iterable[Clip], config: ConvertConfig) -> None:
                 came = f"{rate:g} and {clip.fps:g} Hz ({clip.name})"
                 raise BadInput(out, "one rate for files that hold none", came, f"Say it: --fps {rate:g}.")
             file = write_motion(folder, clip, config.to)
-            rows.writerow((file.name, clip.name, f"{clip.fps:g}", clip.source, clip.licence))
-        (folder / LICENCES).write_text(table.getvalue(), encoding="utf-8")
+            rows.append(Stated(file.name, clip.name, clip.fps, clip.source, clip.licence))
+        (folder / LICENCES).write_text(table_of(rows), encoding="utf-8")

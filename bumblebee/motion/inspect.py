@@ -12,6 +12,7 @@ from bumblebee.motion.checks import check_raw
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.formats.read import RobotConfig, format_of
 from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.licence_table import stated_of
 from bumblebee.motion.licences import licence_of
 from bumblebee.motion.listing import Found, Motion, Readers, find_motions, reason_of
 from bumblebee.motion.raw import RawMotion
@@ -115,8 +116,13 @@ def _row(path: Path, motion: Motion) -> Inspected:
         problem = _fault(path, motion) or problem
     return Inspected(
         path, kind, motion.name, len(root), motion.fps, rate, _range(root[:, 2]), joints, captions,
-        licence_of(motion.file), motion.notes, problem,
+        _licence(motion.file), motion.notes, problem,
     )  # fmt: skip
+
+
+def _licence(file: Path) -> str:
+    before = stated_of(file)
+    return before.licence if before else licence_of(file)
 
 
 def _captions(file: Path) -> tuple[int, str]:

@@ -1,7 +1,7 @@
 """What lies at a path, file by file: motions of the robot, of people, clips of a library, or why a file gives none."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from bumblebee.motion import walk
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.formats.read import PICKLES, RobotConfig, is_robot_npz, read_robot
 from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.licence_table import LICENCES, stated_of
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.sources import Source
 from bumblebee.motion.store import read_index, read_indexed
@@ -53,6 +54,8 @@ def find_motions(path: Path, options: RobotConfig | None = None, readers: Reader
     path, options, readers = Path(path), options or RobotConfig(), readers or usual_readers()
     nothing = True
     for source in readers.sources(path):
+        if source.path.name == LICENCES:
+            continue
         nothing = False
         if source.path.name == walk.INDEX and source.archive is None:
             yield from _library(source.path.parent)
@@ -84,7 +87,7 @@ def _file(source: Source, options: RobotConfig, readers: Readers) -> Found:
         data = source.read(LIMITS.file_bytes)
         suffix = source.path.suffix.lower()
         if suffix == ".csv" or suffix in PICKLES or (suffix == ".npz" and is_robot_npz(data)):
-            found: list[Motion] = [*read_robot(source.path, data, options)]
+            found: list[Motion] = [*_robot(source.path, data, options)]
         elif readers.human is not None:
             found = [*readers.human(source.path, data)]
         else:
@@ -95,6 +98,14 @@ def _file(source: Source, options: RobotConfig, readers: Readers) -> Found:
         said = shown(f"it could not be read ({type(error).__name__}: {error}): please report this")
         return Found(source.path, reason=said, data=data)
     return Found(source.path, tuple(found), data=data)
+
+
+def _robot(path: Path, data: bytes, options: RobotConfig) -> list[RawMotion]:
+    """Motions of the robot; the rate of a CSV file that was converted here stands in the table beside it."""
+    stated = stated_of(path) if path.suffix.lower() == ".csv" else None
+    if stated is None:
+        return read_robot(path, data, options)
+    return [replace(raw, rate_from=LICENCES) for raw in read_robot(path, data, replace(options, csv_fps=stated.fps))]
 
 
 def _library(folder: Path) -> Iterator[Found]:
