@@ -104,7 +104,8 @@ def detect(
         raise BadInput(f"{where}, body_pos_w", known, f"{body_pos.shape[1]} bodies")
     best = found[0]
     if best.error > NEAR:
-        came = f"joints that put them {best.error:.2f} m beside in the mean, in the best order of all that are known"
+        beside = f"joints that put them {best.error:.2f} m beside in the mean, in the best order of all that are known"
+        came = beside if np.isfinite(best.error) else "no finite numbers"
         raise BadInput(f"{where}, body_pos_w", known, came, "A motion of another robot?")
     limit = max(_APART * best.error, _FLOOR)
     rival = next((o for o in found if o.error <= limit and not _alike(joints[some], o, best)), None)
@@ -136,11 +137,13 @@ def _candidates(
 
 
 def _distance(body_pos: np.ndarray, order: tuple[str, ...], poses: dict) -> float:
-    """Mean distance of the bodies [m]; those beyond the wrists' first joint depend on joints that are not read."""
-    distances = [
-        np.linalg.norm(body_pos[:, column] - poses[name][0], axis=1)
-        for column, name in enumerate(order)
-        if name != "world" and not name.endswith(("wrist_pitch_link", "wrist_yaw_link"))
-    ]
-    mean = float(np.mean(distances))
-    return mean if np.isfinite(mean) else np.inf
+    """Mean distance of the bodies over the frames without NaN [m]; those beyond the wrists turn by joints not read."""
+    distances = np.stack(
+        [
+            np.linalg.norm(body_pos[:, column] - poses[name][0], axis=1)
+            for column, name in enumerate(order)
+            if name != "world" and not name.endswith(("wrist_pitch_link", "wrist_yaw_link"))
+        ]
+    )
+    whole = np.isfinite(distances).all(axis=0)
+    return float(distances[:, whole].mean()) if whole.any() else np.inf
