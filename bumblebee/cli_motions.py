@@ -131,7 +131,8 @@ def _options(csv_fps: float | None, *rest: str) -> "RobotConfig":
     try:
         return RobotConfig(csv_fps=csv_fps, **given)
     except Unfit as error:
-        raise BadInput(f"--{error.field.replace('_', '-')}", error.expected, error.came) from None
+        expected = error.expected.replace("one of , ", "one of ")  # "" stands for: not said
+        raise BadInput(f"--{error.field.replace('_', '-')}", expected, error.came) from None
 
 
 def _print_table(rows: "list[Inspected]", path: Path) -> None:

@@ -1,5 +1,6 @@
 """What lies at a path, file by file: motions of the robot, of people, clips of a library, or why a file gives none."""
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -52,6 +53,8 @@ def find_motions(path: Path, options: RobotConfig | None = None, readers: Reader
         BadInput: nothing lies at `path`, or nothing that could be a motion.
     """
     path, options, readers = Path(path), options or RobotConfig(), readers or usual_readers()
+    if not os.path.lexists(path):
+        raise BadInput(path, "a motion file, or a folder that holds some", "no such file or folder")
     nothing = True
     for source in readers.sources(path):
         if source.path.name == LICENCES:

@@ -103,8 +103,11 @@ def _stick(bodies: np.ndarray) -> np.ndarray:
 
 def _gif(frames: np.ndarray, rate: float) -> bytes:
     images = [Image.fromarray(frame).quantize(128) for frame in frames]
+    # A GIF counts hundredths of a second: frames differ by one, so that the film as a whole keeps real speed.
+    ends = np.round(np.arange(1, len(images) + 1) * 100 / rate).astype(int)
+    lengths = [int(length) * 10 for length in np.diff(ends, prepend=0)]
     buffer = io.BytesIO()
-    images[0].save(buffer, "gif", save_all=True, append_images=images[1:], duration=1000 / rate, loop=0)
+    images[0].save(buffer, "gif", save_all=True, append_images=images[1:], duration=lengths, loop=0)
     return buffer.getvalue()
 
 
