@@ -41,7 +41,8 @@ def inspect(
     from bumblebee.motion.inspect import inspect as look
 
     options = _options(csv_fps, csv_length, csv_angle, csv_euler, npz_joints)
-    counts, shown_rows, first = Counts(), [], ""
+    shown_rows: list[Inspected] = []
+    counts, first = Counts(), ""
     for found in look(path, options):
         counts.add(found)
         for row in found:

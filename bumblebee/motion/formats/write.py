@@ -4,6 +4,7 @@ import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import joblib
 import numpy as np
@@ -75,7 +76,8 @@ def mjlab_npz(clip: Clip) -> bytes:
     # The root exactly as the clip has it: kinematics scales the quaternion to length 1 once more.
     arrays["body_quat_w"][:, 0] = clip.root_quat
     stream = io.BytesIO()
-    np.savez(stream, fps=np.array([clip.fps]), **{k: np.asarray(v, np.float32) for k, v in arrays.items()})
+    content: dict[str, Any] = {key: np.asarray(values, np.float32) for key, values in arrays.items()}
+    np.savez(stream, fps=np.array([clip.fps]), **content)
     return stream.getvalue()
 
 
