@@ -47,9 +47,9 @@ def inspect(
         counts.add(found)
         for row in found:
             first = first or row.problem
-            if not row.name:
-                print(f"{_place(row.file, path)}: {row.problem}")
-            elif len(shown_rows) < rows:
+            if row.problem:
+                print(_line(f"{_place(row.file, path)}: {row.problem}"))
+            if row.name and len(shown_rows) < rows:
                 shown_rows.append(row)
     _print_table(shown_rows, path)
     if counts.motions > len(shown_rows):
@@ -76,6 +76,7 @@ def convert(
     from bumblebee.motion.convert import KINDS, LIBRARY, ConvertConfig
     from bumblebee.motion.convert import convert as write
     from bumblebee.motion.formats.write import FORMATS
+    from bumblebee.motion.inspect import count
 
     if to not in KINDS:
         raise BadInput("--to", f"one of {', '.join(KINDS)}", repr(to)[:60])
@@ -84,7 +85,8 @@ def convert(
     done = write(path, out, config, overwrite, lambda line: print(f"skipped: {line}", file=sys.stderr))
     rates = ", ".join(f"{rate:g}" for rate in sorted(done.rates))
     took = time.monotonic() - began
-    print(f"{done.files:,} files: {done.written:,} motions written, {len(done.skipped):,} skipped, in {took:.1f} s")
+    written = f"{count(done.written, 'motion')} written, {len(done.skipped):,} skipped"
+    print(f"{count(done.files, 'file')}: {written}, in {took:.1f} s")
     print(f"written: {out}, {rates} Hz" + ("" if to == LIBRARY else f"; licences: {out / 'LICENCES.csv'}"))
     if to != LIBRARY and not FORMATS[to].holds_rate:
         print(f"These files hold no rate: LICENCES.csv says {rates} Hz, other programs must be told")
@@ -137,7 +139,7 @@ def _options(csv_fps: float | None, *rest: str) -> "RobotConfig":
 
 
 def _print_table(rows: "list[Inspected]", path: Path) -> None:
-    """One line a motion, and a line below it where it has a problem."""
+    """One line a motion."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -161,7 +163,7 @@ def _print_table(rows: "list[Inspected]", path: Path) -> None:
             str(row.joints or "person"),
             str(row.captions),
             row.licence,
-            "; ".join([*row.notes, *([f"PROBLEM: {row.problem}"] if row.problem else [])]),
+            "; ".join([*(["not usable, see above"] if row.problem else []), *row.notes]),
         )
         table.add_row(*(Text(_line(cell)) for cell in cells))
     wide = None if sys.stdout.isatty() else 200

@@ -86,7 +86,7 @@ def convert(
     clips = _clips(path, config, done, tell or (lambda line: None), readers)
     first = next(clips, None)
     if first is None:
-        came = f"{done.files} files, none of them usable; the first: {': '.join(done.skipped[0])}"
+        came = f"{done.files:,} files with none that is usable; the first: {': '.join(done.skipped[0])}"
         raise BadInput(path, "a motion of the robot", came)
     counted = _counted(itertools.chain([first], clips), done)
     if config.to == LIBRARY:

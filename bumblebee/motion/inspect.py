@@ -75,7 +75,7 @@ class Counts:
     def __str__(self) -> str:
         read = self.files - self.unreadable
         return (
-            f"{_count(self.files, 'file')}: {read} read, {self.unreadable} not. {_count(self.motions, 'motion')}: "
+            f"{count(self.files, 'file')}: {read} read, {self.unreadable} not. {count(self.motions, 'motion')}: "
             f"{self.usable} usable ({self.seconds:.0f} s), {self.faulty} with a problem."
         )
 
@@ -147,5 +147,6 @@ def _range(height: np.ndarray) -> tuple[float, float]:
     return (float(height.min()), float(height.max())) if len(height) else (np.nan, np.nan)
 
 
-def _count(number: int, word: str) -> str:
+def count(number: int, word: str) -> str:
+    """A number with its word, in the plural where there are several."""
     return f"{number:,} {word}{'s' * (number != 1)}"
