@@ -23,6 +23,10 @@ class RawMotion:
     """Number that a person gives to the first frame in the file: its line in a CSV file."""
     part: str = ""
     """Which motion of the file, where it holds several."""
+    notes: tuple[str, ...] = ()
+    """What was detected and not stated by the file: units, an order of joints; for the summary."""
+    rate_from: str = "file"
+    """Who states the frame rate: the file itself, or a setting."""
 
     @property
     def where(self) -> str:

@@ -1,27 +1,37 @@
-"""Reads ASAP's motions of the G1: joblib pickles with 23 joints, root quaternions xyzw; GMR's field names too."""
+"""Reads motions of the G1 from pickles: ASAP's, PHC's and H2O's layout, GMR's and TWIST's, one or many in a file.
+
+All have root quaternions xyzw and Unitree's order of joints. ASAP, PHC and H2O name their fields `root_trans_offset`,
+`root_rot`, `dof`, `pose_aa`, `fps`; GMR and TWIST `root_pos`, `root_rot`, `dof_pos`, `fps`. `pose_aa` holds a rotation
+vector for each body, the root's first: where the joint angles or the root's quaternion are missing they come from it.
+"""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bumblebee import quaternions
 from bumblebee.errors import BadInput
 from bumblebee.io.read import require_real
 from bumblebee.motion.formats import safe_pickle
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.texts import shown
-from bumblebee.robot.facts import joint_names
+from bumblebee.robot.facts import joint_names, joints
 
 # Of all motions of a file together; a pickle may name one array many times.
 _MAX_FRAMES = 5_000_000
 _MAX_SECONDS = 4 * 3600.0
+_EXTENDED = 3  # bodies without a joint that ASAP appends to `pose_aa`: both hands and the head
+_OFF_AXIS = 1e-3  # rad of a rotation that is not about the joint's axis
+_APART = 0.02  # rad between two rotations that are the same
 
 # What we call it -> what the field calls it, ASAP's name first, then GMR's.
 _FIELDS = {
-    "root_pos": ("root_trans_offset", "root_pos"),
-    "root_quat": ("root_rot",),
+    "root_pos": ("root_trans_offset", "root_pos", "root_trans"),
+    "root_quat": ("root_rot", "root_quat"),
     "joint_pos": ("dof", "dof_pos"),
 }
+JOINT_FIELDS = _FIELDS["joint_pos"]
 
 
 def read_asap_pickle(path: Path, data: bytes | None = None) -> list[RawMotion]:
@@ -34,7 +44,12 @@ def read_asap_pickle(path: Path, data: bytes | None = None) -> list[RawMotion]:
     content = safe_pickle.load(path, data)
     if not isinstance(content, dict) or not content:
         raise BadInput(path, "a dict of motions", f"a {type(content).__name__}")
-    if _field(content, "joint_pos") is not None:
+    return read_fields(path, content)
+
+
+def read_fields(path: Path, content: dict) -> list[RawMotion]:
+    """The motions of a dict of motions, or of the fields of a single one."""
+    if is_motion(content):
         content, named = {"": content}, False
     else:
         named = len(content) > 1
@@ -43,6 +58,23 @@ def read_asap_pickle(path: Path, data: bytes | None = None) -> list[RawMotion]:
         _motion(path, f"{path.stem}_{_said(name)}" if named else path.stem, _said(name) if named else "", motion)
         for name, motion in content.items()
     ]
+
+
+def is_motion(content: dict) -> bool:
+    """Whether these are the fields of a motion of the robot."""
+    return _field(content, "joint_pos") is not None or _robot_pose(content) is not None
+
+
+def _robot_pose(motion: dict) -> np.ndarray | None:
+    """`pose_aa` where it has as many bodies as the G1, (T, B, 3) [rad]."""
+    pose = motion.get("pose_aa")
+    if not isinstance(pose, np.ndarray) or pose.ndim != 3 or pose.shape[2] != 3 or _dof(pose.shape[1]) is None:
+        return None
+    return pose
+
+
+def _dof(bodies: int) -> int | None:
+    return next((dof for dof in (23, 29) if bodies in (1 + dof, 1 + dof + _EXTENDED)), None)
 
 
 def _bounded(path: Path, motions: dict) -> None:
@@ -65,8 +97,8 @@ def _motion(path: Path, name: str, part: str, motion: Any) -> RawMotion:
     if not isinstance(motion, dict):
         raise BadInput(where, "a dict with root_trans_offset, root_rot, dof and fps", f"a {type(motion).__name__}")
     root_pos = _matrix(where, motion, "root_pos", (3,))
-    root_quat = _matrix(where, motion, "root_quat", (4,))
-    joint_pos = _matrix(where, motion, "joint_pos", (23, 29))
+    joint_pos, notes = _joint_angles(where, motion)
+    root_quat, more = _rotations(where, motion)
     for field, values in (("root_quat", root_quat), ("joint_pos", joint_pos)):
         if len(values) != len(root_pos):
             names = f"{_FIELDS['root_pos'][0]} and {_FIELDS[field][0]}"
@@ -75,8 +107,54 @@ def _motion(path: Path, name: str, part: str, motion: Any) -> RawMotion:
     if fps is None or not 1 <= fps <= 1000:
         came = f"{fps:g}" if fps is not None else f"a {type(motion.get('fps')).__name__}"
         raise BadInput(f"{where}, fps", "a number of frames a second from 1 to 1000", came)
-    xyzw = root_quat[:, [3, 0, 1, 2]]
-    return RawMotion(name, fps, root_pos, xyzw, actuated(joint_pos), path, first_row=0, part=part)
+    angles = actuated(joint_pos)
+    return RawMotion(name, fps, root_pos, root_quat, angles, path, first_row=0, part=part, notes=(*notes, *more))
+
+
+def _joint_angles(where: str, motion: dict) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Joint angles (T, 23 or 29) [rad], from `pose_aa` where there is no `dof`."""
+    pose = _robot_pose(motion)
+    if _field(motion, "joint_pos") is not None or pose is None:
+        return _matrix(where, motion, "joint_pos", (23, 29)), ()
+    pose = require_real(f"{where}, pose_aa", pose)
+    dof = _dof(pose.shape[1])
+    axes = np.array([joint.axis for joint in joints(dof or 23)])
+    turned = pose[:, 1 : 1 + len(axes)]
+    with np.errstate(all="ignore"):  # what is no number is named by the checks of every motion
+        angles = (turned * axes).sum(axis=2)
+        beside = float(np.abs(turned - angles[..., None] * axes).max(initial=0.0))
+    if beside > _OFF_AXIS:
+        wanted = f"rotations about the {len(axes)} joint axes of the G1"
+        raise BadInput(f"{where}, pose_aa", wanted, f"{beside:.3g} rad beside them", "A motion of another body?")
+    return angles, ("joint angles from pose_aa",)
+
+
+def _rotations(where: str, motion: dict) -> tuple[np.ndarray, tuple[str, ...]]:
+    """The root's quaternions (T, 4) [wxyz]; `pose_aa` says their order where there is one."""
+    pose = _robot_pose(motion)
+    told = None
+    if pose is not None and pose.any():  # some files carry zeros instead
+        with np.errstate(all="ignore"):
+            told = quaternions.from_rotation_vector(require_real(f"{where}, pose_aa", pose)[:, 0])
+    if _field(motion, "root_quat") is None and told is not None:
+        return told, ("root rotation from pose_aa",)
+    given = _matrix(where, motion, "root_quat", (4,))
+    xyzw = given[:, [3, 0, 1, 2]]
+    if told is None or len(told) != len(given) or _apart(xyzw, told) <= _APART:
+        return xyzw, ()
+    if _apart(given, told) <= _APART:
+        return given, ("root quaternions wxyz, as pose_aa tells",)
+    came = f"{_apart(xyzw, told):.2f} rad apart in the median"
+    raise BadInput(f"{where}, root_rot", "the same rotation as in pose_aa", came, "Which of them is right?")
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Median angle between rotations (T, 4) [rad]; infinite where they are no numbers."""
+    with np.errstate(all="ignore"):
+        lengths = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
+        dot = np.abs((one * other).sum(axis=1)) / lengths
+        angle = float(np.median(2 * np.arccos(np.clip(dot, 0, 1)))) if len(dot) else 0.0
+    return angle if np.isfinite(angle) else np.inf
 
 
 def _rate(motion: dict) -> float | None:

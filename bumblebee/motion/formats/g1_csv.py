@@ -1,44 +1,98 @@
-"""Reads G1 motions in the field's CSV layout: root xyz [m], root quaternion xyzw, 29 or 23 joint angles [rad].
+"""Reads G1 motions from CSV files: the field's layout without a header, and those whose header says what they hold.
 
-There is no frame rate in such a file: LAFAN1's retargets have 30 Hz, g1_moves 60 Hz.
+There is no frame rate in such a file: LAFAN1's retargets have 30 Hz, g1_moves 60 Hz, BONES-SEED 120 Hz.
 """
 
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes
 from bumblebee.motion.checks import MAX_FRAMES
+from bumblebee.motion.formats.config import RobotConfig
+from bumblebee.motion.formats.csv_header import CsvLayout, bare_layout, header_layout
 from bumblebee.motion.raw import RawMotion
-from bumblebee.robot.facts import WRIST_JOINTS, joint_names
 
 MAX_BYTES = 256 << 20  # an hour at 60 Hz has 80 MB
 _BLOCK = 10_000  # rows that are split into cells at a time
-_ROOT = 7
-_WIDTHS = {_ROOT + dof: joint_names(dof) for dof in (29, 23)}
+_WIDEST = 1 + 7 + 29  # columns of any layout
+_TURN = 6.5  # joint angles of a moving robot are larger in degrees, smaller in radians
+_LOW, _HIGH = 0.03, 5.0  # m: the pelvis in the median, lying down or standing
 
 
-def read_g1_csv(path: Path, fps: float, data: bytes | None = None) -> RawMotion:
-    """One motion; a header row, where there is one, names the joints in their order.
+def read_g1_csv(path: Path, fps: float, data: bytes | None = None, options: RobotConfig | None = None) -> RawMotion:
+    """One motion.
 
     Args:
         path: the file.
         fps: its frame rate [Hz].
         data: its bytes, where they have been read.
+        options: units and Euler order for headers that do not say them.
     """
     lines = _lines(path, read_bytes(path, MAX_BYTES) if data is None else data)
     width = lines[0].count(",") + 1
-    if width > max(_WIDTHS):  # before anything is split: a line may have a hundred million commas
-        raise _width(path, 1, width)
-    header = _header(path, lines[0])
-    first_row = 2 if header else 1
-    joints = header or _WIDTHS.get(width)
-    if joints is None:
-        raise _width(path, 1, width)
-    values = _numbers(path, lines[first_row - 1 :], first_row, _ROOT + len(joints))
-    order = [_ROOT + joints.index(name) for name in joint_names()]
-    return RawMotion(path.stem, float(fps), values[:, :3], values[:, [6, 3, 4, 5]], values[:, order], path, first_row)
+    if width > _WIDEST:  # before anything is split: a line may have a hundred million commas
+        bare_layout(f"{path}, row 1", width)
+    cells = _header(path, lines[0])
+    layout = header_layout(path, cells, options or RobotConfig()) if cells else bare_layout(f"{path}, row 1", width)
+    first_row = 2 if cells else 1
+    values = _numbers(path, lines[first_row - 1 :], first_row, layout.width)
+    if layout.counter is not None:
+        _counted(path, values[:, layout.counter], first_row)
+    if layout.euler and not layout.stated:
+        _units_hold(path, values, layout)
+    angle = np.pi / 180 if layout.degrees else 1.0
+    return RawMotion(
+        path.stem,
+        float(fps),
+        values[:, layout.position] * layout.metres,
+        _rotation(values, layout),
+        values[:, layout.joints] * angle,
+        path,
+        first_row,
+        notes=(layout.note,) if layout.note else (),
+        rate_from="setting",
+    )
+
+
+def _rotation(values: np.ndarray, layout: CsvLayout) -> np.ndarray:
+    """The root's quaternions (T, 4) [wxyz]; not a number where an angle is none."""
+    rotation = values[:, layout.rotation]
+    if not layout.euler:
+        return rotation
+    finite = np.isfinite(rotation).all(axis=1)
+    quat = np.full((len(values), 4), np.nan)
+    angles = rotation[:, ["xyz".index(axis) for axis in layout.euler.lower()]][finite]
+    if len(angles):
+        turned = Rotation.from_euler(layout.euler, angles, degrees=layout.degrees)
+        quat[finite] = turned.as_quat()[:, [3, 0, 1, 2]]
+    return quat
+
+
+def _counted(path: Path, numbers: np.ndarray, first_row: int) -> None:
+    """A file that numbers its frames has all of them."""
+    jumps = np.flatnonzero(np.diff(numbers) != 1)
+    if len(jumps):
+        row, before = int(jumps[0]) + 1, numbers[jumps[0]]
+        where = f"{path}, row {row + first_row}, frame number"
+        raise BadInput(where, f"{before + 1:g}, the next", f"{numbers[row]:g}", "Copy or export the file again.")
+
+
+def _units_hold(path: Path, values: np.ndarray, layout: CsvLayout) -> None:
+    """Centimetres and degrees, which the layout has and the file does not say, must fit to its numbers."""
+    values = values[np.isfinite(values).all(axis=1)]
+    if not len(values):
+        return  # the checks of every motion name the cell
+    height = float(np.median(values[:, layout.position[2]]))
+    if not _LOW <= abs(height) * layout.metres <= _HIGH:
+        remedy = "Other units? Set motions.read.csv_length, csv_angle and csv_euler (--csv-length ...)."
+        raise BadInput(f"{path}, root height", f"{layout.unit}", f"{height:.4g} in the median", remedy)
+    angle = float(np.abs(values[:, layout.joints]).max())
+    if layout.degrees and angle < _TURN:
+        remedy = "Radians, or a robot that never moves: set motions.read.csv_length, csv_angle and csv_euler."
+        raise BadInput(f"{path}, joint angles", "degrees", f"none above {angle:.3g}", remedy)
 
 
 def _lines(path: Path, data: bytes) -> list[str]:
@@ -57,33 +111,22 @@ def _lines(path: Path, data: bytes) -> list[str]:
     return lines
 
 
-def _header(path: Path, line: str) -> tuple[str, ...] | None:
-    """Joint names of a header row in full (`left_knee_joint`), or None if the first row holds numbers."""
+def _header(path: Path, line: str) -> list[str] | None:
+    """The cells of a header row, or None if the first row holds numbers."""
     cells = [cell.strip().strip('"') for cell in line.split(",")]
     if all(_is_number(cell) for cell in cells):
         return None
     if any(_is_number(cell) for cell in cells):
         column = next(i for i, cell in enumerate(cells, 1) if not _is_number(cell))
         raise BadInput(f"{path}, row 1, column {column}", "a number", repr(cells[column - 1][:80])[:60])
-    names = []
-    for column, cell in enumerate(cells[_ROOT:], _ROOT + 1):
-        name = cell.lower().removesuffix("_dof").removesuffix("_joint") + "_joint"
-        if name not in joint_names(29):
-            raise BadInput(f"{path}, row 1, column {column}", "the name of a G1 joint", f"unknown joint {cell[:60]!r}")
-        names.append(name)
-    missing = [name for name in joint_names() if name not in names]
-    if missing or len(set(names)) != len(names):
-        came = f"none for {missing[0]}" if missing else "one joint twice"
-        wanted = f"7 root columns, then one for each of the 23 joints (the {len(WRIST_JOINTS)} wrist joints may follow)"
-        raise BadInput(f"{path}, row 1", wanted, came)
-    return tuple(names)
+    return cells
 
 
 def _numbers(path: Path, lines: list[str], first_row: int, width: int) -> np.ndarray:
     """The table (T, width); a bad row or cell is named by its number as an editor shows it."""
     for row, line in enumerate(lines, first_row):
         if (came := line.count(",") + 1) != width:
-            raise _width(path, row, came) if first_row == 1 and row == 1 else _ragged(path, row, width, came)
+            raise _ragged(path, row, width, came)
     values = np.empty((len(lines), width))
     for start in range(0, len(lines), _BLOCK):
         values[start : start + _BLOCK] = _block(path, lines[start : start + _BLOCK], first_row + start, width)
@@ -108,11 +151,6 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return "_" not in cell
-
-
-def _width(path: Path, row: int, came: int) -> BadInput:
-    wanted = "36 columns (xyz, quaternion xyzw, 29 joints), or 30 with 23 joints"
-    return BadInput(f"{path}, row {row}", wanted, f"{came} column{'s' * (came != 1)}")
 
 
 def _ragged(path: Path, row: int, width: int, came: int) -> BadInput:

@@ -44,7 +44,10 @@ def test_29_joints_lose_their_wrists(motions):
     [
         ({"dof": np.zeros((80, 22))}, r"dof or dof_pos: expected an array of 23 or 29 columns, came shape \(80, 22\)"),
         ({"dof": [0.0]}, "dof or dof_pos: expected an array of 23 or 29 columns, came a list"),
-        ({"root_rot": np.zeros((80, 3))}, r"root_rot: expected an array of 4 columns, came shape \(80, 3\)"),
+        (
+            {"root_rot": np.zeros((80, 3))},
+            r"root_rot or root_quat: expected an array of 4 columns, came shape \(80, 3\)",
+        ),
         ({"root_trans_offset": np.zeros((79, 3))}, "as many frames in root_trans_offset and root_rot, came 79 and 80"),
         ({"fps": 0}, "fps: expected a number of frames a second from 1 to 1000, came 0"),
         ({"fps": "30"}, "fps: expected .* came a str"),
@@ -62,7 +65,9 @@ def test_a_missing_field_is_named_with_those_that_are_there(motions, tmp_path):
     fields = motions.fields(motions.raw())
     del fields["root_rot"]
     joblib.dump({"walk": fields}, tmp_path / "a.pkl")
-    with pytest.raises(BadInput, match=r"root_rot: expected .* came no such field among root_trans_offset, dof, fps"):
+    with pytest.raises(
+        BadInput, match=r"root_rot or root_quat: expected .* came no such field among root_trans_offset, dof, fps"
+    ):
         read_asap_pickle(tmp_path / "a.pkl")
 
 

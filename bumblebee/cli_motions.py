@@ -1,0 +1,239 @@
+"""Command line: `bumblebee motions inspect`, `convert`, `play`."""
+
+import os
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from bumblebee.errors import BadInput
+
+if TYPE_CHECKING:
+    from bumblebee.motion.clip import Clip
+    from bumblebee.motion.formats.config import RobotConfig
+    from bumblebee.motion.inspect import Inspected
+
+app = typer.Typer(help="Look at motions, convert them, play them.", no_args_is_help=True)
+
+Where = Annotated[Path, typer.Argument(metavar="PATH", help="A motion file, a folder, or a motion library.")]
+CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
+CsvLength = Annotated[str, typer.Option("--csv-length", help="m, cm or mm: of CSV files with Euler angles.")]
+CsvAngle = Annotated[str, typer.Option("--csv-angle", help="rad or deg: of the same files.")]
+CsvEuler = Annotated[str, typer.Option("--csv-euler", help="Their order: xyz about the world's axes, XYZ the body's.")]
+NpzJoints = Annotated[str, typer.Option("--npz-joints", help="depth_first (MuJoCo) or breadth_first (Isaac).")]
+Rows = Annotated[int, typer.Option("--rows", min=1, help="Rows of the table at most; all are counted.")]
+
+
+@app.command()
+def inspect(
+    path: Where,
+    csv_fps: CsvFps = None,
+    csv_length: CsvLength = "",
+    csv_angle: CsvAngle = "",
+    csv_euler: CsvEuler = "",
+    npz_joints: NpzJoints = "",
+    rows: Rows = 200,
+) -> None:
+    """A table of motions: format, rate and who says it, length, height, captions, licence; bad files one line each."""
+    from bumblebee.motion.inspect import Counts
+    from bumblebee.motion.inspect import inspect as look
+
+    options = _options(csv_fps, csv_length, csv_angle, csv_euler, npz_joints)
+    shown_rows: list[Inspected] = []
+    counts, first = Counts(), ""
+    for found in look(path, options):
+        counts.add(found)
+        for row in found:
+            first = first or row.problem
+            if row.problem:
+                print(_line(f"{_place(row.file, path)}: {row.problem}"))
+            if row.name and len(shown_rows) < rows:
+                shown_rows.append(row)
+    _print_table(shown_rows, path)
+    if counts.motions > len(shown_rows):
+        print(f"... and {counts.motions - len(shown_rows):,} more motions (--rows)")
+    print(counts)
+    if not counts.motions:
+        raise BadInput(path, "a motion", f"{counts.files:,} files, none of them readable; the first: {first}"[:1500])
+
+
+@app.command()
+def convert(
+    path: Where,
+    out: Annotated[Path, typer.Option("--out", help="New folder for the motions and LICENCES.csv.")],
+    to: Annotated[str, typer.Option("--to", help="g1_csv, asap, mjlab or library.")],
+    fps: Annotated[float | None, typer.Option("--fps", min=1, max=1000, help="Rate of what is written.")] = None,
+    csv_fps: CsvFps = None,
+    csv_length: CsvLength = "",
+    csv_angle: CsvAngle = "",
+    csv_euler: CsvEuler = "",
+    npz_joints: NpzJoints = "",
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what was converted before.")] = False,
+) -> None:
+    """Write motions in another format; without --fps at their own rate, 50 Hz for mjlab and libraries."""
+    from bumblebee.motion.convert import KINDS, LIBRARY, ConvertConfig
+    from bumblebee.motion.convert import convert as write
+    from bumblebee.motion.formats.write import FORMATS
+    from bumblebee.motion.inspect import count
+
+    if to not in KINDS:
+        raise BadInput("--to", f"one of {', '.join(KINDS)}", repr(to)[:60])
+    config = ConvertConfig(to, fps, _options(csv_fps, csv_length, csv_angle, csv_euler, npz_joints))
+    began = time.monotonic()
+    done = write(path, out, config, overwrite, lambda line: print(f"skipped: {line}", file=sys.stderr))
+    rates = ", ".join(f"{rate:g}" for rate in sorted(done.rates))
+    took = time.monotonic() - began
+    written = f"{count(done.written, 'motion')} written, {len(done.skipped):,} skipped"
+    print(f"{count(done.files, 'file')}: {written}, in {took:.1f} s")
+    print(f"written: {out}, {rates} Hz" + ("" if to == LIBRARY else f"; licences: {out / 'LICENCES.csv'}"))
+    if to != LIBRARY and not FORMATS[to].holds_rate:
+        print(f"These files hold no rate: LICENCES.csv says {rates} Hz, other programs must be told")
+    given = None if to == LIBRARY else FORMATS[to].fps
+    if given and fps and fps != given:
+        print(
+            f"Mind: mjlab plays a frame each step of its policy, {given:g} Hz as it is shipped, whatever the file says."
+        )
+
+
+@app.command()
+def play(
+    path: Where,
+    motion: Annotated[str, typer.Option("--motion", help="Which, where there are several: its name.")] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="film.gif, or film.png for a filmstrip.")] = None,
+    start: Annotated[float, typer.Option("--start", min=0, help="Where it begins [s].")] = 0.0,
+    seconds: Annotated[float, typer.Option("--seconds", min=0.1, max=120, help="How much is shown.")] = 10.0,
+    panels: Annotated[int, typer.Option("--panels", min=1, max=40, help="Frames of a filmstrip.")] = 8,
+    csv_fps: CsvFps = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+) -> None:
+    """Show a motion on the robot: in a window, or with --out as a film or a filmstrip."""
+    if out is not None:
+        _claim_picture(out, path, overwrite)
+    elif not _display():
+        raise BadInput("--out", "film.gif or film.png on a machine without a display", "nothing")
+    clip = _chosen(path, motion, csv_fps)
+    if out is None:
+        _window(clip)
+        return
+    from bumblebee.report.playback import PlayConfig, write_pictures
+
+    said = write_pictures(out, clip, PlayConfig(panels=panels, start=start, seconds=seconds))
+    print(f"{clip.name}: {said}")
+    print(f"written: {out}")
+
+
+def _options(csv_fps: float | None, *rest: str) -> "RobotConfig":
+    """The readers' settings; what is out of range is said by the option's name."""
+    from bumblebee.motion.formats.config import RobotConfig
+    from bumblebee.ranges import Unfit
+
+    names: Any = ("csv_length", "csv_angle", "csv_euler", "npz_joints")
+    given: dict[str, Any] = dict(zip(names, rest, strict=False))
+    try:
+        return RobotConfig(csv_fps=csv_fps, **given)
+    except Unfit as error:
+        expected = error.expected.replace("one of , ", "one of ")  # "" stands for: not said
+        raise BadInput(f"--{error.field.replace('_', '-')}", expected, error.came) from None
+
+
+def _print_table(rows: "list[Inspected]", path: Path) -> None:
+    """One line a motion."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    if not rows:
+        return
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("motion", "file", "format", "frames", "Hz", "s", "root m", "joints", "captions", "licence", "notes"):
+        table.add_column(
+            name, overflow="fold", justify="right" if name in ("frames", "s", "joints", "captions") else "left"
+        )
+    for row in rows:
+        cells = (
+            row.name,
+            _place(row.file, path),
+            row.format,
+            str(row.frames),
+            f"{row.fps:g} ({row.rate_from})",
+            f"{row.seconds:.1f}",
+            f"{row.height[0]:.2f} to {row.height[1]:.2f}",
+            str(row.joints or "person"),
+            str(row.captions),
+            row.licence,
+            "; ".join([*(["not usable, see above"] if row.problem else []), *row.notes]),
+        )
+        table.add_row(*(Text(_line(cell)) for cell in cells))
+    wide = None if sys.stdout.isatty() else 200
+    Console(width=wide, highlight=False).print(table)
+
+
+def _place(file: Path, path: Path) -> str:
+    from bumblebee.motion.texts import shown
+
+    return shown(os.path.relpath(file, path) if Path(path).is_dir() else str(file))
+
+
+def _line(text: str) -> str:
+    return "".join(sign if sign.isprintable() else "\ufffd" for sign in text)
+
+
+def _chosen(path: Path, name: str, csv_fps: float | None) -> "Clip":
+    """The motion of that name at a path, or the only one."""
+    from bumblebee.motion.convert import clips_at
+    from bumblebee.motion.formats.config import RobotConfig
+
+    names: list[str] = []
+    reasons: list[str] = []
+    clip = None
+    for found in clips_at(path, RobotConfig(csv_fps=csv_fps), reasons.append):
+        names.append(found.name)
+        if name in ("", found.name):
+            clip = found
+        if name and clip is not None:
+            return clip
+    if clip is not None and len(names) == 1:
+        return clip
+    some = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
+    if names:
+        raise BadInput(
+            path, "the name of one motion", repr(name) if name else f"{len(names)} motions", f"--motion: {some}"
+        )
+    raise BadInput(path, "a motion of the robot", f"none that can be used; the first: {' '.join(reasons[:1])}"[:1500])
+
+
+def _claim_picture(out: Path, path: Path, overwrite: bool) -> None:
+    from bumblebee.io.write import refuse_overlap, try_output
+
+    refuse_overlap(out, [path])
+    try_output(out)
+    if os.path.lexists(out) and (out.is_symlink() or not out.is_file() or not overwrite):
+        remedy = "Add --overwrite to replace it." if out.is_file() and not out.is_symlink() else "Choose another name."
+        raise BadInput(out, "a new file", "something that is there", remedy)
+
+
+def _display() -> bool:
+    return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _window(clip: "Clip") -> None:
+    """Play a clip over and over in MuJoCo's viewer until it is closed."""
+    import mujoco
+    import mujoco.viewer
+    import numpy as np
+
+    from bumblebee.robot.model import build_model
+
+    model = build_model()
+    data = mujoco.MjData(model)
+    qpos = np.concatenate([clip.root_pos, clip.root_quat, clip.joint_pos], axis=1)
+    with mujoco.viewer.launch_passive(model, data) as viewer:
+        began = time.monotonic()
+        while viewer.is_running():
+            row = int((time.monotonic() - began) * clip.fps) % clip.frames
+            data.qpos[:] = qpos[row]
+            mujoco.mj_forward(model, data)
+            viewer.sync()
+            time.sleep(1 / clip.fps)

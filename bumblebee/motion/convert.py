@@ -1,0 +1,228 @@
+"""Motions of any format that is read, written in one that other trainers take, with the licence of each."""
+
+import hashlib
+import itertools
+import os
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from bumblebee.errors import BadInput
+from bumblebee.io.names import safe_stem
+from bumblebee.io.write import new_folder, refuse_overlap, try_output
+from bumblebee.motion.captions import find_captions
+from bumblebee.motion.checks import check_clip, check_raw
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.formats.read import RobotConfig
+from bumblebee.motion.formats.write import FORMATS, write_motion
+from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.kinematics import make_clip
+from bumblebee.motion.licence_table import LICENCES, Stated, read_table, stated_of, table_of
+from bumblebee.motion.licences import licence_of
+from bumblebee.motion.listing import Found, Motion, Readers, find_motions, reason_of
+from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.resample import resample
+from bumblebee.motion.store import write_library
+from bumblebee.motion.texts import shown
+from bumblebee.motion.walk import INDEX
+
+LIBRARY = "library"
+KINDS = (*FORMATS, LIBRARY)
+_LIBRARY_FPS = 50.0  # Hz: the policy's
+_OWN = {INDEX, "clips", "skipped.csv"}  # names in a library
+
+
+@dataclass(frozen=True)
+class ConvertConfig:
+    """What is written."""
+
+    to: str
+    """One of `KINDS`."""
+    fps: float | None = None
+    """Rate of what is written [Hz]; None: each motion's own, 50 for mjlab and libraries."""
+    robot: RobotConfig = field(default_factory=RobotConfig)
+
+    @property
+    def rate(self) -> float | None:
+        """The rate of all that is written, None where each motion keeps its own [Hz]."""
+        given = _LIBRARY_FPS if self.to == LIBRARY else FORMATS[self.to].fps
+        return self.fps or given
+
+
+@dataclass
+class Converted:
+    """What came of it."""
+
+    written: int = 0
+    files: int = 0
+    skipped: list[tuple[str, str]] = field(default_factory=list)
+    """Files and motions that gave nothing: place, reason."""
+    rates: set[float] = field(default_factory=set)
+
+
+def convert(
+    path: Path,
+    out: Path,
+    config: ConvertConfig,
+    overwrite: bool = False,
+    tell: Callable[[str], None] | None = None,
+    readers: Readers | None = None,
+) -> Converted:
+    """Write the motions at `path` into the folder `out`, which appears whole or not at all.
+
+    Args:
+        path: a file, a folder or a motion library.
+        out: a new folder, or with `overwrite` an earlier result.
+        config: format and rate.
+        overwrite: replace an earlier result.
+        tell: called with a line for each file or motion that gives nothing.
+        readers: others than the usual.
+
+    Raises:
+        BadInput: `out` is an input or somebody else's; nothing could be written.
+    """
+    claim(out, path, config.to, overwrite)
+    done = Converted()
+    clips = _clips(path, config, done, tell or (lambda line: None), readers)
+    first = next(clips, None)
+    if first is None:
+        came = f"{done.files:,} files with none that is usable; the first: {': '.join(done.skipped[0])}"
+        raise BadInput(path, "a motion of the robot", came)
+    counted = _counted(itertools.chain([first], clips), done)
+    if config.to == LIBRARY:
+        write_library(out, counted)
+    else:
+        _write(out, counted, config)
+    return done
+
+
+def claim(out: Path, path: Path, to: str, overwrite: bool) -> None:
+    """See that a result may be written at `out`, and that the disk takes it, before the work; else `BadInput`."""
+    refuse_overlap(out, [path])
+    inside = Path(os.path.realpath(path)) in Path(os.path.realpath(out)).parents
+    if inside and Path(path).is_dir():
+        raise BadInput(out, "a place apart from what is read", f"one in {path}", "Choose another.")
+    try_output(out)
+    if not os.path.lexists(out):
+        return
+    if out.is_symlink() or not out.is_dir() or (os.listdir(out) and not _ours(out, to)):
+        raise BadInput(out, "a new folder, or converted motions to replace", "something else", "Choose another name.")
+    if os.listdir(out) and not overwrite:
+        came = "motions that were converted before"
+        raise BadInput(out, "a folder that does not exist yet", came, "Add --overwrite to replace it.")
+
+
+def _ours(out: Path, to: str) -> bool:
+    """Whether a folder holds an earlier result of the same kind, and nothing else."""
+    names = set(os.listdir(out))
+    if to == LIBRARY:
+        return INDEX in names and names <= _OWN
+    written = read_table(out)
+    return bool(written) and names <= {LICENCES, *written}
+
+
+def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> Clip:
+    """A motion of the robot, checked and at another rate, as a clip; heights stay as they are.
+
+    Raises:
+        BadInput: a check that it fails.
+    """
+    check_raw(raw)
+    raw = resample(raw, fps or raw.fps)
+    captions, before = find_captions(raw.file, ""), stated_of(raw.file)
+    clip = make_clip(
+        safe_stem(raw.name, "motion"),
+        raw.fps,
+        raw.root_pos,
+        raw.root_quat,
+        raw.joint_pos,
+        captions=captions,
+        caption_source="file" if captions else "",
+        source=before.source if before else shown(str(Path(raw.file.parent.name) / raw.file.name)),
+        licence=before.licence if before else licence_of(raw.file),
+        sha256=digest,
+    )
+    check_clip(raw.where, clip)
+    return clip
+
+
+def clips_at(path: Path, options: RobotConfig, tell: Callable[[str], None]) -> Iterator[Clip]:
+    """The motions at `path` as clips at their own rates, under distinct names; `tell` gets a line for each other."""
+    yield from _clips(path, ConvertConfig("asap", robot=options), Converted(), tell, None)
+
+
+def _clips(
+    path: Path, config: ConvertConfig, done: Converted, tell: Callable[[str], None], readers: Readers | None
+) -> Iterator[Clip]:
+    """The motions that can be written, one after the other, under distinct names; the others are told."""
+    names = _Names()
+
+    def skip(place: str, reason: str) -> None:
+        done.skipped.append((place, reason))
+        tell(f"{place}: {reason}")
+
+    for found in find_motions(path, config.robot, readers):
+        done.files += 1
+        place = shown(os.path.relpath(found.path, path) if Path(path).is_dir() else str(found.path))
+        if not found.motions:
+            skip(place, found.reason or "no motion in it")
+        for motion in found.motions:
+            try:
+                clip = _clip(motion, found, config)
+            except BadInput as error:
+                skip(
+                    f"{place}, {shown(motion.name)}" if len(found.motions) > 1 else place, reason_of(error, found.path)
+                )
+                continue
+            yield replace(clip, name=names.distinct(clip.name, found.path.parent.name))
+
+
+def _clip(motion: Motion, found: Found, config: ConvertConfig) -> Clip:
+    if isinstance(motion, HumanMotion):
+        raise BadInput(motion.where, "a motion of the robot", "a person's", "It must be retargeted first.")
+    if isinstance(motion, RawMotion):
+        return clip_of(motion, config.rate, hashlib.sha256(found.data).hexdigest())
+    if config.rate is None or config.rate == motion.fps:
+        return motion
+    raw = RawMotion(motion.name, motion.fps, motion.root_pos, motion.root_quat, motion.joint_pos, found.path)
+    moved = resample(raw, config.rate)
+    about = {name: getattr(motion, name) for name in ("captions", "source", "licence", "sha256", "family", "split")}
+    about["caption_source"] = motion.caption_source
+    return make_clip(motion.name, moved.fps, moved.root_pos, moved.root_quat, moved.joint_pos, **about)
+
+
+class _Names:
+    """Names of files, no two alike, also where the file system does not tell cases apart."""
+
+    def __init__(self) -> None:
+        self._taken: set[str] = set()
+
+    def distinct(self, name: str, folder: str) -> str:
+        """`name`, with the folder's in front where it is taken, with a number where that is not enough."""
+        tried, number = name, 1
+        while tried.replace(".", "_").casefold() in self._taken:
+            number += 1
+            tried = safe_stem(f"{folder}_{name}") if number == 2 and folder else f"{name[:100]}_{number}"
+        self._taken.add(tried.replace(".", "_").casefold())
+        return tried
+
+
+def _counted(clips: Iterable[Clip], done: Converted) -> Iterator[Clip]:
+    for clip in clips:
+        done.written += 1
+        done.rates.add(clip.fps)
+        yield clip
+
+
+def _write(out: Path, clips: Iterable[Clip], config: ConvertConfig) -> None:
+    rows: list[Stated] = []
+    rate = None
+    with new_folder(out) as folder:
+        for clip in clips:
+            rate = rate or clip.fps
+            if not FORMATS[config.to].holds_rate and clip.fps != rate:
+                came = f"{rate:g} and {clip.fps:g} Hz ({clip.name})"
+                raise BadInput(out, "one rate for files that hold none", came, f"Say it: --fps {rate:g}.")
+            file = write_motion(folder, clip, config.to)
+            rows.append(Stated(file.name, clip.name, clip.fps, clip.source, clip.licence))
+        (folder / LICENCES).write_text(table_of(rows), encoding="utf-8")

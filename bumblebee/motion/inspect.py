@@ -1,0 +1,152 @@
+"""A table of what lies at a path: each motion with its format, rate, length, height, captions, licence and problems."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bumblebee.errors import BadInput
+from bumblebee.motion.captions import find_captions
+from bumblebee.motion.checks import check_raw
+from bumblebee.motion.clip import Clip
+from bumblebee.motion.formats.read import RobotConfig, format_of
+from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.licence_table import stated_of
+from bumblebee.motion.licences import licence_of
+from bumblebee.motion.listing import Found, Motion, Readers, find_motions, reason_of
+from bumblebee.motion.raw import RawMotion
+
+
+@dataclass(frozen=True)
+class Inspected:
+    """One motion, or a file without any (no `name`, and a `problem`)."""
+
+    file: Path
+    format: str
+    name: str = ""
+    frames: int = 0
+    fps: float = 0.0
+    rate_from: str = ""
+    """Who says the rate: file, setting or library."""
+    height: tuple[float, float] = (0.0, 0.0)
+    """Of the root, lowest and highest [m]."""
+    joints: int = 0
+    """Joints of the robot; 0 for a person."""
+    captions: int = 0
+    licence: str = ""
+    notes: tuple[str, ...] = ()
+    problem: str = ""
+    """Why the file or the motion cannot be used, "" if it can."""
+
+    @property
+    def seconds(self) -> float:
+        """From the first frame to the last."""
+        return max(self.frames - 1, 0) / self.fps if self.fps else 0.0
+
+
+@dataclass
+class Counts:
+    """Files and motions, which add up."""
+
+    files: int = 0
+    unreadable: int = 0
+    """Files without a motion."""
+    motions: int = 0
+    faulty: int = 0
+    """Motions that were read and failed a check."""
+    seconds: float = 0.0
+    """Of the motions that are usable."""
+
+    def add(self, rows: list[Inspected]) -> None:
+        """Count the rows of one file."""
+        self.files += 1
+        motions = [row for row in rows if row.name]
+        self.unreadable += not motions
+        self.motions += len(motions)
+        self.faulty += sum(bool(row.problem) for row in motions)
+        self.seconds += sum(row.seconds for row in motions if not row.problem)
+
+    @property
+    def usable(self) -> int:
+        """Motions without a problem."""
+        return self.motions - self.faulty
+
+    def __str__(self) -> str:
+        read = self.files - self.unreadable
+        return (
+            f"{count(self.files, 'file')}: {read} read, {self.unreadable} not. {count(self.motions, 'motion')}: "
+            f"{self.usable} usable ({self.seconds:.0f} s), {self.faulty} with a problem."
+        )
+
+
+def inspect(
+    path: Path, options: RobotConfig | None = None, readers: Readers | None = None
+) -> Iterator[list[Inspected]]:
+    """The rows of each file at or below `path`.
+
+    Args:
+        path: a file, a folder or a motion library.
+        options: what files of robot motion may leave unsaid.
+        readers: others than the usual.
+    """
+    for found in find_motions(path, options, readers):
+        yield rows_of(found)
+
+
+def rows_of(found: Found) -> list[Inspected]:
+    """A row for each motion of a file; one with the reason where there is none."""
+    if not found.motions:
+        return [Inspected(found.path, format_of(found.path), problem=found.reason or "no motion in it")]
+    return [_row(found.path, motion) for motion in found.motions]
+
+
+def _row(path: Path, motion: Motion) -> Inspected:
+    if isinstance(motion, Clip):
+        return Inspected(
+            path, "library", motion.name, motion.frames, motion.fps, "library", _range(motion.root_pos[:, 2]),
+            motion.joint_pos.shape[1], len(motion.captions), motion.licence,
+        )  # fmt: skip
+    captions, problem = _captions(motion.file)
+    if isinstance(motion, HumanMotion):
+        kind, root = f"person {path.suffix.lower()}", motion.landmark("pelvis")
+        joints, rate = 0, "file"
+    else:
+        kind, root, joints, rate = format_of(path), motion.root_pos, motion.joint_pos.shape[1], motion.rate_from
+        problem = _fault(path, motion) or problem
+    return Inspected(
+        path, kind, motion.name, len(root), motion.fps, rate, _range(root[:, 2]), joints, captions,
+        _licence(motion.file), motion.notes, problem,
+    )  # fmt: skip
+
+
+def _licence(file: Path) -> str:
+    before = stated_of(file)
+    return before.licence if before else licence_of(file)
+
+
+def _captions(file: Path) -> tuple[int, str]:
+    """How many captions a motion's file has, and what is wrong with them."""
+    try:
+        return len(find_captions(file, "")), ""
+    except BadInput as error:
+        return 0, f"captions: {error}"
+
+
+def _fault(path: Path, motion: RawMotion) -> str:
+    """The check that a motion of the robot fails, "" if none."""
+    try:
+        check_raw(motion)
+    except BadInput as error:
+        return reason_of(error, path)
+    return ""
+
+
+def _range(height: np.ndarray) -> tuple[float, float]:
+    height = height[np.isfinite(height)]
+    return (float(height.min()), float(height.max())) if len(height) else (np.nan, np.nan)
+
+
+def count(number: int, word: str) -> str:
+    """A number with its word, in the plural where there are several."""
+    return f"{number:,} {word}{'s' * (number != 1)}"
