@@ -25,7 +25,9 @@ def read_bytes(path: Path, most: int = LIMITS.file_bytes) -> bytes:
     """The bytes of a regular file of at most `most` bytes; pipes, devices and folders are refused, not waited for."""
     try:
         with open_file(path, most) as stream:
-            return stream.read(most + 1)
+            size = os.fstat(stream.fileno()).st_size
+            data = stream.read(size + 1)  # not `most + 1`, which Python allocates at once
+            return data if len(data) <= size else data + stream.read(most - size)
     except OSError as error:
         raise BadInput(path, "a file that can be read", error.strerror or str(error)) from None
 

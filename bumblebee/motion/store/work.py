@@ -42,7 +42,7 @@ def map_clips(folder: Path, work: Callable[[Clip], Result], processes: int | Non
         waiting: deque[Future[list[Result]]] = deque()
         try:
             for start in starts:
-                waiting.append(pool.submit(_batch, work, start))
+                waiting.append(pool.submit(_batch, work, start, min(start + BATCH, len(library))))
                 if len(waiting) > _AHEAD * processes:
                     yield from waiting.popleft().result()
             while waiting:
@@ -57,10 +57,10 @@ def _begin(folder: Path) -> None:
     _library = Library(folder)
 
 
-def _batch(work: Callable[[Clip], Result], start: int) -> list[Result]:
+def _batch(work: Callable[[Clip], Result], start: int, stop: int) -> list[Result]:
     assert _library is not None
     done = []
-    for _, clip in _library.each(range(start, min(start + BATCH, len(_library)))):
+    for _, clip in _library.each(range(start, stop)):
         if isinstance(clip, BadInput):
             raise clip
         done.append(work(clip))
