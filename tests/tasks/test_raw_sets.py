@@ -66,13 +66,13 @@ def made(folder: Path) -> list[str]:
     return names
 
 
-def repro(folder: Path) -> list[str]:
+def repro(folder: Path, **options: object) -> list[str]:
     """Bring it up to date; the stages that had work."""
     before = Path.cwd()
     os.chdir(folder)
     try:
         with Repo(".") as repo:
-            return [stage.addressing for stage in repo.reproduce()]
+            return [stage.addressing for stage in repo.reproduce(**options)]
     finally:
         os.chdir(before)
 
@@ -162,10 +162,8 @@ def test_the_flow_sees_the_sets_before_the_stage_that_reads_them(small: Path):
     stages = read_stages(small)
     assert next(stage for stage in stages if stage.name == "motions").needs == {"data/raw/lab.dvc"}
     assert to_run(stages, changed_stages(small)) == {"data/raw/lab.dvc", "motions", "filter"}
-    one_by_one = [stage.name for stage in stages if stage.name != "robot"]
-    for name in one_by_one:  # as flows.reproduce does
-        with Repo(str(small)) as repo:
-            repo.reproduce(targets=[str(small / name) if name.endswith(".dvc") else name], single_item=True)
+    for stage in stages:  # as flows.reproduce does
+        repro(small, targets=[stage.name], single_item=True)
     assert changed_stages(small) == set()
 
 

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from bumblebee.errors import BadInput
@@ -41,7 +42,7 @@ class Library:
         self._rows: list[Row] = places.to_dict("records")
         self._row_of = {row["name"]: number for number, row in enumerate(self._rows)}
         self._open: OrderedDict[str, Shard] = OrderedDict()
-        self._last: tuple[str, int, dict[int, Read]] = ("", -1, {})
+        self._last: tuple[str, int, np.ndarray] = ("", -1, np.zeros((0, 0)))
         self._lock = threading.Lock()
 
     def __len__(self) -> int:
@@ -109,22 +110,35 @@ class Library:
         """The clips of some rows; a row group is unpacked once where its rows follow each other."""
         with self._lock:
             read: list[tuple[str, Read]] = []
-            for row in rows:
-                try:
-                    read.append((row["name"], self._clip(row)))
-                except BadInput as error:
-                    read.append((row["name"], error))
+            for shard, same in groupby(rows, key=lambda row: row["shard"]):
+                run = list(same)
+                read += self._of_shard(shard, run) if shard else [self._of_file(row) for row in run]
             return read
 
-    def _clip(self, row: Row) -> Read:
-        if not row["shard"]:
-            return _as_told(self.folder, row, read_clip(path_of(self.folder, row["name"])))
-        shard = self._shard(row["shard"])
-        group = shard.group(row["position"])
-        if self._last[:2] != (row["shard"], group):
-            self._last = (row["shard"], group, shard.read(group))
-        clip = self._last[2][row["position"]]
-        return clip if isinstance(clip, BadInput) else _as_told(self.folder, row, clip)
+    def _of_file(self, row: Row) -> tuple[str, Read]:
+        path = path_of(self.folder, row["name"])
+        try:
+            return row["name"], _as_told(path, row, read_clip(path))
+        except BadInput as error:
+            return row["name"], error
+
+    def _of_shard(self, name: str, rows: list[Row]) -> list[tuple[str, Read]]:
+        try:
+            shard = self._shard(name)
+            groups = [shard.group(row["position"]) for row in rows]
+        except BadInput as error:
+            return [(row["name"], error) for row in rows]
+        read: list[tuple[str, Read]] = []
+        for group, pairs in groupby(zip(groups, rows, strict=True), key=lambda pair: pair[0]):
+            run = [row for _, row in pairs]
+            try:
+                if self._last[:2] != (name, group):
+                    self._last = (name, group, shard.read(group))
+                clips = shard.clips([row["position"] for row in run], self._last[2])
+            except BadInput as error:
+                clips = dict.fromkeys([row["position"] for row in run], error)
+            read += [(row["name"], _as_told(shard.path, row, clips[row["position"]])) for row in run]
+        return read
 
     def _shard(self, name: str) -> Shard:
         if name in self._open:
@@ -142,10 +156,11 @@ def read_library(folder: Path, names: Sequence[str] | None = None) -> list[Clip]
     return list(library) if names is None else library.select(names)
 
 
-def _as_told(folder: Path, row: Row, clip: Clip) -> Clip:
-    path = path_of(folder, row["shard"] or row["name"])
+def _as_told(path: Path, row: Row, clip: Read) -> Read:
+    if isinstance(clip, BadInput):
+        return clip
     for fact in _TOLD_TWICE:
         if getattr(clip, fact) != row[fact]:
             came = f"{getattr(clip, fact)!r}"[:80]
-            raise BadInput(f"{path}: {fact}", f"{row[fact]!r} as in the index"[:80], came, "Write the library again.")
+            return BadInput(f"{path}: {fact}", f"{row[fact]!r} as in the index"[:80], came, "Write the library again.")
     return clip

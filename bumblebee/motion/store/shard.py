@@ -110,27 +110,32 @@ class Shard:
             raise BadInput(self.path, f"a clip at position {position}", f"{len(self._places)} clips")
         return self._places[position][0]
 
-    def read(self, group: int) -> dict[int, Clip | BadInput]:
-        """The clips of a row group by position, checked; one with wrong values comes as what is wrong with it.
+    def read(self, group: int) -> np.ndarray:
+        """The rows of a row group, for `clips`.
 
         Raises:
-            BadInput: the row group is damaged.
+            BadInput: it is damaged.
         """
-        values = self._file.read(group)
-        found: dict[int, Clip | BadInput] = {}
-        for position, (own, start, frames) in enumerate(self._places):
-            if own == group:
-                found[position] = Clip(**self.facts[position], **arrays_of(values[start : start + frames]))
-        clips = [(self.where(position), clip) for position, clip in found.items() if isinstance(clip, Clip)]
+        return self._file.read(group)
+
+    def clips(self, positions: Sequence[int], values: np.ndarray) -> dict[int, Clip | BadInput]:
+        """The clips at some positions of one row group, checked; one with wrong values is what is wrong with it."""
+        made = {}
+        for position in positions:
+            _, start, frames = self._places[position]
+            made[position] = Clip(**self.facts[position], **arrays_of(values[start : start + frames]))
         try:
-            check_clips(clips)
+            check_clips([(self.where(position), clip) for position, clip in made.items()])
         except BadInput:
-            for position, (where, clip) in zip(list(found), clips, strict=True):
-                try:
-                    check_clips([(where, clip)])
-                except BadInput as error:
-                    found[position] = error
-        return found
+            return {position: self._judged(position, clip) for position, clip in made.items()}
+        return dict(made)
+
+    def _judged(self, position: int, clip: Clip) -> Clip | BadInput:
+        try:
+            check_clips([(self.where(position), clip)])
+        except BadInput as error:
+            return error
+        return clip
 
     def rows(self) -> list[dict[str, Any]]:
         """What the index says about the clips, but for the shard's name."""

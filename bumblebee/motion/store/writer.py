@@ -6,6 +6,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import groupby
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -177,20 +178,17 @@ class LibraryWriter:
         """The shard without the clips that others took the place of."""
         keys = [key for key, row in self._rows.items() if row["shard"] == name]
         keys.sort(key=lambda key: self._rows[key]["position"])
-        shard = Shard(path_of(self.folder, name))
+        shard, kept = Shard(path_of(self.folder, name)), []
         try:
-            found: dict[int, Clip] = {}
-            for group in sorted({shard.group(self._rows[key]["position"]) for key in keys}):
-                for position, clip in shard.read(group).items():
-                    if not isinstance(clip, BadInput):
-                        found[position] = clip
+            for group, own in groupby(keys, key=lambda key: shard.group(self._rows[key]["position"])):
+                found = shard.clips([self._rows[key]["position"] for key in own], shard.read(group))
+                for clip in found.values():
+                    if isinstance(clip, BadInput):  # on this disk: nothing is dropped in silence
+                        raise clip
+                    kept.append(clip)
         finally:
             shard.close()
-        kept = [found[at] for key in keys if (at := self._rows[key]["position"]) in found]
-        for key in keys:
-            if self._rows[key]["position"] not in found:  # damaged on the disk: it goes with what it was
-                del self._rows[key]
-        self._take(_written(self.folder, kept) if kept else [])
+        self._take(_written(self.folder, kept))
 
 
 def _written(folder: Path, clips: list[Clip]) -> list[Row]:
