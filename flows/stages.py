@@ -4,6 +4,7 @@ python -m flows.stages [--workspace runs/demo]     # each stage with its state, 
 """
 
 import argparse
+import os
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -61,23 +62,27 @@ def read_stages(workspace: Path) -> list[Stage]:
             graph = repo.index.graph
             found = {}
             for node in repo.index.stages:
-                needs = frozenset(_name(other.addressing) for other in graph.successors(node))
+                needs = frozenset(_name(other.addressing, workspace) for other in graph.successors(node))
                 made = {str(out.fs_path) for out in repo.index.outs}
                 lacks = frozenset(
                     str(dep.def_path)
                     for dep in node.deps
                     if dep.def_path and not dep.exists and not any(_inside(str(dep.fs_path), out) for out in made)
                 )
-                name = _name(node.addressing)
+                name = _name(node.addressing, workspace)
                 found[name] = Stage(name, str(node.cmd), needs, lacks)
     except DvcException as error:
         raise BadInput(workspace / "dvc.yaml", "stages that DVC can read", str(error)) from None
     return in_order(found.values())
 
 
-def _name(address: str) -> str:
-    """A stage's name; seen from another folder, DVC puts the path of dvc.yaml before it."""
-    return address.rpartition(":")[2]
+def _name(address: str, workspace: Path) -> str:
+    """A stage's name, or that of the file of a set in data/raw, as seen from the workspace.
+
+    Seen from another folder, DVC puts the path of dvc.yaml before the one and begins the other there.
+    """
+    name = address.rpartition(":")[2]
+    return os.path.relpath(name, workspace) if name.endswith(".dvc") else name
 
 
 def _inside(path: str, out: str) -> bool:
@@ -107,7 +112,7 @@ def changed_stages(workspace: Path) -> set[str]:
 
     try:
         with Repo(str(workspace)) as repo:
-            return {_name(address) for address in repo.status()}
+            return {_name(address, workspace) for address in repo.status()}
     except LockError as error:
         lines = [line.strip() for line in str(error).splitlines() if "PID" in line] or [str(error)]
         remedy = "Wait for it or stop it, then run again."

@@ -1,8 +1,10 @@
 """A workspace: a folder with its own dvc.yaml, params.yaml, data, models and servers, using this checkout's code."""
 
+import contextlib
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from tasks import params, paths
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")
 FIELD_BASE = "none"  # who brings motions has, on the robot, odometry to act on and no motion capture to log
+_RAW = paths.RAW.parts
 GENERATED = ".params.generated.yaml"  # what params.yaml was when it was last made here
 
 
@@ -54,14 +57,15 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
     for name in CODE:
         _link(folder / name, HOME / name)
     _write(folder / ".dvcignore", (HOME / ".dvcignore").read_text())
-    _write(folder / "dvc.yaml", stages_with(motions_of(content)))
+    _write(folder / "dvc.yaml", stages_with(folders_of(content)))
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     if edited is None or content != edited:
         _write(folder / "params.yaml", text)
     if edited is None:
         _write(folder / GENERATED, text)
-    (folder / paths.INCOMING).mkdir(parents=True, exist_ok=True)
-    _write(folder / paths.INCOMING / "README.md", (HOME / paths.INCOMING / "README.md").read_text())
+    for place in (paths.INCOMING, paths.RAW):
+        (folder / place).mkdir(parents=True, exist_ok=True)
+        _write(folder / place / "README.md", (HOME / place / "README.md").read_text())
     if not (folder / ".dvc" / "config").exists():
         init = [sys.executable, "-m", "dvc", "init", "--no-scm", "-q"]
         subprocess.run(init, cwd=folder, env=environment(folder), check=True)
@@ -82,25 +86,28 @@ def settings_of(folder: Path, profile: str | None) -> tuple[dict[str, Any], dict
     return (merge(content, params.read(profile_path(profile))) if profile else content), None
 
 
-def motions_of(content: dict[str, Any]) -> Path | None:
-    """The user's motions; None for the embedded ones, and for what `tasks.sections` refuses before the first stage."""
+def folders_of(content: dict[str, Any]) -> list[Path]:
+    """The user's motions and texts outside data/raw; not what `tasks.sections` refuses before the first stage."""
     section = content.get("motions")
-    source = section.get("source") if isinstance(section, dict) else None
-    if not isinstance(source, str) or not source.isprintable() or source in ("", "embedded"):
-        return None
-    try:
-        return Path(source).expanduser()
-    except RuntimeError:  # the home of nobody
-        return None
+    section = section if isinstance(section, dict) else {}
+    read = section.get("read")
+    named = [section.get("source"), read.get("captions_folder") if isinstance(read, dict) else None]
+    found = []
+    for text in named:
+        if isinstance(text, str) and text.isprintable() and text not in ("", "embedded"):
+            with contextlib.suppress(RuntimeError):  # the home of nobody
+                found.append(Path(text).expanduser())
+    return [folder for folder in found if folder.is_absolute() or folder.parts[: len(_RAW)] != _RAW]
 
 
-def stages_with(motions: Path | None) -> str:
-    """dvc.yaml, in which the stage motions also depends on the user's folder, so that new files make it stale."""
+def stages_with(folders: Sequence[Path]) -> str:
+    """dvc.yaml, in which the stage motions also depends on the user's folders, so that new files make it stale."""
     text = (HOME / "dvc.yaml").read_text()
-    if motions is None:
+    if not folders:
         return text
     pipeline = yaml.safe_load(text)
-    pipeline["stages"]["motions"]["deps"].append(str(motions.expanduser().resolve()))
+    deps = pipeline["stages"]["motions"]["deps"]
+    deps += [path for path in dict.fromkeys(str(folder.resolve()) for folder in folders) if path not in deps]
     return yaml.safe_dump(pipeline, sort_keys=False, width=120)
 
 

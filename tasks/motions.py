@@ -13,6 +13,7 @@ from bumblebee.progress import progress
 from bumblebee.ranges import Name, PartOf, Ranged, Unfit
 from tasks import paths
 from tasks.stage import load, log_run, run_stage
+from tasks.watched import require_watched
 
 EMBEDDED = "embedded"
 CONTROL_HZ = 50.0
@@ -41,11 +42,20 @@ class MotionsConfig(Ranged):
 def main() -> None:
     """Read the source, split it, write the library, say what came."""
     config = load("motions", MotionsConfig)
+    make_cache()
     reading = gather(config)
     clips = hold_out(reading.clips, config.holdout_share)
     write_library(paths.MOTIONS, clips, reading.skipped)
     tell(clips, reading)
     log_run("motions", params=config, metrics=metrics(clips, reading), artifacts=[paths.MOTIONS / "skipped.csv"])
+
+
+def make_cache() -> None:
+    """The folder of what is retargeted: an output of this stage that stays from run to run."""
+    paths.RETARGETS.mkdir(parents=True, exist_ok=True)
+    note = paths.RETARGETS / "README.md"
+    if not note.exists():  # DVC warns of empty folders
+        note.write_text("Retargeted motions, each by the hash of what it was made from (bumblebee/motion/cache.py).\n")
 
 
 def gather(config: MotionsConfig) -> Reading:
@@ -57,6 +67,7 @@ def gather(config: MotionsConfig) -> Reading:
         raise BadInput(
             "params.yaml: motions.source", f"a folder of motions or {EMBEDDED!r}", f"{source}: nothing there"
         )
+    require_watched("motions", {"source": source, "read.captions_folder": config.read.captions_folder})
     with progress(len(motion_files(source)), "reading motions", "files") as bar:
         return read_folder(source, config.read, bar.update)
 

@@ -4,6 +4,10 @@ from pathlib import Path
 
 DATA = Path("data")
 """What the loop itself fills."""
+RAW = Path("data/raw")
+"""Where a user's motions and texts lie, a folder a set, kept by DVC."""
+RETARGETS = Path("data/retargets")
+"""The cache of retargeted motions, by content."""
 MOTIONS = Path("data/motions")
 """The library of all motions that could be read."""
 FILTERED = Path("data/filtered")

@@ -61,8 +61,9 @@ NO_RESULT = {
     "bumblebee/measured/tables.py": "the same",
     **{
         f"bumblebee/motion/{name}.py": "reads and writes the library of clips: it refuses or passes"
-        for name in ("captions", "checks", "clip_facts", "parquet", "raw", "store", "texts")
+        for name in ("captions", "checks", "clip_facts", "parquet", "raw", "texts")
     },
+    "bumblebee/motion/store/": "the same",
     "tasks/stage.py": "starts a stage and stores what it made",
     "tasks/paths.py": "where that lies; dvc.yaml says it too",
     "tasks/params.py": "reads parameters; what they are is a dependency of its own",

@@ -50,7 +50,7 @@ def test_a_stage_depends_on_the_sections_that_its_module_loads(stage: str):
 def test_a_stage_names_the_paths_that_its_module_uses(stage: str):
     """Of paths that are constants in tasks/paths.py; those of rounds and clusters are spelled in dvc.yaml alone."""
     entry = STAGES[stage]
-    named = [str(path) for path in (*entry["deps"], *entry["outs"])]
+    named = [path if isinstance(path, str) else next(iter(path)) for path in (*entry["deps"], *entry["outs"])]
     for name in sorted(set(re.findall(r"\bpaths\.([A-Z][A-Z_]*)\b", source(stage)))):
         path = getattr(paths, name)
         if not isinstance(path, Path) or path == paths.SCRATCH:

@@ -12,7 +12,7 @@ import stat
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import yaml
@@ -24,24 +24,32 @@ from bumblebee.io.limits import LIMITS, Limits
 def read_bytes(path: Path, most: int = LIMITS.file_bytes) -> bytes:
     """The bytes of a regular file of at most `most` bytes; pipes, devices and folders are refused, not waited for."""
     try:
+        with open_file(path, most) as stream:
+            size = os.fstat(stream.fileno()).st_size
+            data = stream.read(size + 1)  # not `most + 1`, which Python allocates at once
+            return data if len(data) <= size else data + stream.read(most - size)
+    except OSError as error:
+        raise BadInput(path, "a file that can be read", error.strerror or str(error)) from None
+
+
+def open_file(path: Path, most: int = LIMITS.file_bytes) -> BinaryIO:
+    """The same file, opened, for what reads parts of it."""
+    try:
         # Opening a pipe would wait for a writer; O_NONBLOCK does not.
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError:
         raise BadInput(path, "a file", "no such file") from None
     except (OSError, ValueError) as error:
         raise BadInput(path, "a file that can be read", getattr(error, "strerror", None) or str(error)) from None
-    try:
-        facts = os.fstat(handle)
-        if not stat.S_ISREG(facts.st_mode):  # asked first: no stream can be made of a folder
-            os.close(handle)
-            came = "a folder" if stat.S_ISDIR(facts.st_mode) else "a pipe, device or socket"
-            raise BadInput(path, "a file", came)
-        with os.fdopen(handle, "rb") as stream:
-            if facts.st_size > most:
-                raise BadInput(path, f"at most {most:,} bytes", f"{facts.st_size:,}")
-            return stream.read(most + 1)
-    except OSError as error:
-        raise BadInput(path, "a file that can be read", error.strerror or str(error)) from None
+    facts = os.fstat(handle)
+    if not stat.S_ISREG(facts.st_mode):  # asked first: no stream can be made of a folder
+        os.close(handle)
+        came = "a folder" if stat.S_ISDIR(facts.st_mode) else "a pipe, device or socket"
+        raise BadInput(path, "a file", came)
+    if facts.st_size > most:
+        os.close(handle)
+        raise BadInput(path, f"at most {most:,} bytes", f"{facts.st_size:,}")
+    return os.fdopen(handle, "rb")
 
 
 def read_text(path: Path, most: int = LIMITS.text_bytes) -> str:

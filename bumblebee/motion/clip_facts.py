@@ -6,6 +6,7 @@ from bumblebee.errors import BadInput
 from bumblebee.io.names import require_stem
 from bumblebee.io.read import decode, parse_json
 from bumblebee.motion.captions import parse_caption
+from bumblebee.motion.clip import Clip
 from bumblebee.motion.texts import require_line
 
 TEXTS = ("source", "licence", "sha256", "family", "split", "caption_source")
@@ -14,13 +15,22 @@ _KEYS = ("name", "fps", *FACTS)
 _SPLITS = ("train", "test")
 
 
+def facts_of(clip: Clip) -> dict[str, Any]:
+    """The fields of a clip that are no arrays, as plain data."""
+    return {key: getattr(clip, key) for key in _KEYS}
+
+
 def read_facts(where: object, data: bytes) -> dict[str, Any]:
     """The fields of `Clip` that are no arrays, from JSON.
 
     Raises:
         BadInput: a key that is missing, unknown or of another type; a name that cannot name a file.
     """
-    facts = parse_json(where, decode(where, data))
+    return require_facts(where, parse_json(where, decode(where, data)))
+
+
+def require_facts(where: object, facts: Any) -> dict[str, Any]:
+    """The same from plain data."""
     if not isinstance(facts, dict):
         raise BadInput(where, "a table of facts about a clip", f"a {type(facts).__name__}")
     missing = [key for key in _KEYS if key not in facts]

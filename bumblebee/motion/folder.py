@@ -4,11 +4,11 @@ import hashlib
 import os
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, TypeVar
 
 import pandas as pd
 
@@ -27,7 +27,7 @@ from bumblebee.motion.naming import distinct
 from bumblebee.motion.pieces import split_long
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
-from bumblebee.motion.store import read_index, read_indexed, read_library
+from bumblebee.motion.store import Library, read_library
 from bumblebee.motion.texts import shown
 from bumblebee.motion.walk import INDEX, motion_files
 from bumblebee.ranges import Line, Name, Range, Ranged
@@ -137,23 +137,24 @@ def _parts(file: Path, config: ReadConfig) -> Iterator[tuple[Path, list[Clip] | 
         groups = _tried(lambda: _motions(file, config), file)
         yield from [(file, groups)] if isinstance(groups, str) else [(file, group) for group in groups]
         return
-    rows = _tried(lambda: read_index(file.parent).to_dict("records"), file)
-    if isinstance(rows, str):
-        yield file, rows
+    library = _tried(lambda: Library(file.parent), file)
+    if isinstance(library, str):
+        yield file, library
         return
     whole: list[list[Clip]] = []
-    for row in rows:
-        part = file.parent / "clips" / f"{row['name']}.parquet"
-        clip = _tried(partial(_indexed, file.parent, row, config), part)
-        if isinstance(clip, str):
-            yield part, clip
+    for name, clip in library.each():
+        pieces = _tried(partial(_pieces, clip, config), file)
+        if isinstance(pieces, str):
+            yield file.parent / name, pieces
         else:
-            whole.append(clip)
+            whole.append(pieces)
     yield from ((file, group) for group in _apart(whole))
 
 
-def _indexed(library: Path, row: Mapping[str, Any], config: ReadConfig) -> list[Clip]:
-    return split_long(read_indexed(library, row), config.max_seconds)
+def _pieces(clip: Clip | BadInput, config: ReadConfig) -> list[Clip]:
+    if isinstance(clip, BadInput):
+        raise clip
+    return split_long(clip, config.max_seconds)
 
 
 def _tried(read: Callable[[], Result], file: Path) -> Result | str:

@@ -15,7 +15,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tests.fuzz.motion_files import JOINTS, change_facts, csv, fields, table
+from tests.fuzz.motion_files import JOINTS, change_facts, csv, fields, shard, table
 
 Make = Callable[[Path], object]
 
@@ -197,7 +197,7 @@ def column(name: str, change: Callable[[np.ndarray], Any]) -> Make:
     """One column of the clip `sway` changed."""
 
     def make(folder: Path) -> None:
-        path = folder / "clips/sway.parquet"
+        path = shard(folder)
         found = pq.read_table(path)
         values = pa.array(change(found.column(name).to_numpy().copy()))
         index = found.column_names.index(name)
@@ -207,15 +207,15 @@ def column(name: str, change: Callable[[np.ndarray], Any]) -> Make:
 
 
 def facts(**changed: Any) -> Make:
-    return lambda folder: change_facts(folder / "clips/sway.parquet", lambda found: found.update(changed))
+    return lambda folder: change_facts(shard(folder), lambda found: found.update(changed))
 
 
 def without(key: str) -> Make:
-    return lambda folder: change_facts(folder / "clips/sway.parquet", lambda found: found.__delitem__(key))
+    return lambda folder: change_facts(shard(folder), lambda found: found.__delitem__(key))
 
 
 def metadata(content: str) -> Make:
-    return lambda folder: change_facts(folder / "clips/sway.parquet", lambda _: content)
+    return lambda folder: change_facts(shard(folder), lambda _: content)
 
 
 def index(change: Callable[[pd.DataFrame], Any]) -> Make:
@@ -228,7 +228,7 @@ def index(change: Callable[[pd.DataFrame], Any]) -> Make:
 
 
 def swapped_joints(folder: Path) -> None:
-    path = folder / "clips/sway.parquet"
+    path = shard(folder)
     found = pq.read_table(path)
     names = found.column_names
     one, other = (names.index(f"{side}_knee_joint") for side in ("left", "right"))
@@ -237,12 +237,16 @@ def swapped_joints(folder: Path) -> None:
     pq.write_table(found, path)
 
 
-def cut(name: str, share: float) -> Make:
+def cut(file: Callable[[Path], Path], share: float) -> Make:
     def make(folder: Path) -> None:
-        data = (folder / name).read_bytes()
-        (folder / name).write_bytes(data[: int(len(data) * share)])
+        data = file(folder).read_bytes()
+        file(folder).write_bytes(data[: int(len(data) * share)])
 
     return make
+
+
+def table_file(folder: Path) -> Path:
+    return folder / "index.parquet"
 
 
 def long_text(folder: Path) -> None:
@@ -257,31 +261,35 @@ def long_text(folder: Path) -> None:
 
 def many_rows(folder: Path) -> None:
     """A column of equal numbers packs a thousandfold and more."""
-    found = pq.read_table(folder / "clips/sway.parquet")
+    found = pq.read_table(shard(folder))
     same = pa.array(np.zeros(4_100_000, dtype=np.float32))
     one = pa.table({found.column_names[0]: same}, metadata=found.schema.metadata)
-    pq.write_table(one, folder / "clips/sway.parquet")
+    pq.write_table(one, shard(folder))
 
 
-def replaced(name: str, make: Make) -> Make:
+def replaced(file: Callable[[Path], Path], make: Make) -> Make:
     def change(folder: Path) -> None:
-        (folder / name).unlink()
-        make(folder / name)
+        path = file(folder)
+        path.unlink()
+        make(path)
 
     return change
 
 
 def renamed(name: str) -> Make:
-    """Index and clip agree on a name that leads out of the library; the clip lies there."""
+    """Index and clip agree on a name that leads out of the library."""
 
     def make(folder: Path) -> None:
-        target = folder / "clips" / f"{name}.parquet"
-        target.parent.mkdir(parents=True, exist_ok=True)
         facts(name=name)(folder)
-        (folder / "clips/sway.parquet").rename(target)
         index(lambda found: found.__setitem__("name", name))(folder)
 
     return make
+
+
+def shard_elsewhere(folder: Path) -> None:
+    """The shard lies out of the library, under a name that the index gives."""
+    shard(folder).rename(folder / "escaped.parquet")
+    index(lambda found: found.__setitem__("shard", "../escaped"))(folder)
 
 
 LIBRARIES: dict[str, Make] = {
@@ -301,21 +309,15 @@ LIBRARIES: dict[str, Make] = {
     "clip: text": column("root_x", lambda v: [str(x) for x in v]),
     "clip: whole numbers": column("root_x", lambda v: v.astype(int)),
     "clip: a gap": column("root_x", lambda v: [None, *v[1:].tolist()]),
-    "clip: no rows": lambda f: pq.write_table(
-        pq.read_table(f / "clips/sway.parquet").slice(0, 0), f / "clips/sway.parquet"
-    ),
-    "clip: a column missing": lambda f: pq.write_table(
-        pq.read_table(f / "clips/sway.parquet").drop_columns(["root_x"]), f / "clips/sway.parquet"
-    ),
+    "clip: no rows": lambda f: pq.write_table(pq.read_table(shard(f)).slice(0, 0), shard(f)),
+    "clip: a column missing": lambda f: pq.write_table(pq.read_table(shard(f)).drop_columns(["root_x"]), shard(f)),
     "clip: 4 million rows": many_rows,
-    "clip: cut off": cut("clips/sway.parquet", 0.6),
-    "clip: empty": cut("clips/sway.parquet", 0),
-    "clip: gone": lambda folder: (folder / "clips/sway.parquet").unlink(),
-    "clip: a folder": replaced("clips/sway.parquet", lambda path: path.mkdir()),
-    "clip: a pipe": replaced("clips/sway.parquet", os.mkfifo),
-    "facts: none": lambda f: pq.write_table(
-        pq.read_table(f / "clips/sway.parquet").replace_schema_metadata(None), f / "clips/sway.parquet"
-    ),
+    "clip: cut off": cut(shard, 0.6),
+    "clip: empty": cut(shard, 0),
+    "clip: gone": lambda folder: shard(folder).unlink(),
+    "clip: a folder": replaced(shard, lambda path: path.mkdir()),
+    "clip: a pipe": replaced(shard, os.mkfifo),
+    "facts: none": lambda f: pq.write_table(pq.read_table(shard(f)).replace_schema_metadata(None), shard(f)),
     "facts: no JSON": metadata("{"),
     "facts: a list": metadata("[1]"),
     "facts: null": metadata("null"),
@@ -339,9 +341,9 @@ LIBRARIES: dict[str, Make] = {
     "facts: licence a list": facts(licence=["MIT"]),
     "facts: source of 10 MB": facts(source="x" * 10_000_000),
     "index: gone": lambda folder: (folder / "index.parquet").unlink(),
-    "index: cut off": cut("index.parquet", 0.7),
+    "index: cut off": cut(table_file, 0.7),
     "index: no Parquet": lambda folder: (folder / "index.parquet").write_bytes(b"PAR1 no PAR1"),
-    "index: a pipe": replaced("index.parquet", os.mkfifo),
+    "index: a pipe": replaced(table_file, os.mkfifo),
     "index: no names": index(lambda found: found.drop(columns="name")),
     "index: names are numbers": index(lambda found: found.__setitem__("name", 3)),
     "index: a name missing": index(lambda found: found.__setitem__("name", None)),
@@ -349,6 +351,16 @@ LIBRARIES: dict[str, Make] = {
     "index: names alike but for case": index(lambda f: pd.concat([f, f.assign(name="SWAY")])),
     "index: a clip that is not there": index(lambda found: found.__setitem__("name", "jump")),
     "index: another number of frames": index(lambda found: found.__setitem__("frames", 99)),
+    "index: a shard out of the library": shard_elsewhere,
+    "index: a shard that is not there": index(lambda found: found.__setitem__("shard", "0" * 32)),
+    "index: a shard's name of another form": index(lambda found: found.__setitem__("shard", "sway")),
+    "index: shards are numbers": index(lambda found: found.__setitem__("shard", 3)),
+    "index: a position beyond the shard": index(lambda found: found.__setitem__("position", 1)),
+    "index: a position before it": index(lambda found: found.__setitem__("position", -1)),
+    "facts: more frames than rows": facts(frames=25),
+    "facts: fewer frames than rows": facts(frames=23),
+    "facts: frames negative": facts(frames=-24),
+    "facts: frames text": facts(frames="24"),
     "index: another split": index(lambda found: found.__setitem__("split", "test")),
     "index: frames are text": index(lambda found: found.__setitem__("frames", "many")),
     "index: 50 GB of one text": long_text,

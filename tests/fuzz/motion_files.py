@@ -29,6 +29,7 @@ effects:
     - {term: sin(12*q), coefficient: 0.3}
     - {term: 'friction(q[left_hip_pitch_joint]^2)', coefficient: 0.001}
 """
+FACTS = b"bumblebee.clips"
 
 
 def motion(frames: int = 24) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -76,13 +77,19 @@ def library(folder: Path, *names: str) -> Path:
     return folder
 
 
+def shard(folder: Path) -> Path:
+    """The file of a library's only shard."""
+    (path,) = (folder / "clips").iterdir()
+    return path
+
+
 def change_facts(path: Path, change: Any) -> None:
-    """Rewrite the facts in a clip's metadata; `change` gets them as a dict and may return text instead."""
+    """Rewrite the facts about a shard's first clip; `change` gets them as a dict and may return text instead."""
     found = pq.read_table(path)
-    facts = json.loads(found.schema.metadata[b"bumblebee.clip"])
-    text = change(facts)
+    facts = json.loads(found.schema.metadata[FACTS])
+    text = change(facts[0])
     text = text if isinstance(text, str) else json.dumps(facts)
-    pq.write_table(found.replace_schema_metadata({b"bumblebee.clip": text.encode()}), path)
+    pq.write_table(found.replace_schema_metadata({FACTS: text.encode()}), path)
 
 
 def policy(folder: Path, gain: float = 0.0) -> Path:

@@ -23,7 +23,7 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.folder import ReadConfig, read_file
 from bumblebee.motion.store import read_library
 from tests.fuzz.budget import SECONDS, rounds
-from tests.fuzz.motion_files import change_facts, csv, fields, library, policy, table
+from tests.fuzz.motion_files import change_facts, csv, fields, library, policy, shard, table
 
 CONFIG = ReadConfig(csv_fps=30)
 SHARE = 1 / 7  # of the file's seconds, for each test
@@ -133,7 +133,7 @@ def test_damaged_libraries(tmp_path: Path) -> None:
     for seed in each():
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(whole, folder)
-        path = folder / ("index.parquet" if seed % 2 else "clips/a.parquet")
+        path = folder / "index.parquet" if seed % 2 else shard(folder)
         path.write_bytes(damaged(path.read_bytes(), seed))
         outcome(lambda: read_library(folder), f"library, seed {seed}")
         assert sorted(p.name for p in tmp_path.rglob("*") if p.is_dir()) == ["clips", "clips", "in", "lib", "whole"]
@@ -147,7 +147,7 @@ def odd(rng: np.random.Generator) -> object:
 
 def test_libraries_with_odd_facts_and_values(tmp_path: Path) -> None:
     folder = library(tmp_path / "lib")
-    path = folder / "clips/sway.parquet"
+    path = shard(folder)
     whole, index = path.read_bytes(), (folder / "index.parquet").read_bytes()
     for seed in each():
         rng = np.random.default_rng(seed)

@@ -10,7 +10,9 @@ from bumblebee.errors import BadInput
 from bumblebee.io.names import LONGEST, require_stem
 from bumblebee.motion import folder as reader
 from bumblebee.motion.folder import ReadConfig, read_file, read_folder
-from bumblebee.motion.store import read_library, write_library
+from bumblebee.motion.store import LibraryWriter, read_library, write_library
+from bumblebee.motion.store.index import read_places
+from bumblebee.motion.store.place import path_of
 from bumblebee.motion.walk import motion_files
 
 CONFIG = ReadConfig(csv_fps=30)
@@ -51,11 +53,14 @@ def test_a_library_that_was_cut_again_has_no_name_twice(motions, tmp_path):
 
 def test_a_damaged_clip_of_a_library_is_listed_and_the_others_are_read(motions, tmp_path):
     write_library(tmp_path / "in/lib", [motions.clip(name, 12) for name in "abc"])
-    (tmp_path / "in/lib/clips/b.parquet").write_bytes(b"PAR1")
+    with LibraryWriter(tmp_path / "in/lib") as writer:  # a shard of its own
+        writer.add(motions.clip("d", 12))
+    path = path_of(tmp_path / "in/lib", read_places(tmp_path / "in/lib")["shard"][3])
+    path.write_bytes(b"PAR1")
     reading = read_folder(tmp_path / "in", CONFIG)
-    assert [clip.name for clip in reading.clips] == ["a", "c"]
-    assert reading.skipped["file"].tolist() == ["lib/clips/b.parquet"]
-    assert reading.skipped["reason"][0].startswith("expected a readable Parquet file")
+    assert [clip.name for clip in reading.clips] == ["a", "b", "c"]
+    assert reading.skipped["file"].tolist() == ["lib/d"]
+    assert "expected a readable Parquet file" in reading.skipped["reason"][0]
 
 
 @pytest.mark.parametrize("name", ["../../escaped", "/tmp/escaped", "a/b", ".hidden", "", "x" * 200, "a\nb"])

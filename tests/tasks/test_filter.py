@@ -8,11 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bumblebee.motion import store
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.filter import DROP_COLUMNS
 from bumblebee.motion.kinematics import lowest, make_clip
-from bumblebee.motion.store import read_library, write_library
+from bumblebee.motion.store import read_library, write_library, writer
 from bumblebee.robot.facts import stand_pose
 from tasks import filter as stage
 from tasks import paths
@@ -70,11 +69,11 @@ def test_no_motion_left_ends_in_one_line_and_leaves_nothing(capsys):
 def test_a_full_disk_leaves_the_old_result(capsys, monkeypatch):
     run([standing("good")])
 
-    def full(path: Path, clip: Clip) -> None:
+    def full(path: Path, data: bytes) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
     write_library(paths.MOTIONS, [standing("new")])
-    monkeypatch.setattr(store, "write_clip", full)
+    monkeypatch.setattr(writer, "put", full)
     with pytest.raises(SystemExit) as caught:
         run_stage(stage.main, [])
     assert caught.value.code == 2
