@@ -1,172 +1,188 @@
-"""Reads motions from a user's files: every format that is known, resampled, grounded, captioned, cut, hashed."""
+"""Reads motions from a user's files: every format that is known, at one rate, on the floor, captioned, cut, hashed."""
 
 import hashlib
 import os
-import zipfile
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import TypeVar
 
 import pandas as pd
 
 from bumblebee.errors import BadInput
+from bumblebee.io.limits import LIMITS
 from bumblebee.io.names import safe_stem
-from bumblebee.io.read import read_bytes
-from bumblebee.motion.captions import caption_from_name, family_of, find_captions
-from bumblebee.motion.checks import check_clip, check_raw
+from bumblebee.motion.captions import family_of
+from bumblebee.motion.checks import check_clip
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.formats.asap_pickle import read_asap_pickle
-from bumblebee.motion.formats.g1_csv import read_g1_csv
-from bumblebee.motion.grounding import GroundingConfig, ground
+from bumblebee.motion.describe.accounting import Account, account
+from bumblebee.motion.describe.described import Described
+from bumblebee.motion.describe.describer import describer
 from bumblebee.motion.kinematics import make_clip
-from bumblebee.motion.licences import licence_of
+from bumblebee.motion.licence_table import LICENCES, stated_of
+from bumblebee.motion.licences import licence_of, stated_rate
 from bumblebee.motion.naming import distinct
 from bumblebee.motion.pieces import split_long
-from bumblebee.motion.raw import RawMotion
-from bumblebee.motion.resample import resample
-from bumblebee.motion.store import Library, read_library
+from bumblebee.motion.ready import Job, Ready, make_ready, why_not
+from bumblebee.motion.settings import ReadConfig
+from bumblebee.motion.side_by_side import in_order
+from bumblebee.motion.sources import Source
+from bumblebee.motion.store import Library
 from bumblebee.motion.texts import shown
-from bumblebee.motion.walk import INDEX, motion_files
-from bumblebee.ranges import Line, Name, Range, Ranged
+from bumblebee.motion.walk import INDEX, motion_sources
+
+__all__ = ["ReadConfig", "Reading", "read_file", "read_folder", "skipped_table"]
 
 Result = TypeVar("Result")
-
-# Formats that come in such folders and are not read.
-_NOT_YET = {
-    ".npz": "SMPL motions cannot be read yet",
-    ".npy": "NumPy arrays cannot be read yet",
-    ".bvh": "BVH motions cannot be read yet",
-    ".fbx": "FBX motions cannot be read yet",
-    ".c3d": "C3D recordings cannot be read yet",
-    ".zip": "archives cannot be read yet: unpack it",
-    ".tar": "archives cannot be read yet: unpack it",
-    ".gz": "archives cannot be read yet: unpack it",
-    ".7z": "archives cannot be read yet: unpack it",
-}
-_PICKLES = (".pkl", ".pickle", ".joblib", ".p")
-_END_OF_ZIP = 22 + (1 << 16)  # bytes: the record at a zip's end with the longest comment
-_MAX_DIRECTORY = 16 << 20  # bytes of a zip's list of files
-_UNKNOWN = "a format that is not known"
-
-
-Hertz = Annotated[float, Range(least=1, most=10_000)]
-
-
-@dataclass(frozen=True)
-class ReadConfig(Ranged):
-    """How motion files become clips."""
-
-    csv_fps: Hertz = 60.0
-    """Frame rate of CSV files, which do not say it: g1_moves 60, LAFAN1's retargets 30 [Hz]."""
-    csv_fps_by_folder: dict[Name, Hertz] = field(default_factory=dict)
-    """Another rate for the CSV files under a folder of that name, such as `{lafan1: 30}` [Hz]."""
-    fps: Hertz = 50.0
-    """Frame rate of the clips: that of the policy [Hz]."""
-    max_seconds: Annotated[float, Range(least=0, most=3600)] = 10.0
-    """Longer motions are cut into equal pieces `<name>_p0`, `_p1` ... no longer than this; 0 never cuts [s]."""
-    captions_folder: Line = ""
-    """Where `<stem>.txt` caption files lie, if not beside the motions."""
-    grounding: GroundingConfig = field(default_factory=GroundingConfig)
-    """Correction of motions that float or sink."""
-
-    def __post_init__(self) -> None:
-        """Refuse pieces that are shorter than any motion."""
-        super().__post_init__()
-        self.require(self.max_seconds == 0 or self.max_seconds >= 0.2, "max_seconds", "0, or at least 0.2")
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What a folder gave: the clips, and the files without any (`file`, `reason`)."""
+    """What a folder gave: the clips, the files without any, and what was detected rather than stated."""
 
     clips: list[Clip]
     skipped: pd.DataFrame
+    """Columns `file`, `reason`."""
+    notes: pd.DataFrame = field(default_factory=lambda: noted_table([]))
+    """Columns `file`, `note`."""
+    texts: Account | None = None
+    """Where the captions come from, in counts that add up."""
 
 
-def read_folder(path: Path, config: ReadConfig | None = None, tell: Callable[[], None] | None = None) -> Reading:
-    """All motions below `path`; a file that cannot be used is listed and does not stop the others.
+@dataclass(frozen=True)
+class _File:
+    """One source and what came of it: motions, or why there are none; a library's clips come as they are."""
+
+    source: Source
+    sha256: str = ""
+    ready: tuple[Ready, ...] = ()
+    clips: tuple[Clip, ...] = ()
+    reason: str = ""
+    place: Path | None = None
+    """Of a library's clip that gave none."""
+
+
+def read_folder(
+    path: Path, config: ReadConfig | None = None, tell: Callable[[], None] | None = None, cache: Path | None = None
+) -> Reading:
+    """All motions below `path`, in archives too; a file that cannot be used is listed and does not stop the others.
 
     Args:
         path: a folder, or a single file, which must then be readable.
         config: how the files are read.
         tell: called after each file.
+        cache: folder in which retargeted motions are kept, by what they were made from.
 
     Raises:
-        BadInput: no such folder, or no motion in it, or the single file cannot be used.
+        BadInput: no such folder, or no motion in it, or the single file cannot be used; texts that cannot be opened.
     """
     path, config = Path(path), config or ReadConfig()
-    if not path.is_dir():
-        return Reading(read_file(path, config), skipped_table([]))
-    files = motion_files(path)
+    if not os.path.lexists(path):
+        raise BadInput(path, "a folder with motion files, or a motion file", "no such folder or file")
+    say = describer(config.describe, path)
     found: list[tuple[Path, list[Clip]]] = []
     skipped: list[tuple[str, str]] = []
-    for file in files:
-        for part, group in _parts(file, config):
+    notes: list[tuple[str, str]] = []
+    told: list[Described] = []
+    files = 0
+    for file in _files(path, config, cache):
+        files += not file.place
+        name = shown(os.path.relpath(file.place or file.source.path, path if path.is_dir() else path.parent))
+        if file.reason:
+            skipped.append((name, file.reason))
+        groups = [
+            (file.source.path, group) for group in _apart([split_long(c, config.max_seconds) for c in file.clips])
+        ]
+        for ready in file.ready:
+            said = say.captions(ready.raw.file, ready.raw.name, _seconds(ready), ready.amass_fps)
+            group = _tried(partial(_clips, ready, said, file, config), file.source.path)
             if isinstance(group, str):
-                skipped.append((shown(os.path.relpath(part, path)), group))
-            else:
-                found.append((file, group))
-        if tell:
+                skipped.append((name, group))
+                continue
+            told.append(said)
+            notes += [(name, note) for note in (*ready.raw.notes, *said.notes)]
+            groups.append((file.source.path, group))
+        found += groups
+        if tell and not file.place:
             tell()
     clips = distinct(found)
     if not clips:
-        first = f"; the first: {skipped[0][0]}: {skipped[0][1]}" if skipped else ""
-        came = f"{len(files)} files, none of them usable{first}"
-        raise BadInput(path, "G1 CSV files, ASAP pickles or a motion library", came)
-    return Reading(clips, skipped_table(skipped))
+        raise _nothing(path, files, skipped)
+    return Reading(clips, skipped_table(skipped), noted_table(notes), account(say, told))
 
 
 def read_file(path: Path, config: ReadConfig | None = None) -> list[Clip]:
-    """The clips of one file: a G1 CSV, an ASAP pickle, or the index of a motion library."""
-    path, config = Path(path), config or ReadConfig()
-    if path.name == INDEX:
-        clips = read_library(path.parent)
-        return distinct([(path, group) for group in _apart([split_long(clip, config.max_seconds) for clip in clips])])
-    return distinct([(path, group) for group in _motions(path, config)])
+    """The clips of one file that must be readable: of any format, an archive, or the index of a motion library."""
+    return read_folder(path, config).clips
 
 
-def _parts(file: Path, config: ReadConfig) -> Iterator[tuple[Path, list[Clip] | str]]:
-    """What a file of a folder gives: groups of clips whose names stay together, or the reason why there are none.
-
-    A clip of a library counts by itself, so that a damaged one does not take the others with it.
-    """
-    if file.name != INDEX:
-        groups = _tried(lambda: _motions(file, config), file)
-        yield from [(file, groups)] if isinstance(groups, str) else [(file, group) for group in groups]
-        return
-    library = _tried(lambda: Library(file.parent), file)
-    if isinstance(library, str):
-        yield file, library
-        return
-    whole: list[list[Clip]] = []
-    for name, clip in library.each():
-        pieces = _tried(partial(_pieces, clip, config), file)
-        if isinstance(pieces, str):
-            yield file.parent / name, pieces
+def _files(path: Path, config: ReadConfig, cache: Path | None) -> Iterator[_File]:
+    """Each file and what came of it, in order; the work on them goes to several processes."""
+    work = partial(_worked, config=config, cache=cache)
+    loaded = (_loaded(source, config) for source in motion_sources(path) if source.path.name != LICENCES)
+    for done in in_order(work, loaded, config.processes):
+        if done.source.path.name == INDEX and done.source.archive is None and not done.reason:
+            yield from _library(done.source)
         else:
-            whole.append(pieces)
-    yield from ((file, group) for group in _apart(whole))
+            yield done
 
 
-def _pieces(clip: Clip | BadInput, config: ReadConfig) -> list[Clip]:
-    if isinstance(clip, BadInput):
-        raise clip
-    return split_long(clip, config.max_seconds)
+@dataclass(frozen=True)
+class _Loaded:
+    """A source with its bytes, or why it has none; without `Source.read`, which does not go to other processes."""
+
+    path: Path
+    archive: Path | None
+    data: bytes = b""
+    csv_fps: float | None = None
+    reason: str = ""
 
 
-def _tried(read: Callable[[], Result], file: Path) -> Result | str:
-    """What `read` returns, or why it does not."""
-    try:
-        return read()
-    except BadInput as error:
-        return shown(_reason(error, file), 1000)
-    except OSError as error:  # a file that vanished, a disk that was unplugged
-        return shown(error.strerror or str(error))
-    except Exception as error:  # a mistake of ours about one file must not cost the user all the others
-        return shown(f"it could not be read ({type(error).__name__}: {error}): please report this")
+def _loaded(source: Source, config: ReadConfig) -> _Loaded:
+    if source.path.name == INDEX and source.archive is None:
+        return _Loaded(source.path, None)
+    if source.path.is_dir():
+        came = "a link to a folder, which is not followed" if source.path.is_symlink() else "one that cannot be listed"
+        return _Loaded(source.path, source.archive, reason=f"expected a folder with motions, came {came}")
+    data = _tried(partial(source.read, LIMITS.file_bytes), source.path)
+    if isinstance(data, str):
+        return _Loaded(source.path, source.archive, reason=data)
+    rate = _csv_fps(source, config) if source.path.suffix.lower() == ".csv" else None
+    return _Loaded(source.path, source.archive, data, rate)
+
+
+def _worked(loaded: _Loaded, config: ReadConfig, cache: Path | None) -> _File:
+    """What a file holds; never raises."""
+    source = Source(loaded.path, _gone, loaded.archive)
+    if loaded.reason or (loaded.path.name == INDEX and loaded.archive is None):
+        return _File(source, reason=loaded.reason)
+    digest = hashlib.sha256(loaded.data).hexdigest()
+    job = Job(loaded.path, loaded.data, digest, loaded.csv_fps, cache)
+    ready = _tried(partial(make_ready, job, config), loaded.path)
+    if isinstance(ready, str):
+        return _File(source, digest, reason=ready)
+    return _File(source, digest, tuple(ready), reason="" if ready else "no motion in it")
+
+
+def _gone(most: int) -> bytes:
+    raise AssertionError("the bytes were read before")
+
+
+def _library(source: Source) -> Iterator[_File]:
+    """The clips of a library, and each damaged one by itself, so that it does not take the others with it."""
+    library = _tried(partial(Library, source.path.parent), source.path)
+    if isinstance(library, str):
+        yield _File(source, reason=library)
+        return
+    whole = []
+    for name, clip in library.each():
+        if isinstance(clip, BadInput):
+            reason = shown(why_not(clip, source.path), 1000)
+            yield _File(source, reason=reason, place=source.path.parent / name)
+        else:
+            whole.append(clip)
+    yield _File(source, clips=tuple(whole))
 
 
 def _apart(clips: list[list[Clip]]) -> list[list[Clip]]:
@@ -175,90 +191,66 @@ def _apart(clips: list[list[Clip]]) -> list[list[Clip]]:
     return [[clip for pieces in clips for clip in pieces]] if len(set(names)) == len(names) else clips
 
 
-def _motions(path: Path, config: ReadConfig) -> list[list[Clip]]:
-    """The pieces of each motion of a file."""
-    if path.is_dir():
-        came = "a link to a folder, which is not followed" if path.is_symlink() else "one that cannot be listed"
-        raise BadInput(path, "a folder with motions", came)
-    suffix = path.suffix.lower()
-    if suffix not in (*_PICKLES, ".csv"):
-        reason = _inside_zip(path) if suffix == ".zip" else _NOT_YET.get(suffix, _UNKNOWN)
-        if not os.path.lexists(path):
-            raise BadInput(path, "a folder with motion files, or a motion file", "no such folder or file")
-        raise BadInput(path, "a G1 CSV file, an ASAP pickle or a motion library", reason)
-    data = read_bytes(path)
-    digest = hashlib.sha256(data).hexdigest()
-    is_csv = suffix == ".csv"
-    raws = [read_g1_csv(path, _csv_fps(path, config), data)] if is_csv else read_asap_pickle(path, data)
-    return [prepare(raw, config, digest) for raw in raws]
-
-
-def prepare(raw: RawMotion, config: ReadConfig, digest: str = "") -> list[Clip]:
-    """Checked, resampled, grounded, captioned, cut: what becomes of a motion once it is read."""
-    check_raw(raw)
-    raw = resample(raw, config.fps)
-    root_pos, joint_pos = ground(raw.root_pos, raw.root_quat, raw.joint_pos, raw.fps, config.grounding)
-    captions, source = find_captions(raw.file, config.captions_folder), "file"
-    if not captions:
-        captions, source = (caption_from_name(raw.name),), "name"
+def _clips(ready: Ready, said: Described, file: _File, config: ReadConfig) -> list[Clip]:
+    """A motion with its texts, licence and keypoints, cut."""
+    raw = ready.raw
+    before = stated_of(raw.file) if file.source.archive is None else None
     clip = make_clip(
         safe_stem(raw.name, "motion"),
         raw.fps,
-        root_pos,
+        raw.root_pos,
         raw.root_quat,
-        joint_pos,
-        captions=captions,
-        caption_source=source,
-        source=shown(str(Path(raw.file.parent.name) / raw.file.name)),
-        licence=licence_of(raw.file),
-        sha256=digest,
+        raw.joint_pos,
+        captions=said.captions,
+        caption_source=said.source,
+        source=before.source if before else shown(str(Path(raw.file.parent.name) / raw.file.name)),
+        licence=before.licence if before else licence_of(file.source),
+        sha256=file.sha256,
         family=family_of(raw.name),
     )
     check_clip(raw.where, clip)
     return split_long(clip, config.max_seconds)
 
 
-def _inside_zip(path: Path) -> str:
-    """Why an archive is skipped, with what it holds."""
-    reason = _NOT_YET[".zip"]
-    try:
-        if not path.is_file() or not _short_directory(path):
-            return reason
-        with zipfile.ZipFile(path) as archive:
-            kinds = Counter(shown(Path(name).suffix.lower(), 12) for name in archive.namelist())
-    except Exception:  # zipfile raises anything from BadZipFile to NotImplementedError for a damaged directory
-        return reason
-    kinds.pop("", None)
-    if not kinds:
-        return reason
-    kind, count = kinds.most_common(1)[0]
-    return f"{reason} ({count} {kind} files in it" + (f"; {_NOT_YET[kind]})" if kind in _NOT_YET else ")")
+def _seconds(ready: Ready) -> float:
+    return (len(ready.raw.root_pos) - 1) / ready.raw.fps
 
 
-def _short_directory(path: Path) -> bool:
-    """Whether an archive's list of files is small enough to look into: its length stands at the file's end."""
-    size = path.stat().st_size
-    with path.open("rb") as stream:
-        stream.seek(max(0, size - _END_OF_ZIP))
-        end = stream.read(_END_OF_ZIP)
-    at = end.rfind(b"PK\x05\x06")
-    return at >= 0 and len(end) >= at + 16 and int.from_bytes(end[at + 12 : at + 16], "little") <= _MAX_DIRECTORY
-
-
-def _csv_fps(path: Path, config: ReadConfig) -> float:
-    for folder in Path(os.path.realpath(path)).parents:
+def _csv_fps(source: Source, config: ReadConfig) -> float | None:
+    """The rate of a CSV file: of a folder by settings, of all by settings, of LICENCES.csv, of SOURCES.md [Hz]."""
+    for folder in Path(os.path.realpath(source.path)).parents:
         if folder.name in config.csv_fps_by_folder:
             return config.csv_fps_by_folder[folder.name]
-    return config.csv_fps
+    if config.csv_fps is not None:
+        return config.csv_fps
+    stated = stated_of(source.path) if source.archive is None else None
+    return stated.fps if stated else stated_rate(source)
 
 
-def _reason(error: BadInput, file: Path) -> str:
-    """The error's line without the file's name, which stands in a column of its own."""
-    if error.came.startswith(tuple(_NOT_YET.values())) or error.came == _UNKNOWN:
-        return error.came
-    return str(error).removeprefix(str(file)).lstrip(":, ")
+def _tried(read: Callable[[], Result], file: Path) -> Result | str:
+    """What `read` returns, or why it does not."""
+    try:
+        return read()
+    except BadInput as error:
+        return shown(why_not(error, file), 1000)
+    except OSError as error:  # a file that vanished, a disk that was unplugged
+        return shown(error.strerror or str(error))
+    except Exception as error:  # a mistake of ours about one file must not cost the user all the others
+        return shown(f"it could not be read ({type(error).__name__}: {error}): please report this")
+
+
+def _nothing(path: Path, files: int, skipped: list[tuple[str, str]]) -> BadInput:
+    if not path.is_dir() and len(skipped) == 1:
+        return BadInput(path, "motions that can be read", skipped[0][1])
+    first = f"; the first: {skipped[0][0]}: {skipped[0][1]}" if skipped else ""
+    return BadInput(path, "motions that can be read", f"{files} files, none of them usable{first}")
 
 
 def skipped_table(rows: list[tuple[str, str]]) -> pd.DataFrame:
     """Files without clips, columns `file` and `reason`."""
     return pd.DataFrame(rows, columns=["file", "reason"])
+
+
+def noted_table(rows: list[tuple[str, str]]) -> pd.DataFrame:
+    """What was detected, columns `file` and `note`."""
+    return pd.DataFrame(rows, columns=["file", "note"])

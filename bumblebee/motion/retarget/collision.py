@@ -44,7 +44,7 @@ def obstacles(robot: Robot) -> Obstacles:
 
 
 def keep_apart(normal: Normal, at: Poses, robot: Robot, kept: Obstacles, margin: float, sigma: float) -> None:
-    """Adds what is nearer than `margin` [m]: links to each other, and links other than feet to the floor; `sigma` [m]."""
+    """Adds what is nearer than `margin` [m]: links to each other, links other than feet to the floor; `sigma` [m]."""
     ends = _world(at, kept.shapes)
     distance, first, second = _closest(ends, kept.shapes, kept.pairs)
     distance = distance - margin
@@ -93,7 +93,8 @@ def _foot(robot: Robot, side: int) -> tuple[int, np.ndarray, float, bool]:
     corners = robot.sole[side * CORNERS : (side + 1) * CORNERS]
     radius = robot.radius + float(np.linalg.norm(corners[0] - corners[1])) / 2
     heel, toe = corners[:2].mean(axis=0), corners[2:].mean(axis=0)
-    return int(robot.sole_body[side * CORNERS]), np.stack([heel, toe]) + np.array([0, 0, radius - robot.radius]), radius, True
+    axis = np.stack([heel, toe]) + np.array([0.0, 0.0, radius - robot.radius])
+    return int(robot.sole_body[side * CORNERS]), axis, radius, True
 
 
 def _hops(parent: np.ndarray) -> np.ndarray:
@@ -135,7 +136,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _rows(
     robot: Robot, at: Poses, frame: np.ndarray, body: np.ndarray, where: np.ndarray, along: np.ndarray
 ) -> np.ndarray:
-    """Derivatives (E, 6 + n) of points `where` (E, 3) on bodies (E,), each in its frame and along its direction (E, 3)."""
+    """Derivatives (E, 6 + n) of points `where` (E, 3) on bodies (E,), each in its frame along a direction (E, 3)."""
     rows = np.empty((len(frame), 6 + len(robot.tree.joints)))
     rows[:, :3] = along
     rows[:, 3:6] = np.cross(where - at.pos[frame, 0], along)

@@ -29,9 +29,9 @@ _JOINT_SPEED = 20.0  # rad/s, where a mapping states none: what the slower of th
 class Robot:
     """A robot that motions are retargeted to.
 
-    `body` (13,) and `local` (13, 3) [m]: where `POINTS` lie; `sole_body` (8,) and `sole` (8, 3) [m]: the corners of both
-    soles, left foot first, each heel left, heel right, toe left, toe right; `fastest` (n,) [rad/s]; `rest` (n,) [rad]:
-    the angles that joints keep where the person says nothing about them.
+    `body` (13,) and `local` (13, 3) [m]: where `POINTS` lie; `sole_body` (8,) and `sole` (8, 3) [m]: the corners of
+    both soles, left foot first, each heel left, heel right, toe left, toe right; `fastest` (n,) [rad/s]; `rest` (n,)
+    [rad]: the angles that joints keep where the person says nothing about them.
     """
 
     name: str

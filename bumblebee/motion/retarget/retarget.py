@@ -11,11 +11,13 @@ from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.retarget.config import RetargetConfig
 from bumblebee.motion.retarget.mapping import Robot, g1
 from bumblebee.motion.retarget.solve import Trajectory, solve
-from bumblebee.motion.retarget.targets import at_rate, targets
+from bumblebee.motion.retarget.targets import Targets, at_rate, targets
 from bumblebee.robot.facts import joint_names
 
 VERSION = 1
 """Of the method: a cached result of another version is made again."""
+_MOST_SECONDS = 3600.0
+_CLIMB = 0.15  # m: more than the floor of a recording drifts, less than a step of stairs
 _LEAST = 5  # frames: an acceleration needs three
 _LONGEST = 600  # frames fitted at once: a hard place then holds up its own part only
 _OVERLAP = 60  # frames that neighbouring parts share, faded from one to the other
@@ -27,18 +29,42 @@ def retarget(motion: HumanMotion, fps: float = 50.0, config: RetargetConfig | No
     Raises:
         BadInput: fewer frames than an acceleration needs, legs without length.
     """
-    at = fit(motion, g1(), fps, config or RetargetConfig())
+    config = config or RetargetConfig()
+    target = aim(motion, g1(), fps, config)
+    at = fit(target, g1(), config)
     assert g1().tree.joints == joint_names()
-    return RawMotion(motion.name, fps, at.root, root_quat(at), at.joint, motion.file, motion.first_row, motion.part)
+    notes = (*motion.notes, *_climb(target))
+    return RawMotion(
+        motion.name, fps, at.root, root_quat(at), at.joint, motion.file, motion.first_row, motion.part, notes
+    )
 
 
-def fit(motion: HumanMotion, robot: Robot, fps: float, config: RetargetConfig) -> Trajectory:
-    """The trajectory of any robot at `fps` [Hz]."""
+def aim(motion: HumanMotion, robot: Robot, fps: float, config: RetargetConfig) -> Targets:
+    """What a robot should do at `fps` [Hz]."""
+    _check(motion)
     positions = at_rate(motion, fps, config.cutoff)
     if len(positions) < _LEAST:
         raise BadInput(motion.where, f"at least {_LEAST} frames at {fps:g} Hz", str(len(positions)))
-    target = targets(positions, fps, robot, config)
-    parts = [solve(target.part(start, end), robot, config) for start, end in _parts(len(positions))]
+    return targets(positions, fps, robot, config)
+
+
+def _check(motion: HumanMotion) -> None:
+    frames, seconds = len(motion.positions), len(motion.positions) / motion.fps
+    if seconds > _MOST_SECONDS:
+        raise BadInput(motion.where, f"a motion of at most {_MOST_SECONDS:g} s", f"{seconds:.0f} s", "Cut it.")
+    if frames < 2:
+        raise BadInput(motion.where, "at least 2 frames", str(frames))
+
+
+def _climb(target: Targets) -> tuple[str, ...]:
+    """A note where the floor rises or falls under the person: on the robot's flat floor this is another motion."""
+    rise = float(np.ptp(target.floor))
+    return (f"the floor under the person moves by {rise:.2f} m, for the robot it is flat",) if rise > _CLIMB else ()
+
+
+def fit(target: Targets, robot: Robot, config: RetargetConfig) -> Trajectory:
+    """The trajectory of any robot that fits the targets, solved in parts that overlap."""
+    parts = [solve(target.part(start, end), robot, config) for start, end in _parts(len(target.hips))]
     return _joined(parts)
 
 

@@ -1,7 +1,7 @@
 """Inverse kinematics over the whole trajectory: Gauss-Newton on all frames at once.
 
-Frame by frame, a solution depends on where the motion starts, and jumps where two solutions meet. Here every frame knows
-its neighbours: feet that stand do not slide, and accelerations are bounded by a term of their own.
+Frame by frame, a solution depends on where the motion starts, and jumps where two solutions meet. Here every frame
+knows its neighbours: feet that stand do not slide, and accelerations are held down by a term of their own.
 """
 
 from dataclasses import dataclass

@@ -11,7 +11,7 @@ from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
 from bumblebee.motion.retarget.config import RetargetConfig
 from bumblebee.motion.retarget.contacts import foot_points, stance
 from bumblebee.motion.retarget.mapping import CORNERS, POINTS, SIDES, Robot
-from bumblebee.motion.retarget.tree import poses, points
+from bumblebee.motion.retarget.tree import points, poses
 
 SEGMENTS = (
     *((f"{side}_{a}", f"{side}_{b}") for side in SIDES for a, b in (("hip", "knee"), ("knee", "ankle"))),
@@ -28,7 +28,7 @@ class Targets:
 
     `segments` (T, S + 1, 3) [m]: vectors of `SEGMENTS` and of the torso; `hips` (T, 3) [m]: the middle of the hips;
     `feet` (T, 2, 3) [m]: from heel to toe; `contact` (T, 8) from 0 to 1, of the soles' corners; `frame` (T, 3, 3): the
-    pelvis' orientation to start from.
+    pelvis' orientation to start from; `floor` (T,) [m]: how high the floor was under the person.
     """
 
     fps: float
@@ -37,10 +37,11 @@ class Targets:
     feet: np.ndarray
     contact: np.ndarray
     frame: np.ndarray
+    floor: np.ndarray
 
     def part(self, start: int, end: int) -> "Targets":
         """The frames from `start` to before `end`."""
-        arrays = (self.segments, self.hips, self.feet, self.contact, self.frame)
+        arrays = (self.segments, self.hips, self.feet, self.contact, self.frame, self.floor)
         return Targets(self.fps, *(array[start:end] for array in arrays))
 
 
@@ -74,7 +75,7 @@ def targets(positions: np.ndarray, fps: float, robot: Robot, config: RetargetCon
     frame = np.stack([forward, np.cross(spine, forward), spine], axis=-1)
     feet = _foot_directions(lifted, stand.rest) * np.linalg.norm(robot.sole[2] - robot.sole[0])
     contact = np.repeat(stand.contact, CORNERS // 2, axis=2).reshape(len(positions), -1)
-    return Targets(fps, np.stack(segments, axis=1), hips, feet, contact, _orthonormal(frame))
+    return Targets(fps, np.stack(segments, axis=1), hips, feet, contact, _orthonormal(frame), stand.floor)
 
 
 def _lengths(robot: Robot) -> list[float]:
@@ -85,7 +86,7 @@ def _lengths(robot: Robot) -> list[float]:
 
 
 def rest_points(robot: Robot) -> dict[str, np.ndarray]:
-    """Where the robot's points lie with the root at the origin and all joints at rest; `left_sole`, `right_sole` amid the corners."""
+    """Where the robot's points lie with the root at the origin and all joints at rest, and the middles of its soles."""
     at = poses(robot.tree, np.zeros((1, 3)), np.eye(3)[None], robot.rest[None])
     where = dict(zip(POINTS, points(at, robot.body, robot.local)[0], strict=True))
     soles = points(at, robot.sole_body, robot.sole)[0].reshape(2, CORNERS, 3)

@@ -1,0 +1,118 @@
+"""From the bytes of one file to the robot's motions: checked, retargeted or grounded, at one rate."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bumblebee.errors import BadInput
+from bumblebee.motion.cache import Arrays, cached, key_of
+from bumblebee.motion.checks import check_raw
+from bumblebee.motion.grounding import ground
+from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.one_file import read_one
+from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.resample import resample
+from bumblebee.motion.retarget.retarget import VERSION, retarget
+from bumblebee.motion.settings import ReadConfig
+
+_HUMAN = (".bvh", ".npz")
+_READER = 1  # version of the readers of human motion, like `VERSION` part of a cached result's key
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One file to be read, as it goes to another process."""
+
+    path: Path
+    """As it is shown."""
+    data: bytes
+    sha256: str
+    csv_fps: float | None
+    """Of this file, if it is a CSV file [Hz]."""
+    cache: Path | None
+    """Folder of what was retargeted before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """One motion of the robot at `ReadConfig.fps`, where it stands on the floor."""
+
+    raw: RawMotion
+    amass_fps: float | None = None
+    """Rate at which AMASS states to have recorded it [Hz]."""
+
+
+def make_ready(job: Job, config: ReadConfig) -> list[Ready]:
+    """The motions of a file.
+
+    Raises:
+        BadInput: what is wrong in it.
+    """
+    if job.cache is not None and job.path.suffix.lower() in _HUMAN:
+        return _through_cache(job, config)
+    return list(_made(job, config))
+
+
+def _made(job: Job, config: ReadConfig) -> Iterator[Ready]:
+    robot = replace(config.robot, csv_fps=job.csv_fps)
+    for motion in read_one(job.path, job.data, robot, config.human):
+        if isinstance(motion, HumanMotion):
+            rate = motion.fps if job.path.suffix.lower() == ".npz" else None
+            yield Ready(retarget(motion, config.fps, config.retarget), rate)
+            continue
+        check_raw(motion)
+        even = resample(motion, config.fps)
+        pos, joints = ground(even.root_pos, even.root_quat, even.joint_pos, even.fps, config.grounding)
+        yield Ready(replace(even, root_pos=pos, joint_pos=joints))
+
+
+def _through_cache(job: Job, config: ReadConfig) -> list[Ready]:
+    """The same by way of the cache, where the settings, the file's name and its bytes are those of before."""
+    assert job.cache is not None
+    parts = {
+        "file": job.sha256,
+        "name": job.path.name,
+        "fps": config.fps,
+        "human": asdict(config.human),
+        "robot": asdict(config.robot),
+        "grounding": asdict(config.grounding),
+        "retarget": asdict(config.retarget),
+        "version": [VERSION, _READER],
+    }
+    return _unpacked(cached(job.cache, key_of(parts), lambda: _packed(list(_made(job, config)))), job.path)
+
+
+def _packed(found: list[Ready]) -> Arrays:
+    """Motions as arrays, what is said of them as JSON in bytes."""
+    arrays: Arrays = {}
+    about = []
+    for number, one in enumerate(found):
+        raw = one.raw
+        for name in ("root_pos", "root_quat", "joint_pos"):
+            arrays[f"{name}{number}"] = getattr(raw, name).astype(np.float32)
+        said = {"name": raw.name, "fps": raw.fps, "first_row": raw.first_row, "part": raw.part}
+        about.append({**said, "notes": raw.notes, "rate_from": raw.rate_from, "amass_fps": one.amass_fps})
+    return arrays | {"about": np.frombuffer(json.dumps(about).encode(), np.uint8)}
+
+
+def _unpacked(arrays: Arrays, path: Path) -> list[Ready]:
+    found = []
+    for number, said in enumerate(json.loads(arrays["about"].tobytes())):
+        values = [arrays[f"{name}{number}"].astype(np.float64) for name in ("root_pos", "root_quat", "joint_pos")]
+        amass = said.pop("amass_fps")
+        raw = RawMotion(**{**said, "notes": tuple(said["notes"])}, file=path, **_named(values))
+        found.append(Ready(raw, amass))
+    return found
+
+
+def _named(values: list[np.ndarray]) -> dict[str, np.ndarray]:
+    return dict(zip(("root_pos", "root_quat", "joint_pos"), values, strict=True))
+
+
+def why_not(error: BadInput, path: Path) -> str:
+    """The error's line without the file's name, which stands in a column of its own."""
+    text = str(error)
+    return text.removeprefix(str(path)).lstrip(":, ") if text.startswith(str(path)) else text
