@@ -83,6 +83,7 @@ def test_left_and_right_are_never_exchanged_in_the_tables():
         ([*LAFAN1.split(), "Left_Foot"], "none for left_ankle"),
         (["root", "tail", "wing"], "a skeleton that is not known"),
         (["x" * 80] * 1000, "a skeleton that is not known"),
+        ([f"{number}hip" for number in range(1000)], "none for left_hip"),
     ],
 )
 def test_a_skeleton_without_match_is_one_line_about_what_is_missing(names, words):
