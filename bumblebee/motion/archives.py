@@ -77,8 +77,8 @@ def _listed(path: Path, changed: int, size: int) -> tuple[Member, ...]:
     for member in found:
         key = PurePosixPath(member.name.replace("\\", "/")).parts
         if key in listed and key:
-            came = "two"
-            listed[key] = _bad(member.name, _shown(path, member.name), "one member of each name", came, "Rename one.")
+            where = _shown(path, member.name)
+            listed[key] = _bad(member.name, where, "one member of each name", "two", "Rename one.")
         else:
             listed[key] = member
     return tuple(listed.values())

@@ -172,6 +172,15 @@ def test_a_member_that_unpacks_to_a_thousand_times_its_size_is_one_line(tmp_path
     assert len(read) == 3 and len(lines) == 1 and "100 times its packed size" in lines[0]
 
 
+def test_a_member_that_says_it_is_packed_into_nothing_is_one_line(tmp_path):
+    data = bytearray(make_zip(tmp_path / "m.zip", GOOD).read_bytes())
+    at = data.index(b"PK\x01\x02")
+    struct.pack_into("<II", data, at + 20, 0, 500_000_000)
+    (tmp_path / "m.zip").write_bytes(data)
+    read, lines = outcome(tmp_path / "m.zip")
+    assert len(read) == 2 and len(lines) == 1 and "times its packed size" in lines[0]
+
+
 @MAKERS
 def test_more_than_is_asked_for_is_refused_before_it_is_unpacked(tmp_path, make, name):
     sources = {source.path.name: source for source in motion_sources(make(tmp_path / name, GOOD))}
