@@ -97,6 +97,24 @@ TABLES = (
         ("{}thigh", "{}calf", "{}foot", "{}toe0|{}toe|{}foot/end", "{}upperarm", "{}forearm", "{}hand"),
     ),
     _table(
+        "Biovision",
+        "left|right",
+        ("hips|hip", "chest2|chest", "neck", "head"),
+        ("{}upleg", "{}lowleg", "{}foot", "{}toe|{}foot/end", "{}uparm", "{}lowarm", "{}hand"),
+    ),
+    _table(
+        "Unity, VRM",
+        "left|right",
+        ("hips", "upperchest|chest|spine", "neck", "head"),
+        ("{}upperleg", "{}lowerleg", "{}foot", "{}toes|{}foot/end", "{}upperarm", "{}lowerarm", "{}hand"),
+    ),
+    _table(
+        "OptiTrack",
+        "l|r",
+        ("hip", "chest", "neck", "head"),
+        ("{}thigh", "{}shin", "{}foot", "{}toe|{}foot/end", "{}uarm", "{}farm", "{}hand"),
+    ),
+    _table(
         "Unreal",
         "l|r",
         ("pelvis", "spine05|spine04|spine03|spine02", "neck01|neck", "head"),
