@@ -171,7 +171,9 @@ def member_bytes(where: object, archive: zipfile.ZipFile, info: zipfile.ZipInfo,
     if size > limits.unpacked_bytes:
         raise BadInput(where, f"at most {limits.unpacked_bytes:,} bytes unpacked", f"{size:,}")
     if size > limits.free_bytes and size > limits.ratio * max(info.compress_size, 1):
-        raise BadInput(where, f"at most {limits.ratio:g} times its packed size", f"{size / info.compress_size:.0f}")
+        raise BadInput(
+            where, f"at most {limits.ratio:g} times its packed size", f"{size / max(info.compress_size, 1):.0f}"
+        )
     try:
         with archive.open(info) as stream:
             data = stream.read(size + 1)

@@ -4,6 +4,7 @@ Names, sizes and kinds that an archive states are not believed further than `ARC
 that member only: its `read` says so.
 """
 
+import bz2
 import gzip
 import io
 import re
@@ -22,7 +23,7 @@ from bumblebee.io.limits import LIMITS
 from bumblebee.io.read import member_bytes
 from bumblebee.motion.texts import shown
 
-SUFFIXES = (".zip", ".tar", ".tar.gz", ".tgz")
+SUFFIXES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2")  # AMASS comes as .tar.bz2
 ARCHIVE = replace(LIMITS, unpacked_bytes=64 << 30, members=250_000)
 """Of an archive: its members are read one by one, so that together they may be more than memory holds."""
 _MAX_DIRECTORY = 64 << 20  # bytes of a zip's list of members
@@ -48,6 +49,12 @@ def is_archive(path: Path) -> bool:
     return path.name.lower().endswith(SUFFIXES)
 
 
+def climbs_out(name: str) -> bool:
+    """Whether a member's name leads out of its archive, on any system."""
+    plain = name.replace("\\", "/")
+    return ".." in plain.split("/") or plain.startswith("/") or re.match(r"[A-Za-z]:", plain) is not None
+
+
 def list_archive(path: Path) -> list[Member]:
     """The members, a zip's by name, a tar's in their order; what is wrong with the archive is a bad member "".
 
@@ -70,8 +77,8 @@ def _listed(path: Path, changed: int, size: int) -> tuple[Member, ...]:
     for member in found:
         key = PurePosixPath(member.name.replace("\\", "/")).parts
         if key in listed and key:
-            came = "two"
-            listed[key] = _bad(member.name, _shown(path, member.name), "one member of each name", came, "Rename one.")
+            where = _shown(path, member.name)
+            listed[key] = _bad(member.name, where, "one member of each name", "two", "Rename one.")
         else:
             listed[key] = member
     return tuple(listed.values())
@@ -93,14 +100,13 @@ def _shown(path: Path, name: str) -> Path:
 def _checked(path: Path, name: str, mode: int, read: Callable[[int], bytes]) -> Member:
     """A member, bad where its name or kind is one that no motion has."""
     where = _shown(path, name)
-    plain = name.replace("\\", "/")
-    if ".." in plain.split("/") or plain.startswith("/") or re.match(r"[A-Za-z]:", plain):
+    if climbs_out(name):
         return _bad(
             name, f"{path}, member {shown(name, 200)!r}", "a name within the archive", "one that climbs out of it"
         )
     if stat.S_IFMT(mode) not in (0, stat.S_IFREG):
         return _bad(name, where, "a file", "a link" if stat.S_ISLNK(mode) else "a device or pipe")
-    if is_archive(Path(plain)):
+    if is_archive(Path(name)):
         return _bad(name, where, "a file that is no archive", "an archive in an archive", "Unpack it.")
     return Member(name, read)
 
@@ -166,7 +172,7 @@ def _read_zip(path: Path, changed: int, size: int, index: int, most: int) -> byt
 class _Stream(io.RawIOBase):
     """A tar's bytes, unpacked; a header that asks for more than any has is refused before memory is given to it."""
 
-    def __init__(self, file: IO[bytes]) -> None:
+    def __init__(self, file: IO[bytes] | bz2.BZ2File | gzip.GzipFile) -> None:
         self.file, self.lock = file, threading.Lock()
 
     def read(self, size: int = -1) -> bytes:
@@ -185,7 +191,10 @@ class _Stream(io.RawIOBase):
 
 
 def _tar_stream(path: Path) -> _Stream:
-    return _Stream(path.open("rb") if path.suffix.lower() == ".tar" else gzip.GzipFile(path))
+    kind = path.suffix.lower()
+    if kind == ".tar":
+        return _Stream(path.open("rb"))
+    return _Stream(bz2.BZ2File(path) if kind in (".bz2", ".tbz2") else gzip.GzipFile(path))
 
 
 @lru_cache(maxsize=4)
@@ -200,7 +209,7 @@ def _tar(path: Path, changed: int, size: int) -> Iterator[Member]:
         stream = _tar_stream(path)
         with stream.file, tarfile.open(fileobj=stream, mode="r:") as archive:
             for info in archive:
-                archive.members = []  # else it keeps them all
+                vars(archive)["members"] = []  # else it keeps them all
                 count += 1
                 end = info.offset_data + info.size
                 if count > ARCHIVE.members or end > ARCHIVE.unpacked_bytes:

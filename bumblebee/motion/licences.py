@@ -45,13 +45,16 @@ def licence_of(file: Path | Source) -> str:
 
     A file: its row in SOURCES.md, else a licence file in its folder. A member: the row that names the archive, else
     `<stem>.LICENCE.txt` beside the archive, else a licence file in it, the nearest to the member, else that of the
-    archive's folder.
+    archive's folder. A text that is no licence known here but forbids commercial use says so.
     """
     if isinstance(file, Path):
         return _from_table(file) or _from_folder(file.resolve().parent) or UNKNOWN
     if file.archive is None:
         return licence_of(file.path)
-    return _from_table(file.archive) or _beside(file.archive) or _inside(file) or licence_of(file.archive)
+    row = row_of(file.archive)
+    named = row is not None and any(name.name == file.archive.name for name in row.names)
+    own = _from_table(file.archive) if named else ""
+    return own or _beside(file.archive) or _inside(file) or licence_of(file.archive)
 
 
 def stated_rate(source: Path | Source) -> float | None:
@@ -121,7 +124,9 @@ def _archived(archive: Path) -> dict[str, str]:
 def _named(name: str, text: str) -> str:
     """The SPDX name of a licence's text, or where it stands; "" of an empty one."""
     plain = " ".join(text.lower().split())
-    return next((spdx for phrase, spdx in _TEXTS if phrase in plain), f"see {name}") if plain else ""
+    # Only in a text of no known licence: the GPL has the word too.
+    other = f"non-commercial, see {name}" if _NONCOMMERCIAL.search(plain) else f"see {name}"
+    return next((spdx for phrase, spdx in _TEXTS if phrase in plain), other) if plain else ""
 
 
 def _text(path: Path) -> str:

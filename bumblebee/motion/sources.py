@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from bumblebee.io.read import read_bytes
-from bumblebee.motion.archives import list_archive
+from bumblebee.motion.archives import climbs_out, list_archive
 from bumblebee.motion.texts import shown
 
 
@@ -36,7 +36,10 @@ def archive_sources(path: Path, is_motion: Callable[[Path], bool]) -> Iterator[S
     """
     for member in list_archive(path):
         name = Path(shown(member.name.replace("\\", "/"), 1000))
-        if member.bad or is_motion(name):
-            # A bad name (`..`, absolute) must not lead elsewhere in `path` either: only its last part is shown.
-            place = path / name.name if member.bad and member.name else path / name
-            yield Source(place if member.name else path, member.read, path)
+        if not member.name:
+            yield Source(path, member.read, path)
+        elif climbs_out(member.name):
+            # The place that is shown must not climb either.
+            yield Source(path / ("" if name.name == ".." else name.name), member.read, path)
+        elif is_motion(name):
+            yield Source(path / name, member.read, path)

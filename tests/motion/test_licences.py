@@ -99,6 +99,23 @@ def test_a_member_of_an_archive_without_any_has_the_licence_of_the_folder(tmp_pa
     assert set(licences(archive(tmp_path / "walks.zip")).values()) == {"CC-BY-NC-4.0"}
 
 
+def test_a_row_that_names_only_the_folder_gives_way_to_a_file_named_after_the_archive(tmp_path):
+    (tmp_path / "SOURCES.md").write_text("| folder | licence |\n|---|---|\n| `m` | Apache-2.0 |\n")
+    (tmp_path / "m").mkdir()
+    (tmp_path / "m/walks.LICENSE.txt").write_text("MIT License")
+    assert set(licences(archive(tmp_path / "m/walks.zip")).values()) == {"MIT"}
+    assert set(licences(archive(tmp_path / "m/runs.zip")).values()) == {"Apache-2.0"}
+
+
+def test_a_text_of_no_known_licence_that_forbids_commercial_use_says_so(tmp_path):
+    (tmp_path / "LICENSE.txt").write_text("for non-commercial\nscientific research purposes")
+    licence = licence_of(tmp_path / "a.npz")
+    assert licence == "non-commercial, see LICENSE.txt" and noncommercial(licence)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/COPYING").write_text("GNU General Public License ... only for noncommercial distribution")
+    assert noncommercial(licence_of(tmp_path / "other/a.npz")) is False
+
+
 @pytest.mark.parametrize(
     ("licence", "forbids"),
     [

@@ -87,7 +87,8 @@ def parse_bvh(path: Path, data: bytes) -> Bvh:
 def _hierarchy(path: Path, lines: list[str]) -> _Joints:
     if sum(map(len, lines)) > _MAX_HEADER:
         raise BadInput(path, f"a hierarchy of at most {_MAX_HEADER:,} characters", "a longer one")
-    joints, chain, closed = _Joints(), [], False
+    joints, closed = _Joints(), False
+    chain: list[int] = []
     for number, line in enumerate(lines, 2):
         for words in _statements(line):
             where = f"{path}, line {number}"

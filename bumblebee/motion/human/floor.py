@@ -6,7 +6,7 @@ from bumblebee.motion.human.motion import LANDMARKS
 
 _REST = {"ankle": 0.07, "toe": 0.015}
 """Heights of the joints over the floor while the foot stands flat [m]: of SMPL's mean body, from the sole boxes of the
-MJCF that `smpl.py` names; ankles at 4 % of a person's height."""
+MJCF that `smpl_body.py` names; ankles at 4 % of a person's height."""
 _STILL = 0.3  # speed below which a foot stands [m/s]
 _STANDING = 0.05  # share of the frames in which some foot must stand for a floor to be found
 _LOW = 10.0  # percentile of the standing feet's heights that is the floor: most stand on it, none much below it

@@ -15,6 +15,7 @@ from bumblebee.motion.human.motion import LANDMARKS
 
 _SIDES = ("left", "right")
 _LIMBS = ("hip", "knee", "ankle", "toe", "shoulder", "elbow", "wrist")
+_PREFIXES = 12  # that are tried: a file of a thousand hips must not take minutes
 _TRUNK = ("pelvis", "chest", "neck", "head")
 
 
@@ -96,6 +97,24 @@ TABLES = (
         ("{}thigh", "{}calf", "{}foot", "{}toe0|{}toe|{}foot/end", "{}upperarm", "{}forearm", "{}hand"),
     ),
     _table(
+        "Biovision",
+        "left|right",
+        ("hips|hip", "chest2|chest", "neck", "head"),
+        ("{}upleg", "{}lowleg", "{}foot", "{}toe|{}foot/end", "{}uparm", "{}lowarm", "{}hand"),
+    ),
+    _table(
+        "Unity, VRM",
+        "left|right",
+        ("hips", "upperchest|chest|spine", "neck", "head"),
+        ("{}upperleg", "{}lowerleg", "{}foot", "{}toes|{}foot/end", "{}upperarm", "{}lowerarm", "{}hand"),
+    ),
+    _table(
+        "OptiTrack",
+        "l|r",
+        ("hip", "chest", "neck", "head"),
+        ("{}thigh", "{}shin", "{}foot", "{}toe|{}foot/end", "{}uarm", "{}farm", "{}hand"),
+    ),
+    _table(
         "Unreal",
         "l|r",
         ("pelvis", "spine05|spine04|spine03|spine02", "neck01|neck", "head"),
@@ -152,7 +171,8 @@ def _matched(table: Table, names: list[str], offsets: np.ndarray) -> tuple[list[
 def _prefixes(names: list[str]) -> list[str]:
     """What may stand before all names: nothing, or what stands before a pelvis' name; the shortest first."""
     words = {word for table in TABLES for word in table.trunk["pelvis"]}
-    return sorted({name.removesuffix(word) for name in names for word in words if name.endswith(word)} | {""}, key=len)
+    found = {name.removesuffix(word) for name in names for word in words if name.endswith(word)} | {""}
+    return sorted(found, key=lambda prefix: (len(prefix), prefix))[:_PREFIXES]
 
 
 def _plain(name: str) -> str:

@@ -22,6 +22,12 @@ Bip01 L Forearm|Bip01 L Hand|Bip01 R UpperArm|Bip01 R Forearm|Bip01 R Hand|Bip01
 Bip01 L Toe0|Bip01 R Thigh|Bip01 R Calf|Bip01 R Foot|Bip01 R Toe0"""
 UNREAL = """root pelvis spine_01 spine_02 spine_03 neck_01 head clavicle_l upperarm_l lowerarm_l hand_l upperarm_r
 lowerarm_r hand_r thigh_l calf_l foot_l ball_l thigh_r calf_r foot_r ball_r"""
+BIOVISION = """Hips Chest Neck Head Head/end LeftCollar LeftUpArm LeftLowArm LeftHand RightCollar RightUpArm RightLowArm
+RightHand LeftUpLeg LeftLowLeg LeftFoot LeftFoot/end RightUpLeg RightLowLeg RightFoot RightFoot/end"""
+UNITY = """Hips Spine Chest UpperChest Neck Head LeftShoulder LeftUpperArm LeftLowerArm LeftHand RightUpperArm
+RightLowerArm RightHand LeftUpperLeg LeftLowerLeg LeftFoot LeftToes RightUpperLeg RightLowerLeg RightFoot RightToes"""
+OPTITRACK = """S_Hip S_Ab S_Chest S_Neck S_Head S_LShoulder S_LUArm S_LFArm S_LHand S_RUArm S_RFArm S_RHand S_LThigh
+S_LShin S_LFoot S_LToe S_RThigh S_RShin S_RFoot S_RToe"""
 SMPL = """Pelvis L_Hip R_Hip Spine1 L_Knee R_Knee Spine2 L_Ankle R_Ankle Spine3 L_Foot R_Foot Neck L_Collar R_Collar
 Head L_Shoulder R_Shoulder L_Elbow R_Elbow L_Wrist R_Wrist L_Hand R_Hand"""
 
@@ -40,6 +46,9 @@ def found(names: list[str], at_parent: tuple[str, ...] = ()) -> dict[str, str]:
         (CMU43, {"left_shoulder": "lShldr", "right_knee": "rShin", "left_toe": "lFoot/end", "chest": "chest"}),
         (LAFAN1, {"left_toe": "LeftToe", "chest": "Spine2", "left_knee": "LeftLeg", "right_elbow": "RightForeArm"}),
         (UNREAL, {"left_toe": "ball_l", "chest": "spine_03", "pelvis": "pelvis", "right_hip": "thigh_r"}),
+        (BIOVISION, {"left_toe": "LeftFoot/end", "chest": "Chest", "left_knee": "LeftLowLeg"}),
+        (UNITY, {"left_toe": "LeftToes", "chest": "UpperChest", "left_shoulder": "LeftUpperArm"}),
+        (OPTITRACK, {"left_toe": "S_LToe", "left_shoulder": "S_LUArm", "pelvis": "S_Hip"}),
         (SMPL, {"left_toe": "L_Foot", "chest": "Spine3", "left_shoulder": "L_Shoulder", "head": "Head"}),
         (SMPL.replace("L_", "left_").replace("R_", "right_"), {"left_toe": "left_Foot", "right_hip": "right_Hip"}),
     ],
@@ -83,6 +92,7 @@ def test_left_and_right_are_never_exchanged_in_the_tables():
         ([*LAFAN1.split(), "Left_Foot"], "none for left_ankle"),
         (["root", "tail", "wing"], "a skeleton that is not known"),
         (["x" * 80] * 1000, "a skeleton that is not known"),
+        ([f"{number}hip" for number in range(1000)], "none for left_hip"),
     ],
 )
 def test_a_skeleton_without_match_is_one_line_about_what_is_missing(names, words):
