@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Look at motions, convert them, play them.", no_args_is_help=True)
 
+_NAMED = 8  # motions in a line that asks for one of them
+
 Where = Annotated[Path, typer.Argument(metavar="PATH", help="A motion file, a folder, or a motion library.")]
 CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
 Settings = Annotated[
@@ -191,15 +193,13 @@ def _chosen(path: Path, name: str, options: "RobotConfig") -> "Clip":
         names.append(found.name)
         if name in ("", found.name):
             clip = found
-        if name and clip is not None:
-            return clip
-    if clip is not None and len(names) == 1:
+        if (name and clip is not None) or (not name and len(names) > _NAMED):
+            break
+    if clip is not None and (name or len(names) == 1):
         return clip
-    some = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
+    some = ", ".join(names[:_NAMED]) + (" ..." if len(names) > _NAMED else "")
     if names:
-        raise BadInput(
-            path, "the name of one motion", repr(name) if name else f"{len(names)} motions", f"--motion: {some}"
-        )
+        raise BadInput(path, "the name of one motion", repr(name) if name else "several motions", f"--motion: {some}")
     raise BadInput(path, "a motion of the robot", f"none that can be used; the first: {' '.join(reasons[:1])}"[:1500])
 
 

@@ -122,7 +122,7 @@ def test_play_asks_for_what_it_needs(folder, tmp_path, capsys, monkeypatch):
     (tmp_path / "mine.gif").write_text("precious")
     cases = [
         ((folder / "walk.pkl",), "--out: expected film.gif or film.png on a machine without a display"),
-        ((folder, "--out", tmp_path / "a.gif", "--csv-fps", 50), "came 2 motions. --motion: sway, walk"),
+        ((folder, "--out", tmp_path / "a.gif", "--csv-fps", 50), "came several motions. --motion: sway, walk"),
         ((folder, "--out", tmp_path / "a.gif", "--motion", "run"), "expected the name of one motion, came 'run'"),
         (
             (folder / "bad.pkl", "--out", tmp_path / "a.gif"),
