@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Look at motions, convert them, play them.", no_args_is_help=True)
 
+_NAMED = 8  # motions in a line that asks for one of them
+
 Where = Annotated[Path, typer.Argument(metavar="PATH", help="A motion file, a folder, or a motion library.")]
 CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
-CsvLength = Annotated[str, typer.Option("--csv-length", help="m, cm or mm: of CSV files with Euler angles.")]
-CsvAngle = Annotated[str, typer.Option("--csv-angle", help="rad or deg: of the same files.")]
-CsvEuler = Annotated[str, typer.Option("--csv-euler", help="Their order: xyz about the world's axes, XYZ the body's.")]
-NpzJoints = Annotated[str, typer.Option("--npz-joints", help="depth_first (MuJoCo) or breadth_first (Isaac).")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="csv_length, csv_angle, csv_euler, npz_joints: docs/data.md."),
+]
 Rows = Annotated[int, typer.Option("--rows", min=1, help="Rows of the table at most; all are counted.")]
 
 
@@ -30,17 +32,14 @@ Rows = Annotated[int, typer.Option("--rows", min=1, help="Rows of the table at m
 def inspect(
     path: Where,
     csv_fps: CsvFps = None,
-    csv_length: CsvLength = "",
-    csv_angle: CsvAngle = "",
-    csv_euler: CsvEuler = "",
-    npz_joints: NpzJoints = "",
+    settings: Settings = None,
     rows: Rows = 200,
 ) -> None:
     """A table of motions: format, rate and who says it, length, height, captions, licence; bad files one line each."""
     from bumblebee.motion.inspect import Counts
     from bumblebee.motion.inspect import inspect as look
 
-    options = _options(csv_fps, csv_length, csv_angle, csv_euler, npz_joints)
+    options = _options(csv_fps, settings)
     shown_rows: list[Inspected] = []
     counts, first = Counts(), ""
     for found in look(path, options):
@@ -66,10 +65,7 @@ def convert(
     to: Annotated[str, typer.Option("--to", help="g1_csv, asap, mjlab or library.")],
     fps: Annotated[float | None, typer.Option("--fps", min=1, max=1000, help="Rate of what is written.")] = None,
     csv_fps: CsvFps = None,
-    csv_length: CsvLength = "",
-    csv_angle: CsvAngle = "",
-    csv_euler: CsvEuler = "",
-    npz_joints: NpzJoints = "",
+    settings: Settings = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what was converted before.")] = False,
 ) -> None:
     """Write motions in another format; without --fps at their own rate, 50 Hz for mjlab and libraries."""
@@ -80,7 +76,7 @@ def convert(
 
     if to not in KINDS:
         raise BadInput("--to", f"one of {', '.join(KINDS)}", repr(to)[:60])
-    config = ConvertConfig(to, fps, _options(csv_fps, csv_length, csv_angle, csv_euler, npz_joints))
+    config = ConvertConfig(to, fps, _options(csv_fps, settings))
     began = time.monotonic()
     done = write(path, out, config, overwrite, lambda line: print(f"skipped: {line}", file=sys.stderr))
     rates = ", ".join(f"{rate:g}" for rate in sorted(done.rates))
@@ -102,40 +98,46 @@ def play(
     path: Where,
     motion: Annotated[str, typer.Option("--motion", help="Which, where there are several: its name.")] = "",
     out: Annotated[Path | None, typer.Option("--out", help="film.gif, or film.png for a filmstrip.")] = None,
-    start: Annotated[float, typer.Option("--start", min=0, help="Where it begins [s].")] = 0.0,
-    seconds: Annotated[float, typer.Option("--seconds", min=0.1, max=120, help="How much is shown.")] = 10.0,
+    seconds: Annotated[tuple[float, float], typer.Option("--seconds", help="From and to: the part that is shown.")] = (
+        0.0,
+        10.0,
+    ),
     panels: Annotated[int, typer.Option("--panels", min=1, max=40, help="Frames of a filmstrip.")] = 8,
     csv_fps: CsvFps = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+    settings: Settings = None,
 ) -> None:
     """Show a motion on the robot: in a window, or with --out as a film or a filmstrip."""
     if out is not None:
-        _claim_picture(out, path, overwrite)
+        _claim_picture(out, path)
     elif not _display():
         raise BadInput("--out", "film.gif or film.png on a machine without a display", "nothing")
-    clip = _chosen(path, motion, csv_fps)
+    clip = _chosen(path, motion, _options(csv_fps, settings))
     if out is None:
         _window(clip)
         return
     from bumblebee.report.playback import PlayConfig, write_pictures
 
-    said = write_pictures(out, clip, PlayConfig(panels=panels, start=start, seconds=seconds))
+    said = write_pictures(out, clip, PlayConfig(panels=panels, start=seconds[0], end=seconds[1]))
     print(f"{clip.name}: {said}")
     print(f"written: {out}")
 
 
-def _options(csv_fps: float | None, *rest: str) -> "RobotConfig":
-    """The readers' settings; what is out of range is said by the option's name."""
-    from bumblebee.motion.formats.config import RobotConfig
+def _options(csv_fps: float | None, settings: list[str] | None) -> "RobotConfig":
+    """The readers' settings, of which each is a word; what is out of range is said by its name."""
+    from bumblebee.motion.formats.config import WORDS, RobotConfig
     from bumblebee.ranges import Unfit
 
-    names: Any = ("csv_length", "csv_angle", "csv_euler", "npz_joints")
-    given: dict[str, Any] = dict(zip(names, rest, strict=False))
+    given: dict[str, Any] = {}
+    for text in settings or []:
+        key, _, value = text.partition("=")
+        if key not in WORDS:
+            raise BadInput("--set", f"KEY=VALUE with a key among {', '.join(WORDS)}", repr(text)[:80])
+        given[key] = value
     try:
         return RobotConfig(csv_fps=csv_fps, **given)
     except Unfit as error:
         expected = error.expected.replace("one of , ", "one of ")  # "" stands for: not said
-        raise BadInput(f"--{error.field.replace('_', '-')}", expected, error.came) from None
+        raise BadInput(f"--set {error.field}", expected, error.came) from None
 
 
 def _print_table(rows: "list[Inspected]", path: Path) -> None:
@@ -180,38 +182,33 @@ def _line(text: str) -> str:
     return "".join(sign if sign.isprintable() else "\ufffd" for sign in text)
 
 
-def _chosen(path: Path, name: str, csv_fps: float | None) -> "Clip":
+def _chosen(path: Path, name: str, options: "RobotConfig") -> "Clip":
     """The motion of that name at a path, or the only one."""
     from bumblebee.motion.convert import clips_at
-    from bumblebee.motion.formats.config import RobotConfig
 
     names: list[str] = []
     reasons: list[str] = []
     clip = None
-    for found in clips_at(path, RobotConfig(csv_fps=csv_fps), reasons.append):
+    for found in clips_at(path, options, reasons.append):
         names.append(found.name)
         if name in ("", found.name):
             clip = found
-        if name and clip is not None:
-            return clip
-    if clip is not None and len(names) == 1:
+        if (name and clip is not None) or (not name and len(names) > _NAMED):
+            break
+    if clip is not None and (name or len(names) == 1):
         return clip
-    some = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
+    some = ", ".join(names[:_NAMED]) + (" ..." if len(names) > _NAMED else "")
     if names:
-        raise BadInput(
-            path, "the name of one motion", repr(name) if name else f"{len(names)} motions", f"--motion: {some}"
-        )
+        raise BadInput(path, "the name of one motion", repr(name) if name else "several motions", f"--motion: {some}")
     raise BadInput(path, "a motion of the robot", f"none that can be used; the first: {' '.join(reasons[:1])}"[:1500])
 
 
-def _claim_picture(out: Path, path: Path, overwrite: bool) -> None:
-    from bumblebee.io.write import refuse_overlap, try_output
+def _claim_picture(out: Path, path: Path) -> None:
+    from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output
 
     refuse_overlap(out, [path])
+    refuse_foreign(out, lambda path: False, "nothing")
     try_output(out)
-    if os.path.lexists(out) and (out.is_symlink() or not out.is_file() or not overwrite):
-        remedy = "Add --overwrite to replace it." if out.is_file() and not out.is_symlink() else "Choose another name."
-        raise BadInput(out, "a new file", "something that is there", remedy)
 
 
 def _display() -> bool:

@@ -82,7 +82,8 @@ def test_convert_writes_and_says_the_rates(folder, tmp_path, capsys):
     ("arguments", "line"),
     [
         (("--to", "bvh"), "--to: expected one of g1_csv, asap, mjlab, library"),
-        (("--to", "asap", "--csv-length", "inch"), "--csv-length: expected one of m, cm, mm"),
+        (("--to", "asap", "--set", "csv_length=inch"), "--set csv_length: expected one of m, cm, mm"),
+        (("--to", "asap", "--set", "rate=3"), "--set: expected KEY=VALUE with a key among csv_length, csv_angle"),
         (("--to", "asap", "--fps", "0"), "Invalid value for '--fps'"),
     ],
 )
@@ -121,16 +122,21 @@ def test_play_asks_for_what_it_needs(folder, tmp_path, capsys, monkeypatch):
     (tmp_path / "mine.gif").write_text("precious")
     cases = [
         ((folder / "walk.pkl",), "--out: expected film.gif or film.png on a machine without a display"),
-        ((folder, "--out", tmp_path / "a.gif", "--csv-fps", 50), "came 2 motions. --motion: sway, walk"),
+        ((folder, "--out", tmp_path / "a.gif", "--csv-fps", 50), "came several motions. --motion: sway, walk"),
         ((folder, "--out", tmp_path / "a.gif", "--motion", "run"), "expected the name of one motion, came 'run'"),
         (
             (folder / "bad.pkl", "--out", tmp_path / "a.gif"),
             "expected a motion of the robot, came none that can be used",
         ),
         ((folder / "walk.pkl", "--out", tmp_path / "a.mp4"), "a name that ends in .gif or .png"),
-        ((folder / "walk.pkl", "--out", tmp_path / "a.gif", "--start", 9), "within the motion's 1.2 s, came 9 s"),
-        ((folder / "walk.pkl", "--out", tmp_path / "mine.gif"), "Add --overwrite to replace it"),
-        ((folder / "walk.pkl", "--out", folder / "walk.pkl", "--overwrite"), "a place apart from what is read"),
+        (
+            (folder / "walk.pkl", "--out", tmp_path / "a.gif", "--seconds", 9, 10),
+            "of the motion's 0 to 1.2 s, came 9 to 10",
+        ),
+        ((folder / "walk.pkl", "--out", tmp_path / "a.gif", "--seconds", "nan", 10), "of the motion's 0 to 1.2 s"),
+        ((folder / "walk.pkl", "--out", tmp_path / "a.gif", "--seconds", 0, 900), "expected at most 120 s, came 900"),
+        ((folder / "walk.pkl", "--out", tmp_path / "mine.gif"), "expected a new name"),
+        ((folder / "walk.pkl", "--out", folder / "walk.pkl"), "a place apart from what is read"),
     ]
     for arguments, line in cases:
         assert run("play", *arguments) == 2, arguments

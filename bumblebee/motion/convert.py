@@ -195,16 +195,25 @@ class _Names:
     """Names of files, no two alike, also where the file system does not tell cases apart."""
 
     def __init__(self) -> None:
-        self._taken: set[str] = set()
+        self._taken = {_folded(Path(LICENCES).stem)}
+        self._last: dict[str, int] = {}  # so that a hundred thousand motions of one name need no search each
 
     def distinct(self, name: str, folder: str) -> str:
         """`name`, with the folder's in front where it is taken, with a number where that is not enough."""
-        tried, number = name, 1
-        while tried.replace(".", "_").casefold() in self._taken:
+        tried = name
+        if _folded(tried) in self._taken and folder:
+            tried = safe_stem(f"{folder[:20]}_{name}")
+        stem, number = tried[:100], self._last.get(_folded(tried[:100]), 1)
+        while _folded(tried) in self._taken:
             number += 1
-            tried = safe_stem(f"{folder}_{name}") if number == 2 and folder else f"{name[:100]}_{number}"
-        self._taken.add(tried.replace(".", "_").casefold())
+            tried = f"{stem}_{number}"
+        self._last[_folded(stem)] = number
+        self._taken.add(_folded(tried))
         return tried
+
+
+def _folded(name: str) -> str:
+    return name.replace(".", "_").casefold()
 
 
 def _counted(clips: Iterable[Clip], done: Converted) -> Iterator[Clip]:

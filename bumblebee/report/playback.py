@@ -17,6 +17,7 @@ from bumblebee.robot.model import build_spec
 SUFFIXES = (".gif", ".png")
 _WIDTH, _HEIGHT = 320, 300  # pixels of a frame
 _SCALE, _GROUND = 170, 262  # pixels a metre; the row of the floor
+_LONGEST = 120.0  # s of a film
 _VIEW = (0.6, -0.8)  # how far x and y go to the right
 _BONES = (
     ("pelvis", "left_hip_roll_link", "left_knee_link", "left_ankle_roll_link"),
@@ -38,8 +39,8 @@ class PlayConfig:
     """Frames of a filmstrip."""
     start: float = 0.0
     """Where it begins [s]."""
-    seconds: float = 10.0
-    """How much is shown at most."""
+    end: float = 10.0
+    """Where it ends at the latest [s]."""
 
 
 def write_pictures(path: Path, clip: Clip, config: PlayConfig | None = None) -> str:
@@ -76,10 +77,12 @@ def pictures(clip: Clip, rows: np.ndarray) -> tuple[np.ndarray, str]:
 
 def _rows(clip: Clip, config: PlayConfig, film: bool) -> tuple[np.ndarray, float]:
     """Which frames are shown, and the film's rate [Hz]."""
-    first = round(config.start * clip.fps)
-    if not 0 <= first < clip.frames:
-        raise BadInput("start", f"a time within the motion's {clip.duration:.1f} s", f"{config.start:g} s")
-    last = min(clip.frames - 1, first + round(config.seconds * clip.fps))
+    if not 0 <= config.start <= min(config.end, clip.duration):  # also for NaN
+        came = f"{config.start:g} to {config.end:g} s"
+        raise BadInput("--seconds", f"a part of the motion's 0 to {clip.duration:.1f} s", came)
+    if config.end - config.start > _LONGEST:
+        raise BadInput("--seconds", f"at most {_LONGEST:g} s", f"{config.end - config.start:g}")
+    first, last = round(config.start * clip.fps), min(clip.frames - 1, round(min(config.end, 1e6) * clip.fps))
     if film:
         step = max(round(clip.fps / config.fps), 1)
         return np.arange(first, last + 1, step), clip.fps / step

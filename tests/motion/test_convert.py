@@ -137,3 +137,13 @@ def test_names_with_dots_stay_apart_where_asap_cuts_them(motions, tmp_path):
     assert len(files) == 2
     for file in files:
         assert list(joblib.load(tmp_path / "out" / file)) == [file.split(".")[0]]
+
+
+def test_many_motions_of_one_name_and_one_called_like_the_table_stay_apart(motions, tmp_path):
+    for name in ("in/a/LICENCES.pkl", "in/a/Walk.pkl", "in/b/walk.pkl", "in/c/walk.pkl", "in/b/c/walk.pkl"):
+        motions.pickle(motions.raw(20), name)
+    done = convert(tmp_path / "in", tmp_path / "out", ConvertConfig("g1_csv"))
+    names = sorted(os.listdir(tmp_path / "out"))
+    assert done.written == 5 and len({name.casefold() for name in names}) == 6
+    assert {"LICENCES.csv", "a_LICENCES.csv", "Walk.csv", "b_walk.csv", "c_walk.csv", "c_walk_2.csv"} == set(names)
+    assert {row["file"] for row in rows_of(tmp_path / "out")} == set(names) - {LICENCES}

@@ -18,7 +18,7 @@ _QUATERNION, _EULER = 7, 6  # columns of the root
 _COUNTERS = ("frame", "frame_id", "frame_index", "index")
 _SOMA = tuple(f"root_{what}{axis}" for what in ("translate", "rotate") for axis in "xyz")
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-_REMEDY = "Say it: motions.read.csv_length, csv_angle and csv_euler, or --csv-length, --csv-angle and --csv-euler."
+_REMEDY = "Say it: motions.read.csv_length, csv_angle and csv_euler (--set csv_length=cm --set csv_angle=deg ...)."
 
 
 @dataclass(frozen=True)

@@ -87,11 +87,11 @@ def _units_hold(path: Path, values: np.ndarray, layout: CsvLayout) -> None:
         return  # the checks of every motion name the cell
     height = float(np.median(values[:, layout.position[2]]))
     if not _LOW <= abs(height) * layout.metres <= _HIGH:
-        remedy = "Other units? Set motions.read.csv_length, csv_angle and csv_euler (--csv-length ...)."
+        remedy = "Other units? Set motions.read.csv_length, csv_angle and csv_euler (--set csv_length=m ...)."
         raise BadInput(f"{path}, root height", f"{layout.unit}", f"{height:.4g} in the median", remedy)
     angle = float(np.abs(values[:, layout.joints]).max())
     if layout.degrees and angle < _TURN:
-        remedy = "Radians, or a robot that never moves: set motions.read.csv_length, csv_angle and csv_euler."
+        remedy = "Radians? Set motions.read.csv_length, csv_angle and csv_euler (--set csv_angle=rad ...)."
         raise BadInput(f"{path}, joint angles", "degrees", f"none above {angle:.3g}", remedy)
 
 

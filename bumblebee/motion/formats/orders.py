@@ -115,7 +115,7 @@ def detect(
     return best
 
 
-DEMAND = "Say it: motions.read.npz_joints, or --npz-joints: depth_first (MuJoCo, mjlab) or breadth_first (Isaac)."
+DEMAND = "Say it: motions.read.npz_joints (--set npz_joints=...): depth_first (MuJoCo, mjlab) or breadth_first (Isaac)."
 
 
 def _alike(joints: np.ndarray, one: Order, other: Order) -> bool:

@@ -2,6 +2,7 @@
 
 import io
 from dataclasses import replace
+from pathlib import Path
 
 import joblib
 import mujoco
@@ -37,8 +38,6 @@ def read(clip, kind, fps):
 
 
 def clip_path(kind):
-    from pathlib import Path
-
     return Path(f"a{FORMATS[kind].suffix}")
 
 
