@@ -3,20 +3,19 @@
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import LIMITS
-from bumblebee.io.read import read_bytes
 from bumblebee.motion import walk
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.formats.read import PICKLES, RobotConfig, is_robot_npz, read_robot
 from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.human.read import read_human
 from bumblebee.motion.licence_table import LICENCES, stated_of
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.sources import Source
-from bumblebee.motion.store import read_index, read_indexed
+from bumblebee.motion.store import Library
 from bumblebee.motion.texts import shown
 
 Motion = RawMotion | HumanMotion | Clip
@@ -69,19 +68,8 @@ def find_motions(path: Path, options: RobotConfig | None = None, readers: Reader
 
 
 def usual_readers() -> Readers:
-    """Files of folders, archives and libraries; people's motion where its readers are installed."""
-    sources = getattr(walk, "motion_sources", file_sources)
-    try:
-        from bumblebee.motion.human.read import read_human
-    except ImportError:
-        return Readers(sources)
-    return Readers(sources, lambda path, data: read_human(path, data, None))
-
-
-def file_sources(path: Path) -> Iterator[Source]:
-    """The motion files at or below `path`, archives unopened."""
-    for file in walk.motion_files(path):
-        yield Source(file, partial(read_bytes, file))
+    """Files of folders, members of archives, libraries; people's motion with nothing set."""
+    return Readers(walk.motion_sources, read_human)
 
 
 def _file(source: Source, options: RobotConfig, readers: Readers) -> Found:
@@ -113,17 +101,17 @@ def _robot(path: Path, data: bytes, options: RobotConfig) -> list[RawMotion]:
 
 def _library(folder: Path) -> Iterator[Found]:
     """The clips of a library, each by itself: a damaged one does not take the others with it."""
+    path = folder / walk.INDEX
     try:
-        rows = read_index(folder).to_dict("records")
+        library = Library(folder)
     except BadInput as error:
-        yield Found(folder / walk.INDEX, reason=reason_of(error, folder / walk.INDEX))
+        yield Found(path, reason=reason_of(error, path))
         return
-    for row in rows:
-        path = folder / "clips" / f"{row['name']}.parquet"
-        try:
-            yield Found(path, (read_indexed(folder, {str(key): value for key, value in row.items()}),))
-        except BadInput as error:
-            yield Found(path, reason=reason_of(error, path))
+    for name, clip in library.each():
+        if isinstance(clip, BadInput):
+            yield Found(folder / name, reason=reason_of(clip, folder))
+        else:
+            yield Found(folder / name, (clip,))
 
 
 def reason_of(error: BadInput, path: Path) -> str:

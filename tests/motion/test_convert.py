@@ -12,8 +12,9 @@ from bumblebee.motion.convert import KINDS, ConvertConfig, convert
 from bumblebee.motion.formats.read import RobotConfig, read_robot
 from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
 from bumblebee.motion.licence_table import LICENCES
-from bumblebee.motion.listing import Readers, file_sources
+from bumblebee.motion.listing import Readers
 from bumblebee.motion.store import read_library
+from bumblebee.motion.walk import motion_sources
 
 CSV = RobotConfig(csv_fps=30)
 
@@ -116,7 +117,7 @@ def test_people_are_left_to_retargeting_and_counted(motions, tmp_path):
 
     motions.pickle(motions.raw(), "in/a.pkl")
     (tmp_path / "in/b.bvh").write_text("bvh")
-    done = convert(tmp_path / "in", tmp_path / "out", ConvertConfig("asap"), readers=Readers(file_sources, person))
+    done = convert(tmp_path / "in", tmp_path / "out", ConvertConfig("asap"), readers=Readers(motion_sources, person))
     assert done.written == 1 and "a person's. It must be retargeted first." in done.skipped[0][1]
 
 

@@ -10,9 +10,10 @@ from bumblebee.errors import BadInput
 from bumblebee.motion.formats.read import RobotConfig
 from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
 from bumblebee.motion.inspect import Counts, inspect
-from bumblebee.motion.listing import Readers, file_sources, find_motions
+from bumblebee.motion.listing import Readers, find_motions
 from bumblebee.motion.sources import Source
 from bumblebee.motion.store import write_library
+from bumblebee.motion.walk import motion_sources
 
 CONFIG = RobotConfig(csv_fps=30)
 
@@ -25,7 +26,7 @@ def person(path: Path, data: bytes) -> list[HumanMotion]:
     return [HumanMotion(path.stem, 120.0, positions, path, notes=("y up",))]
 
 
-FAKES = Readers(file_sources, person)
+FAKES = Readers(motion_sources, person)
 
 
 def test_a_folder_of_everything_gives_rows_and_counts_that_add_up(motions, tmp_path):
@@ -58,18 +59,19 @@ def test_a_folder_of_everything_gives_rows_and_counts_that_add_up(motions, tmp_p
 
 def test_without_readers_of_people_their_files_are_refused_by_name(tmp_path):
     (tmp_path / "walk.bvh").write_text("good")
-    (found,) = find_motions(tmp_path, CONFIG, Readers(file_sources))
+    (found,) = find_motions(tmp_path, CONFIG, Readers(motion_sources))
     assert not found.motions and "expected a motion of the G1" in found.reason
 
 
-def test_a_library_counts_clip_by_clip_and_a_damaged_one_is_one_line(motions, tmp_path):
+def test_a_library_counts_clip_by_clip_and_a_damaged_one_is_a_line_for_each(motions, tmp_path):
     write_library(tmp_path / "lib", [motions.clip(name) for name in ("a", "b", "c")])
-    path = tmp_path / "lib/clips/b.parquet"
-    path.write_bytes(path.read_bytes()[:200])
-    found = list(find_motions(tmp_path / "lib", CONFIG, FAKES))
-    assert [len(one.motions) for one in found] == [1, 0, 1] and found[1].reason
     (rows,) = list(inspect(tmp_path / "lib", CONFIG, FAKES))[:1]
-    assert rows[0].format == rows[0].rate_from == "library"
+    assert rows[0].format == rows[0].rate_from == "library" and rows[0].name == "a"
+    (shard,) = (tmp_path / "lib/clips").iterdir()
+    shard.write_bytes(shard.read_bytes()[:200])
+    found = list(find_motions(tmp_path / "lib", CONFIG, FAKES))
+    assert [one.path.name for one in found] == ["a", "b", "c"]
+    assert all(one.reason and not one.motions for one in found)
 
 
 def test_members_of_archives_are_read_by_their_own_names(motions, tmp_path):
@@ -85,7 +87,7 @@ def test_a_mistake_of_ours_costs_one_file(motions, tmp_path):
 
     (tmp_path / "a.bvh").write_text("good")
     motions.csv(motions.raw(), "b.csv")
-    found = list(find_motions(tmp_path, CONFIG, Readers(file_sources, broken)))
+    found = list(find_motions(tmp_path, CONFIG, Readers(motion_sources, broken)))
     assert "ZeroDivisionError: oops): please report this" in found[0].reason and found[1].motions
 
 
