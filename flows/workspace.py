@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import bumblebee
 from bumblebee.errors import BadInput
 from flows.environment import environment
 from tasks import params, paths
+from tasks.filter_files import files_named
 
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")
@@ -54,7 +56,7 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
     for name in CODE:
         _link(folder / name, HOME / name)
     _write(folder / ".dvcignore", (HOME / ".dvcignore").read_text())
-    _write(folder / "dvc.yaml", stages_with(motions_of(content)))
+    _write(folder / "dvc.yaml", stages_with(motions_of(content), [file for _, file in files_named(content)]))
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     if edited is None or content != edited:
         _write(folder / "params.yaml", text)
@@ -94,13 +96,20 @@ def motions_of(content: dict[str, Any]) -> Path | None:
         return None
 
 
-def stages_with(motions: Path | None) -> str:
-    """dvc.yaml, in which the stage motions also depends on the user's folder, so that new files make it stale."""
+def stages_with(motions: Path | None, of_filter: Sequence[str] = ()) -> str:
+    """dvc.yaml, in which the user's folder and files are dependencies, too, so that what is new there makes stale.
+
+    Args:
+        motions: read by the stage motions.
+        of_filter: files and folders that the section filter names, as they stand there.
+    """
     text = (HOME / "dvc.yaml").read_text()
-    if motions is None:
+    if motions is None and not of_filter:
         return text
     pipeline = yaml.safe_load(text)
-    pipeline["stages"]["motions"]["deps"].append(str(motions.expanduser().resolve()))
+    if motions is not None:
+        pipeline["stages"]["motions"]["deps"].append(str(motions.expanduser().resolve()))
+    pipeline["stages"]["filter"]["deps"] += of_filter
     return yaml.safe_dump(pipeline, sort_keys=False, width=120)
 
 
