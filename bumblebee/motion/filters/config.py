@@ -21,7 +21,7 @@ class FilterConfig(Ranged):
     """A frame whose lowest point is higher than this counts as airborne [m]."""
     airborne_seconds: Limit = 1.0
     """How long the robot may be airborne without a break [s]."""
-    skate: Limit = 0.5
+    skate: Limit = 0.6
     """How fast the soles may slide over the floor, in the mean over all frames in which they are on it [m/s]."""
     other_contact_height: Limit = 0.02
     """A body that is no foot is on the floor where its lowest point is lower than this [m]."""
@@ -37,8 +37,8 @@ class FilterConfig(Ranged):
     """How fast the pelvis may move from one frame to the next [m/s]; beyond it the motion jumps."""
     root_turn: Speed = 15.0
     """How fast the pelvis may turn from one frame to the next [rad/s]; beyond it the motion flips."""
-    spike: Speed = 500.0
-    """Acceleration of a keypoint over three frames [m/s^2], 50 g; beyond it a frame lies beside its neighbours."""
+    spike: Speed = 600.0
+    """Acceleration of a keypoint over three frames [m/s^2], 60 g; beyond it a frame lies beside its neighbours."""
     self_collision_depth: Limit = 0.05
     """Links whose collision primitives overlap by more than this lie in each other [m]."""
     self_collision_seconds: Limit = 0.5
