@@ -83,7 +83,7 @@ def decide(rows: Sequence[dict[str, Any]], config: FilterStageConfig) -> list[De
 def try_policy(rows: Sequence[dict[str, Any]], config: PolicyFilter) -> dict[str, dict[str, object]]:
     """The motions that the policy cannot follow, each with the row that says why."""
     found: dict[str, dict[str, object]] = {}
-    ticks = int(sum(row["frames"] for row in rows)) * config.tries
+    ticks = int(sum(row["frames"] for row in rows))
     with loaded(config) as policy, progress(ticks, "filtering by policy", "ticks") as bar:
         for some in _batches(rows, config.at_once):
             found |= unfollowed(policy, some, config, bar.update)

@@ -20,6 +20,7 @@ from bumblebee.deploy.episodes import Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.sensors import NO_NOISE
+from bumblebee.evaluation.contract import StartNoise
 from bumblebee.evaluation.metrics import key_errors
 from bumblebee.learning.export import export_shipped
 from bumblebee.measured.rollout import Rollout
@@ -27,7 +28,7 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.filter import row_of
 from bumblebee.motion.filters.worst import Worst
 from bumblebee.motion.kinematics import forward_key_positions
-from bumblebee.ranges import Count, Few, Line, Range, Ranged, Seed
+from bumblebee.ranges import Count, Few, Line, Range, Ranged
 from tasks.filter_files import SHIPPED
 
 RULE = "policy"
@@ -42,10 +43,6 @@ class PolicyFilter(Ranged):
     motions. Else the folder of an exported policy (`policy.onnx` and `contract.json`)."""
     distance: Annotated[float, Range(above=0, most=100)] = 0.5
     """How far the key bodies may be from the reference, in their mean, at any time [m]."""
-    tries: Few = 1
-    """Start states of each motion; it is kept if the policy follows it from one of them."""
-    seed: Seed = 0
-    """Of the start states."""
     at_once: Count = 64
     """Motions that are simulated side by side."""
     threads: Few = 2
@@ -68,7 +65,7 @@ def unfollowed(
     config: PolicyFilter,
     on_tick: Callable[[int], None] = lambda ended: None,
 ) -> dict[str, dict[str, object]]:
-    """The clips that the policy cannot follow, by name, each with its best try as a row of `DROP_COLUMNS`.
+    """The clips that the policy cannot follow, by name, each as a row of `DROP_COLUMNS`.
 
     Args:
         policy: what is run.
@@ -77,20 +74,22 @@ def unfollowed(
         on_tick: told how many robot ticks were simulated.
     """
     by_name = {clip.name: clip for clip in clips}
-    planned = [
-        Episode(f"{name}-{number}", RULE, name, config.seed + number)
-        for name in by_name
-        for number in range(config.tries)
-    ]
+    planned = [Episode(name, RULE, name, seed=0) for name in by_name]  # without noise a seed decides nothing
     rollouts = run_episodes(
-        lambda count: NominalRobots(count, config.threads), planned, {RULE: policy}, by_name, NO_NOISE, on_tick=on_tick
+        lambda count: NominalRobots(count, config.threads),
+        planned,
+        {RULE: policy},
+        by_name,
+        NO_NOISE,
+        StartNoise(joint_pos=0.0, joint_vel=0.0),
+        on_tick,
     )
-    best: dict[str, tuple[bool, Worst]] = {}
-    for episode, rollout in zip(planned, rollouts, strict=True):
-        found = judged(rollout, by_name[episode.motion], config.distance)
-        if episode.motion not in best or (not found[0], found[1].value) < _rank(best[episode.motion]):
-            best[episode.motion] = found
-    return {name: row_of(by_name[name], RULE, worst) for name, (followed, worst) in best.items() if not followed}
+    found = {}
+    for (name, clip), rollout in zip(by_name.items(), rollouts, strict=True):
+        followed, worst = judged(rollout, clip, config.distance)
+        if not followed:
+            found[name] = row_of(clip, RULE, worst)
+    return found
 
 
 def judged(rollout: Rollout, clip: Clip, limit: float) -> tuple[bool, Worst]:
@@ -110,8 +109,3 @@ def judged(rollout: Rollout, clip: Clip, limit: float) -> tuple[bool, Worst]:
         said = f"the policy falls; until then its key bodies are at most {worst:.2f} m from the motion in their mean"
         return False, Worst(worst, limit, "m", length, said)
     return True, Worst(worst, limit, "m", frame, f"followed within {worst:.2f} m")
-
-
-def _rank(found: tuple[bool, Worst]) -> tuple[bool, float]:
-    """Smaller is better."""
-    return not found[0], found[1].value

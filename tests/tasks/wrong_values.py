@@ -61,7 +61,7 @@ WRONG: list[tuple[str, Any, str]] = [
     *_same("filter.overrule", "a\nb", 5),
     *_same("filter.policy.source", "\x1b[2J", True),
     *_same("filter.policy.distance", 0, NAN),
-    *_same("filter.policy.tries", 0),
+    *_same("filter.policy.threads", 0),
     *_same("filter.policy.at_once", 0),
     *_same("cluster.text_encoder", "", "./nowhere"),
     *_same("cluster.fps", 0, -5, NAN),

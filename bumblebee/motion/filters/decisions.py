@@ -60,7 +60,8 @@ class Decision:
 
 def decisions_table(decisions: Iterable[Decision]) -> pd.DataFrame:
     """One row a motion, columns `DECISION_COLUMNS`."""
-    return pd.DataFrame([one.row() for one in decisions], columns=list(DECISION_COLUMNS))
+    table = pd.DataFrame([one.row() for one in decisions], columns=list(DECISION_COLUMNS))
+    return table.astype({"frame": "Int64"})  # a frame's number stays whole beside motions that have none
 
 
 def drops_table(decisions: Iterable[Decision]) -> pd.DataFrame:
