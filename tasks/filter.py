@@ -44,6 +44,8 @@ def main() -> None:
     config = load("filter", FilterStageConfig)
     require_tracked(config)
     rows = read_index(paths.MOTIONS).to_dict("records")
+    if not rows:
+        raise BadInput(paths.MOTIONS, "at least one motion", "a library of none", "See skipped.csv there.")
     decisions = decide(rows, config)
     tell(decisions)
     kept = {one.motion for one in decisions if one.decision == "keep"}

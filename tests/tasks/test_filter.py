@@ -149,6 +149,12 @@ def test_no_motion_left_ends_in_one_line_and_leaves_nothing(capsys):
     assert not paths.FILTERED.exists()
 
 
+def test_a_library_of_nothing_ends_in_one_line(capsys):
+    with pytest.raises(SystemExit) as caught:
+        run([])
+    assert caught.value.code == 2 and "a library of none" in capsys.readouterr().err
+
+
 def test_a_full_disk_leaves_the_old_result(capsys, monkeypatch):
     run([standing("good")])
 
