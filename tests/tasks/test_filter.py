@@ -149,9 +149,10 @@ def test_no_motion_left_ends_in_one_line_and_leaves_nothing(capsys):
     assert not paths.FILTERED.exists()
 
 
-def test_a_library_of_nothing_ends_in_one_line(capsys):
+def test_a_library_of_nothing_ends_in_one_line(capsys, monkeypatch):
+    monkeypatch.setattr(stage, "read_index", lambda folder: pd.DataFrame(columns=["name"]))
     with pytest.raises(SystemExit) as caught:
-        run([])
+        run_stage(stage.main, [])
     assert caught.value.code == 2 and "a library of none" in capsys.readouterr().err
 
 
