@@ -95,6 +95,8 @@ def unfollowed(
 def judged(rollout: Rollout, clip: Clip, limit: float) -> tuple[bool, Worst]:
     """Whether a rollout followed its clip to the end, and its largest mean distance [m] until it failed."""
     length = min(rollout.frames, clip.frames)
+    if rollout.base_pos is None or rollout.base_quat is None:
+        raise TypeError("robots in simulation log where their base is")
     keys = forward_key_positions(rollout.base_pos[:length], rollout.base_quat[:length], rollout.joint_pos[:length])
     distance = key_errors(keys, clip.key_pos[:length]).mean(axis=1)
     beyond = np.flatnonzero(~(distance <= limit))  # what is no number is beyond any limit

@@ -71,7 +71,7 @@ def drops_table(decisions: Iterable[Decision]) -> pd.DataFrame:
         if one.decision == "drop":
             word = one.overrule
             said = f"{word.who}: {word.reason}" if word else ""
-            own = {"motion": one.motion, "rule": OVERRULED, "explanation": said}
+            own: dict[str, object] = {"motion": one.motion, "rule": OVERRULED, "explanation": said}
             rows += [dict(row) for row in one.broken] or [own]
     return pd.DataFrame(rows, columns=list(DROP_COLUMNS))
 
