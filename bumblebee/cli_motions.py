@@ -12,8 +12,8 @@ from bumblebee.errors import BadInput
 
 if TYPE_CHECKING:
     from bumblebee.motion.clip import Clip
-    from bumblebee.motion.formats.config import RobotConfig
     from bumblebee.motion.inspect import Inspected
+    from bumblebee.motion.one_file import FileConfig
 
 app = typer.Typer(help="Look at motions, convert them, play them.", no_args_is_help=True)
 
@@ -23,7 +23,7 @@ Where = Annotated[Path, typer.Argument(metavar="PATH", help="A motion file, a fo
 CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="csv_length, csv_angle, csv_euler, npz_joints: docs/data.md."),
+    typer.Option("--set", metavar="KEY=VALUE", help="What files leave unsaid: docs/data.md."),
 ]
 Rows = Annotated[int, typer.Option("--rows", min=1, help="Rows of the table at most; all are counted.")]
 
@@ -122,9 +122,9 @@ def play(
     print(f"written: {out}")
 
 
-def _options(csv_fps: float | None, settings: list[str] | None) -> "RobotConfig":
+def _options(csv_fps: float | None, settings: list[str] | None) -> "FileConfig":
     """The readers' settings, of which each is a word; what is out of range is said by its name."""
-    from bumblebee.motion.formats.config import WORDS, RobotConfig
+    from bumblebee.motion.one_file import WORDS, FileConfig
     from bumblebee.ranges import Unfit
 
     given: dict[str, Any] = {}
@@ -134,7 +134,7 @@ def _options(csv_fps: float | None, settings: list[str] | None) -> "RobotConfig"
             raise BadInput("--set", f"KEY=VALUE with a key among {', '.join(WORDS)}", repr(text)[:80])
         given[key] = value
     try:
-        return RobotConfig(csv_fps=csv_fps, **given)
+        return FileConfig(csv_fps=csv_fps, **given)
     except Unfit as error:
         expected = error.expected.replace("one of , ", "one of ")  # "" stands for: not said
         raise BadInput(f"--set {error.field}", expected, error.came) from None
@@ -182,7 +182,7 @@ def _line(text: str) -> str:
     return "".join(sign if sign.isprintable() else "\ufffd" for sign in text)
 
 
-def _chosen(path: Path, name: str, options: "RobotConfig") -> "Clip":
+def _chosen(path: Path, name: str, options: "FileConfig") -> "Clip":
     """The motion of that name at a path, or the only one."""
     from bumblebee.motion.convert import clips_at
 

@@ -14,6 +14,7 @@ import bumblebee
 from bumblebee.errors import BadInput
 from flows.environment import environment
 from tasks import params, paths
+from tasks.filter_files import files_named
 
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")
@@ -57,7 +58,7 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
     for name in CODE:
         _link(folder / name, HOME / name)
     _write(folder / ".dvcignore", (HOME / ".dvcignore").read_text())
-    _write(folder / "dvc.yaml", stages_with(folders_of(content)))
+    _write(folder / "dvc.yaml", stages_with(folders_of(content), [file for _, file in files_named(content)]))
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     if edited is None or content != edited:
         _write(folder / "params.yaml", text)
@@ -100,14 +101,20 @@ def folders_of(content: dict[str, Any]) -> list[Path]:
     return [folder for folder in found if folder.is_absolute() or folder.parts[: len(_RAW)] != _RAW]
 
 
-def stages_with(folders: Sequence[Path]) -> str:
-    """dvc.yaml, in which the stage motions also depends on the user's folders, so that new files make it stale."""
+def stages_with(folders: Sequence[Path], of_filter: Sequence[str] = ()) -> str:
+    """dvc.yaml, in which the user's folders and files are dependencies, too, so that what is new there makes stale.
+
+    Args:
+        folders: read by the stage motions.
+        of_filter: files and folders that the section filter names, as they stand there.
+    """
     text = (HOME / "dvc.yaml").read_text()
-    if not folders:
+    if not folders and not of_filter:
         return text
     pipeline = yaml.safe_load(text)
     deps = pipeline["stages"]["motions"]["deps"]
     deps += [path for path in dict.fromkeys(str(folder.resolve()) for folder in folders) if path not in deps]
+    pipeline["stages"]["filter"]["deps"] += of_filter
     return yaml.safe_dump(pipeline, sort_keys=False, width=120)
 
 

@@ -19,7 +19,7 @@ FILE = Path("params.yaml")
 SECTIONS = {
     "seal": "tasks.seal:SealConfig",
     "motions": "tasks.motions:MotionsConfig",
-    "filter": "bumblebee.motion.filter:FilterConfig",
+    "filter": "tasks.filter:FilterStageConfig",
     "cluster": "bumblebee.clustering.config:ClusterConfig",
     "base": "tasks.base:BaseConfig",
     "experts": "tasks.experts:ExpertsConfig",

@@ -6,6 +6,7 @@ from typing import Any
 from bumblebee.clustering.text import encoder_folder
 from bumblebee.errors import BadInput
 from tasks import paths
+from tasks.filter_files import SHIPPED
 
 
 def check_sources(found: dict[str, Any], path: Path) -> None:
@@ -24,6 +25,13 @@ def check_sources(found: dict[str, Any], path: Path) -> None:
         _require(_at_home(motions.source, place, wanted), place, wanted, either=True)
     if motions.read.captions_folder:
         _require(Path(motions.read.captions_folder), f"{path}: motions.read.captions_folder", "a folder of captions")
+    rules = found["filter"]
+    if rules.overrule and not Path(rules.overrule).is_file():
+        raise BadInput(f"{path}: filter.overrule", "a CSV or YAML file", f"{rules.overrule}: no such file")
+    if rules.policy.source not in ("", SHIPPED):
+        _require(
+            Path(rules.policy.source), f"{path}: filter.policy.source", f"{SHIPPED!r} or an exported policy's folder"
+        )
     try:
         encoder_folder(found["cluster"].text_encoder)
     except BadInput as error:

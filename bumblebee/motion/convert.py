@@ -13,15 +13,16 @@ from bumblebee.io.write import new_folder, refuse_overlap, try_output
 from bumblebee.motion.captions import find_captions
 from bumblebee.motion.checks import check_clip, check_raw
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.formats.read import RobotConfig
 from bumblebee.motion.formats.write import FORMATS, write_motion
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.licence_table import LICENCES, Stated, read_table, stated_of, table_of
 from bumblebee.motion.licences import licence_of
-from bumblebee.motion.listing import Found, Motion, Readers, find_motions, reason_of
+from bumblebee.motion.listing import Found, Motion, find_motions, reason_of
+from bumblebee.motion.one_file import FileConfig
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
+from bumblebee.motion.retarget.retarget import retarget
 from bumblebee.motion.store import write_library
 from bumblebee.motion.texts import shown
 from bumblebee.motion.walk import INDEX
@@ -40,7 +41,8 @@ class ConvertConfig:
     """One of `KINDS`."""
     fps: float | None = None
     """Rate of what is written [Hz]; None: each motion's own, 50 for mjlab and libraries."""
-    robot: RobotConfig = field(default_factory=RobotConfig)
+    files: FileConfig = field(default_factory=FileConfig)
+    """What the files may leave unsaid."""
 
     @property
     def rate(self) -> float | None:
@@ -66,7 +68,6 @@ def convert(
     config: ConvertConfig,
     overwrite: bool = False,
     tell: Callable[[str], None] | None = None,
-    readers: Readers | None = None,
 ) -> Converted:
     """Write the motions at `path` into the folder `out`, which appears whole or not at all.
 
@@ -76,14 +77,13 @@ def convert(
         config: format and rate.
         overwrite: replace an earlier result.
         tell: called with a line for each file or motion that gives nothing.
-        readers: others than the usual.
 
     Raises:
         BadInput: `out` is an input or somebody else's; nothing could be written.
     """
     claim(out, path, config.to, overwrite)
     done = Converted()
-    clips = _clips(path, config, done, tell or (lambda line: None), readers)
+    clips = _clips(path, config, done, tell or (lambda line: None))
     first = next(clips, None)
     if first is None:
         came = f"{done.files:,} files with none that is usable; the first: {': '.join(done.skipped[0])}"
@@ -146,14 +146,12 @@ def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> Clip:
     return clip
 
 
-def clips_at(path: Path, options: RobotConfig, tell: Callable[[str], None]) -> Iterator[Clip]:
+def clips_at(path: Path, files: FileConfig, tell: Callable[[str], None]) -> Iterator[Clip]:
     """The motions at `path` as clips at their own rates, under distinct names; `tell` gets a line for each other."""
-    yield from _clips(path, ConvertConfig("asap", robot=options), Converted(), tell, None)
+    yield from _clips(path, ConvertConfig("asap", files=files), Converted(), tell)
 
 
-def _clips(
-    path: Path, config: ConvertConfig, done: Converted, tell: Callable[[str], None], readers: Readers | None
-) -> Iterator[Clip]:
+def _clips(path: Path, config: ConvertConfig, done: Converted, tell: Callable[[str], None]) -> Iterator[Clip]:
     """The motions that can be written, one after the other, under distinct names; the others are told."""
     names = _Names()
 
@@ -161,7 +159,7 @@ def _clips(
         done.skipped.append((place, reason))
         tell(f"{place}: {reason}")
 
-    for found in find_motions(path, config.robot, readers):
+    for found in find_motions(path, config.files):
         done.files += 1
         place = shown(os.path.relpath(found.path, path) if Path(path).is_dir() else str(found.path))
         if not found.motions:
@@ -179,9 +177,10 @@ def _clips(
 
 def _clip(motion: Motion, found: Found, config: ConvertConfig) -> Clip:
     if isinstance(motion, HumanMotion):
-        raise BadInput(motion.where, "a motion of the robot", "a person's", "It must be retargeted first.")
+        motion = retarget(motion, config.rate or _LIBRARY_FPS)
     if isinstance(motion, RawMotion):
-        return clip_of(motion, config.rate, hashlib.sha256(found.data).hexdigest())
+        clip = clip_of(motion, config.rate, hashlib.sha256(found.data).hexdigest())
+        return replace(clip, licence=found.licence)
     if config.rate is None or config.rate == motion.fps:
         return motion
     raw = RawMotion(motion.name, motion.fps, motion.root_pos, motion.root_quat, motion.joint_pos, found.path)

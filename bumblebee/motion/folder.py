@@ -21,7 +21,8 @@ from bumblebee.motion.describe.described import Described
 from bumblebee.motion.describe.describer import describer
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.licence_table import LICENCES, stated_of
-from bumblebee.motion.licences import licence_of, stated_rate
+from bumblebee.motion.licences import licence_of
+from bumblebee.motion.listing import csv_rate
 from bumblebee.motion.naming import distinct
 from bumblebee.motion.pieces import split_long
 from bumblebee.motion.ready import Job, Ready, make_ready, why_not
@@ -148,7 +149,7 @@ def _loaded(source: Source, config: ReadConfig) -> _Loaded:
     data = _tried(partial(source.read, LIMITS.file_bytes), source.path)
     if isinstance(data, str):
         return _Loaded(source.path, source.archive, reason=data)
-    rate = _csv_fps(source, config) if source.path.suffix.lower() == ".csv" else None
+    rate = _csv_fps(source, config)
     return _Loaded(source.path, source.archive, data, rate)
 
 
@@ -217,14 +218,11 @@ def _seconds(ready: Ready) -> float:
 
 
 def _csv_fps(source: Source, config: ReadConfig) -> float | None:
-    """The rate of a CSV file: of a folder by settings, of all by settings, of LICENCES.csv, of SOURCES.md [Hz]."""
+    """The rate of a CSV file [Hz]: that of a folder by the settings, else as for every command (`csv_rate`)."""
     for folder in Path(os.path.realpath(source.path)).parents:
         if folder.name in config.csv_fps_by_folder:
             return config.csv_fps_by_folder[folder.name]
-    if config.csv_fps is not None:
-        return config.csv_fps
-    stated = stated_of(source.path) if source.archive is None else None
-    return stated.fps if stated else stated_rate(source)
+    return csv_rate(source, config)[0]
 
 
 def _tried(read: Callable[[], Result], file: Path) -> Result | str:

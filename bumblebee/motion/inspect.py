@@ -10,11 +10,10 @@ from bumblebee.errors import BadInput
 from bumblebee.motion.captions import find_captions
 from bumblebee.motion.checks import check_raw
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.formats.read import RobotConfig, format_of
+from bumblebee.motion.formats.read import format_of
 from bumblebee.motion.human.motion import HumanMotion
-from bumblebee.motion.licence_table import stated_of
-from bumblebee.motion.licences import licence_of
-from bumblebee.motion.listing import Found, Motion, Readers, find_motions, reason_of
+from bumblebee.motion.listing import Found, Motion, find_motions, reason_of
+from bumblebee.motion.one_file import FileConfig
 from bumblebee.motion.raw import RawMotion
 
 
@@ -80,17 +79,14 @@ class Counts:
         )
 
 
-def inspect(
-    path: Path, options: RobotConfig | None = None, readers: Readers | None = None
-) -> Iterator[list[Inspected]]:
+def inspect(path: Path, config: FileConfig | None = None) -> Iterator[list[Inspected]]:
     """The rows of each file at or below `path`.
 
     Args:
         path: a file, a folder or a motion library.
-        options: what files of robot motion may leave unsaid.
-        readers: others than the usual.
+        config: what files may leave unsaid.
     """
-    for found in find_motions(path, options, readers):
+    for found in find_motions(path, config):
         yield rows_of(found)
 
 
@@ -98,10 +94,11 @@ def rows_of(found: Found) -> list[Inspected]:
     """A row for each motion of a file; one with the reason where there is none."""
     if not found.motions:
         return [Inspected(found.path, format_of(found.path), problem=found.reason or "no motion in it")]
-    return [_row(found.path, motion) for motion in found.motions]
+    return [_row(found, motion) for motion in found.motions]
 
 
-def _row(path: Path, motion: Motion) -> Inspected:
+def _row(found: Found, motion: Motion) -> Inspected:
+    path = found.path
     if isinstance(motion, Clip):
         return Inspected(
             path, "library", motion.name, motion.frames, motion.fps, "library", _range(motion.root_pos[:, 2]),
@@ -116,13 +113,8 @@ def _row(path: Path, motion: Motion) -> Inspected:
         problem = _fault(path, motion) or problem
     return Inspected(
         path, kind, motion.name, len(root), motion.fps, rate, _range(root[:, 2]), joints, captions,
-        _licence(motion.file), motion.notes, problem,
+        found.licence, motion.notes, problem,
     )  # fmt: skip
-
-
-def _licence(file: Path) -> str:
-    before = stated_of(file)
-    return before.licence if before else licence_of(file)
 
 
 def _captions(file: Path) -> tuple[int, str]:

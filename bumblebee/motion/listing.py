@@ -1,7 +1,7 @@
 """What lies at a path, file by file: motions of the robot, of people, clips of a library, or why a file gives none."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -9,10 +9,10 @@ from bumblebee.errors import BadInput
 from bumblebee.io.limits import LIMITS
 from bumblebee.motion import walk
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.formats.read import PICKLES, RobotConfig, is_robot_npz, read_robot
 from bumblebee.motion.human.motion import HumanMotion
-from bumblebee.motion.human.read import read_human
 from bumblebee.motion.licence_table import LICENCES, stated_of
+from bumblebee.motion.licences import licence_of, stated_rate
+from bumblebee.motion.one_file import FileConfig, read_one
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.sources import Source
 from bumblebee.motion.store import Library
@@ -30,73 +30,69 @@ class Found:
     reason: str = ""
     """Why there are no motions."""
     data: bytes = field(default=b"", repr=False)
+    source: Source | None = None
+    """Where the bytes come from; None for a clip of a library."""
+
+    @property
+    def licence(self) -> str:
+        """That of the file: of the table beside it where it was converted here, else as `licence_of` finds it."""
+        before = stated_of(self.path) if self.source is None or self.source.archive is None else None
+        return before.licence if before else licence_of(self.source or self.path)
 
 
-@dataclass(frozen=True)
-class Readers:
-    """Who finds the files and who reads motions of people."""
-
-    sources: Callable[[Path], Iterator[Source]]
-    human: Callable[[Path, bytes], list[HumanMotion]] | None = None
-
-
-def find_motions(path: Path, options: RobotConfig | None = None, readers: Readers | None = None) -> Iterator[Found]:
+def find_motions(path: Path, config: FileConfig | None = None) -> Iterator[Found]:
     """Each file at or below `path`, read when it is asked for; a bad one is a reason, and the next follows.
 
     Args:
         path: a file, a folder or a motion library.
-        options: what files of robot motion may leave unsaid.
-        readers: others than the usual.
+        config: what files may leave unsaid.
 
     Raises:
         BadInput: nothing lies at `path`, or nothing that could be a motion.
     """
-    path, options, readers = Path(path), options or RobotConfig(), readers or usual_readers()
+    path, config = Path(path), config or FileConfig()
     if not os.path.lexists(path):
         raise BadInput(path, "a motion file, or a folder that holds some", "no such file or folder")
     nothing = True
-    for source in readers.sources(path):
+    for source in walk.motion_sources(path):
         if source.path.name == LICENCES:
             continue
         nothing = False
         if source.path.name == walk.INDEX and source.archive is None:
             yield from _library(source.path.parent)
         else:
-            yield _file(source, options, readers)
+            yield _file(source, config)
     if nothing:
         raise BadInput(path, "a motion file, or a folder that holds some", "none")
 
 
-def usual_readers() -> Readers:
-    """Files of folders, members of archives, libraries; people's motion with nothing set."""
-    return Readers(walk.motion_sources, read_human)
-
-
-def _file(source: Source, options: RobotConfig, readers: Readers) -> Found:
+def _file(source: Source, config: FileConfig) -> Found:
     data = b""
     try:
         data = source.read(LIMITS.file_bytes)
-        suffix = source.path.suffix.lower()
-        if suffix == ".csv" or suffix in PICKLES or (suffix == ".npz" and is_robot_npz(data)):
-            found: list[Motion] = [*_robot(source.path, data, options)]
-        elif readers.human is not None:
-            found = [*readers.human(source.path, data)]
-        else:
-            found = [*read_robot(source.path, data, options)]  # which says what can be read
+        rate, rate_from = csv_rate(source, config)
+        found = read_one(source.path, data, replace(config, csv_fps=rate))
     except BadInput as error:
         return Found(source.path, reason=reason_of(error, source.path), data=data)
     except Exception as error:  # a mistake of ours about one file must not cost the user all the others
         said = shown(f"it could not be read ({type(error).__name__}: {error}): please report this")
         return Found(source.path, reason=said, data=data)
-    return Found(source.path, tuple(found), data=data)
+    if rate_from:
+        found = [replace(raw, rate_from=rate_from) for raw in found]
+    return Found(source.path, tuple(found), data=data, source=source)
 
 
-def _robot(path: Path, data: bytes, options: RobotConfig) -> list[RawMotion]:
-    """Motions of the robot; the rate of a CSV file that was converted here stands in the table beside it."""
-    stated = stated_of(path) if path.suffix.lower() == ".csv" else None
-    if stated is None:
-        return read_robot(path, data, options)
-    return [replace(raw, rate_from=LICENCES) for raw in read_robot(path, data, replace(options, csv_fps=stated.fps))]
+def csv_rate(source: Source, config: FileConfig) -> tuple[float | None, str]:
+    """The rate of a CSV file [Hz] and who says it: LICENCES.csv beside it, the settings, SOURCES.md; else None, ""."""
+    if source.path.suffix.lower() != ".csv":
+        return config.csv_fps, ""
+    stated = stated_of(source.path) if source.archive is None else None
+    if stated is not None:
+        return stated.fps, LICENCES
+    if config.csv_fps is not None:
+        return config.csv_fps, ""
+    rate = stated_rate(source)
+    return rate, "SOURCES.md" if rate else ""
 
 
 def _library(folder: Path) -> Iterator[Found]:

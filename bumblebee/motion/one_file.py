@@ -1,16 +1,21 @@
 """The motions of one file, whatever its format: told by its suffix, and for `.npz` by the arrays in it."""
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.formats.config import RobotConfig
+from bumblebee.motion.formats.config import Euler, RobotConfig
 from bumblebee.motion.formats.read import SUFFIXES as ROBOT
 from bumblebee.motion.formats.read import is_robot_npz, read_robot
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.human.read import SUFFIXES as HUMAN
 from bumblebee.motion.human.read import HumanConfig, read_human
 from bumblebee.motion.raw import RawMotion
+from bumblebee.ranges import Range, Ranged
 
+WORDS = ("csv_length", "csv_angle", "csv_euler", "npz_joints", "unit", "up")
+"""The settings that are one of a few words."""
 READ = tuple(dict.fromkeys((*ROBOT, *HUMAN)))
 _NOT_READ = {
     ".npy": "a single NumPy array, which does not say what it holds",
@@ -21,14 +26,46 @@ _NOT_READ = {
 }
 
 
-def read_one(path: Path, data: bytes, robot: RobotConfig, human: HumanConfig) -> list[RawMotion | HumanMotion]:
+@dataclass(frozen=True)
+class FileConfig(Ranged):
+    """What files may leave unsaid; "", None and 0: the file must say it, or the motion tell it, or it is refused."""
+
+    csv_fps: Annotated[float, Range(least=1, most=1000)] | None = None
+    """Frame rate of CSV files, which do not hold one: g1_moves 60, LAFAN1's retargets 30 [Hz]. Without it, that which
+    LICENCES.csv beside the file or a row of SOURCES.md states."""
+    csv_length: Literal["", "m", "cm", "mm"] = ""
+    """Unit of the root's position in a CSV file with Euler angles."""
+    csv_angle: Literal["", "rad", "deg"] = ""
+    """Unit of Euler and joint angles in such a file."""
+    csv_euler: Euler = ""
+    """Order of its Euler angles as SciPy writes it: small letters about the world's axes, capitals about the body's."""
+    npz_joints: Literal["", "depth_first", "breadth_first"] = ""
+    """Order of the joints in an `.npz` file whose bodies do not tell: depth-first (MuJoCo), breadth-first (Isaac)."""
+    unit: Literal["", "m", "dm", "cm", "mm", "inch", "cmu"] = ""
+    """Unit of BVH files; empty: by the length of the legs. `cmu` is 1 / 0.45 inch."""
+    up: Literal["", "y", "z"] = ""
+    """The up axis of human motion; empty: BVH's by the body, that of SMPL files z, where the body stands so."""
+    smpl_fps: Annotated[float, Range(least=0, most=1000)] = 0.0
+    """Frame rate of SMPL files that state none [Hz]."""
+
+    @property
+    def robot(self) -> RobotConfig:
+        """What concerns motions of the robot."""
+        return RobotConfig(self.csv_fps, self.csv_length, self.csv_angle, self.csv_euler, self.npz_joints)
+
+    @property
+    def human(self) -> HumanConfig:
+        """What concerns motions of people."""
+        return HumanConfig(self.unit, self.up, self.smpl_fps)
+
+
+def read_one(path: Path, data: bytes, config: FileConfig) -> list[RawMotion | HumanMotion]:
     """The motions of a file, of the robot or of people, at the file's own rate and unchecked.
 
     Args:
         path: as it is shown; its suffix says how it is read.
         data: its bytes.
-        robot: what files of robot motion may leave unsaid.
-        human: what files of human motion may leave unsaid.
+        config: what the file may leave unsaid.
 
     Raises:
         BadInput: a format that is not read, or what is wrong in the file.
@@ -38,5 +75,5 @@ def read_one(path: Path, data: bytes, robot: RobotConfig, human: HumanConfig) ->
         wanted = f"motions ({', '.join(READ)}), an archive of such, or a motion library"
         raise BadInput(path, wanted, _NOT_READ.get(suffix, "a format that is not known"))
     if suffix in ROBOT and (suffix != ".npz" or is_robot_npz(data)):
-        return [*read_robot(path, data, robot)]
-    return [*read_human(path, data, human)]
+        return [*read_robot(path, data, config.robot)]
+    return [*read_human(path, data, config.human)]

@@ -28,7 +28,7 @@ def quality(clip: Clip, human: np.ndarray | None = None) -> dict[str, float]:
     if human is not None and len(human) != clip.frames:
         raise ValueError(f"{clip.name}: {len(human)} frames of the person, {clip.frames} of the robot")
     contacts = robot_contacts(clip) if human is None else human_contacts(human, clip.fps)
-    standing = ~flights(clip) if human is None else contacts.any(axis=1)
+    standing = np.asarray(~flights(clip) if human is None else contacts.any(axis=1))
     return {**floor(clip, standing), **skate(clip, contacts), **limits(clip), **smoothness(clip), **collisions(clip)}
 
 

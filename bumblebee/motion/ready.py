@@ -57,8 +57,7 @@ def make_ready(job: Job, config: ReadConfig) -> list[Ready]:
 
 
 def _made(job: Job, config: ReadConfig) -> Iterator[Ready]:
-    robot = replace(config.robot, csv_fps=job.csv_fps)
-    for motion in read_one(job.path, job.data, robot, config.human):
+    for motion in read_one(job.path, job.data, replace(config, csv_fps=job.csv_fps)):
         if isinstance(motion, HumanMotion):
             rate = motion.fps if job.path.suffix.lower() == ".npz" else None
             yield Ready(retarget(motion, config.fps, config.retarget), rate)

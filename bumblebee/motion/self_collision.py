@@ -5,6 +5,7 @@ distance of their segments. Bodies that are joined by one hinge or rigidly (the 
 are those whose primitives overlap where all joints are at 0 (hips and pelvis): that overlap is the model's.
 """
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -16,32 +17,53 @@ from bumblebee.robot.facts import g1_bodies, joint_names
 Poses = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
-def self_penetration(root_pos: np.ndarray, root_quat: np.ndarray, joint_pos: np.ndarray) -> tuple[np.ndarray, list]:
-    """Depth of the deepest overlap in each frame, (T,) [m], 0 where nothing touches; and the pair of bodies, (T,).
+@dataclass(frozen=True)
+class Links:
+    """The primitives of one body over a motion: segments with radii, and a ball that holds them all."""
+
+    starts: np.ndarray
+    """(T, N, 3) [m, world]."""
+    ends: np.ndarray
+    """(T, N, 3) [m, world]."""
+    radii: np.ndarray
+    """(N,) [m]."""
+    centre: np.ndarray
+    """(T, 3) [m, world], of the ball."""
+    reach: float
+    """Its radius [m]."""
+
+
+def self_penetration(
+    root_pos: np.ndarray, root_quat: np.ndarray, joint_pos: np.ndarray
+) -> tuple[np.ndarray, list[tuple[str, str]]]:
+    """Depth of the deepest overlap in each frame, (T,) [m], 0 where nothing touches; and the pair of bodies, T of them.
 
     Args:
         root_pos: (T, 3) [m, world].
         root_quat: (T, 4) [wxyz].
         joint_pos: (T, 23) [rad].
     """
-    segments = _segments(forward_bodies(root_pos, root_quat, joint_pos))
+    links = _links(forward_bodies(root_pos, root_quat, joint_pos))
     deepest, worst = np.zeros(len(root_pos)), np.full(len(root_pos), -1)
     for number, (first, second) in enumerate(compared_bodies()):
-        depth = _depth(segments[first], segments[second])
-        deeper = depth > deepest
-        deepest[deeper], worst[deeper] = depth[deeper], number
+        one, other = links[first], links[second]
+        near = np.flatnonzero(_squared(one.centre - other.centre) < (one.reach + other.reach) ** 2)
+        if len(near):
+            depth = _depth(one, other, near)
+            deeper = depth > deepest[near]
+            deepest[near[deeper]], worst[near[deeper]] = depth[deeper], number
     return deepest, [compared_bodies()[pair] if pair >= 0 else ("", "") for pair in worst]
 
 
 @cache
 def compared_bodies() -> tuple[tuple[str, str], ...]:
     """The pairs of bodies whose overlap counts."""
-    at_zero = _segments(forward_bodies(np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), np.zeros((1, len(joint_names())))))
-    names = list(at_zero)
+    at_zero = _links(forward_bodies(np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), np.zeros((1, len(joint_names())))))
+    names, only = list(at_zero), np.zeros(1, dtype=int)
     pairs = []
     for i, first in enumerate(names):
         for second in names[i + 1 :]:
-            if not _joined(first, second) and _depth(at_zero[first], at_zero[second])[0] <= 0:
+            if not _joined(first, second) and _depth(at_zero[first], at_zero[second], only)[0] <= 0:
                 pairs.append((first, second))
     return tuple(pairs)
 
@@ -64,21 +86,21 @@ def _parent_piece(piece: str) -> str:
     return "" if parent == "world" else _piece(parent)
 
 
-def _segments(poses: Poses) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """For each body with primitives: ends of its segments (T, N, 3) twice [m, world], and their radii (N,) [m]."""
+def _links(poses: Poses) -> dict[str, Links]:
+    """The bodies that have primitives."""
     found = {}
     for name, (pos, quat) in poses.items():
         if "collision" in g1_bodies()[name]:
-            starts, ends, radii = _primitives(name)
-            place = pos[:, None]
-            turn = quat[:, None]
-            found[name] = place + quaternions.rotate(turn, starts), place + quaternions.rotate(turn, ends), radii
+            starts, ends, radii, centre, reach = _primitives(name)
+            corners = np.concatenate([starts, ends, centre[None]])
+            placed = pos[:, None] + quaternions.rotate(quat[:, None], corners[None])
+            found[name] = Links(placed[:, : len(radii)], placed[:, len(radii) : -1], radii, placed[:, -1], reach)
     return found
 
 
 @cache
-def _primitives(body: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Ends of a body's segments (1, N, 3) twice [m, body] and radii (N,) [m]."""
+def _primitives(body: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
+    """Ends of a body's segments (N, 3) twice [m, body], radii (N,) [m]; middle (3,) and radius of a ball around all."""
     starts, ends, radii = [], [], []
     for geom in g1_bodies()[body]["collision"]:
         half = geom["size"][1] if geom["type"] == "capsule" else 0.0
@@ -86,28 +108,21 @@ def _primitives(body: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         starts.append(np.asarray(geom["pos"]) - reach)
         ends.append(np.asarray(geom["pos"]) + reach)
         radii.append(geom["size"][0])
-    return np.array(starts)[None], np.array(ends)[None], np.array(radii)
+    centre = np.mean(starts + ends, axis=0)
+    ball = (np.linalg.norm(np.array(starts + ends) - centre, axis=-1) + np.array(radii + radii)).max()
+    return np.array(starts), np.array(ends), np.array(radii), centre, float(ball)
 
 
-def _depth(first: tuple, second: tuple) -> np.ndarray:
-    """Deepest overlap of the primitives of two bodies, (T,) [m]; frames in which they are far apart are skipped."""
-    depth = np.full(len(first[0]), -np.inf)
-    centres = [(body[0] + body[1]).mean(axis=1) / 2 for body in (first, second)]
-    reach = [_reach(body, centre) for body, centre in zip((first, second), centres, strict=True)]
-    near = np.flatnonzero(np.linalg.norm(centres[0] - centres[1], axis=-1) < sum(reach))
-    if len(near):
-        a, b, c, d = (end[near] for end in (*first[:2], *second[:2]))
-        distance = segment_distance(a[:, :, None], b[:, :, None], c[:, None], d[:, None])
-        overlap = first[2][:, None] + second[2][None] - distance
-        depth[near] = overlap.max(axis=(1, 2))
-    return depth
+def _depth(one: Links, other: Links, frames: np.ndarray) -> np.ndarray:
+    """Deepest overlap of the primitives of two bodies in these frames (n,), (n,) [m]; negative where they are apart."""
+    a, b = one.starts[frames, :, None], one.ends[frames, :, None]
+    c, d = other.starts[frames, None], other.ends[frames, None]
+    overlap = one.radii[:, None] + other.radii[None] - segment_distance(a, b, c, d)
+    return overlap.max(axis=(1, 2))
 
 
-def _reach(body: tuple, centre: np.ndarray) -> np.ndarray:
-    """Radius of a ball around `centre` (T, 3) that holds all primitives of a body, (T,) [m]."""
-    ends = np.concatenate([body[0], body[1]], axis=1)
-    radii = np.concatenate([body[2], body[2]])
-    return (np.linalg.norm(ends - centre[:, None], axis=-1) + radii).max(axis=1)
+def _squared(vector: np.ndarray) -> np.ndarray:
+    return np.einsum("ti,ti->t", vector, vector)
 
 
 def segment_distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:

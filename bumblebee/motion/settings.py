@@ -4,22 +4,18 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from bumblebee.motion.describe.describer import DescribeConfig
-from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.grounding import GroundingConfig
-from bumblebee.motion.human.read import HumanConfig
+from bumblebee.motion.one_file import FileConfig
 from bumblebee.motion.retarget.config import RetargetConfig
-from bumblebee.ranges import Name, Range, Ranged
+from bumblebee.ranges import Name, Range
 
 Hertz = Annotated[float, Range(least=1, most=10_000)]
 
 
 @dataclass(frozen=True)
-class ReadConfig(Ranged):
+class ReadConfig(FileConfig):
     """How motion files become clips."""
 
-    csv_fps: Hertz | None = None
-    """Frame rate of CSV files, which do not hold one: g1_moves 60, LAFAN1's retargets 30 [Hz]. Without it, that which
-    LICENCES.csv beside the file or a row of SOURCES.md states; a file without any is refused."""
     csv_fps_by_folder: dict[Name, Hertz] = field(default_factory=dict)
     """Another rate for the CSV files under a folder of that name, such as `{lafan1: 30}` [Hz]."""
     fps: Hertz = 50.0
@@ -28,10 +24,6 @@ class ReadConfig(Ranged):
     """Longer motions are cut into equal pieces `<name>_p0`, `_p1` ... no longer than this; 0 never cuts [s]."""
     processes: Annotated[int, Range(least=0, most=256)] = 0
     """How many work side by side; 0: as many as there are cores. The result does not depend on it."""
-    robot: RobotConfig = field(default_factory=RobotConfig)
-    """What files of robot motion may leave unsaid."""
-    human: HumanConfig = field(default_factory=HumanConfig)
-    """What files of human motion may leave unsaid."""
     retarget: RetargetConfig = field(default_factory=RetargetConfig)
     """From people to the robot."""
     grounding: GroundingConfig = field(default_factory=GroundingConfig)

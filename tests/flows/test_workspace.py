@@ -68,6 +68,15 @@ def test_the_users_motions_are_a_dependency_of_the_stage_that_reads_them(tmp_pat
     assert read(folder / "params.yaml")["motions"]["source"] == str(motions)
 
 
+def test_the_files_that_the_filter_is_given_are_dependencies_of_its_stage(tmp_path: Path):
+    named = {"overrule": "word.csv", "policy": {"source": "/lab/policy"}}
+    folder = workspaces.create(tmp_path / "lab", filter=named)
+    deps = yaml.safe_load((folder / "dvc.yaml").read_text())["stages"]["filter"]["deps"]
+    assert deps[-2:] == ["word.csv", "/lab/policy"]
+    workspaces.create(folder, filter={"overrule": "", "policy": {"source": "shipped"}})
+    assert (folder / "dvc.yaml").read_text() == (workspaces.HOME / "dvc.yaml").read_text()
+
+
 def test_missing_motions_and_unknown_names_are_bad_input(tmp_path: Path):
     with pytest.raises(BadInput, match="a folder of motion files"):
         workspaces.create(tmp_path / "lab", motions=tmp_path / "nothing")

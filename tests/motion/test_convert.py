@@ -9,14 +9,13 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.convert import KINDS, ConvertConfig, convert
-from bumblebee.motion.formats.read import RobotConfig, read_robot
-from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
+from bumblebee.motion.formats.read import read_robot
 from bumblebee.motion.licence_table import LICENCES
-from bumblebee.motion.listing import Readers
+from bumblebee.motion.one_file import FileConfig
 from bumblebee.motion.store import read_library
-from bumblebee.motion.walk import motion_sources
+from tests.motion.human.people import bvh
 
-CSV = RobotConfig(csv_fps=30)
+CSV = FileConfig(csv_fps=30)
 
 
 @pytest.fixture
@@ -38,7 +37,7 @@ def rows_of(out):
 @pytest.mark.parametrize(("kind", "suffix"), [("g1_csv", ".csv"), ("asap", ".pkl"), ("mjlab", ".npz")])
 def test_every_motion_is_written_with_its_licence_and_source(motions, source, tmp_path, kind, suffix):
     told = []
-    done = convert(source, tmp_path / "out", ConvertConfig(kind, robot=CSV), tell=told.append)
+    done = convert(source, tmp_path / "out", ConvertConfig(kind, files=CSV), tell=told.append)
     assert (done.files, done.written, len(done.skipped)) == (3, 2, 1) and told[0].startswith("two/bad.pkl: expected")
     assert sorted(os.listdir(tmp_path / "out")) == [LICENCES, f"sway{suffix}", f"two_sway{suffix}"]
     first, second = rows_of(tmp_path / "out")
@@ -52,7 +51,7 @@ def test_every_motion_is_written_with_its_licence_and_source(motions, source, tm
     }
     assert (second["source"], second["licence"]) == ("two/sway.pkl", "MIT")
     path = tmp_path / "out" / f"two_sway{suffix}"
-    (raw,) = read_robot(path, path.read_bytes(), CSV)
+    (raw,) = read_robot(path, path.read_bytes(), CSV.robot)
     if rate == "30":
         np.testing.assert_array_equal(raw.joint_pos.astype(np.float32), motions.raw().joint_pos.astype(np.float32))
     else:
@@ -84,7 +83,7 @@ def test_csv_files_of_several_rates_are_refused_whole(motions, tmp_path):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_earlier_result_is_replaced_when_asked_and_anything_else_is_not(motions, source, tmp_path, kind):
-    out, config = tmp_path / "out", ConvertConfig(kind, robot=CSV)
+    out, config = tmp_path / "out", ConvertConfig(kind, files=CSV)
     convert(source, out, config)
     with pytest.raises(BadInput, match=r"converted before\. Add --overwrite"):
         convert(source, out, config)
@@ -99,7 +98,7 @@ def test_an_earlier_result_is_replaced_when_asked_and_anything_else_is_not(motio
 def test_places_that_are_inputs_are_refused(source, tmp_path):
     for out in (source, source.parent, source / "new", source / "two"):
         with pytest.raises(BadInput):
-            convert(source, out, ConvertConfig("asap", robot=CSV), overwrite=True)
+            convert(source, out, ConvertConfig("asap", files=CSV), overwrite=True)
     assert sorted(os.listdir(source / "two")) == ["LICENSE", "bad.pkl", "sway.pkl"]
 
 
@@ -111,14 +110,13 @@ def test_nothing_usable_writes_nothing(tmp_path, source):
     assert not (tmp_path / "out").exists()
 
 
-def test_people_are_left_to_retargeting_and_counted(motions, tmp_path):
-    def person(path, data):
-        return [HumanMotion(path.stem, 120.0, np.ones((25, len(LANDMARKS), 3)), path)]
-
+def test_people_are_retargeted(motions, tmp_path):
     motions.pickle(motions.raw(), "in/a.pkl")
-    (tmp_path / "in/b.bvh").write_text("bvh")
-    done = convert(tmp_path / "in", tmp_path / "out", ConvertConfig("asap"), readers=Readers(motion_sources, person))
-    assert done.written == 1 and "a person's. It must be retargeted first." in done.skipped[0][1]
+    (tmp_path / "in/b.bvh").write_text(bvh(frames=60))
+    done = convert(tmp_path / "in", tmp_path / "out", ConvertConfig("asap"))
+    assert done.written == 2 and not done.skipped
+    (raw,) = read_robot(tmp_path / "out/b.pkl", (tmp_path / "out/b.pkl").read_bytes())
+    assert raw.fps == 50 and 0.6 < raw.root_pos[:, 2].mean() < 0.85
 
 
 def test_a_motion_that_fails_a_check_is_skipped_by_its_name(motions, tmp_path):

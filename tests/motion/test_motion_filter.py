@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bumblebee import quaternions
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.filter import DROP_COLUMNS, RULES, FilterConfig, filter_clips, violations
-from bumblebee.motion.kinematics import make_clip
+from bumblebee.motion.kinematics import lowest, make_clip
 from bumblebee.robot.facts import joint_names, joints
 
 AT = 40  # the frame that the broken motions break at
@@ -59,8 +60,45 @@ def turns_too_fast(clip: Clip) -> Clip:
 
 def keypoint_too_fast(clip: Clip) -> Clip:
     key_pos = np.array(clip.key_pos)
-    key_pos[AT + 1 :, 10] += [0.0, 0.4, 0.0]  # 20 m/s: with sane joints a keypoint alone does not do it
+    share = np.clip((np.arange(clip.frames) - AT + 10) / 20, 0, 1)
+    key_pos[:, 10, 1] += 5.33 * share**2 * (3 - 2 * share)  # 20 m/s, without a jerk; sane joints alone do not do it
     return replace(clip, key_pos=key_pos)
+
+
+def jerks_for_a_frame(clip: Clip) -> Clip:
+    key_pos = np.array(clip.key_pos)
+    key_pos[AT, 10] += [0.0, 0.14, 0.0]  # 7 m/s there and back again
+    return replace(clip, key_pos=key_pos)
+
+
+def glides(clip: Clip) -> Clip:
+    return remade(clip, root_pos=clip.root_pos + np.multiply.outer(np.arange(clip.frames) / 50, [0.0, 0.8, 0.0]))
+
+
+def turned(clip: Clip, quat) -> Clip:
+    root_quat = quaternions.multiply(quat, clip.root_quat)
+    root_pos = np.array(clip.root_pos)
+    root_pos[:, 2] -= lowest(root_pos, root_quat, clip.joint_pos)
+    return make_clip(clip.name, clip.fps, root_pos, root_quat, clip.joint_pos)
+
+
+def spins_in_a_frame(clip: Clip) -> Clip:
+    angle = np.where(np.arange(clip.frames) > AT, 0.36, 0.0)  # 18 rad/s
+    return turned(clip, quaternions.from_axis_angle([0.0, 0.0, 1.0], angle))
+
+
+def lies(clip: Clip) -> Clip:
+    return turned(clip, quaternions.from_axis_angle([0.0, 1.0, 0.0], np.full(clip.frames, np.pi / 2)))
+
+
+def arm_in_the_chest(clip: Clip) -> Clip:
+    joint_pos = np.array(clip.joint_pos)
+    arm = [joint_names().index(f"left_{name}_joint") for name in ("shoulder_pitch", "shoulder_roll", "shoulder_yaw")]
+    away = np.array([1.03, -0.95, -0.55, 1.81]) - joint_pos[:, [*arm, arm[-1] + 1]]
+    frames = np.arange(clip.frames)
+    there = np.clip(np.minimum(frames - AT + 20, AT + 80 - frames) / 20, 0, 1)
+    joint_pos[:, [*arm, arm[-1] + 1]] += there[:, None] * away
+    return remade(clip, joint_pos=joint_pos)
 
 
 CASES = {
@@ -71,6 +109,11 @@ CASES = {
     "body_speed": (keypoint_too_fast, 20.0, 1.0, AT),
     "joint_speed": (turns_too_fast, 47.5, 1.0, AT),
     "root_jump": (leaps_aside, 7.5, 0.2, AT),
+    "root_turn": (spins_in_a_frame, 18.0, 0.3, AT),
+    "spike": (jerks_for_a_frame, 700.0, 30.0, AT),
+    "skate": (glides, 0.85, 0.1, None),
+    "self_collision": (arm_in_the_chest, 1.2, 0.2, None),
+    "other_contact": (lies, 2.98, 0.1, None),
 }
 
 

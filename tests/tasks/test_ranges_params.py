@@ -148,6 +148,8 @@ def test_the_command_ends_with_one_line_and_status_2(tmp_path: Path):
         ("motions.source", "nowhere"),
         ("motions.source", "~nobody-of-this-name/motions"),
         ("motions.read.captions_folder", "nowhere"),
+        ("filter.overrule", "nowhere.csv"),
+        ("filter.policy.source", "nowhere"),
         ("rollouts.source", "nowhere"),
         ("rollouts.source", "params.yaml"),
         ("ingest.incoming", "nowhere/r{round}"),
@@ -167,6 +169,9 @@ def test_sources_that_are_there_pass(tmp_path: Path):
     (tmp_path / "robot.xml").touch()
     content = changed(shipped(), "motions.source", str(tmp_path / "mine"))
     content = changed(content, "motions.read.captions_folder", str(tmp_path / "captions"))
+    (tmp_path / "word.csv").touch()
+    content = changed(content, "filter.overrule", str(tmp_path / "word.csv"))
+    content = changed(content, "filter.policy.source", "shipped")
     content = changed(content, "rollouts.source", str(tmp_path / "lab"))
     content = changed(content, "ingest.incoming", str(tmp_path / "lab" / "r{round}"))
     sections.check(written(tmp_path, changed(content, "ingest.model", str(tmp_path / "robot.xml"))))

@@ -5,8 +5,6 @@ from typing import Annotated, Literal
 
 from bumblebee.ranges import Range, Ranged
 
-WORDS = ("csv_length", "csv_angle", "csv_euler", "npz_joints")
-"""The settings that are one of a few words."""
 Euler = Literal["", "xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"]
 
 

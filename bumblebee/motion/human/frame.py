@@ -47,7 +47,7 @@ def find_unit(where: object, legs: float, stated: str) -> tuple[float, tuple[str
     if len(fitting) != 1:
         came = f"legs of {legs:.4g} units, which {' and '.join(fitting) or 'none'} would explain"
         wanted = f"a unit (of {', '.join(UNITS)}) with legs of {LEGS[0]} to {LEGS[1]} m"
-        raise BadInput(where, wanted, came, "State it: `unit`.")
+        raise BadInput(where, wanted, came, "Say it: motions.read.unit (--set unit=cm).")
     return UNITS[fitting[0]], (f"unit {fitting[0]}, by legs of {legs:.4g} units = {legs * UNITS[fitting[0]]:.3f} m",)
 
 
@@ -77,7 +77,12 @@ def find_up(where: object, moving: str, resting: str, stated: str) -> tuple[str,
     if len(told) != 1:
         both = f"{moving} by the motion, {resting} by the skeleton's own pose"
         wanted = "y or z as the up axis, along which the head is above the feet"
-        raise BadInput(where, wanted, both if told else "a head above the feet along neither", "State it: `up`.")
+        raise BadInput(
+            where,
+            wanted,
+            both if told else "a head above the feet along neither",
+            "Say it: motions.read.up (--set up=y).",
+        )
     (axis,) = told
     by = "the motion" if moving else "the skeleton's own pose alone"
     return axis, (f"{axis} is up, by {by}",)

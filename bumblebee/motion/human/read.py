@@ -88,6 +88,6 @@ def _from_smpl(path: Path, data: bytes, options: HumanConfig) -> tuple[float, np
     shown = upright_axis(motion.positions)
     if shown == "y" and not options.up:
         came = "a head above the feet along y: y up, or a person who lies"
-        raise BadInput(path, "z up, as AMASS has it", came, "State it: `up`, y or z.")
+        raise BadInput(path, "z up, as AMASS has it", came, "Say it: motions.read.up, y or z (--set up=y).")
     doubt = ("z is up, as AMASS has it: the body does not stand so",) if not shown and not options.up else ()
     return motion.fps, z_up(motion.positions, options.up or "z"), (*motion.notes, *doubt)

@@ -111,7 +111,12 @@ def _rate(path: Path, arrays: dict[str, np.ndarray], fps: float) -> tuple[float,
     found = next((name for name in RATES if name in arrays), None)
     if found is None:
         if not fps:
-            raise BadInput(path, f"a frame rate ({', '.join(RATES[:3])})", "none", "State it: `fps`.")
+            raise BadInput(
+                path,
+                f"a frame rate ({', '.join(RATES[:3])})",
+                "none",
+                "Say it: motions.read.smpl_fps (--set smpl_fps=120).",
+            )
         return fps, (f"{fps:g} Hz, as the settings say",)
     values = arrays[found]
     is_number = values.size == 1 and values.dtype.kind in "iuf"
