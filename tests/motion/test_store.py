@@ -4,6 +4,7 @@ import errno
 import hashlib
 import multiprocessing
 import operator
+import shutil
 import time
 import tracemalloc
 from dataclasses import replace
@@ -324,3 +325,17 @@ def test_what_a_killed_process_left_is_cleared_and_a_library_that_it_moved_away_
         write_library(tmp_path / "lib", [motions.clip("", 12)])
     assert [clip.name for clip in read_library(tmp_path / "lib")] == ["old"]
     assert [path.name for path in tmp_path.iterdir()] == ["lib"]
+
+
+def test_a_writer_that_was_killed_before_it_removed_the_old_shards_brings_no_old_motion_back(motions, tmp_path):
+    clips = many(motions, 3)
+    write_library(tmp_path / "lib", clips)
+    (old,) = (tmp_path / "lib/clips").iterdir()
+    kept = Path(shutil.copy2(old, tmp_path / "kept"))
+    time.sleep(0.02)  # beyond the clock of any file system here
+    with LibraryWriter(tmp_path / "lib") as added:
+        added.add(replace(clips[1], sha256="new"))
+    shutil.copy2(kept, old)
+    with LibraryWriter(tmp_path / "lib") as added:
+        assert added.has("m0001", "new") and added.has("m0002", clips[2].sha256)
+    assert Library(tmp_path / "lib")["m0001"].sha256 == "new" and not old.exists()
