@@ -2,9 +2,13 @@
 
 import errno
 import hashlib
+import multiprocessing
 import operator
+import shutil
+import time
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -281,3 +285,57 @@ def test_work_in_processes_comes_in_order_and_as_in_one(motions, tmp_path, monke
     name = operator.attrgetter("name")
     alone = list(map_clips(tmp_path / "lib", name, processes=1))
     assert list(map_clips(tmp_path / "lib", name, processes=2)) == alone == [f"m{n:04d}" for n in range(40)]
+
+
+def _add_until_killed(folder: Path, clips: list) -> None:
+    with LibraryWriter(folder) as added:
+        for clip in clips:
+            added.add(clip)
+            time.sleep(0.002)
+
+
+def test_a_process_that_is_killed_while_it_adds_costs_one_shard_at_most(motions, tmp_path):
+    clips = many(motions, 2000)
+    write_library(tmp_path / "lib", clips[:3])
+    before = len(shards(tmp_path / "lib"))
+    adding = multiprocessing.get_context("spawn").Process(target=_add_until_killed, args=(tmp_path / "lib", clips[3:]))
+    adding.start()
+    end = time.monotonic() + 60
+    while len(list((tmp_path / "lib/clips").glob("[0-9a-f]*"))) < before + 2 and time.monotonic() < end:
+        time.sleep(0.01)
+    adding.kill()
+    adding.join()
+    assert [clip.name for clip in read_library(tmp_path / "lib")] == ["m0000", "m0001", "m0002"]
+    with LibraryWriter(tmp_path / "lib") as added:
+        there = sum(added.has(clip.name, clip.sha256) for clip in clips)
+        assert there >= 3 + 2 * shard.LEAST_CLIPS
+        for clip in clips[there : there + 5]:
+            assert not added.has(clip.name, clip.sha256)
+            added.add(clip)
+    assert Library(tmp_path / "lib").names == [clip.name for clip in clips[: there + 5]]
+    assert not [path for path in (tmp_path / "lib/clips").iterdir() if path.name.startswith(".")]
+
+
+def test_what_a_killed_process_left_is_cleared_and_a_library_that_it_moved_away_comes_back(motions, tmp_path):
+    write_library(tmp_path / "lib", [motions.clip("old", 12)])
+    gone = 2**22 + 1  # beyond all process numbers
+    (tmp_path / "lib").rename(tmp_path / f".lib.{gone}.old")
+    (tmp_path / f".lib.{gone}.abc.part").mkdir()
+    with pytest.raises(BadInput):  # one that fails puts back what the other had moved away
+        write_library(tmp_path / "lib", [motions.clip("", 12)])
+    assert [clip.name for clip in read_library(tmp_path / "lib")] == ["old"]
+    assert [path.name for path in tmp_path.iterdir()] == ["lib"]
+
+
+def test_a_writer_that_was_killed_before_it_removed_the_old_shards_brings_no_old_motion_back(motions, tmp_path):
+    clips = many(motions, 3)
+    write_library(tmp_path / "lib", clips)
+    (old,) = (tmp_path / "lib/clips").iterdir()
+    kept = Path(shutil.copy2(old, tmp_path / "kept"))
+    time.sleep(0.02)  # beyond the clock of any file system here
+    with LibraryWriter(tmp_path / "lib") as added:
+        added.add(replace(clips[1], sha256="new"))
+    shutil.copy2(kept, old)
+    with LibraryWriter(tmp_path / "lib") as added:
+        assert added.has("m0001", "new") and added.has("m0002", clips[2].sha256)
+    assert Library(tmp_path / "lib")["m0001"].sha256 == "new" and not old.exists()

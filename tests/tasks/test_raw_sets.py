@@ -92,7 +92,9 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("bumblebee", "tasks", "flows"):
         (folder / name).symlink_to(HOME / name)
     (folder / "read.py").write_text(READ)
-    (folder / "params.yaml").write_text("motions: {source: data/raw/lab, read: {csv_fps: 30}}\nfilter: {}\n")
+    settings = yaml.safe_load((HOME / "params.yaml").read_text())
+    settings["motions"] = {"source": "data/raw/lab", "read": {"csv_fps": 30}}
+    (folder / "params.yaml").write_text(yaml.safe_dump(settings))
     stages = yaml.safe_load((HOME / "dvc.yaml").read_text())["stages"]
     kept = {name: stages[name] for name in ("motions", "filter")}
     kept["robot"] = {"cmd": "touch robot.txt", "deps": ["bumblebee/robot"], "outs": ["robot.txt"]}
@@ -202,7 +204,7 @@ def test_a_workspace_watches_the_users_texts_as_well_as_his_motions(tmp_path: Pa
     assert (folder / "data/raw/README.md").exists()
 
 
-@pytest.mark.slow  # 2 minutes of starting programs; the tests above have the same graph
+@pytest.mark.slow  # a minute of starting programs; the tests above have the same graph
 def test_the_stages_themselves(lab: Path):
     folder = lab / "data/raw/lab"
     folder.mkdir()

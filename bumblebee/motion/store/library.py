@@ -18,7 +18,7 @@ from bumblebee.motion.store.place import path_of
 from bumblebee.motion.store.shard import GROUP_CLIPS, Shard
 
 _TOLD_TWICE = ("name", "family", "split", "source", "licence", "sha256", "frames", "caption_source")
-_OPEN = 4  # shards that stay open
+_OPEN = 64  # shards that stay open: some 30 MB
 
 Read = Clip | BadInput
 

@@ -149,8 +149,15 @@ class LibraryWriter:
 
     def _take_finished(self) -> None:
         """The shards of a writer that was killed, in the order in which they were written."""
-        others = [path for path in (self.folder / "clips").iterdir() if is_shard(path) and path.stem not in self._sizes]
-        for path in sorted(others, key=lambda path: (path.stat().st_mtime_ns, path.name)):
+        index = self.folder / FILE
+        # One that is older than the index was replaced, and its writer was killed before it had removed it.
+        oldest = index.stat().st_mtime_ns if index.exists() else -1
+        others = [
+            (made, path)
+            for path in (self.folder / "clips").iterdir()
+            if is_shard(path) and path.stem not in self._sizes and (made := path.stat().st_mtime_ns) > oldest
+        ]
+        for _, path in sorted(others):
             try:
                 shard = Shard(path)
             except BadInput:
