@@ -12,7 +12,7 @@ from importlib.resources import files
 
 import yaml
 
-from bumblebee.deploy.undeclared.kinds import Kind, Place
+from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place
 
 
 def _share(field: str, share: float) -> Callable[[Place], float]:
@@ -72,6 +72,10 @@ LARGEST: dict[str, Callable[[Place], float]] = {
     "dead_band": _fixed(0.10),
     "ripple": _share("limit", 0.15),
 }
+if unlike := LARGEST.keys() ^ KINDS.keys():
+    raise TypeError(
+        f"bumblebee/deploy/undeclared/faults.py: LARGEST needs a row for each kind, not so: {sorted(unlike)}"
+    )
 
 
 def largest(kind: Kind, place: Place) -> float:
