@@ -33,7 +33,7 @@ def in_terms(plant: Plant, fit: Fit, candidate: Candidate) -> dict[str, float]:
 
 
 def quantities_of(texts: Sequence[str]) -> tuple[str, ...]:
-    """Quantities that terms depend on: of `term_library.QUANTITIES`, and "another joint (NAME)"."""
+    """Quantities that terms depend on: of `catalogue_laws.QUANTITIES`, and "another joint (NAME)"."""
     found: list[str] = []
     for term in map(read_term, texts):
         found += [f"another joint ({other})" for other in term.others]

@@ -1,6 +1,7 @@
 """What is forgotten of a new effect of the catalogue is said, with the file and what to add."""
 
 import functools
+import importlib
 from pathlib import Path
 
 import mujoco
@@ -175,3 +176,9 @@ def test_every_effect_has_an_equation_from_another_hand(kind: str) -> None:
     assert f'"{kind}"' in written, f"tests/sim/{EQUATIONS[0]}: the equation of {kind}, integrated in NumPy"
     told = f"bumblebee/deploy/undeclared/kinds.py: a law of {kind} for the sealed benchmark, sharing no code"
     assert kind in KINDS, told
+
+
+@pytest.mark.parametrize("module", ["compensation_rules", "stand_in_effects", "undeclared.faults"])
+def test_what_a_module_of_the_deployment_wants_of_each_effect_it_has(module: str) -> None:
+    """Each compares its table with the catalogue's, or with the sealed benchmark's, as it is imported."""
+    assert importlib.import_module(f"bumblebee.deploy.{module}")
