@@ -1,6 +1,6 @@
 """What the diagnosis must know of each effect of the catalogue beside its equation: one row an effect.
 
-A new effect of the catalogue needs a row here and a candidate in `enumerate.py`; without a row nothing is imported.
+A new effect of the catalogue needs a row here; without one nothing is imported. The rest: docs/adding-an-effect.md.
 """
 
 from collections.abc import Iterable
