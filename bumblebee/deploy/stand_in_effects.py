@@ -29,9 +29,12 @@ UNITS = {
     "ground_compliance": "s", "ground_slope": "rad", "thermal_fade": "1/s", "strength_drift": "1/s",
     "external_wrench": "N, N m", "position_friction": "N m", "odd_cogging": "N m", "cross_coupling": "N m/rad",
     "tendon": "N m/rad", "dwell_friction": "N m", "rate_limit": "rad/s", "quantised_command": "rad",
-    "drag": "N m s^2/rad^2", "dead_band": "rad", "ripple": "N m",
+    "drag": "N m s^2/rad^2", "dead_band": "rad", "ripple": "N m", "load_dependent_friction": "", "motor_strength": "",
+    "kp": "", "kd": "", "dropped_commands": "", "ground_friction": "", "gain_cycle": "", "loose_mount": "N m/rad",
 }  # fmt: skip
-"""Kind -> unit of its parameters; a kind that is not here has a share or a factor."""
+"""Kind -> unit of its parameters; "" for a share or a factor."""
+if unlike := UNITS.keys() ^ KINDS.keys():
+    raise TypeError(f"bumblebee/deploy/stand_in_effects.py: UNITS needs a row for each kind, not so: {sorted(unlike)}")
 _DRAWN = {"sign": int, "axis": int, "number": int, "other": str}
 _PEAKS = ("peak_torque", "peak_speed", "peak_rate")
 
@@ -75,7 +78,7 @@ def entry(kind: Kind, place: Place, size: float) -> Json:
         "effect": kind.name,
         "where": [place.name] if place.name else [],
         "parameters": {name: float(parameters[name]) for name in changed},  # those that the size changes come first
-        "unit": UNITS.get(kind.name, ""),
+        "unit": UNITS[kind.name],
         "size": float(size),
         "draw": {**place.draw, **{name: getattr(place, name) for name in _PEAKS}},
     }

@@ -10,6 +10,12 @@ _ON_SLIDE = {
     "kg m^2": "kg",
     "1/turn": "rad/m",  # of a phase: sin(value * position)
 }
+_ON_BOTH = ("", "s", "1/s")
+
+
+def is_known(unit: str) -> bool:
+    """Whether it is told what a quantity of this unit on a hinge has on a slide."""
+    return unit in _ON_SLIDE or unit in _ON_BOTH
 
 
 def joint_unit(hinge: str, slide: bool) -> str:

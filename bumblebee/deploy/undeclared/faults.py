@@ -12,7 +12,7 @@ from importlib.resources import files
 
 import yaml
 
-from bumblebee.deploy.undeclared.kinds import Kind, Place
+from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place, fits
 
 
 def _share(field: str, share: float) -> Callable[[Place], float]:
@@ -72,6 +72,9 @@ LARGEST: dict[str, Callable[[Place], float]] = {
     "dead_band": _fixed(0.10),
     "ripple": _share("limit", 0.15),
 }
+if unlike := LARGEST.keys() ^ {name for name, kind in KINDS.items() if fits(kind, "g1")}:
+    where = "bumblebee/deploy/undeclared/faults.py"
+    raise TypeError(f"{where}: LARGEST needs a row for each kind that a G1 can have, not so: {sorted(unlike)}")
 
 
 def largest(kind: Kind, place: Place) -> float:

@@ -3,17 +3,13 @@
 from collections.abc import Sequence
 
 from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.sim.effects import SUFFIX
-
-_SPRINGS = {"joint_spring", "asymmetric_friction"}
+from bumblebee.diagnosis.candidates.traits import exclude
 
 
 def is_chosen(c: Candidate, chosen: Sequence[Candidate]) -> bool:
-    """Whether it is chosen, or something on its place that one spring of MJCF cannot be as well."""
+    """Whether it is chosen, or something on its place that cannot be there as well."""
     there = {o.effect for o in chosen if o.where == c.where}
-    if c.effect in there or (c.effect in SUFFIX and there & set(SUFFIX)):
-        return True
-    return bool((c.effect == "hysteresis" and there & _SPRINGS) or (c.effect in _SPRINGS and "hysteresis" in there))
+    return c.effect in there or any(exclude(c.effect, other) for other in there)
 
 
 def is_like(c: Candidate, others: Sequence[Candidate]) -> bool:

@@ -1,6 +1,6 @@
 """What the diagnosis must know of each effect of the catalogue beside its equation: one row an effect.
 
-A new effect of the catalogue needs a row here and a candidate in `enumerate.py`; without a row nothing is imported.
+A new effect of the catalogue needs a row here; without one nothing is imported. The rest: docs/adding-an-effect.md.
 """
 
 from collections.abc import Iterable
@@ -37,6 +37,8 @@ class Traits:
     they are told torques), the whole robot, or every link. PACE's set (Bjelonic et al. 2025: armature, damping,
     friction, offset, delay) and the drive's strength. Of a drive that is told its torque gears rub with it, and an
     offset shows as a centre of mass does."""
+    not_beside: tuple[str, ...] = ()
+    """Effects that a joint cannot have as well: MJCF has one spring a joint, and one second hinge. Said on one side."""
     named_first: int = 0
     """Of effects that fit the same the one that is met most often is named: its place in that order; 0: after these."""
 
@@ -75,9 +77,15 @@ TRAITS: dict[str, Traits] = {
     "asymmetric_friction": Traits(
         "move the joint at the same speed both ways, with the joint's axis vertical", on_dry_friction=True
     ),
-    "hysteresis": Traits("move to and fro by small angles"),
+    "hysteresis": Traits("move to and fro by small angles", not_beside=("joint_spring", "asymmetric_friction")),
     "cogging": Traits("turn the unpowered joint slowly"),
-    "backlash": Traits("rock the joint with the motor held", column="simulated", fine_steps=True, abrupt=True),
+    "backlash": Traits(
+        "rock the joint with the motor held",
+        column="simulated",
+        fine_steps=True,
+        abrupt=True,
+        not_beside=("series_elasticity",),
+    ),
     "series_elasticity": Traits(
         "load the joint with the motor held", column="simulated", fine_steps=True, inverse=True, costly=True
     ),
@@ -111,6 +119,11 @@ USUAL_OF_TORQUE = _kinds("joint", "torque")
 USUAL_OF_ROBOT = _kinds("robot")
 USUAL_OF_BODIES = _kinds("body")
 IMU_TILT = "imu_offset"
+
+
+def exclude(one: str, other: str) -> bool:
+    """Whether a joint cannot have both."""
+    return other in TRAITS[one].not_beside or one in TRAITS[other].not_beside
 
 
 def naming_order(kind: str) -> int:

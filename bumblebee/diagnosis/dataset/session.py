@@ -113,14 +113,7 @@ def make_session(
     train, holdout = split(long, rules.split)
     accept = accepting(long, train, holdout, rules.split)
     notes = [f"set aside: {error}" for _, error in failed] + _check_notes(warnings, rules.usable.warnings)
-    if folded:
-        notes.append(
-            f"position and velocity actuators combined into one servo with one torque limit: {', '.join(folded[:6])}"
-        )
-    if plant.floating and not has_pos:
-        notes.append("no base_pos: the base's height is estimated from stance, its error is a nuisance parameter")
-    if set(accept) & set(holdout):
-        notes.append(JUDGED_TWICE)
+    notes += _model_notes(folded, plant.floating and not has_pos) + [JUDGED_TWICE] * bool(set(accept) & set(holdout))
     period = float(np.median(np.diff(long[0].time)))
     steps, search_step = steps_of(period, float(spec.option.timestep), plant.model.nv, rules.time_steps)
     sigma = estimate_noise(long, layout, rules.noise)
@@ -154,6 +147,18 @@ def _check_notes(warnings: Sequence[str], most: int) -> list[str]:
     """What the checks found that does not stop a file; of more than `most` findings the number."""
     notes = [f"check: {text}" for text in warnings[:most]]
     return [*notes, f"{len(warnings) - most} more findings that do not stop a file"] if len(warnings) > most else notes
+
+
+def _model_notes(folded: Sequence[str], no_height: bool) -> list[str]:
+    """On joints whose actuators became one, and on a base whose height is in no log."""
+    notes = []
+    if folded:
+        notes.append(
+            f"position and velocity actuators combined into one servo with one torque limit: {', '.join(folded[:6])}"
+        )
+    if no_height:
+        notes.append("no base_pos: the base's height is estimated from stance, its error is a nuisance parameter")
+    return notes
 
 
 def _refined(

@@ -6,8 +6,8 @@ a joint accelerates by 12 rad/s^2. Over a span the integral of velocities of age
 the change of velocity; the change that the positions show is the instrument, so that noise of the velocities makes the
 age no smaller. A simulation that moves its positions by the new velocities has them half a step apart: that much, at
 steps of a millisecond, is no age. Logs of position targets are left as they are: a servo answers a new target within
-the period, and a joint that speeds up at its beginning goes further than the velocities at the ticks say. That passed
-for 1 to 4 ms on a simulated arm at 50 Hz, and raised alarms where nothing was wrong.
+the period, and a joint that speeds up at its beginning goes further than the velocities at the ticks say, which would
+pass for an age.
 """
 
 from collections.abc import Sequence

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bumblebee.diagnosis.discrepancy.catalogue_laws import LAWS, QUANTITIES, waves
 from bumblebee.diagnosis.discrepancy.regressors import Quantities
 from bumblebee.diagnosis.thresholds.discrepancy import TermLibrary
 from bumblebee.sim.effects import Term, read_term
 
-QUANTITIES = ("position", "velocity", "target", "torque", "time", "history")
 _POSITION, _VELOCITY, _TARGET, _TORQUE, _TIME, _HISTORY = ((name,) for name in QUANTITIES)
 
 
@@ -71,26 +71,11 @@ def basis_functions(data: Quantities, joint: int) -> list[BasisFunction]:
 
 def _catalogue(data: Quantities, j: int) -> Iterator[BasisFunction]:
     """What effects of the catalogue look like on one joint."""
-    rule = data.thresholds.term_library
-    speed, travel = _rms(data.v[..., j]), float(np.ptp(data.q[..., j]))
-    yield BasisFunction(("friction(1)",), _VELOCITY, 1, "coulomb_friction")
-    yield BasisFunction(("v",), _VELOCITY, 1, "viscous_friction")
-    yield BasisFunction(("1",), (), 1, "joint_spring")
-    yield BasisFunction(("q", "1"), _POSITION, 1, "joint_spring")
-    yield BasisFunction(("t*tau",), _TIME, 2, "strength_drift")
-    for share in rule.stribeck_speeds:
-        yield BasisFunction((f"friction(exp(-(v/{share * speed:.3g})^2))",), _VELOCITY, 2, "stribeck_friction")
-    for n in rule.cogging_harmonics:
-        if n * travel > rule.cogging_travel * np.pi:
-            step = rule.harmonic_reach / travel
-            yield BasisFunction(_waves("{}")(n), _POSITION, 2, "cogging", float(n), _waves("{}"), step)
-    if np.ptp(data.tau[..., j]) > 0:
-        yield BasisFunction(("tau",), _TORQUE, 1, "motor_strength")
-        yield BasisFunction(("u - q",), _TARGET, 1, "kp")
-        yield BasisFunction(("friction(abs(tau))",), _TORQUE, 2, "load_dependent_friction")
-        for share in rule.saturation_quantiles:
-            edge = f"{np.quantile(np.abs(data.tau[..., j]), share):.4g}"
-            yield BasisFunction((f"relu(tau - {edge}) - relu(-tau - {edge})",), _TORQUE, 2, "torque_limit")
+    driven = bool(np.ptp(data.tau[..., j]) > 0)
+    for kind, law in LAWS.items():
+        if driven or not law.driven:
+            for texts, on, cost, *inner in law.rows(data, j):
+                yield BasisFunction(texts, on, cost, kind, *inner)
 
 
 def _friction(data: Quantities, j: int) -> Iterator[BasisFunction]:
@@ -100,7 +85,7 @@ def _friction(data: Quantities, j: int) -> Iterator[BasisFunction]:
     for n in range(1, rule.friction_harmonics + 1):
         if n * travel > rule.friction_travel:
             yield BasisFunction(
-                _waves("friction({})")(n), _POSITION, 3, "", float(n), _waves("friction({})"), rule.friction_reach
+                waves("friction({})")(n), _POSITION, 3, "", float(n), waves("friction({})"), rule.friction_reach
             )
     yield BasisFunction(("friction(t)",), _TIME, 3)
     for time in rule.rest_times:
@@ -256,10 +241,6 @@ def joined(texts: list[str], sizes: np.ndarray) -> tuple[list[str], np.ndarray]:
     return [frame + _curve(name, knots, sizes.tolist()) + closing], np.ones(1)
 
 
-def _waves(frame: str) -> Callable[[float], tuple[str, ...]]:
-    return lambda n: tuple(frame.format(f"{f}({n:.4g}*q)") for f in ("sin", "cos"))
-
-
 def _beats(frame: str) -> Callable[[float], tuple[str, ...]]:
     return lambda rate: tuple(frame.format(f"{f}({rate:.4g}*t)") for f in ("sin", "cos"))
 
@@ -282,7 +263,3 @@ def _slewed(tick: float) -> Callable[[float], tuple[str, ...]]:
 
 def _stair(size: float) -> tuple[str, ...]:
     return (f"stair(u, {size:.5g}) - u",)
-
-
-def _rms(x: np.ndarray) -> float:
-    return float(np.sqrt((x**2).mean())) + 1e-9

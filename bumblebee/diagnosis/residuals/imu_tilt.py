@@ -3,9 +3,8 @@
 Windows of a robot whose sensor is mounted at an angle start at that angle to their feet, and read it all the way. The
 first part is nothing but a start that is off, of which the whitening has the answer as the mean over starts on both
 sides. A simulation from one tilted start has another, with the jumps of the feet that just touch, and what is
-peculiar to it looks like much information, since noise in the starts does not look so: fitted with it a tilt of 3.4
-mrad came out as 1.0, one of 6.8 as 3.3. With the slopes they came out as 3.4 +- 0.14 and 6.6 +- 0.10. So residuals
-are taken as linear in the tilt, around that which the windows were whitened with.
+peculiar to it looks like much information, since noise in the starts does not look so: a tilt fitted with it comes out
+too small. So residuals are taken as linear in the tilt, around that which the windows were whitened with.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,8 @@
 """Starts that the readings after them agree with.
 
 A measured start of a robot in contact has its feet a millimetre above the floor or inside it. What the simulation does
-from there is not what it does from the true start, and neither are its sensitivities: masses came out a quarter too
-small. Here each start is moved, within the noise, to where the readings of the next few ticks say that it was: one step
+from there is not what it does from the true start, and neither are its sensitivities: masses would come out too small.
+Here each start is moved, within the noise, to where the readings of the next few ticks say that it was: one step
 of the iterated Kalman filter. The residual is taken back to the measured start to first order (`Whitener.offset`), so
 that nothing is gained or lost but the point around which everything is linear, and that is nearly the true one.
 """

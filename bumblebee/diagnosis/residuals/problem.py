@@ -179,7 +179,7 @@ def make_problem(
     thresholds, (fine, coarse) = thresholds or Thresholds(), steps
     rules = thresholds.residuals
     variation, read = vary(plant, effects), windows
-    # What a start's move does to a late servo shows in fine steps alone: a delay of 7 ms came out a tenth too short.
+    # What a start's move does to a late servo shows in fine steps alone; else its delay would come out too short.
     step = coarse if plant.floating or rough(e.effect for e in effects) else fine
     noisy = NoisyWindows(plant, layout, read, variation, sigma, step, rules.whitening)
     move = start_moves(noisy, rng, rules.initial_state)

@@ -4,9 +4,9 @@ The residual of a window has the noise of its readings and, larger by far in con
 The second part is sampled: K perturbed starts give K differences. Their signs come from a Hadamard matrix, each start
 coordinate one of its columns: all coordinates move at once, by one standard deviation, yet where the simulation is
 linear the K differences have the propagated covariance exactly, without the error of a random sample. Nothing of that
-is shrunk: a tenth of its diagonal, which was added before, is far more than the readings' noise in most directions. It
-cost half of the chi-square of an effect on a robot in contact, where a complete model had a power of 0.65. Where the
-simulation is not linear (contact), a part of what the slopes leave is added to the diagonal.
+is shrunk: even a tenth of its diagonal is far more than the readings' noise in most directions, and would hide effects
+on a robot in contact. Where the simulation is not linear (contact), a part of what the slopes leave is added to the
+diagonal.
 
 The differences' mean is what curvature makes of noise. Seen from the measured start the true one is `start - noise`, so
 the residual's mean has the opposite sign, and less of it where the true state is known to be milder than a measured one

@@ -114,8 +114,7 @@ class SearchState:
             return False
         if c.effect in SATURATIONS and tests.z[k] < bound:  # those that few windows feel have trials of their own
             return False
-        cost, rule = self.fit.cost, self.problem.thresholds.selection.screening
-        return is_promising(c, tests, k, bound, share, cost, cost / self.fit.residual.size, rule)
+        return is_promising(c, tests, k, bound, share, self.fit, self.problem.thresholds.selection.screening)
 
     def trials(self) -> tuple[list[Trial], list[Candidate]]:
         """Candidates tried in the simulator with their costs; and those that were looked at."""

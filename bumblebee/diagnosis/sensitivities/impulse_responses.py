@@ -5,7 +5,6 @@ answers, weighted with its mean torque in each fifth. A few dozen simulations so
 the answers go through contacts and servos as the simulation does.
 """
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,43 +76,56 @@ def answers_of(
     count = max(1, int(np.ceil(windows.span / step - 1e-6)))
     control = inputs_of(windows, variation, step, count, {})
     edges = np.unique(np.linspace(0, count, min(segments, count) + 1).round().astype(int))
-    model, size, many = with_step(variation.model, step), len(windows), len(pushed)
+    model, size = with_step(variation.model, step), len(windows)
+    with without([model], out_of_reach(plant, windows)):  # a batch runs on a copy
+        plain, batch = Batch(model, size, threads()), Batch(model, len(pushed) * size, threads())
     qpos = windows.qpos.copy()
     qpos[:, plant.qpos] -= variation.offset
-    with without([model], out_of_reach(plant, windows)):  # a batch runs on a copy
-        plain, batch = Batch(model, size, threads()), Batch(model, many * size, threads())
-    plain.bind("qpos")[:], plain.bind("qvel")[:] = qpos, windows.qvel
-    out = plain.rollout(count, control, record=("qpos", "qvel"))
-    path = Path(
-        step=step,
-        qpos=np.concatenate((qpos[:, None], out["qpos"]), axis=1),
-        qvel=np.concatenate((windows.qvel[:, None], out["qvel"]), axis=1),
-        control=control,
-        edges=edges,
-    )
-    offset = variation.offset
+    path = _free_path(plain, qpos, windows.qvel, step, control, edges)
 
     def readings(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """(copies, W, N, D) from states at all steps (copies * W, K + 1, .)."""
         copies = len(q) // size
         parts = (at_ticks(windows, x[:, 0].reshape(copies, size, -1), x[:, 1:], step, copies) for x in (q, v))
-        return simulated_readings(plant, layout, *parts, offset)
+        return simulated_readings(plant, layout, *parts, variation.offset)
 
     base, base_quat = readings(path.qpos, path.qvel)
     change = np.zeros((plant.model.nv, len(edges) - 1, size, *base.shape[2:]))
-    for s, (first, last) in enumerate(itertools.pairwise(edges)):
-        batch.reset(stage=0)
-        batch.bind("qpos")[:] = np.tile(path.qpos[:, first], (many, 1))
-        batch.bind("qvel")[:] = np.tile(path.qvel[:, first], (many, 1))
-        push = np.repeat(np.diag(sizes)[pushed], size, axis=0)
-        q, v = (np.tile(x[:, : first + 1], (many, 1, 1)) for x in (path.qpos, path.qvel))
-        for a, b, torque in ((first, last, push), (last, count, np.zeros_like(push))):
-            if b > a:
-                batch.bind("qfrc_applied")[:] = torque
-                part = batch.rollout(b - a, np.tile(control[:, a:b], (many, 1, 1)), record=("qpos", "qvel"))
-                q, v = np.concatenate((q, part["qpos"]), axis=1), np.concatenate((v, part["qvel"]), axis=1)
-        moved, moved_quat = readings(q, v)
+    for s in range(len(edges) - 1):
+        moved, moved_quat = readings(*_pushed_path(batch, path, np.diag(sizes)[pushed], s))
         same = None if base_quat is None else np.broadcast_to(base_quat, moved_quat.shape)
         change[pushed, s] = difference(layout, moved, moved_quat, np.broadcast_to(base, moved.shape), same)
     change /= sizes[:, None, None, None, None]
     return Answers(path, np.nan_to_num(change))
+
+
+def _free_path(
+    batch: Batch, qpos: np.ndarray, qvel: np.ndarray, step: float, control: np.ndarray, edges: np.ndarray
+) -> Path:
+    """The windows as they go without a pulse, from `qpos` (W, nq) and `qvel` (W, nv)."""
+    batch.bind("qpos")[:], batch.bind("qvel")[:] = qpos, qvel
+    out = batch.rollout(control.shape[1], control, record=("qpos", "qvel"))
+    return Path(
+        step=step,
+        qpos=np.concatenate((qpos[:, None], out["qpos"]), axis=1),
+        qvel=np.concatenate((qvel[:, None], out["qvel"]), axis=1),
+        control=control,
+        edges=edges,
+    )
+
+
+def _pushed_path(batch: Batch, path: Path, torques: np.ndarray, segment: int) -> tuple[np.ndarray, np.ndarray]:
+    """States (P * W, K + 1, .) under each of P torques (P, nv) during one segment, and as they go on after it."""
+    first, last = path.edges[segment : segment + 2]
+    many, (size, count) = len(torques), path.control.shape[:2]
+    batch.reset(stage=0)
+    batch.bind("qpos")[:] = np.tile(path.qpos[:, first], (many, 1))
+    batch.bind("qvel")[:] = np.tile(path.qvel[:, first], (many, 1))
+    push = np.repeat(torques, size, axis=0)
+    q, v = (np.tile(x[:, : first + 1], (many, 1, 1)) for x in (path.qpos, path.qvel))
+    for a, b, torque in ((first, last, push), (last, count, np.zeros_like(push))):
+        if b > a:
+            batch.bind("qfrc_applied")[:] = torque
+            part = batch.rollout(b - a, np.tile(path.control[:, a:b], (many, 1, 1)), record=("qpos", "qvel"))
+            q, v = np.concatenate((q, part["qpos"]), axis=1), np.concatenate((v, part["qvel"]), axis=1)
+    return q, v

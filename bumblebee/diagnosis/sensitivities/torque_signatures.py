@@ -18,6 +18,8 @@ from bumblebee.diagnosis.thresholds.sensitivities import TorqueSignatures
 from bumblebee.sim.effects import Effect, bent, runtime_hooks, sloped, spread_inertia
 from bumblebee.sim.servo import servos_of
 
+_NO_SIGNATURE = '{} has no torque in sensitivities/torque_signatures.py: add it, or column="simulated" in traits.py'
+
 
 class Signatures:
     """Torques on the W windows' degrees of freedom, mean over each of S segments of their paths."""
@@ -49,6 +51,8 @@ class Signatures:
             return self._wrench(candidate)
         if candidate.effect == "ground_slope":
             return self._slope(candidate)
+        if candidate.where and candidate.where not in self.plant.joints:
+            raise ValueError(_NO_SIGNATURE.format(candidate.effect))
         columns = [self.plant.joints.index(candidate.where)] if candidate.where else list(range(len(self.plant.joints)))
         parts = [self._joint(candidate, j) for j in columns]
         out = np.zeros((len(candidate.free), *self.path.mean(self.q).shape[:2], self.plant.model.nv))
@@ -113,7 +117,7 @@ class Signatures:
         effect = c.at(np.array(c.nominal) + np.array(c.step))
         if c.effect in ("command_delay", "dropped_commands"):
             return self.servos.gain[j] * (self._moved_control(effect)[..., j] - self.u[..., j])
-        raise ValueError(f"{c.effect} has no signature: simulate it")
+        raise ValueError(_NO_SIGNATURE.format(c.effect))
 
     def _moved_control(self, effect: Effect) -> np.ndarray:
         """Controls (W, K, J) with a delay or lost commands on all joints, of which the caller takes one."""

@@ -1,5 +1,7 @@
 """What the declared model says of an effect's parameters in a place."""
 
+from collections.abc import Callable, Sequence
+
 import mujoco
 import numpy as np
 
@@ -16,45 +18,89 @@ def touching(model: mujoco.MjModel, ground: int) -> list[int]:
 
 def declared_values(plant: Plant, kind: str, place: str) -> tuple[float, ...]:
     """The parameters of an effect as the declared model has them; infinite where it knows no bound."""
-    model = plant.model
     entry = CATALOGUE[kind]
-    if kind in ("link_mass", "link_com", "link_inertia"):
-        body = model.body(place).id
-        fields = {"link_mass": model.body_mass, "link_com": model.body_ipos, "link_inertia": model.body_inertia}
-        declared = tuple(float(x) for x in np.atleast_1d(fields[kind][body]))
-        return (*declared, 0.0) if kind == "link_mass" else declared
-    if kind == "ground_friction":
-        ground = int(model.geom(place).id)
-        others = [model.geom_friction[g, 0] for g in touching(model, ground)]
-        return (float(max(model.geom_friction[ground, 0], np.median(others) if others else 0.0)),)
-    if kind == "ground_compliance":
-        return (float(model.geom_solref[int(model.geom(place).id), 0]),)
-    if entry.on != "joint" or not place:
+    if not place and entry.on == "joint":
         return (0.0,) * len(entry.parameters)
-    return _declared_on_joint(plant, kind, plant.joints.index(place))
+    found = _DECLARED[kind](plant, place)
+    return (*map(float, found), *(0.0,) * (len(entry.parameters) - len(found)))
 
 
-def _declared_on_joint(plant: Plant, kind: str, column: int) -> tuple[float, ...]:
-    model, dof, a = plant.model, plant.dof[column], plant.actuator[column]
-    joint = int(model.dof_jntid[dof])
-    simple = {
-        "coulomb_friction": model.dof_frictionloss[dof],
-        "viscous_friction": model.dof_damping[dof],
-        "armature": model.dof_armature[dof],
-        "command_delay": plant.delay[a] if a >= 0 else 0.0,
-        "encoder_offset": plant.offset[column],
-        "motor_strength": 1.0,
-        "kp": 1.0,
-        "kd": 1.0,
-        "torque_speed_limit": np.inf,
-        "series_elasticity": np.inf,
-    }
-    if kind in simple:
-        return (float(simple[kind]), *(0.0,) * (len(CATALOGUE[kind].parameters) - 1))
-    if kind == "torque_limit":
-        limited = a >= 0 and model.actuator_forcelimited[a]
-        return (float(abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1]) if limited else np.inf,)
-    if kind == "joint_spring":
-        stiffness = float(model.jnt_stiffness[joint])
-        return (stiffness, stiffness * float(model.qpos_spring[model.jnt_qposadr[joint]]))
-    return (0.0,) * len(CATALOGUE[kind].parameters)
+_Declared = Callable[[Plant, str], Sequence[float]]
+"""(plant, place) -> the first parameters; the others are 0."""
+
+
+def _absent_at(value: float) -> _Declared:
+    """No model declares it: the value at which it is not there."""
+    return lambda plant, place: (value,)
+
+
+def _of_dof(name: str) -> _Declared:
+    return lambda plant, place: (getattr(plant.model, name)[plant.dof[plant.joints.index(place)]],)
+
+
+def _of_body(name: str) -> _Declared:
+    return lambda plant, place: np.atleast_1d(getattr(plant.model, name)[plant.model.body(place).id])
+
+
+def _delay(plant: Plant, place: str) -> Sequence[float]:
+    a = plant.actuator[plant.joints.index(place)]
+    return (plant.delay[a] if a >= 0 else 0.0,)
+
+
+def _limit(plant: Plant, place: str) -> Sequence[float]:
+    model, a = plant.model, plant.actuator[plant.joints.index(place)]
+    limited = a >= 0 and model.actuator_forcelimited[a]
+    return (abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1] if limited else np.inf,)
+
+
+def _spring(plant: Plant, place: str) -> Sequence[float]:
+    model, joint = plant.model, int(plant.model.joint(place).id)
+    stiffness = float(model.jnt_stiffness[joint])
+    return (stiffness, stiffness * float(model.qpos_spring[model.jnt_qposadr[joint]]))
+
+
+def _ground_friction(plant: Plant, place: str) -> Sequence[float]:
+    model, ground = plant.model, int(plant.model.geom(place).id)
+    others = [model.geom_friction[g, 0] for g in touching(model, ground)]
+    return (max(model.geom_friction[ground, 0], np.median(others) if others else 0.0),)
+
+
+_NONE, _FACTOR, _UNBOUNDED = _absent_at(0.0), _absent_at(1.0), _absent_at(np.inf)
+_DECLARED: dict[str, _Declared] = {
+    "coulomb_friction": _of_dof("dof_frictionloss"),
+    "viscous_friction": _of_dof("dof_damping"),
+    "stribeck_friction": _NONE,
+    "load_dependent_friction": _NONE,
+    "armature": _of_dof("dof_armature"),
+    "motor_strength": _FACTOR,
+    "kp": _FACTOR,
+    "kd": _FACTOR,
+    "torque_limit": _limit,
+    "torque_speed_limit": _UNBOUNDED,
+    "command_delay": _delay,
+    "torque_lag": _NONE,
+    "encoder_delay": _NONE,
+    "dropped_commands": _NONE,
+    "encoder_offset": lambda plant, place: (plant.offset[plant.joints.index(place)],),
+    "imu_offset": _NONE,
+    "encoder_quantisation": _NONE,
+    "joint_spring": _spring,
+    "asymmetric_friction": _NONE,
+    "hysteresis": _NONE,
+    "cogging": _NONE,
+    "backlash": _NONE,
+    "series_elasticity": _UNBOUNDED,
+    "link_mass": _of_body("body_mass"),
+    "link_com": _of_body("body_ipos"),
+    "link_inertia": _of_body("body_inertia"),
+    "ground_friction": _ground_friction,
+    "ground_compliance": lambda plant, place: (plant.model.geom_solref[int(plant.model.geom(place).id), 0],),
+    "ground_slope": _NONE,
+    "thermal_fade": _NONE,
+    "strength_drift": _NONE,
+    "external_wrench": _NONE,
+    "discovered": lambda plant, place: (),
+}
+if unlike := CATALOGUE.keys() ^ _DECLARED.keys():
+    where = "bumblebee/diagnosis/simulation/declared.py"
+    raise TypeError(f"{where}: _DECLARED needs a row for each of the catalogue's effects, not so: {sorted(unlike)}")

@@ -7,22 +7,15 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.simulation.declared import touching
+from bumblebee.diagnosis.simulation.in_place import WRITE, Target
 from bumblebee.diagnosis.simulation.plant import Plant, make_plant
-from bumblebee.sim.effects import (
-    CATALOGUE,
-    STICTION_SOLIMP,
-    STICTION_SOLREF,
-    Effect,
-    RuntimeHooks,
-    add_to_spec,
-    native,
-    runtime_hooks,
-)
+from bumblebee.sim.effects import CATALOGUE, Effect, RuntimeHooks, add_to_spec, native, runtime_hooks
 
 _ORDER = tuple(CATALOGUE)
 # Effects that change the layout of MuJoCo's state: they are compiled, once for each set of places.
 STRUCTURAL = ("backlash", "series_elasticity", "hysteresis")
+# Effects after which constants that derive from the model are computed again.
+_NEW_CONSTANTS = ("armature", "link_mass", "link_com", "link_inertia", *STRUCTURAL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,14 +51,15 @@ def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
     structural = [e for e in effects if _is_structural(e)]
     own = _structure(plant, structural) if structural else plant
     model, delay, offset = copy.copy(own.model), plant.delay.copy(), plant.offset.copy()
-    constants, hidden = False, []
+    hidden = []
     for effect in sorted(effects, key=lambda e: _ORDER.index(e.effect)):
         for place in effect.where or _everywhere(plant, effect.effect):
-            constants |= _apply(own, model, delay, offset, effect, place)
+            if effect.effect in WRITE:
+                WRITE[effect.effect](Target(own, model, delay, offset, place), *effect.values())
             if _is_structural(effect):
                 hidden.append((effect.effect, place, effect.values()))
     _set_rotors(plant, own, model, hidden, {place for e in effects if e.effect == "armature" for place in e.where})
-    if constants:
+    if any(effect.effect in _NEW_CONSTANTS for effect in effects):
         # set_const reads qpos0 through a scratch MjData; gains, friction and damping do not enter it.
         mujoco.mj_setConst(model, mujoco.MjData(model))
     hooks = runtime_hooks(effects, model)
@@ -139,97 +133,3 @@ def _form(effect: Effect) -> tuple[bool, ...]:
     if effect.effect not in native.SUFFIX:
         return ()
     return tuple(bool(value) for value in (effect.values()[1], *effect.values()[3:]))
-
-
-def _apply(
-    plant: Plant, model: mujoco.MjModel, delay: np.ndarray, offset: np.ndarray, effect: Effect, place: str
-) -> bool:
-    """Write one effect; True if constants that derive from the model must be computed again."""
-    kind, values = effect.effect, effect.values()
-    if CATALOGUE[kind].on == "body":
-        return _apply_to_body(model, kind, place, values)
-    if CATALOGUE[kind].on == "geom":
-        _apply_to_ground(model, kind, place, values[0])
-        return False
-    if kind == "ground_slope":
-        model.opt.gravity = native.sloped(model.opt.gravity, *values)
-        return False
-    column = plant.joints.index(place)
-    if kind == "discovered":  # a hook; its terms may be dry friction, which has to stick
-        dof = plant.dof[column]
-        model.dof_solref[dof], model.dof_solimp[dof, :2] = STICTION_SOLREF, STICTION_SOLIMP
-        return False
-    _apply_to_joint(plant, model, kind, column, values)
-    if kind == "command_delay":
-        delay[plant.actuator[column]] = values[0]
-    elif kind == "encoder_offset":
-        offset[column] = values[0]
-    return kind in ("armature", *STRUCTURAL)
-
-
-def _apply_to_joint(plant: Plant, model: mujoco.MjModel, kind: str, column: int, values: tuple[float, ...]) -> None:
-    dof, a, value = plant.dof[column], plant.actuator[column], values[0]
-    joint = int(model.dof_jntid[dof])
-    if kind in ("coulomb_friction", "stribeck_friction", "load_dependent_friction"):
-        model.dof_solref[dof], model.dof_solimp[dof, :2] = STICTION_SOLREF, STICTION_SOLIMP
-        if kind == "coulomb_friction":
-            model.dof_frictionloss[dof] = value
-    elif kind == "viscous_friction":
-        model.dof_damping[dof] = value
-    elif kind == "armature":
-        model.dof_armature[dof] = value
-    elif kind == "encoder_offset":
-        if a >= 0:
-            model.actuator_biasprm[a, 0] = model.actuator_biasprm[a, 1] * value * model.actuator_gear[a, 0]
-    elif kind == "torque_limit":
-        force = value / abs(model.actuator_gear[a, 0])
-        model.actuator_forcelimited[a], model.actuator_forcerange[a] = 1, (-force, force)
-    elif kind in ("motor_strength", "kp", "kd"):
-        kp = value if kind != "kd" else 1.0
-        kd = value if kind != "kp" else 1.0
-        model.actuator_gainprm[a, 0] *= kp
-        model.actuator_biasprm[a, :3] *= [kp, kp, kd]
-    elif kind == "asymmetric_friction":
-        stiffness, rest = model.jnt_stiffness[joint], model.qpos_spring[model.jnt_qposadr[joint]]
-        _set_spring(model, joint, stiffness, stiffness * rest - 0.5 * value)
-    elif kind == "joint_spring":
-        _set_spring(model, joint, *values)
-    elif kind == "hysteresis":
-        if not values[2]:
-            model.jnt_stiffness[joint], model.jnt_springyield[joint] = value / values[1], values[1]
-    elif kind in native.SUFFIX:
-        second = int(model.joint(plant.joints[column] + native.SUFFIX[kind]).id)
-        if kind == "backlash":
-            model.jnt_range[second] = (-0.5 * value, 0.5 * value)
-        else:
-            model.jnt_stiffness[second] = value
-            model.dof_damping[model.jnt_dofadr[second]] = values[2] * value
-
-
-def _set_spring(model: mujoco.MjModel, joint: int, stiffness: float, preload: float) -> None:
-    stiffness, rest = native.spring_of(float(stiffness), float(preload))
-    model.jnt_stiffness[joint], model.qpos_spring[model.jnt_qposadr[joint]] = stiffness, rest
-
-
-def _apply_to_body(model: mujoco.MjModel, kind: str, place: str, values: tuple[float, ...]) -> bool:
-    body = model.body(place).id
-    if kind == "link_mass":
-        mass, spread = values
-        factor = mass / model.body_mass[body]
-        model.body_inertia[body] = native.spread_inertia(model.body_inertia[body], factor, spread)
-        model.body_mass[body] = mass
-    elif kind == "link_com":
-        model.body_ipos[body] = values
-    elif kind == "link_inertia":
-        model.body_inertia[body] = native.physical_inertia(values)
-    return kind in ("link_mass", "link_com", "link_inertia")
-
-
-def _apply_to_ground(model: mujoco.MjModel, kind: str, place: str, value: float) -> None:
-    ground = int(model.geom(place).id)
-    others = touching(model, ground)
-    if kind == "ground_friction":
-        model.geom_friction[ground, 0] = value
-        model.geom_friction[others, 0] = np.minimum(value, model.geom_friction[others, 0])
-    else:
-        model.geom_solref[[ground, *others], 0] = value

@@ -11,11 +11,12 @@ from bumblebee.sim.effects.file import effects_yaml, read_effects, write_effects
 from bumblebee.sim.effects.forces import Memory, StepHooks, bent, history_length
 from bumblebee.sim.effects.hooks import RuntimeHooks, runtime_hooks
 from bumblebee.sim.effects.native import SUFFIX, is_hidden, physical_inertia, sloped, spread_inertia
-from bumblebee.sim.effects.spec import add_to_spec
+from bumblebee.sim.effects.spec import ADDED, add_to_spec
 from bumblebee.sim.effects.states import State, states_of
 from bumblebee.sim.effects.terms import Term, read_term
 
 __all__ = [
+    "ADDED",
     "CATALOGUE",
     "STICTION_SOLIMP",
     "STICTION_SOLREF",

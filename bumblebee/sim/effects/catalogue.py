@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
+from bumblebee.sim.units import is_known
+
 # MuJoCo's default dry friction creeps where a real joint sticks; a joint with `coulomb_friction` gets it stiff.
 STICTION_SOLREF = (0.004, 1.0)
 STICTION_SOLIMP = 0.99
@@ -134,6 +136,10 @@ CATALOGUE: dict[str, Kind] = {
     # Its parameters are terms of `sim.effects.terms` and their coefficients, not names of this catalogue.
     "discovered": Kind("joint", (), native=False),
 }
+if unlike := {
+    p.unit for kind in CATALOGUE.values() if kind.on == "joint" for p in kind.parameters if not is_known(p.unit)
+}:
+    raise TypeError(f"bumblebee/sim/units.py: say what {sorted(unlike)} is on a slide")
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,7 @@ def needs_effects(model: mujoco.MjModel, hooks: RuntimeHooks | None) -> bool:
     """Whether `MujocoCpu` alone would leave something out."""
     hidden = model.nq != _ROOT_Q + len(hook_joints(model))
     yields = bool((model.jnt_plasticadr >= 0).any())
-    return hidden or yields or (hooks is not None and (hooks.steps or not _only_offsets(hooks)))
-
-
-def _only_offsets(hooks: RuntimeHooks) -> bool:
-    return not (hooks.encoder_step.any() or hooks.imu.any() or hooks.dropped.any())
+    return hidden or yields or (hooks is not None and not hooks.only_offsets)
 
 
 class EffectsCpu(MujocoCpu):

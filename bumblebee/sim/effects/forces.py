@@ -50,6 +50,14 @@ class Memory:
     """(n, H): z of Dahl's law on the H joints that have it."""
 
 
+# Fields of the model that are written, and the attributes that show them.
+WRITTEN = {
+    "dof_frictionloss": "_loss",
+    "actuator_gainprm": "_gain",
+    "actuator_biasprm": "_bias",
+    "actuator_forcerange": "_range",
+}
+# What is carried from step to step: saved, and on a GPU kept in place. tests/test_forgotten.py finds what is missing.
 _REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states", "bent")
 
 
@@ -82,21 +90,23 @@ class StepHooks:
         self._kept = states_of(hooks.terms)
         self._states = np.zeros((count, len(self._kept)))
         self._bent = np.zeros((count, len(hooks.hysteresis)))
-        self._fading = bool(hooks.thermal.any() or hooks.drift.any())
-        self._rubbing = bool(hooks.stiction[:, 0].any() or hooks.load_friction.any())
-        self._rubbing |= any(term.rubs for _, _, term in hooks.terms)
-        self._driving = any(term.drives for _, _, term in hooks.terms)
-        self._running_out = bool(np.isfinite(hooks.speed_limit).any())
-        self._late = bool(hooks.encoder_delay.any() or hooks.encoder_step.any() or hooks.torque_lag.any())
-        self._pushing = self._late or bool(hooks.cogging) or any(not term.rubs for _, _, term in hooks.terms)
-        self._pushing |= bool(hooks.hysteresis)
+        terms = [term for _, _, term in hooks.terms]
+        self._fading, self._running_out, self._late = hooks.has("gain"), hooks.has("limit"), hooks.has("feedback")
+        self._rubbing = hooks.has("loss") or any(term.rubs for term in terms)
+        self._driving = any(term.drives for term in terms)
+        self._pushing = self._late or hooks.has("torque") or any(not term.rubs for term in terms)
         if self._fading:
-            self._gain, self._bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
+            self._expand("actuator_gainprm", "actuator_biasprm")
         if self._rubbing:
-            self._loss = batch.expand("dof_frictionloss")
+            self._expand("dof_frictionloss")
         if self._running_out:
-            self._range = batch.expand("actuator_forcerange")
+            self._expand("actuator_forcerange")
         self.rebase(("dof_frictionloss", "actuator_gainprm", "actuator_biasprm"))
+
+    def _expand(self, *names: str) -> None:
+        """Take fields of the model that have a row for each world, to write to."""
+        for name in names:
+            setattr(self, WRITTEN[name], self._batch.expand(name))
 
     def rebase(self, fields: Iterable[str]) -> None:
         """Take the worlds' present values of some fields (randomised ones, say) as those that the hooks act upon."""

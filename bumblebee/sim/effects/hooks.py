@@ -4,16 +4,23 @@
 play and flexible shafts left out.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.sim.effects.catalogue import CATALOGUE, Effect
+from bumblebee.sim.effects.catalogue import CATALOGUE, HOOKED, Effect
 from bumblebee.sim.effects.native import SUFFIX, is_hidden
 from bumblebee.sim.effects.terms import Term, read_term
+
+Acts = Literal["reading", "command", "start", "gain", "loss", "limit", "feedback", "torque", "rotor", "terms"]
+"""What a hook changes: what sensors report; which commands arrive; what is set once as a world begins; or, before each
+physics step, the servo's gains, the dry friction, the torque's limit, the servo's feedback, a torque beside it, the
+servo's torque on a rotor. What discovered terms change, each says."""
+_BEFORE_STEPS: tuple[Acts, ...] = ("gain", "loss", "limit", "feedback", "torque", "rotor", "terms")
 
 
 def _none() -> np.ndarray:
@@ -61,37 +68,64 @@ class RuntimeHooks:
     imu: np.ndarray = field(default_factory=lambda: np.zeros(3))
     """(3,) [rad]: rotation vector in the base's frame that is multiplied onto the reading of its orientation."""
 
+    def has(self, *acts: Acts) -> bool:
+        """Whether there is an effect that changes one of these."""
+        return any(_is_there(self, name) for name, which in _ACTS.items() if which in acts)
+
     @property
     def empty(self) -> bool:
         """Whether the model alone carries every effect."""
-        read = self.encoder_offset.any() or self.encoder_step.any() or self.imu.any()
-        return not (read or self.dropped.any() or self.steps)
+        return not any(_is_there(self, name) for name in _ACTS)
+
+    @property
+    def only_offsets(self) -> bool:
+        """Whether nothing but encoders' offsets is left to do, which every engine does by itself."""
+        return not any(_is_there(self, name) for name in _ACTS if name != "encoder_offset")
 
     @property
     def steps(self) -> bool:
         """Whether `effects.forces.StepHooks` has something to do."""
-        return bool(self.each_step or self.wrench)
+        return self.each_step or self.has("start")
 
     @property
     def each_step(self) -> bool:
         """Whether something must be written before every physics step."""
-        arrays = (self.encoder_step, self.encoder_delay, self.torque_lag, self.load_friction, self.thermal, self.drift)
-        some = any(a.any() for a in arrays) or self.stiction[:, 0].any()
-        some = some or np.isfinite(self.speed_limit).any() or self.hysteresis or self.rotors
-        return bool(some or self.cogging or self.terms)
+        return self.has(*_BEFORE_STEPS)
 
 
-_COLUMN = {
-    "encoder_offset": "encoder_offset",
-    "encoder_quantisation": "encoder_step",
-    "encoder_delay": "encoder_delay",
-    "torque_lag": "torque_lag",
-    "dropped_commands": "dropped",
-    "load_dependent_friction": "load_friction",
-    "torque_speed_limit": "speed_limit",
-    "thermal_fade": "thermal",
-    "strength_drift": "drift",
+_ACTS: dict[str, Acts] = {
+    "encoder_offset": "reading",
+    "encoder_step": "feedback",
+    "encoder_delay": "feedback",
+    "torque_lag": "feedback",
+    "dropped": "command",
+    "stiction": "loss",
+    "load_friction": "loss",
+    "speed_limit": "limit",
+    "thermal": "gain",
+    "drift": "gain",
+    "cogging": "torque",
+    "terms": "terms",
+    "hysteresis": "torque",
+    "rotors": "rotor",
+    "wrench": "start",
+    "imu": "reading",
 }
+_FIELDS = [f.name for f in fields(RuntimeHooks) if f.name not in ("joints", "dropped_together")]
+if unsaid := set(_FIELDS) ^ _ACTS.keys():
+    raise TypeError(
+        f"bumblebee/sim/effects/hooks.py: _ACTS needs a row for each array of RuntimeHooks; not so: {unsaid}"
+    )
+_ABSENT = {"speed_limit": np.inf}  # where an effect is not there; the others at 0
+_LISTS = [f.name for f in fields(RuntimeHooks) if f.default == ()]
+
+
+def _is_there(hooks: RuntimeHooks, name: str) -> bool:
+    value = getattr(hooks, name)
+    if isinstance(value, tuple):
+        return bool(value)
+    first = value[:, 0] if value.ndim == 2 else value
+    return bool((first != _ABSENT.get(name, 0.0)).any())
 
 
 def hook_joints(model: mujoco.MjModel) -> list[int]:
@@ -100,52 +134,111 @@ def hook_joints(model: mujoco.MjModel) -> list[int]:
     return [j for j in range(model.njnt) if int(model.jnt_type[j]) in scalar and not is_hidden(model.joint(j).name)]
 
 
+class _Making:
+    """The hooks of one model while they are made; attributes are those of `RuntimeHooks`."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self.model = model
+        self.joints = tuple(model.joint(j).name for j in hook_joints(model))
+        count = len(self.joints)
+        arrays = {name: np.full(count, _ABSENT.get(name, 0.0)) for name in _ACTS if name not in _LISTS}
+        self.made: dict[str, Any] = arrays | dict.fromkeys(_LISTS, ())
+        self.made |= {"imu": np.zeros(3), "dropped_together": True, "stiction": np.tile((0.0, 1.0), (count, 1))}
+
+    def column(self, kind: str, place: str) -> int:
+        """Of the joint `place`."""
+        return _column(self.joints, kind, place)
+
+    def columns(self, effect: Effect) -> Sequence[int]:
+        """Of the joints that an effect sits on."""
+        return [self.column(effect.effect, place) for place in effect.where] or range(len(self.joints))
+
+
+def _array(name: str) -> Callable[[_Making, Effect], None]:
+    def hook(making: _Making, effect: Effect) -> None:
+        for column in making.columns(effect):
+            making.made[name][column] = effect.value()
+
+    return hook
+
+
+def _dropped(making: _Making, effect: Effect) -> None:
+    making.made["dropped_together"] &= not effect.where
+    _array("dropped")(making, effect)
+
+
+def _stiction(making: _Making, effect: Effect) -> None:
+    for column in making.columns(effect):
+        making.made["stiction"][column] = effect.values()
+
+
+def _cogging(making: _Making, effect: Effect) -> None:
+    making.made["cogging"] += tuple((column, *effect.values()) for column in making.columns(effect))
+
+
+def _dahl(making: _Making, effect: Effect) -> None:
+    amplitude, width, dahl = effect.values()
+    if dahl:
+        columns = [making.column(effect.effect, place) for place in effect.where]
+        making.made["hysteresis"] += tuple((column, amplitude, width) for column in columns)
+
+
+def _rotors(making: _Making, effect: Effect) -> None:
+    if effect.values()[1]:
+        making.made["rotors"] += tuple(
+            (making.column(effect.effect, p), _rotor(making.model, effect.effect, p)) for p in effect.where
+        )
+
+
+def _discovered(making: _Making, effect: Effect) -> None:
+    making.made["terms"] += tuple(_terms(making.joints, effect))
+
+
+def _tilt(making: _Making, effect: Effect) -> None:
+    for place in effect.where:
+        _body(making.model, effect.effect, place)
+    making.made["imu"][:2] = effect.values()
+
+
+def _wrench(making: _Making, effect: Effect) -> None:
+    bodies = [_body(making.model, effect.effect, place) for place in effect.where]
+    making.made["wrench"] += tuple((body, np.array(effect.values())) for body in bodies)
+
+
+HOOKS: dict[str, Callable[[_Making, Effect], None]] = {
+    "encoder_offset": _array("encoder_offset"),
+    "encoder_quantisation": _array("encoder_step"),
+    "encoder_delay": _array("encoder_delay"),
+    "torque_lag": _array("torque_lag"),
+    "dropped_commands": _dropped,
+    "stribeck_friction": _stiction,
+    "load_dependent_friction": _array("load_friction"),
+    "torque_speed_limit": _array("speed_limit"),
+    "thermal_fade": _array("thermal"),
+    "strength_drift": _array("drift"),
+    "cogging": _cogging,
+    "hysteresis": _dahl,
+    "backlash": _rotors,
+    "series_elasticity": _rotors,
+    "imu_offset": _tilt,
+    "external_wrench": _wrench,
+    "discovered": _discovered,
+}
+"""Effect -> what it adds to the hooks, of those that plain MJCF does not carry in every form."""
+_NEEDED = {kind for kind, entry in CATALOGUE.items() if not entry.native} | HOOKED.keys()
+if unlike := _NEEDED ^ HOOKS.keys():
+    raise TypeError(
+        f"bumblebee/sim/effects/hooks.py: HOOKS needs a row each for what MJCF lacks; not so: {sorted(unlike)}"
+    )
+
+
 def runtime_hooks(effects: Sequence[Effect], model: mujoco.MjModel) -> RuntimeHooks:
     """The hooks that `effects` need on `model`."""
-    names = tuple(model.joint(j).name for j in hook_joints(model))
-    table = {field_: np.zeros(len(names)) for field_ in _COLUMN.values()}
-    table["speed_limit"] = np.full(len(names), np.inf)
-    stiction, imu = np.zeros((len(names), 2)), np.zeros(3)
-    stiction[:, 1] = 1.0
-    cogging, wrench, terms, dahl, rotors, together = [], [], [], [], [], True
+    making = _Making(model)
     for effect in effects:
-        kind = CATALOGUE[effect.effect]
-        if kind.on == "body" and effect.effect in ("imu_offset", "external_wrench"):
-            bodies = [_body(model, effect.effect, place) for place in effect.where]
-            if effect.effect == "imu_offset":
-                imu[:2] = effect.values()
-            else:
-                wrench += [(body, np.array(effect.values())) for body in bodies]
-            continue
-        if effect.effect == "discovered":
-            terms += _terms(names, effect)
-        if effect.effect == "hysteresis" and effect.values()[-1]:
-            dahl += [(_column(names, effect.effect, place), *effect.values()[:2]) for place in effect.where]
-        if effect.effect in SUFFIX and effect.values()[1]:
-            rotors += [(_column(names, effect.effect, p), _rotor(model, effect.effect, p)) for p in effect.where]
-        if effect.effect not in (*_COLUMN, "stribeck_friction", "cogging"):
-            continue
-        together = together and not (effect.effect == "dropped_commands" and effect.where)
-        for column in [_column(names, effect.effect, p) for p in effect.where] or range(len(names)):
-            if effect.effect == "stribeck_friction":
-                stiction[column] = effect.values()
-            elif effect.effect == "cogging":
-                sine, cosine, periods = effect.values()
-                cogging.append((column, sine, cosine, periods))
-            else:
-                table[_COLUMN[effect.effect]][column] = effect.value()
-    return RuntimeHooks(
-        joints=names,
-        stiction=stiction,
-        cogging=tuple(cogging),
-        terms=tuple(terms),
-        hysteresis=tuple(dahl),
-        rotors=tuple(rotors),
-        wrench=tuple(wrench),
-        imu=imu,
-        dropped_together=together,
-        **table,
-    )
+        if effect.effect in HOOKS:
+            HOOKS[effect.effect](making, effect)
+    return RuntimeHooks(making.joints, **making.made)
 
 
 def _terms(names: tuple[str, ...], effect: Effect) -> list[tuple[int, float, Term]]:

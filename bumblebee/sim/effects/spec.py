@@ -19,7 +19,7 @@ The others need `sim.effects.hooks` at run time.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco
@@ -37,10 +37,10 @@ _ORDER = tuple(CATALOGUE)
 def add_to_spec(spec: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
     """Add every effect that MuJoCo can express to `spec`, in place."""
     for effect in sorted(effects, key=lambda e: _ORDER.index(e.effect)):
-        if effect.effect not in _ADD:
+        if effect.effect not in ADDED:
             continue
         for place in effect.where or _everywhere(spec, effect.effect):
-            _ADD[effect.effect](spec, place, *effect.values())
+            ADDED[effect.effect](spec, place, *effect.values())
 
 
 def _everywhere(spec: mujoco.MjSpec, kind: str) -> tuple[str, ...]:
@@ -197,7 +197,7 @@ def _slope(spec: mujoco.MjSpec, name: str, x: float, y: float) -> None:
     spec.option.gravity = native.sloped(spec.option.gravity, x, y)
 
 
-_ADD = {
+ADDED: dict[str, Callable[..., None]] = {
     "coulomb_friction": _frictionloss,
     "viscous_friction": _damping,
     "stribeck_friction": _stiff_friction,
@@ -222,3 +222,8 @@ _ADD = {
     "ground_compliance": _ground_compliance,
     "ground_slope": _slope,
 }
+"""Effect -> what it changes in a spec, (spec, place, *parameters)."""
+if missing := {kind for kind, entry in CATALOGUE.items() if entry.native} - ADDED.keys():
+    raise TypeError(f"bumblebee/sim/effects/spec.py: ADDED needs a row for what plain MJCF carries: {sorted(missing)}")
+if unknown := ADDED.keys() - CATALOGUE.keys():
+    raise TypeError(f"bumblebee/sim/effects/spec.py: ADDED has what the catalogue does not: {sorted(unknown)}")

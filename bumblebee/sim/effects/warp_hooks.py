@@ -13,17 +13,9 @@ import torch
 from torch import Tensor
 
 from bumblebee.sim.device_arrays import DeviceArray
-from bumblebee.sim.effects.forces import _REMEMBERED, StepHooks
+from bumblebee.sim.effects.forces import _REMEMBERED, WRITTEN, StepHooks
 from bumblebee.sim.effects.hooks import RuntimeHooks
 from bumblebee.sim.effects.terms import Term, _value
-
-_WRITTEN = {
-    "dof_frictionloss": "_loss",
-    "actuator_gainprm": "_gain",
-    "actuator_biasprm": "_bias",
-    "actuator_forcerange": "_range",
-}
-
 
 _KINDS = {"fresh": torch.bool, "time": torch.float64}  # clocks that strike on time are sums of thousands of steps
 
@@ -102,9 +94,9 @@ class WarpHooks(StepHooks):
 
     def refresh(self, fields: Iterable[str]) -> None:
         """Some fields of the model have new arrays: write into those, on top of their values."""
-        for name in set(fields) & set(_WRITTEN):
-            if hasattr(self, _WRITTEN[name]):
-                setattr(self, _WRITTEN[name], self._batch.expand(name))
+        for name in set(fields) & set(WRITTEN):
+            if hasattr(self, WRITTEN[name]):
+                setattr(self, WRITTEN[name], self._batch.expand(name))
         self.rebase(fields)
 
     def _put_back(self) -> None:

@@ -1,18 +1,27 @@
 """What is forgotten of a new effect of the catalogue is said, with the file and what to add."""
 
 import functools
+import importlib
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
+from mujoco.batch import Batch
 
+from bumblebee.deploy.undeclared.kinds import KINDS
 from bumblebee.diagnosis.candidates.candidate import Candidate, is_simulated, shortlisted
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
+from bumblebee.diagnosis.candidates.exclusion import is_chosen
 from bumblebee.diagnosis.candidates.traits import TRAITS
 from bumblebee.diagnosis.residuals.problem import Problem
 from bumblebee.diagnosis.sensitivities.columns import pulse_sizes, screen
 from bumblebee.diagnosis.simulation.declared import declared_values
-from bumblebee.sim.effects import CATALOGUE
+from bumblebee.diagnosis.simulation.variation import Variation, vary
+from bumblebee.errors import BadInput
+from bumblebee.sim.effects import ADDED, CATALOGUE, StepHooks, add_to_spec, runtime_hooks
+from bumblebee.sim.effects.forces import _REMEMBERED, WRITTEN
+from bumblebee.sim.effects.hooks import HOOKS
 from tests.diagnosis import arm, stander
 
 HOME = Path(__file__).parents[3]
@@ -22,6 +31,9 @@ NOT_SEARCHED = {
 }
 ENUMERATE = "bumblebee/diagnosis/candidates/enumerate.py"
 SIGNATURES = "bumblebee/diagnosis/sensitivities/torque_signatures.py"
+IN_PLACE = "bumblebee/diagnosis/simulation/in_place.py"
+BESIDE_THE_MODEL = {"actuator_delay", "actuator_history"}
+EQUATIONS = ("test_effect_equations.py", "test_structural_equations.py", "test_effects.py", "test_effect_engine.py")
 VARIATION = "bumblebee/diagnosis/simulation/variation.py, or the hooks and the spec in bumblebee/sim/effects"
 
 
@@ -89,3 +101,85 @@ def test_the_declared_value_of_an_effect_on_a_joint_is_known(kind: str) -> None:
 def test_every_effect_stands_in_the_guide(kind: str) -> None:
     guide = (HOME / "docs/diagnosis.md").read_text()
     assert f"`{kind}`" in guide, f"docs/diagnosis.md: add a row for {kind} to 'What it looks for'"
+
+
+@pytest.mark.parametrize("kind", ADDED)
+def test_a_model_varied_in_place_is_the_one_that_the_spec_makes(kind: str) -> None:
+    """Every array of the compiled model, but what `Variation` has beside it: delays, and what belongs to them."""
+    compared = 0
+    for problem, c in candidates(kind) if kind in SEARCHED else []:
+        effect, spec = c.at(c.start), problem.plant.spec.copy()
+        add_to_spec(spec, [effect])
+        made, varied = spec.compile(), vary(problem.plant, [effect]).model
+        for name in _arrays(made):
+            told = f"{IN_PLACE}: {name} after {effect}"
+            np.testing.assert_allclose(getattr(varied, name), getattr(made, name), rtol=1e-6, atol=1e-9, err_msg=told)
+            compared += 1
+    assert compared or kind not in SEARCHED
+
+
+def _arrays(model: mujoco.MjModel) -> list[str]:
+    names = [name for name in dir(model) if isinstance(getattr(model, name), np.ndarray)]
+    return [n for n in names if getattr(model, n).dtype.kind == "f" and n not in BESIDE_THE_MODEL]
+
+
+@pytest.mark.parametrize("kind", SEARCHED)
+def test_what_mjcf_cannot_carry_together_is_never_chosen_together(kind: str) -> None:
+    """Two effects on a joint make a spec that has both and is the model of neither, or one row names the other."""
+    problem, every = robots()["arm"]
+    joint = problem.plant.joints[-1]
+    mine = [c for c in every if (c.effect, c.where) == (kind, joint)]
+    others = {o.effect: o for o in every if o.where == joint and o.effect != kind}
+    for c, o in [(c, o) for c in mine[:2] for o in others.values()]:
+        if not is_chosen(c, [o]):
+            told = f"bumblebee/diagnosis/candidates/traits.py: not_beside=({o.effect!r},) for {kind}"
+            both = [c.at(c.start), o.at(o.start)]
+            try:
+                add_to_spec(problem.plant.spec.copy(), both)
+            except BadInput as error:
+                raise AssertionError(f"{told}: {error}") from error
+            for one in (c, o):
+                assert not _same(vary(problem.plant, both), vary(problem.plant, [one.at(one.start)])), told
+
+
+def _same(one: Variation, other: Variation) -> bool:
+    """Whether two variations are one model with the same beside it."""
+    if one.model.nq != other.model.nq or not np.array_equal(one.delay, other.delay):
+        return False
+    if one.hooks is not None or other.hooks is not None or one.dropped is not None or other.dropped is not None:
+        return False
+    return all(np.array_equal(getattr(one.model, name), getattr(other.model, name)) for name in _arrays(one.model))
+
+
+def test_what_hooks_carry_from_step_to_step_is_saved() -> None:
+    """An array of `StepHooks` that a step has changed is remembered, or a field of the model."""
+    problem, every = robots()["arm"]
+    changed: set[str] = set()
+    for c in {c.effect: c for c in every if c.effect in HOOKS}.values():
+        model = vary(problem.plant, [c.at(c.start)]).model
+        batch = Batch(model, 1, 1)
+        hooks = StepHooks(runtime_hooks([c.at(c.start)], model), model, batch)
+        hooks.reset(np.array([0]))
+        before = {name: value.copy() for name, value in vars(hooks).items() if isinstance(value, np.ndarray)}
+        for _ in range(5):
+            batch.ctrl[:] = 0.3
+            hooks.apply()
+            batch.step()
+        changed |= {name for name, value in before.items() if not np.array_equal(value, getattr(hooks, name))}
+    forgotten = changed - {f"_{name}" for name in _REMEMBERED} - set(WRITTEN.values())
+    assert not forgotten, f"bumblebee/sim/effects/forces.py: add {sorted(forgotten)} to _REMEMBERED"
+    assert {"_time", "_heat", "_lagged", "_past_q"} <= changed
+
+
+@pytest.mark.parametrize("kind", SEARCHED)
+def test_every_effect_has_an_equation_from_another_hand(kind: str) -> None:
+    written = "".join((HOME / "tests/sim" / name).read_text() for name in EQUATIONS)
+    assert f'"{kind}"' in written, f"tests/sim/{EQUATIONS[0]}: the equation of {kind}, integrated in NumPy"
+    told = f"bumblebee/deploy/undeclared/kinds.py: a law of {kind} for the sealed benchmark, sharing no code"
+    assert kind in KINDS, told
+
+
+@pytest.mark.parametrize("module", ["compensation_rules", "stand_in_effects", "undeclared.faults"])
+def test_what_a_module_of_the_deployment_wants_of_each_effect_it_has(module: str) -> None:
+    """Each compares its table with the catalogue's, or with the sealed benchmark's, as it is imported."""
+    assert importlib.import_module(f"bumblebee.deploy.{module}")
