@@ -1,13 +1,16 @@
 """What the report's map shows of each motion: where it lies, what it is, and a few poses in few signs."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from bumblebee.clustering.features import POSITIONS
 from bumblebee.clustering.material import Material
+from bumblebee.clustering.poses import BONES
 
-SIGNS = "".join(chr(code) for code in range(35, 126) if chr(code) not in "&<>\\")
+SIGNS = "".join(chr(code) for code in range(35, 126) if chr(code) not in "&'<>\\")
 """What a number of a pose is written with: printable, and without what HTML or JSON would have to escape."""
 STEP = 1.8 / (len(SIGNS) - 1)
 """Between one sign and the next [m]: 2.1 cm; a picture is 1.8 m wide and high, the pelvis in its middle."""
@@ -30,6 +33,11 @@ def motion_map(materials: Sequence[Material], labels: pd.DataFrame, most: int) -
     table["caption_source"] = [own.source for own in materials]
     table["poses"] = [written(own.poses) if i in drawn else "" for i, own in enumerate(materials)]
     return table
+
+
+def form() -> dict[str, Any]:
+    """How to read the poses: the signs, the step between two of them [m], points of a pose, the lines to draw."""
+    return {"signs": SIGNS, "step": STEP, "joints": len(POSITIONS), "bones": [list(bone) for bone in BONES]}
 
 
 def written(poses: np.ndarray) -> str:

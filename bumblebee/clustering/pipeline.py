@@ -12,7 +12,7 @@ from bumblebee.clustering.audit import Audited, audit
 from bumblebee.clustering.autoencoder import TextMotionAutoencoder
 from bumblebee.clustering.config import ClusterConfig
 from bumblebee.clustering.elbow import elbow_curve
-from bumblebee.clustering.map import motion_map
+from bumblebee.clustering.map import form, motion_map
 from bumblebee.clustering.material import Material, gather
 from bumblebee.clustering.pairs import held_out_retrieval
 from bumblebee.clustering.stability import over_k
@@ -100,6 +100,7 @@ def cluster(
         "loss": {name: float(encoded.curve.iloc[-1][name]) for name in encoded.curve.columns if name != "epoch"},
         "audit": audit(judged, config),
         "retrieval": held_out_retrieval(encoded.model, table, materials),
+        "map": form(),
     }
     statistics = pd.DataFrame([{"name": own.name, **own.statistics} for own in materials])
     points = motion_map(materials, labels, config.map_poses)

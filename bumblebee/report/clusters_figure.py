@@ -37,13 +37,13 @@ def plane_figure(labels: pd.DataFrame, shares: list[float] | None) -> str:
     return svg_uri(figure)
 
 
-def elbow_figure(elbow: pd.DataFrame, k: int, suggested: int) -> str:
+def elbow_figure(elbow: pd.DataFrame, k: int, suggested: int | None) -> str:
     """Image URI.
 
     Args:
         elbow: columns k, within_ss.
         k: the number of clusters used.
-        suggested: the elbow's own suggestion.
+        suggested: the elbow's own suggestion; None where there is no elbow.
     """
     figure, axis = canvas(height=3.1)
     axis.plot(elbow["k"], elbow["within_ss"], "-o", color=INK, ms=4)
