@@ -8,12 +8,12 @@ from bumblebee.report.results import Json, LoopResults
 from bumblebee.report.wording import plural
 
 _COLUMNS = (
-    ("displacement", "displacement [m]", 2),
+    ("displacement", "disp. [m]", 2),
     ("z_move", "z-move [mm]", 2),
     ("speed", "speed [m/s]", 3),
     ("joint", "joint [rad/s]", 3),
-    ("lower_joint", "lower joint", 3),
-    ("upper_joint", "upper joint", 3),
+    ("lower_joint", "lower", 3),
+    ("upper_joint", "upper", 3),
 )
 """Of the paper's table 2: key, heading, digits."""
 
@@ -58,11 +58,10 @@ def _pictures(results: LoopResults) -> list[Block]:
 
 
 def _table(summary: Json) -> Block:
-    header = ("cluster", "label", "clips + held out", *(name for _, name, _ in _COLUMNS), "keywords")
+    header = ("cluster", "clips + held out", *(name for _, name, _ in _COLUMNS), "keywords")
     rows = [
         (
-            name,
-            str(row["label"]),
+            f"{name} {row['label']}",
             f"{row['clips']} + {row['held_out_clips']}",
             *(f"{row[key]:.{digits}f}" if key in row else "–" for key, _, digits in _COLUMNS),
             str(row["keywords"]) or "–",

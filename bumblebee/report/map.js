@@ -73,7 +73,9 @@ for (const figure of document.querySelectorAll("figure.map")) {
     }
   };
   const figures = (point) => {
-    const count = point.poses.length / (2 * joints), wide = 1.15, high = 1.86;
+    const count = point.poses.length / (2 * joints), wide = 1.15;
+    const ups = [...point.poses].filter((_, i) => i % 2).map((sign) => signs.indexOf(sign) * step);
+    const high = Math.max(1.4, Math.max(...ups) + 0.17);
     const made = draw("svg", {viewBox: `0 0 ${(count * wide).toFixed(2)} ${high}`, class: "poses", role: "img"}, about);
     const seconds = [...Array(count).keys()].map((i) => (point.seconds * i / (count - 1)).toFixed(1));
     made.setAttribute("aria-label", `The robot at ${seconds.join(", ")} s`);
