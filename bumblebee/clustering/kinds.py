@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 RULES = (
-    ("airborne", "no foot on the floor in more than 5 % of the frames"),
+    ("airborne", "no foot on the floor in more than 10 % of the frames, the root up or down at 75 mm/s or more"),
     ("travelling", "the root gets 1 m or more from where it starts"),
     ("crouching", "the root comes below 0.62 m; it stands at 0.78 m"),
     ("turning", "the heading covers 90 degrees or more"),
@@ -23,7 +23,7 @@ def kinds(statistics: pd.DataFrame) -> np.ndarray:
     """The kind of each clip, (N,) of the names in `RULES`, from the columns that `clip_statistics` gives."""
     upper, lower = statistics["upper_joint"], statistics["lower_joint"]
     holds = [
-        statistics["airborne"] > 0.05,
+        (statistics["airborne"] > 0.1) & (statistics["z_move"] >= 2.5),  # motion capture that floats does not bounce
         statistics["displacement"] >= 1.0,
         statistics["lowest"] < 0.62,
         statistics["turn"] >= np.pi / 2,

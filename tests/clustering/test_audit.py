@@ -113,17 +113,11 @@ def test_the_papers_own_table_gets_the_papers_own_names() -> None:
 
 
 def test_kinds_follow_their_rules() -> None:
-    plain = {
-        "airborne": 0.0,
-        "displacement": 0.1,
-        "lowest": 0.75,
-        "turn": 0.1,
-        "upper_joint": 0.05,
-        "lower_joint": 0.05,
-    }
+    plain = {"airborne": 0.0, "z_move": 0.5, "displacement": 0.1, "lowest": 0.75, "turn": 0.1}
+    plain |= {"upper_joint": 0.05, "lower_joint": 0.05}
     changed = [
-        {"airborne": 0.2, "displacement": 2.0}, {"displacement": 1.2, "turn": 3.0}, {"lowest": 0.5}, {"turn": 1.6},
-        {"upper_joint": 0.4}, {"upper_joint": 0.4, "lower_joint": 0.3}, {},
+        {"airborne": 0.2, "z_move": 6.0, "displacement": 2.0}, {"displacement": 1.2, "turn": 3.0}, {"lowest": 0.5},
+        {"turn": 1.6}, {"upper_joint": 0.4}, {"upper_joint": 0.4, "lower_joint": 0.3}, {"airborne": 0.9},
     ]  # fmt: skip
     found = kinds(pd.DataFrame([{**plain, **row} for row in changed]))
     assert found.tolist() == ["airborne", "travelling", "crouching", "turning", "arms", "legs", "still"]
