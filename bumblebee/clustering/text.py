@@ -57,7 +57,7 @@ def token_table(captions: Sequence[str], tokens: Sequence[torch.Tensor]) -> Toke
     ends = torch.tensor([len(own) for own in tokens]).cumsum(0)
     means = torch.stack([own.float().mean(0) for own in tokens])
     return TokenTable(
-        tuple(captions), torch.cat(list(tokens)).half(), ends, torch.nn.functional.normalize(means, dim=-1)
+        tuple(captions), torch.cat([own.half() for own in tokens]), ends, torch.nn.functional.normalize(means, dim=-1)
     )
 
 
