@@ -128,7 +128,8 @@ def texts_of(materials: Sequence[Material], config: ClusterConfig) -> TokenTable
 def epochs_of(materials: Sequence[Material], config: ClusterConfig) -> int:
     """How many epochs all trainings have together."""
     training = sum(not own.held_out for own in materials)
-    trainings = 1 + config.audit_retrain + (config.audit_motion_only and any(own.captions for own in materials))
+    told = any(own.captions for own in materials if not own.held_out)
+    trainings = 1 + config.audit_retrain + (config.audit_motion_only and told)
     return trainings * planned_epochs(max(1, training), config)
 
 
