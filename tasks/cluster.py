@@ -1,27 +1,36 @@
 """Cluster the kept motions by text and motion: data/filtered -> data/clusters, models/clustering."""
 
 import json
+import re
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from bumblebee.clustering.config import ClusterConfig
-from bumblebee.clustering.pipeline import Clustering, cluster_clips
+from bumblebee.clustering.material import Material, gather
+from bumblebee.clustering.pipeline import Clustering, cluster, enough, epochs_of, texts_of
 from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.store import read_library
+from bumblebee.motion.store import read_index, read_library
 from bumblebee.progress import progress
 from tasks import paths
 from tasks.sections import loop
 from tasks.stage import load, log_run, output_folder, run_stage
 
+MLFLOW = re.compile(r"[^A-Za-z0-9_./ -]")  # what it takes in no name
+_AT_ONCE = 256  # clips in memory while their features are made
+
 
 def main() -> None:
     """Read the kept clips, cluster them, write labels, curves, summary and the autoencoder."""
     config, names = load("cluster", ClusterConfig), loop().clusters
-    clips = kept_clips()
-    with progress(config.epochs, "text-motion autoencoder", "epochs") as bar:
-        result = cluster_clips(clips, names, config, lambda _, note: bar.update(1, note))
+    materials = kept_material(config)
+    enough(materials, names, config)
+    table = texts_of(materials, config)
+    with progress(epochs_of(materials, config), "text-motion autoencoder", "epochs") as bar:
+        result = cluster(materials, names, config, lambda _, note: bar.update(1, note), table)
     with output_folder(paths.CLUSTERING) as folder:
         write_model(folder, result, config)
     with output_folder(paths.CLUSTERS) as folder:
@@ -33,19 +42,28 @@ def main() -> None:
     )
 
 
-def kept_clips() -> list[Clip]:
-    """The clips that the filter kept."""
-    clips = read_library(paths.FILTERED)
-    if not clips:
+def kept_material(config: ClusterConfig) -> list[Material]:
+    """Features and texts of the clips that the filter kept, of which only so many are in memory at a time."""
+    names = read_index(paths.FILTERED)["name"].tolist()
+    if not names:
         raise BadInput(
             paths.FILTERED / "index.parquet", "at least one kept motion", "none", f"See {paths.FILTERED / 'drops.csv'}"
         )
-    return clips
+    with progress(len(names), "features", "motions") as bar:
+
+        def read() -> Iterator[Clip]:
+            for start in range(0, len(names), _AT_ONCE):
+                part = read_library(paths.FILTERED, names[start : start + _AT_ONCE])
+                yield from part
+                bar.update(len(part))
+
+        return gather(read(), config)
 
 
 def write_tables(folder: Path, result: Clustering) -> None:
-    """labels.parquet, statistics.csv, elbow.csv, curve.csv, summary.json."""
+    """labels.parquet, statistics.csv, elbow.csv, curve.csv, map.parquet, summary.json."""
     result.labels.to_parquet(folder / "labels.parquet", index=False)
+    result.points.to_parquet(folder / "map.parquet", index=False)
     result.statistics.to_csv(folder / "statistics.csv", index=False)
     result.elbow.to_csv(folder / "elbow.csv", index=False)
     result.curve.to_csv(folder / "curve.csv", index=False)
@@ -60,25 +78,53 @@ def write_model(folder: Path, result: Clustering, config: ClusterConfig) -> None
 
 
 def metrics(result: Clustering) -> dict[str, float]:
-    """Final numbers for MLflow."""
-    audit, loss = result.summary["audit"], result.summary["loss"]
-    numbers = {f"loss/{name}": value for name, value in loss.items()}
-    numbers |= {f"stability/{name}": value for name, value in audit["stability"].items()}
-    numbers |= {"k": result.summary["k"], "suggested_k": result.summary["suggested_k"]}
-    if audit["family_ari"] is not None:
-        numbers["family_ari"] = audit["family_ari"]
-    return numbers
+    """Every figure of the summary by its path, for MLflow; its interval beside it as `.low` and `.high`."""
+    summary = result.summary
+    told = {key: summary[key] for key in ("audit", "retrieval", "elbow", "clips", "loss", "clusters")}
+    return {"k": summary["k"], **dict(figures(told))}
+
+
+def figures(tree: dict[str, Any], path: str = "") -> Iterator[tuple[str, float]]:
+    """The numbers of a nested mapping, each with its path."""
+    for key, value in tree.items():
+        place = f"{path}{MLFLOW.sub('_', str(key))}"
+        if key == "value" and value is not None:
+            yield path.rstrip("/"), float(value)
+        elif isinstance(value, dict):
+            yield from figures(value, f"{place}/")
+        elif isinstance(value, list) and len(value) == 2 and None not in value and key.endswith("95"):
+            yield from ((f"{place}.low", float(value[0])), (f"{place}.high", float(value[1])))
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield place, float(value)
 
 
 def tell(result: Clustering) -> None:
-    """One line a cluster."""
+    """One line a cluster, and one where the elbow suggests another number."""
     summary = result.summary
-    print(f"{summary['k']} clusters (the elbow suggests {summary['suggested_k']})")
+    at_random = ", at random, of equal sizes" if summary["method"] == "random" else ""
+    print(f"{summary['k']} clusters{at_random}")
     for name, row in summary["clusters"].items():
         size = f"{row['clips']} clips, {row['held_out_clips']} held out"
         print(f"  {name}  {row['label']}: {size}, {row['speed']:.2f} m/s; {row['keywords'] or 'no keywords'}")
+    if line := elbow_line(summary):
+        print(line)
     if summary["moved_to_fill"]:
         print(f"  moved so that no cluster is too small: {', '.join(summary['moved_to_fill'])}")
+
+
+def elbow_line(summary: dict[str, Any]) -> str:
+    """What to do about another K than the elbow's; "" where both are the same."""
+    bend, k = summary["elbow"], summary["k"]
+    over = f"K from {bend['from']} to {bend['to']}"
+    if bend["suggested_k"] is None:
+        return f"the curve over {over} has no elbow, so nothing speaks for or against {k} clusters there"
+    if bend["suggested_k"] == k:
+        return ""
+    names = ", ".join(f"c{i}" for i in range(bend["suggested_k"]))
+    return (
+        f"params.yaml names {k} clusters, the elbow over {over} suggests {bend['suggested_k']} "
+        f"({bend['rule']}): to follow it, write `clusters: [{names}]`"
+    )
 
 
 if __name__ == "__main__":

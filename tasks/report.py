@@ -12,7 +12,8 @@ import pandas as pd
 from bumblebee.evaluation.summary import comparisons
 from bumblebee.motion.store import read_index
 from bumblebee.ranges import Line, Name, Ranged, Seed
-from bumblebee.report.data_sections import clusters_section, motions_section
+from bumblebee.report.clusters_section import clusters_section
+from bumblebee.report.data_sections import motions_section
 from bumblebee.report.loop_picture import Box, loop_picture
 from bumblebee.report.names import reference, same_files
 from bumblebee.report.opening import opening, opening_lines
@@ -82,6 +83,7 @@ def collect(shape: Loop) -> LoopResults:
         rounds=tuple(round_results(turn, shape.clusters) for turn in shape.rounds if turn.n <= shape.final_round),
         pretrained=base.get("parent") == "pretrained",
         base_trained_on=base.get("kept") != "parent",
+        points=pd.read_parquet(points) if (points := paths.CLUSTERS / "map.parquet").exists() else None,
     )
 
 

@@ -6,20 +6,21 @@ head, pelvis, hands and feet. docs/decisions/clustering-features.md says which f
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import ceil
 
 import numpy as np
 
+from bumblebee import quaternions
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.contacts import foot_contacts
-from bumblebee.robot.facts import FEET, KEY_BODIES
+from bumblebee.motion.kinematics import forward_bodies
+from bumblebee.robot.facts import FEET, KEY_BODIES, g1_bodies
 
-# The G1 has no head among its keypoints and its torso_link starts at the waist: the middle of the shoulders stands in.
-TORSO_TOP = "torso_top"
-POSITIONS = (*KEY_BODIES, TORSO_TOP)
-KEPT_POSITIONS = ("pelvis", TORSO_TOP, "left_wrist_yaw_link", "right_wrist_yaw_link", *FEET)
+HEAD = "head"
+POSITIONS = (*KEY_BODIES, HEAD)
+KEPT_POSITIONS = ("pelvis", HEAD, "left_wrist_yaw_link", "right_wrist_yaw_link", *FEET)
 
-_SHOULDERS = [KEY_BODIES.index(f"{side}_shoulder_roll_link") for side in ("left", "right")]
 _FEET = [KEY_BODIES.index(foot) for foot in FEET]
 
 COLUMNS = (
@@ -45,19 +46,40 @@ class Normaliser:
     std: np.ndarray
 
 
-def motion_windows(clip: Clip, fps: float, seconds: float) -> list[np.ndarray]:
-    """The clip at `fps`, cut into equal windows of at most `seconds`, each (T, D) in the order of `COLUMNS`.
+def motion_windows(clip: Clip, fps: float, seconds: float, contacts: np.ndarray | None = None) -> list[np.ndarray]:
+    """The clip at `fps`, cut into equal windows of at most `seconds`, each (T, D) in the order of `COLUMNS`, float32.
 
     Units are m, m/s and 0/1. Each window stands in its own start frame: shifting or turning (about the vertical)
-    the whole clip changes nothing, lifting it does.
+    the whole clip changes nothing, lifting it does. `contacts` (frames, 2) are the clip's, where they are known.
     """
     velocity = np.gradient(clip.root_pos, 1.0 / clip.fps, axis=0)
     feet_velocity = np.gradient(clip.key_pos[:, _FEET], 1.0 / clip.fps, axis=0)
-    contacts = foot_contacts(clip)
+    contacts = foot_contacts(clip) if contacts is None else contacts
+    parts = window_frames(clip, fps, seconds)
+    return [_window(clip, velocity, feet_velocity, contacts, part) for part in parts]
+
+
+def window_frames(clip: Clip, fps: float, seconds: float) -> list[np.ndarray]:
+    """Which frames of the clip each of its windows has, (T,) each."""
     count = max(1, round(clip.frames / clip.fps * fps))
     frames = np.minimum(np.round(np.arange(count) * clip.fps / fps).astype(int), clip.frames - 1)
-    parts = np.array_split(frames, ceil(count / max(1, round(fps * seconds))))
-    return [_window(clip, velocity, feet_velocity, contacts, part) for part in parts]
+    return np.array_split(frames, ceil(count / max(1, round(fps * seconds))))
+
+
+def window_times(clip: Clip, fps: float, seconds: float) -> list[tuple[float, float]]:
+    """From when to when each window lasts, seconds from the clip's first frame; one ends where the next begins."""
+    starts = [float(frames[0] / clip.fps) for frames in window_frames(clip, fps, seconds)]
+    return list(zip(starts, [*starts[1:], clip.duration], strict=True))
+
+
+def positions(clip: Clip, frames: np.ndarray) -> np.ndarray:
+    """Positions of `POSITIONS` in some frames (T,) of the clip, (T, 15, 3) [m, world].
+
+    The G1 has no head link: the head is a point of `torso_link`, the centre of its collision sphere `head_collision`.
+    """
+    pos, quat = forward_bodies(clip.root_pos[frames], clip.root_quat[frames], clip.joint_pos[frames])["torso_link"]
+    head = pos + quaternions.rotate(quat, _head_in_torso())
+    return np.concatenate([clip.key_pos[frames], head[:, None]], 1)
 
 
 def fit_normaliser(windows: Sequence[np.ndarray]) -> Normaliser:
@@ -87,15 +109,20 @@ def heading(quat: np.ndarray) -> np.ndarray:
 def _window(
     clip: Clip, velocity: np.ndarray, feet_velocity: np.ndarray, contacts: np.ndarray, frames: np.ndarray
 ) -> np.ndarray:
-    root, key = clip.root_pos[frames], clip.key_pos[frames]
-    key = np.concatenate([key, key[:, _SHOULDERS].mean(1, keepdims=True)], 1)
+    root, key = clip.root_pos[frames], positions(clip, frames)
     yaw = heading(clip.root_quat[frames])
     ground = root * (1.0, 1.0, 0.0)  # heights stay those above the floor, they tell a squat from a stand
-    positions = _unyaw(key - ground[:, None], yaw)
+    seen = _unyaw(key - ground[:, None], yaw)
     translation = _unyaw(root - ground[:1], np.full(len(frames), yaw[0]))
     feet = _unyaw(feet_velocity[frames], yaw)
-    parts = (positions, translation, _unyaw(velocity[frames], yaw), contacts[frames], feet)
+    parts = (seen, translation, _unyaw(velocity[frames], yaw), contacts[frames], feet)
     return np.concatenate([part.reshape(len(frames), -1) for part in parts], 1).astype(np.float32)
+
+
+@cache
+def _head_in_torso() -> np.ndarray:
+    shapes = {shape["name"]: shape for shape in g1_bodies()["torso_link"]["collision"]}
+    return np.array(shapes["head_collision"]["pos"])
 
 
 def _unyaw(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:

@@ -1,12 +1,10 @@
-"""K-means on motion latents, and the elbow curve that suggests K (paper, section "Cluster Analysis")."""
+"""K-means on motion latents (paper, section "AE Clustering"), clusters at random, and the plane to see both in."""
 
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from sklearn.cluster import KMeans
 from sklearn.decomposition import PCA
-from sklearn.metrics import silhouette_score
 
 from bumblebee.errors import BadInput
 
@@ -28,6 +26,11 @@ class Clusters:
         return _distances(latents, self.centres).argmin(1)
 
 
+def kmeans(latents: np.ndarray, k: int, seed: int, starts: int = 10) -> KMeans:
+    """K-means on latents (N, Z): the best of several starts."""
+    return KMeans(k, n_init=starts, random_state=seed).fit(latents)
+
+
 def fit_clusters(latents: np.ndarray, speeds: np.ndarray, k: int, seed: int = 0, min_clips: int = 1) -> Clusters:
     """K-means on latents (N, Z), K clusters numbered by mean root speed of their clips, slowest first.
 
@@ -42,13 +45,18 @@ def fit_clusters(latents: np.ndarray, speeds: np.ndarray, k: int, seed: int = 0,
         expected = f"at least {k} x {min_clips} training clips for {k} clusters"
         remedy = "Name fewer clusters in params.yaml, lower cluster.min_clips, or add motions"
         raise BadInput("params.yaml: clusters", expected, f"{len(latents)} clips", remedy)
-    fit = _kmeans(latents, k, seed)
+    fit = kmeans(latents, k, seed)
     labels, moved = fill_small(_distances(latents, fit.cluster_centers_), min_clips)
     centres = np.stack([latents[labels == c].mean(0) for c in range(k)])
     order = np.argsort([speeds[labels == c].mean() for c in range(k)], kind="stable")
     rank = np.empty(k, int)
     rank[order] = np.arange(k)
     return Clusters(rank[labels], centres[order], moved)
+
+
+def random_clusters(count: int, k: int, seed: int) -> np.ndarray:
+    """Labels (count,) drawn at random, in K clusters whose sizes differ by one clip at most."""
+    return np.random.default_rng(seed).permutation(np.arange(count) % k)
 
 
 def fill_small(distances: np.ndarray, min_clips: int) -> tuple[np.ndarray, tuple[int, ...]]:
@@ -69,26 +77,6 @@ def fill_small(distances: np.ndarray, min_clips: int) -> tuple[np.ndarray, tuple
     return labels, tuple(sorted(moved))
 
 
-def elbow_curve(latents: np.ndarray, max_k: int = 10, seed: int = 0) -> pd.DataFrame:
-    """Columns `k`, `within_ss` (total squared distance to the own centre), `silhouette` (NaN where undefined)."""
-    distinct = len(np.unique(latents.round(9), axis=0))
-    rows = []
-    for k in range(1, min(max_k, distinct) + 1):
-        fit = _kmeans(latents, k, seed)
-        defined = 1 < k < len(latents)
-        rows.append((k, float(fit.inertia_), float(silhouette_score(latents, fit.labels_)) if defined else np.nan))
-    return pd.DataFrame(rows, columns=["k", "within_ss", "silhouette"])
-
-
-def knee(curve: pd.DataFrame) -> int:
-    """The K farthest below the straight line between the curve's ends (both axes scaled to one)."""
-    k, within = curve["k"].to_numpy(float), curve["within_ss"].to_numpy(float)
-    if len(k) < 3 or within[0] <= within[-1]:
-        return int(k[0])
-    line = 1 - (k - k[0]) / (k[-1] - k[0])
-    return int(k[np.argmax(line - (within - within[-1]) / (within[0] - within[-1]))])
-
-
 def project(latents: np.ndarray, fitted: np.ndarray) -> np.ndarray:
     """Plane coordinates (N, 2) by PCA of the rows where `fitted` (N,) is true; a plot, nothing is decided on it."""
     size = min(2, int(fitted.sum()), latents.shape[1])
@@ -101,10 +89,6 @@ def plane_shares(latents: np.ndarray, fitted: np.ndarray) -> list[float]:
     size = min(2, int(fitted.sum()), latents.shape[1])
     shares = np.nan_to_num(PCA(size, svd_solver="full").fit(latents[fitted]).explained_variance_ratio_)
     return [float(share) for share in np.pad(shares, (0, 2 - size))]
-
-
-def _kmeans(latents: np.ndarray, k: int, seed: int, starts: int = 10) -> KMeans:
-    return KMeans(k, n_init=starts, random_state=seed).fit(latents)
 
 
 def _distances(latents: np.ndarray, centres: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from sklearn.feature_extraction.text import ENGLISH_STOP_WORDS, TfidfVectorizer
 
+from bumblebee.clustering.features import heading
 from bumblebee.clustering.text import FILLERS, plain_text
 from bumblebee.motion.clip import Clip, velocities
 from bumblebee.motion.contacts import foot_contacts
@@ -14,13 +15,15 @@ from bumblebee.robot.facts import joint_names
 LOWER = tuple(i for i, name in enumerate(joint_names()) if any(part in name for part in ("hip", "knee", "ankle")))
 UPPER = tuple(i for i in range(len(joint_names())) if i not in LOWER)
 COLUMNS = ("displacement", "z_move", "speed", "joint", "lower_joint", "upper_joint", "airborne")
+MORE = ("turn", "lowest")
+"""Of a clip, and not in the table: what `kinds.kind` goes by beside it."""
 
 _WALKS = 0.15  # m/s: above it a cluster is called a walk; the paper's stands reach 0.148, its walks start at 0.353
 _FLIES, _BOUNCES = 0.03, 1.5  # a jump is in the air for more than this share and bounces this often the median cluster
 _NEARLY_ALL = 0.8  # of the clips with a text: a word that so many have is the captions' form, not their meaning
 
 
-def clip_statistics(clip: Clip) -> dict[str, float]:
+def clip_statistics(clip: Clip, contacts: np.ndarray | None = None) -> dict[str, float]:
     """Table 2's numbers of one clip; the paper does not define them further, these definitions are ours.
 
     displacement [m]: largest horizontal distance of the root from where it starts (a closed circle is not zero).
@@ -29,7 +32,11 @@ def clip_statistics(clip: Clip) -> dict[str, float]:
     joint, lower_joint, upper_joint [rad/s]: mean absolute rate over all joints, the legs' 12, the others' 11; the
         paper's figures are means over joints too, as `joint` lies between the other two.
     airborne: share of frames without a foot on the floor (not in the paper; it tells a jump).
+    turn [rad]: between the leftmost and the rightmost heading. lowest [m]: height of the root at its lowest.
+
+    `contacts` (frames, 2) are the clip's, where they are known.
     """
+    contacts = foot_contacts(clip) if contacts is None else contacts
     rates = velocities(clip)
     joint = np.abs(rates.joint_vel).mean(0)
     flat = np.linalg.norm(clip.root_pos[:, :2] - clip.root_pos[0, :2], axis=-1)
@@ -40,9 +47,11 @@ def clip_statistics(clip: Clip) -> dict[str, float]:
         joint.mean(),
         joint[list(LOWER)].mean(),
         joint[list(UPPER)].mean(),
-        1.0 - foot_contacts(clip).any(-1).mean(),
+        1.0 - contacts.any(-1).mean(),
+        np.ptp(np.unwrap(heading(clip.root_quat))),
+        clip.root_pos[:, 2].min(),
     )
-    return dict(zip(COLUMNS, map(float, values), strict=True))
+    return dict(zip((*COLUMNS, *MORE), map(float, values), strict=True))
 
 
 def keywords(captions: Sequence[Sequence[str]], labels: np.ndarray, k: int, count: int = 4) -> list[list[str]]:
@@ -86,9 +95,12 @@ def names(table: pd.DataFrame) -> list[str]:
 
     In the air and bouncing more than the others -> jump; travelling -> walk; else stand. Of several walks the fastest
     is walk-fast, the slowest walk-slow; of several stands the one with the most leg motion relative to the arms' is
-    stand-low, the least stand-up. Anything between is -mid (and numbered if that is not enough).
+    stand-low, the least stand-up. Anything between is -mid (and numbered if that is not enough). Where nobody counted
+    the frames in the air, as in the paper's own table, only the cluster with the largest z-move can be a jump.
     """
-    jumps = (table["airborne"] > _FLIES) & (table["z_move"] > _BOUNCES * table["z_move"].median())
+    bounce = table["z_move"] > _BOUNCES * table["z_move"].median()
+    flies = table["airborne"] > _FLIES if "airborne" in table else table["z_move"] == table["z_move"].max()
+    jumps = bounce & flies
     kinds = np.where(jumps, "jump", np.where(table["speed"] > _WALKS, "walk", "stand"))
     share = table["lower_joint"] / (table["lower_joint"] + table["upper_joint"]).clip(lower=1e-9)
     ends = {

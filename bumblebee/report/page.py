@@ -1,13 +1,13 @@
 """The report as one self-contained HTML file: sections of texts, tables and pictures through one template.
 
 Every text is escaped and pictures are `data:` URIs. The page's own policy forbids everything from outside and every
-script but the film's player, which it names by its hash; a page without a film runs none.
+script but its own, the film's player and the map, which it names by their hash; a page with neither runs none.
 """
 
 import base64
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from itertools import groupby
 
@@ -51,8 +51,8 @@ class Bar:
 class Block:
     """One piece of a section; which fields count depends on `kind`.
 
-    Kinds: text, note, heading, list, table, film, bars, pairs (a table whose rows stack on a phone); and, side by side
-    where there is room: image, still.
+    Kinds: text, note, heading, list, table, film, map, bars, pairs (a table whose rows stack on a phone); and, side by
+    side where there is room: image, still.
     """
 
     kind: str
@@ -68,6 +68,10 @@ class Block:
     bars: tuple[Bar, ...] = ()
     panels: tuple[str, ...] = ()
     """Headings over the parts of a film that stand side by side in it."""
+    facts: dict[str, str] = field(default_factory=dict)
+    """What the script of a map goes by."""
+    choices: tuple[tuple[str, str], ...] = ()
+    """What a map's points can be coloured by: a column, and what it is called."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +113,9 @@ class Part:
     def runs(self) -> list[tuple[str, list[Block]]]:
         """Blocks in runs of one kind: figures beside each other, the rest below each other."""
         return [(name, list(run)) for name, run in groupby(self.blocks, key=_row)]
+
+
+_SCRIPTS = (("film", "player.js"), ("map", "map.js"))
 
 
 def _row(block: Block) -> str:
@@ -186,8 +193,8 @@ def render(
     environment = Environment(autoescape=select_autoescape(default=True), trim_blocks=True, lstrip_blocks=True)
     folder = files("bumblebee.report")
     every = [*sections, *([opening] if opening else [])]
-    films = any(block.kind == "film" for section in every for block in section.blocks)
-    player = folder.joinpath("player.js").read_text() if films else ""
+    kinds = {block.kind for section in every for block in section.blocks}
+    script = "\n".join(folder.joinpath(file).read_text() for kind, file in _SCRIPTS if kind in kinds)
     return environment.from_string(folder.joinpath("page.html.j2").read_text()).render(
         title=title,
         subtitle=subtitle,
@@ -196,8 +203,8 @@ def render(
         picture=Markup(picture),
         sections=list(sections),
         style=Markup(folder.joinpath("page.css").read_text()),
-        player=Markup(player),
-        policy=policy(player),
+        script=Markup(script),
+        policy=policy(script),
     )
 
 

@@ -61,6 +61,9 @@ class LoopResults:
     base_trained_on: bool = False
     """Whether the base stage kept a policy of its own training, and not the one that it went on from."""
 
+    points: pd.DataFrame | None = None
+    """What the map shows of each motion; None where the clustering kept none."""
+
     @property
     def real_robot(self) -> bool:
         """Whether the measured rollouts came from the user's robot and not from the stand-in."""

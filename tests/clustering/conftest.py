@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from bumblebee.clustering.config import ClusterConfig
-from bumblebee.clustering.text import TokenTable, sentence_embeddings
+from bumblebee.clustering.text import TokenTable, token_table
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.robot.facts import joint_names, stand_pose
@@ -55,13 +55,21 @@ def table() -> TokenTable:
     """Random tokens in place of BERT's, for tests that are not about text."""
     draw = torch.Generator().manual_seed(0)
     texts = tuple(sorted(TEXTS.values()))
-    tokens, mask = torch.randn(len(texts), 4, 8, generator=draw), torch.ones(len(texts), 4, dtype=torch.bool)
-    return TokenTable(texts, tokens, mask, sentence_embeddings(tokens, mask))
+    return token_table(texts, [torch.randn(4, 8, generator=draw) for _ in texts])
 
 
 @pytest.fixture(scope="session")
 def tiny() -> ClusterConfig:
     """Sizes that train in about a second."""
     return ClusterConfig(
-        hidden=16, layers=1, heads=2, latent=4, epochs=25, batch_size=8, max_k=6, audit_seeds=3, dropout=0.0
+        hidden=16,
+        layers=1,
+        heads=2,
+        latent=4,
+        epochs=25,
+        batch_size=8,
+        max_k=6,
+        audit_seeds=3,
+        dropout=0.0,
+        audit_retrain=1,
     )

@@ -10,7 +10,7 @@ import torch
 from bumblebee.clustering.autoencoder import AutoencoderConfig, TextMotionAutoencoder, sinusoid
 from bumblebee.clustering.config import ClusterConfig
 from bumblebee.clustering.features import COLUMNS, TARGET_COLUMNS, motion_windows, pad
-from bumblebee.clustering.text import TokenTable
+from bumblebee.clustering.text import TokenTable, token_table
 from bumblebee.clustering.train import TERMS, encode_clips, train
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
@@ -84,8 +84,7 @@ def test_clips_without_captions_train_the_motion_side(
     library: list[Clip], table: TokenTable, tiny: ClusterConfig
 ) -> None:
     clips, _ = _training(library, table)
-    empty = TokenTable((), torch.zeros(0, 1, 1), torch.zeros(0, 1, dtype=torch.bool), torch.zeros(0, 1))
-    _, curve = train(clips, [[]] * len(clips), empty, replace(tiny, epochs=8))
+    _, curve = train(clips, [[[]] for _ in clips], token_table((), ()), replace(tiny, epochs=8))
     assert (curve[["info_nce", "latent_l2", "huber_text"]] == 0).all(axis=None)
     assert curve["huber_motion"].iloc[-1] < curve["huber_motion"].iloc[0]
 
@@ -113,6 +112,6 @@ def test_unusable_settings_are_named(bad: dict[str, float]) -> None:
         ClusterConfig(**bad)
 
 
-def _training(library: list[Clip], table: TokenTable) -> tuple[list[list[np.ndarray]], list[list[int]]]:
+def _training(library: list[Clip], table: TokenTable) -> tuple[list[list[np.ndarray]], list[list[list[int]]]]:
     clips = [clip for clip in library if clip.split == "train"]
-    return [motion_windows(clip, 10.0, 8.0) for clip in clips], [[table.captions.index(c.captions[0])] for c in clips]
+    return [motion_windows(clip, 10.0, 8.0) for clip in clips], [[[table.captions.index(c.captions[0])]] for c in clips]

@@ -35,7 +35,7 @@ def test_shift_and_turn_change_nothing(yaw: float) -> None:
 def test_lift_is_seen() -> None:
     (before,), (after,) = motion_windows(WALK, 10.0, 8.0), motion_windows(moved(WALK, 0.0, (0.0, 0.0, 0.2)), 10.0, 8.0)
     np.testing.assert_allclose(column(after, "r.z") - column(before, "r.z"), 0.2, atol=1e-5)
-    np.testing.assert_allclose(column(after, "p.torso_top.z") - column(before, "p.torso_top.z"), 0.2, atol=1e-5)
+    np.testing.assert_allclose(column(after, "p.head.z") - column(before, "p.head.z"), 0.2, atol=1e-5)
 
 
 def test_walk_goes_forward_at_its_speed() -> None:
@@ -56,7 +56,7 @@ def test_target_keeps_head_pelvis_hands_feet_and_all_the_rest() -> None:
         {f"{s}_ankle_roll_link" for s in ("left", "right")},
         {f"{s}_wrist_yaw_link" for s in ("left", "right")},
     )
-    assert kept == {"pelvis", "torso_top"} | hands | feet
+    assert kept == {"pelvis", "head"} | hands | feet
     assert len(COLUMNS) == 15 * 3 + 3 + 3 + 2 + 6
     assert [n for n in names if not n.startswith("p.")] == [n for n in COLUMNS if not n.startswith("p.")]
 

@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 from sklearn.metrics import adjusted_rand_score
 
-from bumblebee.clustering.kmeans import elbow_curve, fill_small, fit_clusters, knee, plane_shares, project
+from bumblebee.clustering.elbow import elbow_curve, knee
+from bumblebee.clustering.kmeans import fill_small, fit_clusters, plane_shares, project, random_clusters
 from bumblebee.errors import BadInput
 
 
@@ -60,7 +61,7 @@ def test_elbow_falls_and_bends_at_the_true_number() -> None:
 
 def test_elbow_stops_at_the_number_of_different_clips() -> None:
     assert elbow_curve(np.repeat(np.arange(3.0), 4)[:, None], 10)["k"].tolist() == [1, 2, 3]
-    assert knee(pd.DataFrame({"k": [1], "within_ss": [0.0]})) == 1
+    assert knee(pd.DataFrame({"k": [1], "within_ss": [0.0]})) is None
 
 
 def test_projection_keeps_two_dimensions_exactly() -> None:
@@ -78,3 +79,9 @@ def test_the_planes_axes_say_how_much_variance_they_hold() -> None:
     wide = np.array([[3.0, 1, 0], [-3, 1, 0], [3, -1, 0], [-3, -1, 0], [99, 99, 99]])
     np.testing.assert_allclose(plane_shares(wide, np.arange(5) < 4), [0.9, 0.1], atol=1e-12)
     assert plane_shares(np.ones((4, 1)), np.ones(4, bool)) == [0.0, 0.0]
+
+
+def test_random_clusters_have_equal_sizes_and_depend_on_the_seed_alone() -> None:
+    labels = random_clusters(50, 4, seed=3)
+    assert sorted(np.bincount(labels)) == [12, 12, 13, 13]
+    assert (labels == random_clusters(50, 4, seed=3)).all() and (labels != random_clusters(50, 4, seed=4)).any()

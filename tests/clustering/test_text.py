@@ -19,8 +19,9 @@ def test_real_encoder_knows_what_walking_is() -> None:
         PACKAGE,
     )
     assert table.captions == ("a man jumps up high in place", "a person walks forward", "someone strolls ahead")
-    assert table.tokens.shape[:2] == table.mask.shape and table.tokens.shape[2] == 384
-    assert not table.tokens[~table.mask].any() and table.mask.sum(1).min() > 4
+    tokens, mask = table.padded(torch.tensor([2, 0]))
+    assert tokens.shape == (2, int(table.lengths.max()), 384) and mask.sum(1).tolist() == table.lengths[[2, 0]].tolist()
+    assert not tokens[~mask].any() and table.lengths.min() > 4
     jump, walk, stroll = table.sentences
     assert walk @ stroll > max(walk @ jump, stroll @ jump) + 0.1
     torch.testing.assert_close(table.sentences.norm(dim=1), torch.ones(3))

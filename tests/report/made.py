@@ -7,7 +7,8 @@ from typing import Any
 
 import pandas as pd
 
-from bumblebee.report.data_sections import clusters_section, motions_section
+from bumblebee.report.clusters_section import clusters_section
+from bumblebee.report.data_sections import motions_section
 from bumblebee.report.loop_picture import Box, loop_picture
 from bumblebee.report.opening import opening
 from bumblebee.report.page import Block, Section, render
@@ -68,6 +69,11 @@ def published(name: str) -> dict[str, Any]:
     return {**facts, "promoted": True, "reason": why, "onnx_sha256": "f" * 64}
 
 
+def index(value: float) -> dict[str, Any]:
+    """A figure of the clustering's audit, as data/clusters/summary.json has it."""
+    return {"value": value, "ci95": [value - 0.1, value + 0.1], "n": 9, "chance95": [-0.1, 0.1]}
+
+
 def loop_results(
     effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | None, name: str = "<b>walk</b>", note: str = ""
 ) -> LoopResults:
@@ -87,7 +93,12 @@ def loop_results(
         "keywords": "waves",
     }
     audit = {
-        "stability": {"seeds": 1.0, "subsamples": 0.8},
+        "method": "autoencoder",
+        "stability": {"seeds": index(1.0), "subsamples": index(0.8), "retrained": index(0.6)},
+        "silhouette": index(0.4),
+        "balance": {"evenness": 0.9, "smallest": 0.4, "largest": 0.6, "n": 2},
+        "kinematic": {"ari": index(0.3), "ami": index(0.3), "clips": {"still": 2}},
+        "motion_only": None,
         "family_ari": None,
         "separation": {"speed": 0.9},
         "separation_random_split": {"speed": 0.1},

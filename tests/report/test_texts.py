@@ -4,14 +4,14 @@ from typing import Any
 
 import pytest
 
-from bumblebee.report.data_sections import clusters_section
-from tests.report.made import TRUTH, found, loop_results
+from bumblebee.report.clusters_section import clusters_section
+from tests.report.made import TRUTH, found, index, loop_results
 
 
 def words(texts: dict[str, int], agreement: float | None) -> str:
     results = loop_results([found()], [TRUTH])
     results.clusters["clips"] = {"texts": texts}
-    results.clusters["audit"]["family_ari"] = agreement
+    results.clusters["audit"]["family_ari"] = None if agreement is None else index(agreement)
     return " ".join(block.text for block in clusters_section(results).blocks)
 
 

@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from bumblebee.clustering.autoencoder import AutoencoderConfig, TextMotionAutoencoder
+from bumblebee.clustering.config import ClusterConfig
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.store import write_library
@@ -21,7 +22,7 @@ PARAMS = """
 clusters: [slow, quick]
 rounds: []
 final_round: 0
-cluster: {hidden: 8, layers: 1, heads: 2, latent: 4, epochs: 3, max_k: 3, audit_seeds: 2}
+cluster: {hidden: 8, layers: 1, heads: 2, latent: 4, epochs: 3, max_k: 3, audit_seeds: 2, audit_retrain: 1}
 """
 
 
@@ -59,6 +60,8 @@ def test_every_kept_clip_has_a_cluster_and_the_weights_load(capsys):
     assert summary["clusters"]["slow"]["speed"] < summary["clusters"]["quick"]["speed"]
     assert pd.read_csv(paths.CLUSTERS / "elbow.csv")["k"].tolist() == [1, 2, 3]
     assert len(pd.read_csv(paths.CLUSTERS / "curve.csv")) == 3
+    points = pd.read_parquet(paths.CLUSTERS / "map.parquet")
+    assert points["name"].tolist() == labels["name"].tolist() and points["poses"].str.len().eq(4 * 15 * 2).all()
     facts = json.loads((paths.CLUSTERING / "config.json").read_text())["autoencoder"]
     model = TextMotionAutoencoder(AutoencoderConfig(**facts))
     model.load_state_dict(torch.load(paths.CLUSTERING / "autoencoder.pt", weights_only=True))
@@ -80,3 +83,40 @@ def test_unknown_setting_is_named(capsys):
     with pytest.raises(SystemExit):
         run()
     assert "cluster.epoch" in capsys.readouterr().err
+
+
+def test_random_clusters_are_named_as_such_and_fill_the_same_files(capsys):
+    Path("params.yaml").write_text(PARAMS.replace("cluster: {", "cluster: {method: random, "))
+    write_library(paths.FILTERED, [gliding(f"m{i}", 0.3 * i) for i in range(6)])
+    run()
+    labels = pd.read_parquet(paths.CLUSTERS / "labels.parquet")
+    assert labels["cluster"].value_counts().tolist() == [3, 3]
+    summary = json.loads((paths.CLUSTERS / "summary.json").read_text())
+    assert summary["method"] == "random" and "at random" in capsys.readouterr().out
+    assert {path.name for path in paths.CLUSTERING.iterdir()} == {"autoencoder.pt", "config.json"}
+
+
+def test_clips_are_read_in_parts_and_none_is_left_out(monkeypatch):
+    monkeypatch.setattr(stage, "_AT_ONCE", 4)
+    write_library(paths.FILTERED, [gliding(f"m{i}", 0.1 * i) for i in range(9)])
+    assert [own.name for own in stage.kept_material(ClusterConfig())] == [f"m{i}" for i in range(9)]
+
+
+@pytest.mark.parametrize(
+    ("suggested", "k", "said"),
+    [(3, 3, ""), (4, 2, "names 2 clusters, the elbow over K from 1 to 10 suggests 4"), (None, 2, "has no elbow")],
+)
+def test_another_number_than_the_elbows_is_said_with_what_to_write(suggested, k, said):
+    bend = {"suggested_k": suggested, "k": k, "rule": "kneedle", "from": 1, "to": 10, "silhouette_k": 3}
+    line = stage.elbow_line({"k": k, "elbow": bend})
+    assert said in line and bool(line) == bool(said)
+    assert ("[c0, c1, c2, c3]" in line) == (suggested == 4)
+
+
+def test_every_figure_is_a_metric_with_its_interval_and_a_name_that_mlflow_takes():
+    tree = {"retrieval": {"R@1": {"value": 0.5, "ci95": [0.2, 0.8], "n": 9, "chance": 0.1}, "few": True}, "none": None}
+    assert dict(stage.figures(tree)) == {
+        "retrieval/R_1": 0.5, "retrieval/R_1/ci95.low": 0.2, "retrieval/R_1/ci95.high": 0.8, "retrieval/R_1/n": 9.0,
+        "retrieval/R_1/chance": 0.1,
+    }  # fmt: skip
+    assert dict(stage.figures({"a": {"value": None, "ci95": [None, None], "n": 0}})) == {"a/n": 0.0}
