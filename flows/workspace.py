@@ -92,7 +92,15 @@ def folders_of(content: dict[str, Any]) -> list[Path]:
     section = content.get("motions")
     section = section if isinstance(section, dict) else {}
     read = section.get("read")
-    named = [section.get("source"), read.get("captions_folder") if isinstance(read, dict) else None]
+    texts = read.get("describe") if isinstance(read, dict) else None
+    named = [
+        section.get("source"),
+        *(
+            (texts.get(key) for key in ("captions_folder", "captions_csv", "humanml3d"))
+            if isinstance(texts, dict)
+            else ()
+        ),
+    ]
     found = []
     for text in named:
         if isinstance(text, str) and text.isprintable() and text not in ("", "embedded"):

@@ -3,12 +3,15 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import pandas as pd
+
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
-from bumblebee.motion.folder import ReadConfig, Reading, motion_files, read_folder, skipped_table
+from bumblebee.motion.folder import ReadConfig, Reading, read_folder, skipped_table
 from bumblebee.motion.pieces import hold_out
 from bumblebee.motion.store import write_library
+from bumblebee.motion.walk import motion_sources
 from bumblebee.progress import progress
 from bumblebee.ranges import Name, PartOf, Ranged, Unfit
 from tasks import paths
@@ -17,6 +20,10 @@ from tasks.watched import require_watched
 
 EMBEDDED = "embedded"
 CONTROL_HZ = 50.0
+NOTES = "notes.csv"
+TEXTS = ("captions_folder", "captions_csv", "humanml3d")
+"""Settings of `motions.read.describe` that name files or folders."""
+_FEW = 20  # lines of a kind on the terminal
 
 
 @dataclass(frozen=True)
@@ -46,8 +53,10 @@ def main() -> None:
     reading = gather(config)
     clips = hold_out(reading.clips, config.holdout_share)
     write_library(paths.MOTIONS, clips, reading.skipped)
+    reading.notes.to_csv(paths.MOTIONS / NOTES, index=False)
     tell(clips, reading)
-    log_run("motions", params=config, metrics=metrics(clips, reading), artifacts=[paths.MOTIONS / "skipped.csv"])
+    tables = [paths.MOTIONS / "skipped.csv", paths.MOTIONS / NOTES]
+    log_run("motions", params=config, metrics=metrics(clips, reading), artifacts=tables)
 
 
 def make_cache() -> None:
@@ -67,18 +76,25 @@ def gather(config: MotionsConfig) -> Reading:
         raise BadInput(
             "params.yaml: motions.source", f"a folder of motions or {EMBEDDED!r}", f"{source}: nothing there"
         )
-    require_watched("motions", {"source": source, "read.captions_folder": config.read.captions_folder})
-    with progress(len(motion_files(source)), "reading motions", "files") as bar:
-        return read_folder(source, config.read, bar.update)
+    texts = config.read.describe
+    named = {f"read.describe.{key}": getattr(texts, key) for key in TEXTS}
+    require_watched("motions", {"source": source, **named})
+    files = sum(1 for _ in motion_sources(source))
+    with progress(files, "reading motions", "files") as bar:
+        return read_folder(source, config.read, bar.update, paths.RETARGETS)
 
 
 def metrics(clips: list[Clip], reading: Reading) -> dict[str, float]:
     """Counts for MLflow."""
+    texts = (
+        {f"texts/{source}": float(count) for source, count in reading.texts.motions.items()} if reading.texts else {}
+    )
     return {
         "clips": len(clips),
         "held_out": sum(clip.split == "test" for clip in clips),
         "minutes": sum(clip.duration for clip in clips) / 60,
         "files_skipped": len(reading.skipped),
+        **texts,
     }
 
 
@@ -86,9 +102,28 @@ def tell(clips: list[Clip], reading: Reading) -> None:
     """One line of counts, and one for each reason why files were skipped."""
     counts = metrics(clips, reading)
     print(f"{counts['clips']} clips, {counts['minutes']:.1f} minutes, {counts['held_out']} held out -> {paths.MOTIONS}")
-    for reason, group in reading.skipped.groupby("reason"):
-        which = group["file"].iloc[0] + (f" and {len(group) - 1} more" if len(group) > 1 else "")
-        print(f"skipped {which}: {reason}")
+    for row in by_set(clips).itertuples():
+        print(f"  {row.set}: {row.clips} clips, {row.minutes:.1f} minutes, licence {row.licence}")
+    if reading.texts:
+        print("motions with text: " + ", ".join(f"{name} {count}" for name, count in reading.texts.motions.items()))
+        for line in reading.texts.notes[:_FEW]:
+            print(f"text: {line}")
+    for what, table, column in (("skipped", reading.skipped, "reason"), ("noted", reading.notes, "note")):
+        for said, group in table.groupby(column, sort=False):
+            others = group["file"].nunique() - 1
+            print(f"{what} {group['file'].iloc[0]}{f' and {others} more' if others else ''}: {said}")
+
+
+def by_set(clips: list[Clip]) -> pd.DataFrame:
+    """What each folder or archive of the source gave: set, clips, minutes, licence."""
+    rows = [(clip.source.split("/")[0], clip.duration / 60, clip.licence) for clip in clips]
+    table = pd.DataFrame(rows, columns=["set", "minutes", "licence"])
+    groups = table.groupby("set", sort=True)
+    return groups.agg(clips=("minutes", "size"), minutes=("minutes", "sum"), licence=("licence", _all)).reset_index()
+
+
+def _all(licences: pd.Series) -> str:
+    return "; ".join(sorted(set(licences)))
 
 
 if __name__ == "__main__":

@@ -23,8 +23,13 @@ def check_sources(found: dict[str, Any], path: Path) -> None:
     if motions.source != "embedded":
         place, wanted = f"{path}: motions.source", "a folder of motions or 'embedded'"
         _require(_at_home(motions.source, place, wanted), place, wanted, either=True)
-    if motions.read.captions_folder:
-        _require(Path(motions.read.captions_folder), f"{path}: motions.read.captions_folder", "a folder of captions")
+    texts = motions.read.describe
+    for key, wanted in (("captions_folder", "a folder of captions"), ("humanml3d", "HumanML3D's folder")):
+        if getattr(texts, key):
+            _require(Path(getattr(texts, key)).expanduser(), f"{path}: motions.read.describe.{key}", wanted)
+    if texts.captions_csv and not Path(texts.captions_csv).expanduser().is_file():
+        came = f"{texts.captions_csv}: no such file"
+        raise BadInput(f"{path}: motions.read.describe.captions_csv", "a CSV file of captions", came)
     rules = found["filter"]
     if rules.overrule and not Path(rules.overrule).is_file():
         raise BadInput(f"{path}: filter.overrule", "a CSV or YAML file", f"{rules.overrule}: no such file")

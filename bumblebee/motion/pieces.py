@@ -6,9 +6,11 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
+from bumblebee.io.names import safe_stem
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.windows import within
 
@@ -35,22 +37,30 @@ def motion_of(name: str) -> str:
     return re.sub(r"_p\d+$", "", name)
 
 
+def origin(clip: Clip) -> str:
+    """The name of the motion in its own folder: without the folder's, which tells apart equal names of several."""
+    folder = safe_stem(Path(clip.source).parent.name, "")[:20]
+    name = motion_of(clip.name)
+    return re.sub(r"_\d+$", "", name.removeprefix(f"{folder}_")) if folder and name.startswith(f"{folder}_") else name
+
+
 def hold_out(clips: Iterable[Clip], share: float) -> list[Clip]:
     """The clips with `split` set: `share` of the motions of each family are "test", by a hash of their names.
 
-    All pieces of one motion go to the same side. A family of at least four motions has at least one held out and one
+    All pieces of one motion go to the same side, and so does one motion that lies there in several forms, such as a
+    person's and somebody's retarget of it, under one name in two folders. A family of at least four motions has at least one held out and one
     left; a smaller one has none held out, and none has where `share` is 0.
     """
     clips = list(clips)
     families: dict[str, set[str]] = defaultdict(set)
     for clip in clips:
-        families[clip.family].add(motion_of(clip.name))
+        families[clip.family].add(origin(clip))
     held: set[str] = set()
     for motions in families.values():
         if share > 0 and len(motions) >= FAMILY_MINIMUM:
             count = min(max(1, round(share * len(motions))), len(motions) - 1)
             held |= set(sorted(motions, key=_position)[:count])
-    return [replace(clip, split="test" if motion_of(clip.name) in held else "train") for clip in clips]
+    return [replace(clip, split="test" if origin(clip) in held else "train") for clip in clips]
 
 
 def _position(name: str) -> float:

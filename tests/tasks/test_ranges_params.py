@@ -147,7 +147,7 @@ def test_the_command_ends_with_one_line_and_status_2(tmp_path: Path):
     [
         ("motions.source", "nowhere"),
         ("motions.source", "~nobody-of-this-name/motions"),
-        ("motions.read.captions_folder", "nowhere"),
+        ("motions.read.describe.captions_folder", "nowhere"),
         ("filter.overrule", "nowhere.csv"),
         ("filter.policy.source", "nowhere"),
         ("rollouts.source", "nowhere"),
@@ -168,7 +168,7 @@ def test_sources_that_are_there_pass(tmp_path: Path):
         (tmp_path / name).mkdir()
     (tmp_path / "robot.xml").touch()
     content = changed(shipped(), "motions.source", str(tmp_path / "mine"))
-    content = changed(content, "motions.read.captions_folder", str(tmp_path / "captions"))
+    content = changed(content, "motions.read.describe.captions_folder", str(tmp_path / "captions"))
     (tmp_path / "word.csv").touch()
     content = changed(content, "filter.overrule", str(tmp_path / "word.csv"))
     content = changed(content, "filter.policy.source", "shipped")

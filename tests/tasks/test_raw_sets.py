@@ -195,12 +195,12 @@ def test_a_workspace_watches_the_users_texts_as_well_as_his_motions(tmp_path: Pa
         (tmp_path / name).mkdir()
     folder = workspaces.create(tmp_path / "lab", motions=tmp_path / "mocap")
     settings = yaml.safe_load((folder / "params.yaml").read_text())
-    settings["motions"]["read"] = {"captions_folder": str(tmp_path / "texts")}
+    settings["motions"]["read"] = {"describe": {"captions_folder": str(tmp_path / "texts")}}
     (folder / "params.yaml").write_text(yaml.safe_dump(settings))
     workspaces.create(folder)  # as the next `make demo` does
     monkeypatch.chdir(folder)
     monkeypatch.setenv("DVC_STAGE", "motions")
-    require_watched("motions", {"source": tmp_path / "mocap", "read.captions_folder": str(tmp_path / "texts")})
+    require_watched("motions", {"source": tmp_path / "mocap", "read.describe.captions_folder": str(tmp_path / "texts")})
     assert (folder / "data/raw/README.md").exists()
 
 
