@@ -1,8 +1,9 @@
-"""Retargeters on the same people: `python -m benchmarks.retarget.compare FOLDER --out table.json`.
+"""Retargeters on the same people: `python -m benchmarks.retarget.compare PATH --out table.json`.
 
 A retargeter is any function from a `HumanMotion` to a `RawMotion`, named on the command line as `package.module:name`.
-Until people are given, the people are the landmarks of the folder's own robot motions: there is a motion that follows
-them exactly, and the joint error against it tells what a retargeter loses.
+`--reference` names somebody's result on the robot under the same names, which is measured beside them. Where PATH holds
+motions of the robot, their landmarks are the people: there is a motion that follows them exactly, and the joint error
+against it tells what a retargeter loses.
 """
 
 import argparse
@@ -15,11 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.retarget.landmarks import person_of, robot_landmarks, scaled
-from benchmarks.retarget.quality import read_set
 from benchmarks.retarget.table import markdown, summary
 from bumblebee.motion.clip import Clip
+from bumblebee.motion.convert import clip_of
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.kinematics import make_clip
+from bumblebee.motion.listing import find_motions
 from bumblebee.motion.quality import at_times, joint_error, keypoint_error, quality
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
@@ -27,7 +29,7 @@ from bumblebee.progress import progress
 
 Retargeter = Callable[[HumanMotion], RawMotion]
 FPS = 50.0  # of the clips that are judged
-MINK = "benchmarks.retarget.mink_baseline:retarget"
+OURS = "bumblebee.motion.retarget.retarget:retarget"
 
 
 def judged(
@@ -80,16 +82,36 @@ def named(text: str) -> Retargeter:
     return getattr(importlib.import_module(module), name)
 
 
+def people(path: Path, references: Mapping[str, Clip]) -> list[tuple[HumanMotion, Clip | None]]:
+    """The motions of people at `path`; of the robot's, their landmarks stand for a person who can be followed."""
+    found: list[tuple[HumanMotion, Clip | None]] = []
+    for file in find_motions(path):
+        for motion in file.motions:
+            if isinstance(motion, HumanMotion):
+                found.append((motion, references.get(motion.name)))
+            elif isinstance(motion, RawMotion):
+                clip = clip_of(motion, FPS)
+                found.append((person_of(clip), clip))
+    return found
+
+
 def main() -> None:
     """Compare the retargeters named on the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="motions on the robot, whose landmarks are the people")
-    parser.add_argument("--retargeters", nargs="+", default=[MINK], help="package.module:name")
-    parser.add_argument("--most", type=int, default=1000, help="motions at most")
+    parser.add_argument("path", type=Path, help="motions of people, in any format; of the robot: their landmarks")
+    parser.add_argument("--retargeters", nargs="+", default=[OURS], help="package.module:name")
+    parser.add_argument("--reference", type=Path, help="somebody's result on the robot, under the same names")
+    parser.add_argument("--every", type=int, default=1, help="take every so manieth motion")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
-    clips = read_set(options.folder, grounded=True, fps=60.0)[: options.most]
-    found = compare({text: named(text) for text in options.retargeters}, [(person_of(clip), clip) for clip in clips])
+    raws = (
+        {raw.name: raw for file in find_motions(options.reference) for raw in file.motions} if options.reference else {}
+    )
+    motions = people(options.path, {name: clip_of(raw, FPS) for name, raw in raws.items()})[:: options.every]
+    found = compare({text: named(text) for text in options.retargeters}, motions)
+    if raws:
+        theirs = {m.name: against(m, raws[m.name], reference) for m, reference in motions if m.name in raws}
+        found["reference"] = theirs
     tables = {name: {"motions": rows, "summary": summary(rows)} for name, rows in found.items()}
     options.out.write_text(json.dumps(tables, indent=1) + "\n")
     print(markdown({name: table["summary"] for name, table in tables.items()}))
