@@ -100,7 +100,7 @@ def test_a_full_disk_ends_in_one_line_and_leaves_the_old_library(capsys, monkeyp
         raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
     monkeypatch.setattr(writer, "put", full)
-    assert "No space left on device" in ends_with(2, capsys)
+    assert "no space left" in ends_with(2, capsys)
     assert [clip.name for clip in read_library(Path("data/motions"))] == before
     assert sorted(path.name for path in Path("data").iterdir()) == ["motions", "retargets"]
 
@@ -113,7 +113,7 @@ def test_a_read_that_fails_halfway_leaves_no_clips_behind(capsys, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device", "x")
 
     monkeypatch.setattr(motions, "write_library", broken)
-    assert "No space left on device" in ends_with(2, capsys)
+    assert "no space left" in ends_with(2, capsys)
     assert list(Path(".").rglob("*.parquet")) == [] and not Path("data/motions").exists()
 
 
