@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from bumblebee.deploy.describe import action_sentence, joint_table, observation_size, observation_table
+from bumblebee.motion.licence_terms import UNKNOWN, counted, restrictions
 from bumblebee.robot.facts import KEY_BODIES
 
 ROBOTS = {
@@ -29,7 +30,9 @@ class Evaluated:
     """The entry of summary.json over all motions."""
 
 
-def model_card(name: str, policy: str, folder: Path, parent: str | None, evaluated: Evaluated, licences: str) -> str:
+def model_card(
+    name: str, policy: str, folder: Path, parent: str | None, evaluated: Evaluated, licences: Mapping[str, int]
+) -> str:
     """The card, from contract.json and card.json of the policy's folder and its result.
 
     Args:
@@ -38,7 +41,7 @@ def model_card(name: str, policy: str, folder: Path, parent: str | None, evaluat
         folder: the exported policy.
         parent: name of the policy that it was trained from, None where there is none.
         evaluated: how it did.
-        licences: of the motions.
+        licences: licence -> number of motions, as `licences_of` has it.
     """
     contract = json.loads((folder / "contract.json").read_text())
     card = json.loads((folder / "card.json").read_text()) if (folder / "card.json").exists() else {}
@@ -86,7 +89,7 @@ def _gives(contract: dict[str, Any]) -> Iterator[str]:
     yield from joint_table(contract)
 
 
-def _made(card: Mapping[str, Any], parent: str | None, licences: str) -> Iterator[str]:
+def _made(card: Mapping[str, Any], parent: str | None, licences: Mapping[str, int]) -> Iterator[str]:
     origin = parent or ", ".join(card.get("from", [])) or card.get("config", {}).get("init")
     yield f"- from: {origin or 'not said'}"
     if "stage" in card:
@@ -99,7 +102,9 @@ def _made(card: Mapping[str, Any], parent: str | None, licences: str) -> Iterato
         yield "- training did not make it better: these are its parent's weights"
     seed = card.get("config", {}).get("seed")
     yield f"- seed: {seed}" if seed is not None else "- seed: not said"
-    yield f"- licences of the motions: {licences}"
+    named = ", ".join(f"{licence} ({count})" for licence, count in licences.items())
+    yield f"- licences of the motions: {named or UNKNOWN}"
+    yield from (f"- **{line}**" for line in restrictions(licences))
     yield "- every input with its hash: `lineage.json` beside this card"
 
 
@@ -133,13 +138,10 @@ def _limits() -> Iterator[str]:
     yield "- It follows motions like those that it was trained on; it plans nothing and sees no obstacle."
 
 
-def licences_of(library: Path) -> str:
-    """The licences of a motion library's clips with their numbers; "unknown" where it does not say."""
+def licences_of(library: Path) -> dict[str, int]:
+    """The licences of a motion library's clips with their numbers; none where it does not say."""
     index = library / "index.parquet"
     if not index.exists():
-        return "unknown"
+        return {}
     table = pd.read_parquet(index)
-    if "licence" not in table or table.empty:
-        return "unknown"
-    counts = table["licence"].fillna("unknown").replace("", "unknown").value_counts()
-    return ", ".join(f"{licence} ({count})" for licence, count in counts.items())
+    return counted(table["licence"].fillna("")) if "licence" in table else {UNKNOWN: len(table)}

@@ -1,6 +1,8 @@
 """Read or make the motions, resample them to 50 Hz, hold some out: the user's files -> data/motions."""
 
-from dataclasses import dataclass, field
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pandas as pd
@@ -8,14 +10,15 @@ import pandas as pd
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
-from bumblebee.motion.folder import ReadConfig, Reading, read_folder, skipped_table
-from bumblebee.motion.pieces import hold_out
-from bumblebee.motion.store import write_library
+from bumblebee.motion.few_lines import few_lines
+from bumblebee.motion.folder import ReadConfig, Reading, read_each, skipped_table
+from bumblebee.motion.pieces import held_out
+from bumblebee.motion.store import Library, LibraryWriter, read_index, write_library
 from bumblebee.motion.walk import motion_sources
 from bumblebee.progress import progress
 from bumblebee.ranges import Name, PartOf, Ranged, Unfit
 from tasks import paths
-from tasks.stage import load, log_run, run_stage
+from tasks.stage import load, log_run, output_folder, run_stage, scratch
 from tasks.watched import require_watched
 
 EMBEDDED = "embedded"
@@ -23,7 +26,7 @@ CONTROL_HZ = 50.0
 NOTES = "notes.csv"
 TEXTS = ("captions_folder", "captions_csv", "humanml3d")
 """Settings of `motions.read.describe` that name files or folders."""
-_FEW = 20  # lines of a kind on the terminal
+_FEW = 12  # lines of a kind on the terminal
 
 
 @dataclass(frozen=True)
@@ -50,13 +53,19 @@ def main() -> None:
     """Read the source, split it, write the library, say what came."""
     config = load("motions", MotionsConfig)
     make_cache()
-    reading = gather(config)
-    clips = hold_out(reading.clips, config.holdout_share)
-    write_library(paths.MOTIONS, clips, reading.skipped)
-    reading.notes.to_csv(paths.MOTIONS / NOTES, index=False)
-    tell(clips, reading)
+    # Which motions are held out hangs on all of them, and memory does not hold them: they are written twice.
+    unsplit = scratch("motions") / "unsplit"
+    shutil.rmtree(unsplit, ignore_errors=True)  # of a run that was killed
+    try:
+        with LibraryWriter(unsplit) as writer:
+            reading = gather(config, writer.add)
+        write_split(Library(unsplit), config.holdout_share, reading)
+    finally:
+        shutil.rmtree(unsplit, ignore_errors=True)
+    index = read_index(paths.MOTIONS)
+    tell(index, reading)
     tables = [paths.MOTIONS / "skipped.csv", paths.MOTIONS / NOTES]
-    log_run("motions", params=config, metrics=metrics(clips, reading), artifacts=tables)
+    log_run("motions", params=config, metrics=metrics(index, reading), artifacts=tables)
 
 
 def make_cache() -> None:
@@ -67,10 +76,12 @@ def make_cache() -> None:
         note.write_text("Retargeted motions, each by the hash of what it was made from (bumblebee/motion/cache.py).\n")
 
 
-def gather(config: MotionsConfig) -> Reading:
-    """The clips of the configured source, and the files that gave none."""
+def gather(config: MotionsConfig, take: Callable[[Clip], None]) -> Reading:
+    """Give `take` the clips of the configured source; what is said of its files."""
     if config.source == EMBEDDED:
-        return Reading(make_library(config.embedded), skipped_table([]))
+        for clip in make_library(config.embedded):
+            take(clip)
+        return Reading([], skipped_table([]))
     source = Path(config.source).expanduser()
     if not source.exists():
         raise BadInput(
@@ -81,43 +92,61 @@ def gather(config: MotionsConfig) -> Reading:
     require_watched("motions", {"source": source, **named})
     files = sum(1 for _ in motion_sources(source))
     with progress(files, "reading motions", "files") as bar:
-        return read_folder(source, config.read, bar.update, paths.RETARGETS)
+        return read_each(source, take, config.read, bar.update, paths.RETARGETS)
 
 
-def metrics(clips: list[Clip], reading: Reading) -> dict[str, float]:
+def write_split(library: Library, share: float, reading: Reading) -> None:
+    """The library in its place, `share` of the motions held out, with what is said of the files beside it."""
+    held = held_out(library.index.itertuples(index=False), share)
+    with output_folder(paths.MOTIONS) as folder:
+        clips = (replace(clip, split="test" if clip.name in held else "train") for clip in library)
+        write_library(folder, clips, reading.skipped)
+        reading.notes.to_csv(folder / NOTES, index=False)
+
+
+def metrics(index: pd.DataFrame, reading: Reading) -> dict[str, float]:
     """Counts for MLflow."""
-    texts = (
-        {f"texts/{source}": float(count) for source, count in reading.texts.motions.items()} if reading.texts else {}
-    )
+    texts = reading.texts.motions if reading.texts else {}
     return {
-        "clips": len(clips),
-        "held_out": sum(clip.split == "test" for clip in clips),
-        "minutes": sum(clip.duration for clip in clips) / 60,
+        "clips": len(index),
+        "held_out": int((index["split"] == "test").sum()),
+        "minutes": float(index["duration"].sum()) / 60,
         "files_skipped": len(reading.skipped),
-        **texts,
+        **{f"texts/{source}": float(count) for source, count in texts.items()},
     }
 
 
-def tell(clips: list[Clip], reading: Reading) -> None:
-    """One line of counts, and one for each reason why files were skipped."""
-    counts = metrics(clips, reading)
+def tell(index: pd.DataFrame, reading: Reading) -> None:
+    """What came: counts, sets with their licences, texts, why files were skipped, what was detected in others."""
+    counts = metrics(index, reading)
     print(f"{counts['clips']} clips, {counts['minutes']:.1f} minutes, {counts['held_out']} held out -> {paths.MOTIONS}")
-    for row in by_set(clips).itertuples():
-        print(f"  {row.set}: {row.clips} clips, {row.minutes:.1f} minutes, licence {row.licence}")
+    sets = [f"  {row.set}: {row.clips} clips, {row.minutes:.1f} minutes, licence {row.licence}"
+            for row in by_set(index).itertuples()]  # fmt: skip
+    _print(sets, "  {} more sets: " + str(paths.MOTIONS / "index.parquet"))
     if reading.texts:
         print("motions with text: " + ", ".join(f"{name} {count}" for name, count in reading.texts.motions.items()))
-        for line in reading.texts.notes[:_FEW]:
-            print(f"text: {line}")
+        _print([f"text: {line}" for line in reading.texts.notes], "text: {} more lines like these")
     for what, table, column in (("skipped", reading.skipped, "reason"), ("noted", reading.notes, "note")):
-        for said, group in table.groupby(column, sort=False):
-            others = group["file"].nunique() - 1
-            print(f"{what} {group['file'].iloc[0]}{f' and {others} more' if others else ''}: {said}")
+        told = few_lines(zip(table["file"], table[column], strict=True))
+        file = paths.MOTIONS / ("skipped.csv" if what == "skipped" else NOTES)
+        _print([f"{what}: {one.line}: {one.whose}" for one in told], f"{what}: {{}} more kinds: {file}")
 
 
-def by_set(clips: list[Clip]) -> pd.DataFrame:
-    """What each folder or archive of the source gave: set, clips, minutes, licence."""
-    rows = [(clip.source.split("/")[0], clip.duration / 60, clip.licence) for clip in clips]
-    table = pd.DataFrame(rows, columns=["set", "minutes", "licence"])
+def _print(lines: list[str], more: str) -> None:
+    """The first lines, and how many more there are."""
+    for line in lines[:_FEW]:
+        print(line)
+    if len(lines) > _FEW:
+        print(more.format(len(lines) - _FEW))
+
+
+def by_set(index: pd.DataFrame) -> pd.DataFrame:
+    """What each folder of the source gave, be it in an archive: set, clips, minutes, licence."""
+    table = pd.DataFrame({
+        "set": [source.split("/")[0] for source in index["source"]],
+        "minutes": index["duration"] / 60,
+        "licence": index["licence"],
+    })  # fmt: skip
     groups = table.groupby("set", sort=True)
     return groups.agg(clips=("minutes", "size"), minutes=("minutes", "sum"), licence=("licence", _all)).reset_index()
 

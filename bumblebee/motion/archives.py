@@ -126,9 +126,11 @@ def _zip(path: Path, changed: int, size: int) -> Iterator[Member]:
         yield _bad("", path, wanted, f"{len(infos):,} of {total:,}", "Unpack it.")
         return
     for index, info in sorted(enumerate(infos), key=lambda pair: pair[1].filename):
-        if info.is_dir():
+        if info.filename.endswith("/"):
             continue
-        if info.flag_bits & 1:
+        if not info.filename:
+            yield _bad("", path, "members with names", "one without", _AGAIN)
+        elif info.flag_bits & 1:
             yield _bad(
                 info.filename, _shown(path, info.filename), "a member without password", "one with", "Unpack it."
             )

@@ -1,15 +1,11 @@
 """Captions in HumanML3D's line format: `a person walks.#a/DET person/NOUN walk/VERB#0.0#0.0`, times in seconds."""
 
 import math
-import os
 import re
-from pathlib import Path
 
 from bumblebee.errors import BadInput
-from bumblebee.io.read import read_text
 from bumblebee.motion.texts import require_line
 
-_MAX_BYTES = 1 << 20  # of a caption file; HumanML3D's have a few hundred
 _LONGEST_TIME = 1e6  # s
 
 # What a word in a file's name says about the kind of motion; the first that is found decides.
@@ -30,19 +26,6 @@ _FAMILIES = (
 )
 
 
-def read_captions(path: Path) -> tuple[str, ...]:
-    """The lines of a caption file.
-
-    Raises:
-        BadInput: no text, or a line that is not `caption#tokens/POS#from#to`.
-    """
-    lines = [line.strip() for line in read_text(path, _MAX_BYTES).splitlines()]
-    for number, line in enumerate(lines, 1):
-        if line:
-            parse_caption(line, f"{path}, line {number}")
-    return tuple(line for line in lines if line)
-
-
 def parse_caption(line: str, where: object = "caption") -> tuple[str, str, float, float]:
     """Caption, tokens, from [s], to [s]; 0 and 0 mean the whole motion."""
     parts = require_line(where, line).split("#")
@@ -56,16 +39,6 @@ def parse_caption(line: str, where: object = "caption") -> tuple[str, str, float
     if not all(math.isfinite(time) and 0 <= time <= _LONGEST_TIME for time in (start, end)):
         raise BadInput(where, f"times from 0 to {_LONGEST_TIME:g} s", f"{parts[2]!r} and {parts[3]!r}"[:80])
     return parts[0].strip(), parts[1].strip(), start, end
-
-
-def find_captions(motion: Path, folder: str | Path) -> tuple[str, ...]:
-    """The captions that belong to a motion file: `<stem>.txt` in `folder` or beside it; () if there is none."""
-    places = [Path(folder)] if str(folder) else []
-    for place in [*places, motion.parent]:
-        path = place / f"{motion.stem}.txt"
-        if os.path.lexists(path):
-            return read_captions(path)
-    return ()
 
 
 def caption_from_name(name: str) -> str:

@@ -10,9 +10,9 @@ from pathlib import Path
 from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
 from bumblebee.io.write import new_folder, refuse_overlap, try_output
-from bumblebee.motion.captions import find_captions
 from bumblebee.motion.checks import check_clip, check_raw
 from bumblebee.motion.clip import Clip
+from bumblebee.motion.describe.describer import beside
 from bumblebee.motion.formats.write import FORMATS, write_motion
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.kinematics import make_clip
@@ -76,7 +76,7 @@ def convert(
         out: a new folder, or with `overwrite` an earlier result.
         config: format and rate.
         overwrite: replace an earlier result.
-        tell: called with a line for each file or motion that gives nothing.
+        tell: called with a line for each file or motion that gives nothing, and each caption that does not.
 
     Raises:
         BadInput: `out` is an input or somebody else's; nothing could be written.
@@ -121,33 +121,35 @@ def _ours(out: Path, to: str) -> bool:
     return bool(written) and names <= {LICENCES, *written}
 
 
-def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> Clip:
-    """A motion of the robot, checked and at another rate, as a clip; heights stay as they are.
+def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> tuple[Clip, tuple[str, ...]]:
+    """A motion of the robot, checked and at another rate, as a clip, and the captions that could not be used.
+
+    Heights stay as they are.
 
     Raises:
         BadInput: a check that it fails.
     """
     check_raw(raw)
     raw = resample(raw, fps or raw.fps)
-    captions, before = find_captions(raw.file, ""), stated_of(raw.file)
+    texts, before = beside(raw.file, (len(raw.root_pos) - 1) / raw.fps), stated_of(raw.file)
     clip = make_clip(
         safe_stem(raw.name, "motion"),
         raw.fps,
         raw.root_pos,
         raw.root_quat,
         raw.joint_pos,
-        captions=captions,
-        caption_source="file" if captions else "",
+        captions=texts.captions,
+        caption_source=texts.source,
         source=before.source if before else shown(str(Path(raw.file.parent.name) / raw.file.name)),
         licence=before.licence if before else licence_of(raw.file),
         sha256=digest,
     )
     check_clip(raw.where, clip)
-    return clip
+    return clip, texts.notes
 
 
 def clips_at(path: Path, files: FileConfig, tell: Callable[[str], None]) -> Iterator[Clip]:
-    """The motions at `path` as clips at their own rates, under distinct names; `tell` gets a line for each other."""
+    """The motions at `path` as clips at their own rates, under distinct names; `tell` gets a line for what is not."""
     yield from _clips(path, ConvertConfig("asap", files=files), Converted(), tell)
 
 
@@ -166,28 +168,30 @@ def _clips(path: Path, config: ConvertConfig, done: Converted, tell: Callable[[s
             skip(place, found.reason or "no motion in it")
         for motion in found.motions:
             try:
-                clip = _clip(motion, found, config)
+                clip, notes = _clip(motion, found, config)
             except BadInput as error:
                 skip(
                     f"{place}, {shown(motion.name)}" if len(found.motions) > 1 else place, reason_of(error, found.path)
                 )
                 continue
+            for note in notes:
+                tell(f"{place}: {note}")
             yield replace(clip, name=names.distinct(clip.name, found.path.parent.name))
 
 
-def _clip(motion: Motion, found: Found, config: ConvertConfig) -> Clip:
+def _clip(motion: Motion, found: Found, config: ConvertConfig) -> tuple[Clip, tuple[str, ...]]:
     if isinstance(motion, HumanMotion):
         motion = retarget(motion, config.rate or _LIBRARY_FPS)
     if isinstance(motion, RawMotion):
-        clip = clip_of(motion, config.rate, hashlib.sha256(found.data).hexdigest())
-        return replace(clip, licence=found.licence)
+        clip, notes = clip_of(motion, config.rate, hashlib.sha256(found.data).hexdigest())
+        return replace(clip, licence=found.licence), notes
     if config.rate is None or config.rate == motion.fps:
-        return motion
+        return motion, ()
     raw = RawMotion(motion.name, motion.fps, motion.root_pos, motion.root_quat, motion.joint_pos, found.path)
     moved = resample(raw, config.rate)
     about = {name: getattr(motion, name) for name in ("captions", "source", "licence", "sha256", "family", "split")}
     about["caption_source"] = motion.caption_source
-    return make_clip(motion.name, moved.fps, moved.root_pos, moved.root_quat, moved.joint_pos, **about)
+    return make_clip(motion.name, moved.fps, moved.root_pos, moved.root_quat, moved.joint_pos, **about), ()
 
 
 class _Names:

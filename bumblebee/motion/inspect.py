@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.captions import find_captions
 from bumblebee.motion.checks import check_raw
 from bumblebee.motion.clip import Clip
+from bumblebee.motion.describe.describer import beside
 from bumblebee.motion.formats.read import format_of
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.listing import Found, Motion, find_motions, reason_of
@@ -104,25 +104,18 @@ def _row(found: Found, motion: Motion) -> Inspected:
             path, "library", motion.name, motion.frames, motion.fps, "library", _range(motion.root_pos[:, 2]),
             motion.joint_pos.shape[1], len(motion.captions), motion.licence,
         )  # fmt: skip
-    captions, problem = _captions(motion.file)
+    problem = ""
     if isinstance(motion, HumanMotion):
         kind, root = f"person {path.suffix.lower()}", motion.landmark("pelvis")
         joints, rate = 0, "file"
     else:
         kind, root, joints, rate = format_of(path), motion.root_pos, motion.joint_pos.shape[1], motion.rate_from
-        problem = _fault(path, motion) or problem
+        problem = _fault(path, motion)
+    texts = beside(motion.file, (len(root) - 1) / motion.fps)
     return Inspected(
-        path, kind, motion.name, len(root), motion.fps, rate, _range(root[:, 2]), joints, captions,
-        found.licence, motion.notes, problem,
+        path, kind, motion.name, len(root), motion.fps, rate, _range(root[:, 2]), joints,
+        len(texts.captions), found.licence, (*motion.notes, *texts.notes), problem,
     )  # fmt: skip
-
-
-def _captions(file: Path) -> tuple[int, str]:
-    """How many captions a motion's file has, and what is wrong with them."""
-    try:
-        return len(find_captions(file, "")), ""
-    except BadInput as error:
-        return 0, f"captions: {error}"
 
 
 def _fault(path: Path, motion: RawMotion) -> str:

@@ -7,11 +7,11 @@ from pathlib import Path, PurePosixPath
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes
 from bumblebee.motion.archives import SUFFIXES, list_archive
+from bumblebee.motion.licence_terms import UNKNOWN, noncommercial
 from bumblebee.motion.sources import Source
 from bumblebee.motion.sources_table import row_of
 from bumblebee.motion.texts import shown
 
-UNKNOWN = "unknown"
 _MAX_BYTES = 4 << 20  # of a licence or a table
 _LONGEST = 200  # characters of a licence's name
 
@@ -30,14 +30,6 @@ _TEXTS = (
 
 _FILES = ("LICENSE", "LICENCE", "LICENSE.txt", "LICENCE.txt", "LICENSE.md", "LICENCE.md", "COPYING")
 _RATE = re.compile(r"(?:(\d+(?:\.\d+)?)\s*(?:to|and|or|[-/,\u2013])\s*)?\b(\d+(?:\.\d+)?)\s*Hz\b")
-
-# What licences that forbid commercial use are called, and those that allow it.
-_NONCOMMERCIAL = re.compile(
-    r"non-?\s?commercial|\bby-nc\b|\bcc[ -]by[ -]nc|\b(research|academic)( use| purposes)? only", re.IGNORECASE
-)
-_COMMERCIAL = re.compile(
-    r"\b(mit|isc|apache|bsd|0bsd|zlib|unlicense|cc0|cc[ -]by|public domain|[al]?gpl|mpl)\b", re.IGNORECASE
-)
 
 
 def licence_of(file: Path | Source) -> str:
@@ -67,13 +59,6 @@ def stated_rate(source: Path | Source) -> float | None:
     rates = {float(rate) for rate in said}
     (rate,) = rates if len(rates) == 1 else (0.0,)
     return rate if 1 <= rate <= 1000 else None
-
-
-def noncommercial(licence: str) -> bool | None:
-    """Whether a licence forbids commercial use; None where its name does not tell."""
-    if _NONCOMMERCIAL.search(licence):
-        return True
-    return False if _COMMERCIAL.search(licence) else None
 
 
 def _from_table(file: Path) -> str:
@@ -125,7 +110,7 @@ def _named(name: str, text: str) -> str:
     """The SPDX name of a licence's text, or where it stands; "" of an empty one."""
     plain = " ".join(text.lower().split())
     # Only in a text of no known licence: the GPL has the word too.
-    other = f"non-commercial, see {name}" if _NONCOMMERCIAL.search(plain) else f"see {name}"
+    other = f"non-commercial, see {name}" if noncommercial(plain) else f"see {name}"
     return next((spdx for phrase, spdx in _TEXTS if phrase in plain), other) if plain else ""
 
 

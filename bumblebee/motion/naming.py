@@ -1,5 +1,6 @@
 """Names of clips that are read together: distinct, and short enough for files."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,13 +9,13 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.pieces import motion_of
 
 
-def distinct(found: list[tuple[Path, list[Clip]]]) -> list[Clip]:
-    """Names that occur in several groups get the folder's name in front, and a number if that is not enough.
+def distinct(found: Iterable[tuple[Path, list[Clip]]]) -> Iterator[Clip]:
+    """The clips of all groups in order, under names that are distinct.
 
-    Names that differ in case only count as equal: some file systems do not tell them apart.
+    Names that occur in several groups get the folder's name in front, and a number if that is not enough. Names that
+    differ in case only count as equal: some file systems do not tell them apart.
     """
     taken: set[str] = set()
-    clips: list[Clip] = []
     for file, group in found:
         names = [_fitting(motion_of(clip.name), _tail(clip.name)) for clip in group]
         if taken & _folded(names):
@@ -25,8 +26,7 @@ def distinct(found: list[tuple[Path, list[Clip]]]) -> list[Clip]:
             names = [_fitting(motion_of(name), f"_{number}{_tail(name)}") for name in first]  # walk_p3 -> walk_2_p3
             number += 1
         taken |= _folded(names)
-        clips += [replace(clip, name=name) for clip, name in zip(group, names, strict=True)]
-    return clips
+        yield from (replace(clip, name=name) for clip, name in zip(group, names, strict=True))
 
 
 def _folded(names: list[str]) -> set[str]:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -37,30 +38,56 @@ def motion_of(name: str) -> str:
     return re.sub(r"_p\d+$", "", name)
 
 
-def origin(clip: Clip) -> str:
-    """The name of the motion in its own folder: without the folder's, which tells apart equal names of several."""
-    folder = safe_stem(Path(clip.source).parent.name, "")[:20]
-    name = motion_of(clip.name)
-    return re.sub(r"_\d+$", "", name.removeprefix(f"{folder}_")) if folder and name.startswith(f"{folder}_") else name
+def origin(name: str, source: str) -> str:
+    """What a motion is called in its own file, which several forms of it in several folders have in common.
+
+    Args:
+        name: of the clip, where equal names of several files are told apart by the folder's, and then by a number.
+        source: of the clip, `<folder>/<file>`.
+    """
+    place, motion = Path(source), motion_of(name)
+    folder, stem = safe_stem(place.parent.name, "")[:20], motion_of(safe_stem(place.stem, ""))
+    if folder and stem and re.fullmatch(rf"{re.escape(f'{folder}_{stem}')}(_\d+)?", motion):
+        return stem
+    # One of several in its file: a number at its end may be its own.
+    return motion.removeprefix(f"{folder}_") if folder and motion != stem else motion
+
+
+class Named(Protocol):
+    """A clip, or a row of the library's index."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def source(self) -> str: ...  # noqa: D102
+    @property
+    def family(self) -> str: ...  # noqa: D102
+
+
+def held_out(motions: Iterable[Named], share: float) -> set[str]:
+    """The names of the clips to hold out: `share` of the motions of each family, by a hash of their names.
+
+    All pieces of one motion go to the same side, and so does one motion that lies there in several forms, such as a
+    person's and somebody's retarget of it, under one name in two folders. A family of at least four motions has at
+    least one held out and one left; a smaller one has none held out, and none has where `share` is 0.
+    """
+    origins = [(one.name, one.family, origin(one.name, one.source)) for one in motions]
+    families: dict[str, set[str]] = defaultdict(set)
+    for _, family, motion in origins:
+        families[family].add(motion)
+    held: set[str] = set()
+    for members in families.values():
+        if share > 0 and len(members) >= FAMILY_MINIMUM:
+            count = min(max(1, round(share * len(members))), len(members) - 1)
+            held |= set(sorted(members, key=_position)[:count])
+    return {name for name, _, motion in origins if motion in held}
 
 
 def hold_out(clips: Iterable[Clip], share: float) -> list[Clip]:
-    """The clips with `split` set: `share` of the motions of each family are "test", by a hash of their names.
-
-    All pieces of one motion go to the same side, and so does one motion that lies there in several forms, such as a
-    person's and somebody's retarget of it, under one name in two folders. A family of at least four motions has at least one held out and one
-    left; a smaller one has none held out, and none has where `share` is 0.
-    """
+    """The clips with `split` set, "test" for those of `held_out` and "train" for the others."""
     clips = list(clips)
-    families: dict[str, set[str]] = defaultdict(set)
-    for clip in clips:
-        families[clip.family].add(origin(clip))
-    held: set[str] = set()
-    for motions in families.values():
-        if share > 0 and len(motions) >= FAMILY_MINIMUM:
-            count = min(max(1, round(share * len(motions))), len(motions) - 1)
-            held |= set(sorted(motions, key=_position)[:count])
-    return [replace(clip, split="test" if origin(clip) in held else "train") for clip in clips]
+    held = held_out(clips, share)
+    return [replace(clip, split="test" if clip.name in held else "train") for clip in clips]
 
 
 def _position(name: str) -> float:

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bumblebee.errors import BadInput
 from bumblebee.motion.cache import Arrays, cached, key_of
 from bumblebee.motion.checks import check_raw
 from bumblebee.motion.grounding import ground
 from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.human.smpl_body import model_files
 from bumblebee.motion.one_file import read_one
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
@@ -51,9 +51,10 @@ def make_ready(job: Job, config: ReadConfig) -> list[Ready]:
     Raises:
         BadInput: what is wrong in it.
     """
-    if job.cache is not None and job.path.suffix.lower() in _HUMAN:
-        return _through_cache(job, config)
-    return list(_made(job, config))
+    # Packed with and without a cache, which keeps float32: the result must not depend on it.
+    if job.cache is None or job.path.suffix.lower() not in _HUMAN:
+        return _unpacked(_packed(list(_made(job, config))), job.path)
+    return _unpacked(cached(job.cache, _key(job, config), lambda: _packed(list(_made(job, config)))), job.path)
 
 
 def _made(job: Job, config: ReadConfig) -> Iterator[Ready]:
@@ -68,9 +69,8 @@ def _made(job: Job, config: ReadConfig) -> Iterator[Ready]:
         yield Ready(replace(even, root_pos=pos, joint_pos=joints))
 
 
-def _through_cache(job: Job, config: ReadConfig) -> list[Ready]:
-    """The same by way of the cache, where the settings, the file's name and its bytes are those of before."""
-    assert job.cache is not None
+def _key(job: Job, config: ReadConfig) -> str:
+    """Of everything that decides the result: the file's name and bytes, the settings, the bodies, the code."""
     parts = {
         "file": job.sha256,
         "name": job.path.name,
@@ -79,9 +79,10 @@ def _through_cache(job: Job, config: ReadConfig) -> list[Ready]:
         "robot": asdict(config.robot),
         "grounding": asdict(config.grounding),
         "retarget": asdict(config.retarget),
+        "bodies": model_files() if job.path.suffix.lower() == ".npz" else [],
         "version": [VERSION, _READER],
     }
-    return _unpacked(cached(job.cache, key_of(parts), lambda: _packed(list(_made(job, config)))), job.path)
+    return key_of(parts)
 
 
 def _packed(found: list[Ready]) -> Arrays:
@@ -109,9 +110,3 @@ def _unpacked(arrays: Arrays, path: Path) -> list[Ready]:
 
 def _named(values: list[np.ndarray]) -> dict[str, np.ndarray]:
     return dict(zip(("root_pos", "root_quat", "joint_pos"), values, strict=True))
-
-
-def why_not(error: BadInput, path: Path) -> str:
-    """The error's line without the file's name, which stands in a column of its own."""
-    text = str(error)
-    return text.removeprefix(str(path)).lstrip(":, ") if text.startswith(str(path)) else text

@@ -1,5 +1,6 @@
 """The section about the motions that were read and dropped."""
 
+from bumblebee.motion.licence_terms import counted, restrictions
 from bumblebee.report.page import Block, Section, heading, note, table, text
 from bumblebee.report.results import LoopResults
 from bumblebee.report.wording import plural
@@ -25,9 +26,10 @@ def motions_section(results: LoopResults) -> Section:
         for name, part in families
     ]
     blocks.append(table(("family", "motions", "held out", "length"), rows, title="motions by family"))
-    sources = library.groupby("licence").size()
-    licences = "; ".join(f"{name} ({plural(count, 'motion')})" for name, count in sources.items())
-    blocks.append(note(f"Licences: {licences}."))
+    licences = counted(library["licence"])
+    named = "; ".join(f"{name} ({plural(count, 'motion')})" for name, count in licences.items())
+    blocks.append(note(f"Licences: {named}."))
+    blocks += [note(f"{line[0].upper()}{line[1:]}.") for line in restrictions(licences)]
     if len(drops):
         first = drops.drop_duplicates("motion")
         dropped_rows = [(r["motion"], r["rule"], str(r["explanation"])) for _, r in first.head(_MOST_ROWS).iterrows()]
@@ -39,5 +41,5 @@ def motions_section(results: LoopResults) -> Section:
     if len(results.skipped):
         reasons = results.skipped.groupby("reason").size().sort_values(ascending=False)
         unread = [(str(reason), str(count)) for reason, count in reasons.head(_MOST_ROWS).items()]
-        blocks += [heading("Files that cannot be read yet"), table(("reason", "files"), unread)]
+        blocks += [heading("Files that gave no motion"), table(("reason", "files"), unread)]
     return Section("motions", "Motions", tuple(blocks))

@@ -142,12 +142,6 @@ FILES: dict[str, Make] = {
     "csv: a pipe": lambda folder: os.mkfifo(folder / "bad.csv"),
     "csv: a name that is no text": odd_name,
     "folder: a link to itself": lambda folder: (folder / "bad").symlink_to("."),
-    "captions: bytes": captions(b"\xff\xfe\x00#"),
-    "captions: no tokens": captions(b"a person walks\n"),
-    "captions: endless": captions(b"a person walks#a/DET#0.0#inf\n"),
-    "captions: before the start": captions(b"a person walks#a/DET#-1e300#2\n"),
-    "captions: control characters": captions(b"a \x1b[31mperson#a/DET#0#0\n"),
-    "captions: 5 MB": captions(b"a person walks#a/DET#0#0\n" * 200_000),
     "pickle: empty": raw(b"", "bad.pkl"),
     "pickle: cut off": raw(python_pickle.dumps(fields())[:300], "bad.pkl"),
     "pickle: text": raw(b"hello", "bad.pkl"),
@@ -291,6 +285,16 @@ def shard_elsewhere(folder: Path) -> None:
     shard(folder).rename(folder / "escaped.parquet")
     index(lambda found: found.__setitem__("shard", "../escaped"))(folder)
 
+
+CAPTIONS: dict[str, Make] = {
+    "captions: bytes": captions(b"\xff\xfe\x00#"),
+    "captions: no tokens": captions(b"a person walks\n"),
+    "captions: endless": captions(b"a person walks#a/DET#0.0#inf\n"),
+    "captions: before the start": captions(b"a person walks#a/DET#-1e300#2\n"),
+    "captions: control characters": captions(b"a \x1b[31mperson#a/DET#0#0\n"),
+    "captions: 5 MB": captions(b"a person walks#a/DET#0#0\n" * 200_000),
+}
+"""Text files that cost their motion its captions, and nothing else."""
 
 LIBRARIES: dict[str, Make] = {
     "name: out of the library": renamed("../../escaped"),

@@ -10,7 +10,7 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.motion.folder import ReadConfig, read_folder
 from bumblebee.motion.store import read_library
-from tests.fuzz.motion_corpus import FILES, LIBRARIES
+from tests.fuzz.motion_corpus import CAPTIONS, FILES, LIBRARIES
 from tests.fuzz.motion_files import csv, library, table
 
 CONFIG = ReadConfig(csv_fps=30)
@@ -47,6 +47,20 @@ def test_a_bad_file_is_listed_with_its_reason_and_stops_no_other(tmp_path: Path,
     assert files_below(tmp_path) == before and not Path("executed").exists()
     assert all(np.isfinite(clip.root_pos).all() for clip in reading.clips)
     reading.skipped.to_csv(tmp_path / "skipped.csv")
+
+
+@pytest.mark.parametrize("name", CAPTIONS)
+def test_a_bad_text_is_noted_and_costs_its_motion_the_captions_alone(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "motions"
+    folder.mkdir()
+    CAPTIONS[name](folder)
+    before = files_below(tmp_path)
+    reading = read_folder(folder, CONFIG)
+    assert [(clip.name, clip.captions, clip.caption_source) for clip in reading.clips] == [("bad", (), "")]
+    assert reading.skipped.empty and files_below(tmp_path) == before
+    notes = [note for note in reading.notes["note"] if "bad.txt" in note]
+    assert len(notes) == 1 and notes[0].isprintable() and len(notes[0]) < 600
+    assert reading.texts is not None and reading.texts.motions == {"none": 1}
 
 
 @pytest.mark.parametrize("name", LIBRARIES)

@@ -3,7 +3,8 @@
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.captions import caption_from_name, family_of, find_captions, parse_caption, read_captions
+from bumblebee.motion.captions import caption_from_name, family_of, parse_caption
+from bumblebee.motion.describe.describer import beside
 
 LINE = "a person walks forward.#a/DET person/NOUN walk/VERB forward/ADV#0.5#2.0"
 
@@ -14,19 +15,17 @@ def test_a_line_is_taken_apart():
 
 
 @pytest.mark.parametrize("line", ["no hash", "a#b", "a#b#0#1#2", "#b#0#1", "a#b#zero#1"])
-def test_a_line_in_another_form_is_named(tmp_path, line):
-    (tmp_path / "a.txt").write_text(f"{LINE}\n{line}\n")
+def test_a_line_in_another_form_is_named(line):
     with pytest.raises(BadInput, match=r"a\.txt, line 2: expected"):
-        read_captions(tmp_path / "a.txt")
+        parse_caption(line, "a.txt, line 2")
 
 
-def test_captions_lie_in_the_folder_or_beside_the_motion(tmp_path):
-    (tmp_path / "texts").mkdir()
-    (tmp_path / "walk.txt").write_text(f"{LINE}\n\n{LINE}\n")
-    (tmp_path / "texts/jump.txt").write_text("a person jumps#a/X#0.0#0.0")
-    assert find_captions(tmp_path / "walk.csv", "") == (LINE, LINE)
-    assert find_captions(tmp_path / "jump.csv", tmp_path / "texts") == ("a person jumps#a/X#0.0#0.0",)
-    assert find_captions(tmp_path / "squat.csv", tmp_path / "texts") == ()
+def test_the_text_beside_a_motion_is_its_caption(tmp_path):
+    (tmp_path / "walk.txt").write_text(f"{LINE}\n\nno hash\n")
+    told = beside(tmp_path / "walk.csv", 4.0)
+    assert (told.captions, told.source) == ((LINE.replace("0.5#2.0", "0.500#2.000"),), "file")
+    assert len(told.notes) == 1 and "walk.txt, line 3: expected" in told.notes[0]
+    assert beside(tmp_path / "squat.csv", 4.0).captions == ()
 
 
 @pytest.mark.parametrize(

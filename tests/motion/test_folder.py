@@ -8,6 +8,7 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.checks import MIN_FRAMES
+from bumblebee.motion.describe.describer import DescribeConfig
 from bumblebee.motion.folder import ReadConfig, read_file, read_folder
 from bumblebee.motion.kinematics import forward_key_positions
 from bumblebee.motion.store import write_library
@@ -33,6 +34,8 @@ def test_a_clip_says_where_it_comes_from(motions):
     (clip,) = read_file(path, CONFIG)
     assert (clip.source, clip.licence, clip.family) == ("walks/B_SideWalk.csv", "MIT", "walk")
     assert clip.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert (clip.caption_source, clip.captions) == ("", ())
+    (clip,) = read_file(path, ReadConfig(csv_fps=30, describe=DescribeConfig(name_words=True)))
     assert clip.caption_source == "name" and clip.captions[0].startswith("a person performs side walk#")
     path.with_suffix(".txt").write_text("a person walks.#a/DET#0.0#0.0\n")
     (clip,) = read_file(path, CONFIG)
@@ -56,13 +59,13 @@ def test_a_mixed_folder_is_read_and_its_rest_listed(motions, tmp_path):
     reading = read_folder(tmp_path, CONFIG, lambda: done.append(1))
     assert sorted(clip.name for clip in reading.clips) == ["jump", "walk"]
     reasons = dict(zip(reading.skipped["file"], reading.skipped["reason"], strict=True))
-    assert set(reasons) == {"a/short.csv", "b/cut.pkl", "c.npz", "d.zip", "e.xyz"}
+    assert set(reasons) == {"a/short.csv", "b/cut.pkl", "c.npz", "d.zip/x/1.bvh", "d.zip/x/2.bvh", "e.xyz"}
     assert reasons["a/short.csv"] == f"expected at least {MIN_FRAMES} frames, came 3 frames"
     assert reasons["b/cut.pkl"].startswith("expected a whole pickle, came")
-    assert reasons["c.npz"] == "SMPL motions cannot be read yet"
-    assert "2 .bvh files" in reasons["d.zip"] and "BVH motions cannot be read yet" in reasons["d.zip"]
-    assert reasons["e.xyz"] == "a format that is not known"
-    assert len(done) == 7
+    assert "trans" in reasons["c.npz"]
+    assert reasons["d.zip/x/1.bvh"] == reasons["d.zip/x/2.bvh"]
+    assert reasons["e.xyz"].endswith("came a format that is not known")
+    assert len(done) == 8
 
 
 def test_equal_names_in_two_folders_stay_apart(motions, tmp_path):

@@ -8,8 +8,9 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.io.names import LONGEST, require_stem
-from bumblebee.motion import folder as reader
+from bumblebee.motion import ready
 from bumblebee.motion.folder import ReadConfig, read_file, read_folder
+from bumblebee.motion.resample import resample
 from bumblebee.motion.store import LibraryWriter, read_library, write_library
 from bumblebee.motion.store.index import read_places
 from bumblebee.motion.store.place import path_of
@@ -80,23 +81,23 @@ def test_a_clip_that_could_not_be_read_back_is_not_written(motions, tmp_path, va
 
 
 def test_a_file_that_vanishes_meanwhile_is_listed(motions, tmp_path):
-    motions.csv(motions.raw(20), "a.csv")
-    gone = motions.csv(motions.raw(20), "b.csv")
-    reading = read_folder(tmp_path, CONFIG, lambda: gone.unlink(missing_ok=True))
-    assert [clip.name for clip in reading.clips] == ["a"]
-    assert reading.skipped.to_dict("records") == [{"file": "b.csv", "reason": "expected a file, came no such file"}]
+    names = [f"m{number:02}" for number in range(12)]  # the first few are read ahead
+    for name in names:
+        gone = motions.csv(motions.raw(20), f"{name}.csv")  # the last in the end
+    reading = read_folder(tmp_path, ReadConfig(csv_fps=30, processes=1), lambda: gone.unlink(missing_ok=True))
+    assert [clip.name for clip in reading.clips] == names[:-1]
+    assert reading.skipped.to_dict("records") == [{"file": "m11.csv", "reason": "expected a file, came no such file"}]
 
 
 def test_a_mistake_of_ours_about_one_file_does_not_cost_the_others(motions, tmp_path, monkeypatch):
     for name in ("a.csv", "b.csv"):
         motions.csv(motions.raw(20), name)
-    prepare = reader.prepare
 
-    def broken(raw, *rest):
-        return prepare(raw, *rest) if raw.name == "b" else [][1]
+    def broken(raw, fps):
+        return resample(raw, fps) if raw.name == "b" else [][1]
 
-    monkeypatch.setattr(reader, "prepare", broken)
-    reading = read_folder(tmp_path, CONFIG)
+    monkeypatch.setattr(ready, "resample", broken)
+    reading = read_folder(tmp_path, ReadConfig(csv_fps=30, processes=1))
     assert [clip.name for clip in reading.clips] == ["b"]
     assert "IndexError" in reading.skipped["reason"][0]
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from bumblebee.motion.licences import licence_of, noncommercial, stated_rate
+from bumblebee.motion.licence_terms import counted, noncommercial, restrictions
+from bumblebee.motion.licences import licence_of, stated_rate
 from bumblebee.motion.walk import motion_sources
 
 
@@ -140,3 +141,15 @@ def test_a_text_of_no_known_licence_that_forbids_commercial_use_says_so(tmp_path
 )
 def test_whether_a_licence_forbids_commercial_use(licence, forbids):
     assert noncommercial(licence) is forbids
+
+
+def test_what_speaks_against_commercial_use_is_said_and_nothing_where_all_allow_it():
+    assert restrictions(counted(["MIT", "Apache-2.0", "CC BY 4.0"])) == []
+    counts = counted(["MIT", "CC-BY-NC-4.0", "see LICENSE", None, "", "CC-BY-NC-4.0", "unknown"])
+    assert counts == {"unknown": 3, "CC-BY-NC-4.0": 2, "MIT": 1, "see LICENSE": 1}
+    assert restrictions(counts) == [
+        "trained on motions that may not be used commercially: CC-BY-NC-4.0",
+        "read these licences before commercial use, whose names do not settle it: see LICENSE",
+        "licence unknown for 3 motions: ask before commercial use",
+    ]
+    assert restrictions({"unknown": 1}) == ["licence unknown for 1 motion: ask before commercial use"]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bumblebee.motion.pieces import hold_out, motion_of, split_long
+from bumblebee.motion.pieces import hold_out, motion_of, origin, split_long
 
 
 @pytest.mark.parametrize("seconds", [0.5, 0.8, 1.0, 1.59])
@@ -65,3 +65,37 @@ def test_pieces_of_one_motion_stay_together(motions):
 
 def test_a_share_of_0_holds_nothing_out(motions):
     assert held(hold_out(named(motions.clip("x", 12), list("abcdefgh")), 0.0)) == set()
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "own"),
+    [
+        ("walk", "a/walk.bvh", "walk"),
+        ("b_walk", "b/walk.npz", "walk"),  # told apart by the folder
+        ("b_walk_2", "b/walk.csv", "walk"),  # and by a number
+        ("b_walk_p3", "b/walk.npz", "walk"),
+        ("01_01", "01/01_01.bvh", "01_01"),
+        ("cmu_01_01", "cmu/01_01.npz", "01_01"),  # a number of its own
+        ("cmu_01_01_2", "cmu/01_01.csv", "01_01"),
+        ("many_kick", "many/all.pkl", "kick"),  # one of several in its file
+        ("kick_2", "many/all.pkl", "kick_2"),
+        ("walk_forward", "made by us", "walk_forward"),
+    ],
+)
+def test_a_motion_is_known_by_its_name_in_its_own_file(name, source, own):
+    assert origin(name, source) == own
+
+
+def test_one_motion_in_several_folders_goes_to_one_side(motions):
+    clip = motions.clip("x", 12)
+    clips = []
+    for number in range(12):
+        stem = f"{number:02}_{number:02}"
+        clips += [replace(clip, name=stem, source=f"person/{stem}.bvh", family="walk"),
+                  replace(clip, name=f"robot_{stem}", source=f"robot/{stem}.pkl", family="walk"),
+                  replace(clip, name=f"robot_{stem}_2", source=f"robot/{stem}.csv", family="walk")]  # fmt: skip
+    split = {one.name: one.split for one in hold_out(clips, 0.3)}
+    for number in range(12):
+        stem = f"{number:02}_{number:02}"
+        assert split[stem] == split[f"robot_{stem}"] == split[f"robot_{stem}_2"]
+    assert sum(side == "test" for side in split.values()) == 3 * 4

@@ -18,7 +18,7 @@ def words(texts: dict[str, int], agreement: float | None) -> str:
 @pytest.mark.parametrize(
     ("texts", "said"),
     [({"file": 3}, "3 clips: written by you beside"), ({"csv": 1}, "1 clip: written by you in a table"),
-     ({"humanml3d": 2}, "2 clips: HumanML3D's"), ({"made": 1}, "1 clip: the embedded library's own"),
+     ({"humanml3d": 2}, "2 clips: from HumanML3D"), ({"made": 1}, "1 clip: the embedded library's own"),
      ({"name": 2, "none": 1}, "2 clips: a template filled with the file's name; 1 clip: none")],
 )  # fmt: skip
 def test_each_source_of_texts_is_named(texts: dict[str, Any], said: str) -> None:

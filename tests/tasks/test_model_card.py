@@ -39,7 +39,7 @@ def test_the_card_says_what_it_takes_gives_and_is_worth(policy_folder) -> None: 
     (folder / "card.json").write_text(
         json.dumps({"stage": "experts", "cluster": "c0", "round": 0, "frames": 2048, "config": {"seed": 3}})
     )
-    card = model_card("expert-c0", "expert-c0-r0", folder, "base", Evaluated("a" * 64, "stand_in", RESULT), "MIT (2)")
+    card = model_card("expert-c0", "expert-c0-r0", folder, "base", Evaluated("a" * 64, "stand_in", RESULT), {"MIT": 2})
     for said in (
         "`obs` (N, 283) float32 in, `actions` (N, 23) float32 out, 50 times a second",
         "| 0:3 | gravity_b | direction of gravity | 1 | base |",
@@ -65,7 +65,20 @@ def test_what_is_not_known_is_said_to_be_so(policy_folder, tmp_path: Path) -> No
 
 def test_licences_are_counted(tmp_path: Path) -> None:
     pd.DataFrame({"licence": ["MIT", "MIT", ""]}).to_parquet(tmp_path / "index.parquet")
-    assert licences_of(tmp_path) == "MIT (2), unknown (1)"
+    assert licences_of(tmp_path) == {"MIT": 2, "unknown": 1}
+
+
+def test_a_card_says_what_forbids_commercial_use_and_is_silent_where_nothing_does(policy_folder) -> None:  # noqa: F811
+    folder = policy_folder()
+
+    def card(licences: dict[str, int]) -> str:
+        return model_card("base", "base", folder, None, Evaluated("b", "nominal", RESULT), licences)
+
+    told = card({"MIT": 5, "CC-BY-NC-4.0": 2, "unknown": 3})
+    assert "- licences of the motions: MIT (5), CC-BY-NC-4.0 (2), unknown (3)\n" in told
+    assert "- **trained on motions that may not be used commercially: CC-BY-NC-4.0**\n" in told
+    assert "- **licence unknown for 3 motions: ask before commercial use**\n" in told
+    assert "commercial" not in card({"MIT": 5, "Apache-2.0": 1})
 
 
 @pytest.mark.parametrize("length", [99, 100, 101, 5000])

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from bumblebee.errors import BadInput
+from bumblebee.motion.folder import Reading, noted_table, skipped_table
 from bumblebee.motion.store import read_index, read_library, writer
 from bumblebee.robot.facts import stand_pose
 from tasks import motions
@@ -53,7 +54,11 @@ def test_a_folder_becomes_a_library_with_held_out_motions(capsys):
     assert set(index["split"]) == {"train", "test"}
     assert pd.read_csv("data/motions/skipped.csv")["file"].tolist() == ["other.npz"]
     out = capsys.readouterr().out
-    assert "6 clips" in out and "other.npz: SMPL motions cannot be read yet" in out
+    assert "6 clips" in out and "  mine: 6 clips, 0.1 minutes, licence unknown\n" in out
+    assert (
+        "motions with text: none 6\n" in out and "skipped: expected a whole .npz file" in out and ": other.npz\n" in out
+    )
+    assert list(Path(".scratch").rglob("*.parquet")) == []
 
 
 def test_the_embedded_library_is_written_the_same_twice():
@@ -74,7 +79,7 @@ def test_the_embedded_library_is_written_the_same_twice():
             "motions: {source: mine, holdout_share: 1.5}",
             "motions.holdout_share: expected a number of at least 0, below 1, came 1.5",
         ),
-        ("motions: {source: mine/other.npz}", "SMPL motions cannot be read yet"),
+        ("motions: {source: mine/other.npz}", "expected a whole .npz file"),
     ],
 )
 def test_a_wrong_setting_ends_in_one_line_and_status_2(capsys, text, said):
@@ -95,12 +100,51 @@ def test_a_full_disk_ends_in_one_line_and_leaves_the_old_library(capsys, monkeyp
         raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
     monkeypatch.setattr(writer, "put", full)
-    assert "No space left on device" in ends_with(2, capsys)
+    assert "no space left" in ends_with(2, capsys)
     assert [clip.name for clip in read_library(Path("data/motions"))] == before
     assert sorted(path.name for path in Path("data").iterdir()) == ["motions", "retargets"]
+
+
+def test_a_read_that_fails_halfway_leaves_no_clips_behind(capsys, monkeypatch):
+    user_files()
+    params("motions: {source: mine, read: {csv_fps: 30, processes: 1}}")
+
+    def broken(*_):
+        raise OSError(errno.ENOSPC, "No space left on device", "x")
+
+    monkeypatch.setattr(motions, "write_library", broken)
+    assert "no space left" in ends_with(2, capsys)
+    assert list(Path(".").rglob("*.parquet")) == [] and not Path("data/motions").exists()
+
+
+def test_many_notes_are_few_lines_and_all_of_them_in_a_table(capsys):
+    words = (
+        "raven",
+        "heron",
+        "gull",
+        "crane",
+        "finch",
+        "robin",
+        "swift",
+        "owl",
+        "jay",
+        "duck",
+        "goose",
+        "swan",
+        "lark",
+    )
+    kinds = [(f"{word}.bvh", f"read as a {word}") for word in words]
+    heights = [(f"{n}.bvh", f"the floor was at {n / 100 - 0.04:+.3f} m, moved to 0") for n in range(9)]
+    reading = Reading([], skipped_table([]), noted_table(kinds + heights))
+    index = pd.DataFrame({"split": ["train"], "duration": [6.0], "source": ["a/b.bvh"], "licence": ["MIT"]})
+    motions.tell(index, reading)
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("noted")]
+    assert lines[0] == "noted: the floor was at -0.040 to +0.040 m, moved to 0: 9 files"
+    assert lines[1] == "noted: read as a raven: raven.bvh"
+    assert len(lines) == 13 and lines[-1] == "noted: 2 more kinds: data/motions/notes.csv"
 
 
 def test_an_empty_folder_is_bad_input():
     Path("mine").mkdir()
     with pytest.raises(BadInput, match="0 files"):
-        motions.gather(motions.MotionsConfig(source="mine"))
+        motions.gather(motions.MotionsConfig(source="mine"), lambda clip: None)

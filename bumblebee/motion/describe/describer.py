@@ -43,6 +43,11 @@ def describer(config: DescribeConfig, root: Path) -> "Describer":
     return Describer(config, root if root.is_dir() else root.parent, table, humanml3d)
 
 
+def beside(motion: Path, duration: float) -> Described:
+    """The captions in the text file beside a motion of `duration` [s], where nothing else is asked."""
+    return Describer(DescribeConfig(), motion.parent, None, None).captions(motion, motion.stem, duration)
+
+
 @dataclass(frozen=True)
 class Describer:
     """Answers for one motion after the other, and keeps no count itself: `accounting.account` adds the answers up."""

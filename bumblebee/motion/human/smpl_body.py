@@ -112,6 +112,13 @@ def find_body(model: str, gender: str, betas: np.ndarray) -> Body:
     return Body(np.array(figures), tuple(notes))
 
 
+def model_files() -> list[list[object]]:
+    """Name, size and time [ns] of each model that would be found now: what was read with others is out of date."""
+    found = {_model_file(model, gender) for model in _MEAN for gender in GENDERS} - {None}
+    facts = [(str(file), file.stat()) for file in found if file]
+    return sorted([name, stat.st_size, stat.st_mtime_ns] for name, stat in facts)
+
+
 def _model_file(model: str, gender: str) -> Path | None:
     """The model's file, by the names under which it is published."""
     folder = os.environ.get(FOLDER, "")

@@ -61,7 +61,7 @@ def lying(frames: int = 40) -> np.ndarray:
 
 
 def test_a_person_who_lies_is_asked_for_the_up_axis():
-    assert "came z by the motion, y by the skeleton's own pose. State it: `up`." in line(
+    assert "came z by the motion, y by the skeleton's own pose. Say it: motions.read.up (--set up=y)." in line(
         lambda: read(bvh(values=lying()))
     )
     assert np.ptp(read(bvh(values=lying()), up="y").positions[0, :, 2]) < 0.6
@@ -148,7 +148,7 @@ def test_an_smpl_file_that_looks_y_up_is_asked_for_its_axis():
     arrays = smpl()
     arrays["poses"][:, 0], arrays["trans"] = 0, np.tile([0.0, 1.15, 0.0], (40, 1))
     words = line(lambda: read_human(Path("a.npz"), npz(arrays)))
-    assert "y up, or a person who lies" in words and "`up`" in words
+    assert "y up, or a person who lies" in words and "motions.read.up" in words
     (turned,) = read_human(Path("a.npz"), npz(arrays), HumanConfig(up="y"))
     assert turned.landmark("head")[0, 2] > 1.3
     (lies,) = read_human(Path("a.npz"), npz(arrays), HumanConfig(up="z"))

@@ -1,0 +1,45 @@
+"""What is said of many files in few lines: what differs in numbers only is one line, with the range of each."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+_NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?!\.?\w)")
+
+
+@dataclass(frozen=True)
+class Told:
+    """One line about one or more files."""
+
+    line: str
+    files: tuple[str, ...]
+
+    @property
+    def whose(self) -> str:
+        """The file, or how many."""
+        return self.files[0] if len(self.files) == 1 else f"{len(self.files):,} files"
+
+
+def few_lines(said: Iterable[tuple[str, str]]) -> list[Told]:
+    """The lines, those about most files first.
+
+    Args:
+        said: file and line, in the order in which files are to be named.
+    """
+    kinds: dict[tuple[str, ...], list[tuple[str, list[str]]]] = {}
+    for file, line in said:
+        kinds.setdefault(tuple(_NUMBER.split(line)), []).append((file, _NUMBER.findall(line)))
+    told = [Told(_joined(words, [numbers for _, numbers in group]), tuple(dict.fromkeys(file for file, _ in group)))
+            for words, group in kinds.items()]  # fmt: skip
+    return sorted(told, key=lambda one: -len(one.files))
+
+
+def _joined(words: tuple[str, ...], numbers: list[list[str]]) -> str:
+    """The words with the range of the numbers between them."""
+    ranges = [_range(column) for column in zip(*numbers, strict=True)]
+    return words[0] + "".join(number + after for number, after in zip(ranges, words[1:], strict=True))
+
+
+def _range(numbers: tuple[str, ...]) -> str:
+    least, most = min(numbers, key=float), max(numbers, key=float)
+    return least if float(least) == float(most) else f"{least} to {most}"

@@ -1,0 +1,72 @@
+"""Work in several processes keeps the items' order, runs little ahead, and leaves no process behind."""
+
+import math
+import operator
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+from bumblebee.motion.side_by_side import in_order
+
+KILLED = """
+import multiprocessing, time
+from bumblebee.motion.side_by_side import in_order
+
+def items():
+    for number in range(40):
+        if number == 10:  # the processes work
+            print(*[child.pid for child in multiprocessing.active_children()], flush=True)
+        yield 0.0 if number < 8 else 60.0
+
+if __name__ == "__main__":
+    list(in_order(time.sleep, items(), 2))
+"""
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 40])
+def test_results_come_in_the_order_of_the_items(processes, count):
+    assert list(in_order(operator.neg, range(count), processes)) == [-number for number in range(count)]
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_an_exception_passes_after_the_results_before_it(processes):
+    results = in_order(math.sqrt, [4.0] * 12 + [-1.0] * 12, processes)
+    assert [next(results) for _ in range(12)] == [2.0] * 12
+    with pytest.raises(ValueError, match="math domain error"):
+        next(results)
+
+
+def test_items_are_taken_only_as_there_is_room():
+    taken = 0
+
+    def items():
+        nonlocal taken
+        for number in range(1000):
+            taken += 1
+            yield number
+
+    results = in_order(operator.neg, items(), 2)
+    assert [next(results) for _ in range(50)][-1] == -49
+    assert taken <= 50 + 8
+    results.close()
+    assert taken <= 50 + 8
+
+
+def test_no_process_outlives_a_parent_that_is_killed(tmp_path: Path):
+    script = tmp_path / "parent.py"
+    script.write_text(KILLED)
+    parent = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert parent.stdout is not None
+        children = [psutil.Process(int(pid)) for pid in parent.stdout.readline().split()]
+    finally:
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+    assert len(children) == 2
+    _, alive = psutil.wait_procs(children, timeout=20)
+    assert all(process.status() == psutil.STATUS_ZOMBIE for process in alive)
