@@ -1,4 +1,4 @@
-"""Command line: `bumblebee motions inspect`, `convert`, `play`."""
+"""Command line: `bumblebee motions inspect`, `convert`, `retarget`, `play`."""
 
 import os
 import sys
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 app = typer.Typer(help="Look at motions, convert them, play them.", no_args_is_help=True)
 
 _NAMED = 8  # motions in a line that asks for one of them
+_PROGRESS_EVERY = 10.0  # s between lines that say how far a batch is
 
 Where = Annotated[Path, typer.Argument(metavar="PATH", help="A motion file, a folder, or a motion library.")]
 CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
@@ -91,6 +92,43 @@ def convert(
         print(
             f"Mind: mjlab plays a frame each step of its policy, {given:g} Hz as it is shipped, whatever the file says."
         )
+
+
+@app.command()
+def retarget(
+    path: Where,
+    out: Annotated[Path, typer.Option("--out", help="New folder for the motions and LICENCES.csv.")],
+    model: Annotated[Path | None, typer.Option("--model", help="A humanoid's MJCF; without, the G1.")] = None,
+    mapping: Annotated[Path | None, typer.Option("--mapping", help="Its mapping: docs/data.md.")] = None,
+    to: Annotated[str, typer.Option("--to", help="npz or csv.")] = "npz",
+    fps: Annotated[float, typer.Option("--fps", min=5, max=1000, help="Rate of what is written.")] = 50.0,
+    csv_fps: CsvFps = None,
+    settings: Settings = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what was written before.")] = False,
+) -> None:
+    """Put motions of people on any humanoid, one file each with the root's pose and the joints by name."""
+    from bumblebee.motion.inspect import count
+    from bumblebee.motion.retarget_files import RobotFiles, retarget_files
+
+    if to not in ("npz", "csv"):
+        raise BadInput("--to", "npz or csv", repr(to)[:60])
+    config = RobotFiles(model, mapping, fps, to, _options(csv_fps, settings))  # type: ignore[arg-type]
+    if model is None and mapping is None:
+        print("Onto the G1; `bumblebee motions convert` writes the formats that its trainers read.")
+    began = shown = time.monotonic()
+
+    def tell(problem: str, motions: int) -> None:
+        nonlocal shown
+        if problem:
+            print(f"skipped: {problem}", file=sys.stderr)
+        if time.monotonic() - shown > _PROGRESS_EVERY:
+            shown = time.monotonic()
+            print(f"{count(motions, 'motion')} in {shown - began:.0f} s", flush=True)
+
+    done = retarget_files(path, out, config, overwrite, tell)
+    written = f"{count(done.written, 'motion')} written, {len(done.skipped):,} skipped"
+    print(f"{count(done.files, 'file')}: {written}, in {time.monotonic() - began:.1f} s")
+    print(f"written: {out}, {fps:g} Hz, quaternions wxyz; licences: {out / 'LICENCES.csv'}")
 
 
 @app.command()

@@ -155,7 +155,7 @@ def clips_at(path: Path, files: FileConfig, tell: Callable[[str], None]) -> Iter
 
 def _clips(path: Path, config: ConvertConfig, done: Converted, tell: Callable[[str], None]) -> Iterator[Clip]:
     """The motions that can be written, one after the other, under distinct names; the others are told."""
-    names = _Names()
+    names = Names()
 
     def skip(place: str, reason: str) -> None:
         done.skipped.append((place, reason))
@@ -194,7 +194,7 @@ def _clip(motion: Motion, found: Found, config: ConvertConfig) -> tuple[Clip, tu
     return make_clip(motion.name, moved.fps, moved.root_pos, moved.root_quat, moved.joint_pos, **about), ()
 
 
-class _Names:
+class Names:
     """Names of files, no two alike, also where the file system does not tell cases apart."""
 
     def __init__(self) -> None:

@@ -70,6 +70,12 @@ def depths(at: Poses, kept: Obstacles) -> np.ndarray:
     return np.maximum(-distance, 0).max(axis=1, initial=0)
 
 
+def shape_heights(at: Poses, kept: Obstacles) -> np.ndarray:
+    """Height of the lowest link other than the feet over the floor in each frame, (T,) [m], inf without such."""
+    low = _world(at, kept.shapes)[..., 2] - kept.shapes.radius[:, None]
+    return low[:, ~kept.shapes.foot].min(axis=(1, 2), initial=np.inf)
+
+
 def _shapes(robot: Robot) -> Shapes:
     model, feet = robot.model, set(robot.sole_body.tolist())
     rows = []

@@ -13,11 +13,11 @@ class ContactConfig(Ranged):
     """When a part of a person's foot stands on the floor."""
 
     height: Small = 0.04
-    """Lower over the floor than this, measured from where it is while it stands [m]."""
-    limit: Small = 0.005
-    """Joints beyond their range [rad]."""
+    """Lower over the floor than this, measured from where it is while it stands; of an adult, `leg` long [m]."""
     speed: Small = 0.5
-    """And slower than this [m/s]."""
+    """And slower than this; of an adult [m/s]."""
+    leg: Small = 0.82
+    """The adult's leg from hip to ankle: height and speed are smaller for a smaller person [m]."""
     shortest: Small = 0.08
     """A contact or a gap in one that is shorter is noise [s]."""
     blend: Small = 0.03

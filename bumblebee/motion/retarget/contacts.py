@@ -56,6 +56,7 @@ def stance(positions: np.ndarray, fps: float, config: ContactConfig, grounding: 
         ndimage.binary_closing(np.pad(down, ((width, width), (0, 0), (0, 0)), "edge"), line), line
     )
     down = down[width:-width]
-    return Stance(
-        floor, rest, ndimage.gaussian_filter1d(down.astype(float), config.blend * fps, axis=0, mode="nearest")
-    )
+    blended = ndimage.gaussian_filter1d(down.astype(float), config.blend * fps, axis=0, mode="nearest")
+    # A foot that has left the floor is not held by the frames before it: a jump would lose its height.
+    steady = ndimage.grey_opening(above, (width, 1, 1), mode="nearest")
+    return Stance(floor, rest, blended * np.clip(2 - steady / config.height, 0, 1))

@@ -12,7 +12,7 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import parse_yaml, read_text
-from bumblebee.motion.retarget.tree import Tree, tree_of
+from bumblebee.motion.retarget.tree import Tree, points, poses, tree_of
 from bumblebee.robot.facts import joints, stand_pose
 from bumblebee.robot.model import RobotConfig, build_model
 
@@ -23,6 +23,12 @@ POINTS = (*(f"{side}_{limb}" for side in SIDES for limb in LIMBS), "neck")
 CORNERS = 4
 _KEYS = ("robot", "points", "soles", "sole_radius", "joint_speed", "rest")
 _JOINT_SPEED = 20.0  # rad/s, where a mapping states none: what the slower of the G1's motors reach
+_SPEEDS = (0.01, 1000.0)  # rad/s
+_ANGLES = (-2 * np.pi, 2 * np.pi)  # rad
+_FARTHEST = 10.0  # m of a point in its body's frame
+_SHORTEST = 0.01  # m of a limb or a sole
+_LONGEST_NAME = 100
+_LIMBS = (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +70,9 @@ def read_robot(model: Path, mapping: Path) -> Robot:
     """
     try:
         loaded = mujoco.MjModel.from_xml_path(str(model))
-    except ValueError as error:
+    except (ValueError, mujoco.FatalError) as error:
         raise BadInput(model, "an MJCF that MuJoCo loads", " ".join(str(error).split())[:200]) from None
+    tree_of(loaded, model)
     return make_robot(mapping, parse_yaml(mapping, read_text(mapping)), loaded)
 
 
@@ -76,32 +83,65 @@ def make_robot(
     fastest: np.ndarray | None = None,
     rest: np.ndarray | None = None,
 ) -> Robot:
-    """A robot from a mapping that has been read, and its model."""
+    """A robot from a mapping that has been read, and its model.
+
+    Args:
+        where: the mapping's place in a message.
+        mapping: `points` and `soles`, and `robot`, `sole_radius` [m], `joint_speed` [rad/s], `rest` [rad] if wanted.
+        model: with a free joint on its first body and hinges.
+        fastest: highest speeds of the joints (n,) [rad/s] instead of `joint_speed`.
+        rest: angles (n,) [rad] instead of `rest`.
+    """
     if not isinstance(mapping, Mapping) or set(mapping) - set(_KEYS) or {"points", "soles"} - set(mapping):
         came = ", ".join(map(str, mapping))[:80] if isinstance(mapping, Mapping) else f"a {type(mapping).__name__}"
         raise BadInput(where, f"a mapping with {', '.join(_KEYS)}", came)
-    tree = tree_of(model, where)
+    tree = tree_of(model)
     placed = _table(f"{where}: points", mapping["points"], POINTS)
-    points = [_point(f"{where}: points.{name}", placed[name], tree) for name in POINTS]
+    places = [_point(f"{where}: points.{name}", placed[name], tree) for name in POINTS]
     soles = _table(f"{where}: soles", mapping["soles"], SIDES)
     corners = [corner for side in SIDES for corner in _sole(f"{where}: soles.{side}", soles[side], tree)]
     if fastest is None:
-        fastest = _by_joint(f"{where}: joint_speed", mapping.get("joint_speed", {}), tree, _JOINT_SPEED)
+        speeds = mapping.get("joint_speed", _JOINT_SPEED)
+        fastest = _by_joint(f"{where}: joint_speed", speeds, tree, np.full(len(tree.joints), _JOINT_SPEED), _SPEEDS)
     if rest is None:
-        middle = np.clip(0.0, tree.low, tree.high)
-        rest = _by_joint(f"{where}: rest", mapping.get("rest", {}), tree, middle)
-    return Robot(
-        str(mapping.get("robot", model.names[: model.names.index(b"\0")].decode() or "robot")),
+        rest = _by_joint(f"{where}: rest", mapping.get("rest", {}), tree, np.zeros(len(tree.joints)), _ANGLES)
+        rest = np.clip(rest, tree.low, tree.high)
+    robot = Robot(
+        _name(f"{where}: robot", mapping.get("robot", model.names[: model.names.index(b"\0")].decode() or "robot")),
         model,
         tree,
-        np.array([body for body, _ in points]),
-        np.array([local for _, local in points]),
+        np.array([body for body, _ in places]),
+        np.array([local for _, local in places]),
         np.array([body for body, _ in corners]),
         np.array([local for _, local in corners]),
         _radius(f"{where}: sole_radius", mapping.get("sole_radius", 0.0)),
         fastest,
         rest,
     )
+    _require_body(where, robot)
+    return robot
+
+
+def _require_body(where: object, robot: Robot) -> None:
+    """Refuse limbs and soles without length: the points of a mapping are then not where they should be."""
+    at = poses(robot.tree, np.zeros((1, 3)), np.eye(3)[None], robot.rest[None])
+    spots = dict(zip(POINTS, points(at, robot.body, robot.local)[0], strict=True))
+    chains = [(f"{side}_{a}", f"{side}_{b}") for side in SIDES for a, b in _LIMBS]
+    for a, b in (*chains, ("left_hip", "right_hip"), ("left_shoulder", "right_shoulder"), ("left_hip", "neck")):
+        if np.linalg.norm(spots[a] - spots[b]) < _SHORTEST:
+            raise BadInput(f"{where}: points", f"{a} and {b} apart", "the same place")
+    for number, side in enumerate(SIDES):
+        corners = robot.sole[number * CORNERS : (number + 1) * CORNERS]
+        if np.linalg.norm(corners[2:].mean(axis=0) - corners[:2].mean(axis=0)) < _SHORTEST:
+            raise BadInput(f"{where}: soles.{side}", "heel and toe apart", "the same place")
+    if not robot.tree.moves[robot.sole_body].any(axis=1).all():
+        raise BadInput(f"{where}: soles", "bodies below a joint", "one that no joint moves")
+
+
+def _name(where: str, value: Any) -> str:
+    if not isinstance(value, str) or not value.strip() or len(value) > _LONGEST_NAME:
+        raise BadInput(where, f"a name of at most {_LONGEST_NAME} signs", repr(value)[:60])
+    return value
 
 
 def _table(where: str, value: Any, names: tuple[str, ...]) -> Mapping[str, Any]:
@@ -128,25 +168,33 @@ def _sole(where: str, value: Any, tree: Tree) -> list[tuple[int, np.ndarray]]:
 
 
 def _radius(where: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < 0.5:
+    if not _number(value, (0.0, 0.5)):
         raise BadInput(where, "a radius from 0 to 0.5 m", repr(value)[:40])
     return float(value)
 
 
 def _vector(where: str, value: Any) -> np.ndarray:
-    numbers = isinstance(value, list) and all(isinstance(x, int | float) and not isinstance(x, bool) for x in value)
-    if not numbers or len(value) != 3 or not np.isfinite(value).all():
-        raise BadInput(where, "three numbers [m]", repr(value)[:60])
+    if not isinstance(value, list) or len(value) != 3 or not all(_number(x, (-_FARTHEST, _FARTHEST)) for x in value):
+        raise BadInput(where, f"three numbers from -{_FARTHEST:g} to {_FARTHEST:g} [m]", repr(value)[:60])
     return np.array(value, float)
 
 
-def _by_joint(where: str, value: Any, tree: Tree, default: float | np.ndarray) -> np.ndarray:
+def _number(value: Any, within: tuple[float, float]) -> bool:
+    """Whether it is a number within bounds; NaN and infinities are not."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and within[0] <= value <= within[1]
+
+
+def _by_joint(where: str, value: Any, tree: Tree, default: np.ndarray, within: tuple[float, float]) -> np.ndarray:
     """One number a joint: a number for all, or a table whose names may leave out left_ and right_ and _joint."""
-    result = np.broadcast_to(np.asarray(default, float), (len(tree.joints),)).copy()
-    table = value if isinstance(value, Mapping) else dict.fromkeys(tree.joints, value)
-    for name, number in table.items():
-        if isinstance(number, bool) or not isinstance(number, int | float) or not np.isfinite(number):
-            raise BadInput(f"{where}.{name}", "a number", repr(number)[:40])
+    result = default.copy()
+    said = f"a number from {within[0]:g} to {within[1]:g}"
+    if not isinstance(value, Mapping):
+        if not _number(value, within):
+            raise BadInput(where, f"{said}, or a table of joints", repr(value)[:40])
+        return np.full(len(tree.joints), float(value))
+    for name, number in value.items():
+        if not _number(number, within):
+            raise BadInput(f"{where}.{name}"[:200], said, repr(number)[:40])
         hit = [j for j, joint in enumerate(tree.joints) if name in (joint, _plain(joint))]
         if not hit:
             raise BadInput(where, f"joints of the model: {', '.join(tree.joints)}"[:300], repr(name)[:60])

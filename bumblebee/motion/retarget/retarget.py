@@ -6,10 +6,10 @@ import numpy as np
 
 from bumblebee import quaternions
 from bumblebee.errors import BadInput
-from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.retarget.config import RetargetConfig
-from bumblebee.motion.retarget.mapping import Robot, g1
+from bumblebee.motion.retarget.mapping import SIDES, Robot, g1
 from bumblebee.motion.retarget.solve import Trajectory, solve
 from bumblebee.motion.retarget.targets import Targets, at_rate, targets
 from bumblebee.robot.facts import joint_names
@@ -17,6 +17,10 @@ from bumblebee.robot.facts import joint_names
 VERSION = 1
 """Of the method: a cached result of another version is made again."""
 _MOST_SECONDS = 3600.0
+_RATES = (1.0, 1000.0)  # Hz
+_REACH = 1000.0  # m from the world's origin
+_SHORTEST = 0.03  # m of a thigh or shin: a doll's are longer
+LEGS = [(f"{side}_{a}", f"{side}_{b}") for side in SIDES for a, b in (("hip", "knee"), ("knee", "ankle"))]
 _CLIMB = 0.15  # m: more than the floor of a recording drifts, less than a step of stairs
 _LEAST = 5  # frames: an acceleration needs three
 _LONGEST = 600  # frames fitted at once: a hard place then holds up its own part only
@@ -27,7 +31,7 @@ def retarget(motion: HumanMotion, fps: float = 50.0, config: RetargetConfig | No
     """A person's motion on the G1 at `fps` [Hz].
 
     Raises:
-        BadInput: fewer frames than an acceleration needs, legs without length.
+        BadInput: fewer frames than an acceleration needs, NaN, legs without length.
     """
     config = config or RetargetConfig()
     target = aim(motion, g1(), fps, config)
@@ -49,11 +53,24 @@ def aim(motion: HumanMotion, robot: Robot, fps: float, config: RetargetConfig) -
 
 
 def _check(motion: HumanMotion) -> None:
+    """Refuse what no robot can follow, so that nothing after this meets a NaN or divides by nothing."""
+    if not _RATES[0] <= motion.fps <= _RATES[1]:
+        raise BadInput(motion.where, f"a frame rate from {_RATES[0]:g} to {_RATES[1]:g} Hz", f"{motion.fps:g}")
     frames, seconds = len(motion.positions), len(motion.positions) / motion.fps
     if seconds > _MOST_SECONDS:
         raise BadInput(motion.where, f"a motion of at most {_MOST_SECONDS:g} s", f"{seconds:.0f} s", "Cut it.")
     if frames < 2:
         raise BadInput(motion.where, "at least 2 frames", str(frames))
+    bad = np.argwhere(~(np.abs(motion.positions) <= _REACH))  # NaN is not within reach either
+    if len(bad):
+        frame, number, _ = bad[0]
+        came = str(motion.positions[tuple(bad[0])])
+        place = f"{motion.where}, {motion.row(int(frame))}, {LANDMARKS[number]}"
+        raise BadInput(place, f"a position within {_REACH:g} m", came, f"{len(bad):,} such values in the motion.")
+    for a, b in LEGS:
+        length = float(np.median(np.linalg.norm(motion.landmark(a) - motion.landmark(b), axis=-1)))
+        if length < _SHORTEST:
+            raise BadInput(f"{motion.where}, {a} to {b}", f"at least {_SHORTEST:g} m apart", f"{length:.3g} m")
 
 
 def _climb(target: Targets) -> tuple[str, ...]:

@@ -48,7 +48,7 @@ class Targets:
 def at_rate(motion: HumanMotion, fps: float, cutoff: float) -> np.ndarray:
     """The landmarks (T', 18, 3) [m], low-passed at their own rate and resampled to `fps`."""
     values, frames = motion.positions, len(motion.positions)
-    if motion.fps > 2.2 * cutoff and frames > 30:
+    if motion.fps > 2.2 * cutoff and frames > 2:
         values = sosfiltfilt(butter(2, cutoff, fs=motion.fps, output="sos"), values, axis=0, padlen=min(frames - 1, 30))
     if abs(motion.fps - fps) < 1e-9:
         return np.array(values)
@@ -59,8 +59,10 @@ def at_rate(motion: HumanMotion, fps: float, cutoff: float) -> np.ndarray:
 
 def targets(positions: np.ndarray, fps: float, robot: Robot, config: RetargetConfig) -> Targets:
     """Targets of a robot from landmarks (T, 18, 3) at the robot's rate."""
-    stand = stance(positions, fps, config.contact, GroundingConfig())
-    lifted = positions - stand.floor[:, None, None] * np.array([0.0, 0.0, 1.0])
+    size = config.contact.leg / _leg({name: positions[:, i] for i, name in enumerate(LANDMARKS)})
+    stand = stance(positions * size, fps, config.contact, GroundingConfig())
+    rest, floor = stand.rest / size, stand.floor / size
+    lifted = positions - floor[:, None, None] * np.array([0.0, 0.0, 1.0])
     of = {name: lifted[:, i] for i, name in enumerate(LANDMARKS)}
     sizes = _lengths(robot)
     segments = [_unit(of[b] - of[a]) * size for (a, b), size in zip(SEGMENTS, sizes, strict=False)]
@@ -69,13 +71,13 @@ def targets(positions: np.ndarray, fps: float, robot: Robot, config: RetargetCon
     segments.append(spine * sizes[-1])
     scale, ankle = _leg_scale(robot, of)
     hips = middle * scale
-    hips[:, 2] = (middle[:, 2] - stand.rest[:, 0].mean()) * scale + ankle
+    hips[:, 2] = (middle[:, 2] - rest[:, 0].mean()) * scale + ankle
     left = _unit(of["left_hip"] - of["right_hip"])
     forward = _unit(np.cross(left, spine))
     frame = np.stack([forward, np.cross(spine, forward), spine], axis=-1)
-    feet = _foot_directions(lifted, stand.rest) * np.linalg.norm(robot.sole[2] - robot.sole[0])
+    feet = _foot_directions(lifted, rest) * np.linalg.norm(robot.sole[2] - robot.sole[0])
     contact = np.repeat(stand.contact, CORNERS // 2, axis=2).reshape(len(positions), -1)
-    return Targets(fps, np.stack(segments, axis=1), hips, feet, contact, _orthonormal(frame), stand.floor)
+    return Targets(fps, np.stack(segments, axis=1), hips, feet, contact, _orthonormal(frame), floor)
 
 
 def _lengths(robot: Robot) -> list[float]:
@@ -96,13 +98,14 @@ def rest_points(robot: Robot) -> dict[str, np.ndarray]:
 def _leg_scale(robot: Robot, of: dict[str, np.ndarray]) -> tuple[float, float]:
     """The robot's leg over the person's, and the height of the robot's ankle over its sole [m]."""
     at = rest_points(robot)
-
-    def leg(where: dict[str, np.ndarray], side: str) -> float:
-        pairs = ((f"{side}_hip", f"{side}_knee"), (f"{side}_knee", f"{side}_ankle"))
-        return float(sum(np.median(np.linalg.norm(where[b] - where[a], axis=-1)) for a, b in pairs))
-
     ankle = robot.radius + float(np.mean([at[f"{side}_ankle"][2] - at[f"{side}_sole"][2] for side in SIDES]))
-    return float(np.mean([leg(at, s) for s in SIDES]) / np.mean([leg(of, s) for s in SIDES])), ankle
+    return _leg(at) / _leg(of), ankle
+
+
+def _leg(where: dict[str, np.ndarray]) -> float:
+    """Thigh and shin, each its median over time, mean of both sides [m]."""
+    pairs = ((f"{side}_{a}", f"{side}_{b}") for side in SIDES for a, b in (("hip", "knee"), ("knee", "ankle")))
+    return float(sum(np.median(np.linalg.norm(where[b] - where[a], axis=-1)) for a, b in pairs)) / len(SIDES)
 
 
 def _foot_directions(lifted: np.ndarray, rest: np.ndarray) -> np.ndarray:

@@ -41,16 +41,20 @@ class Poses:
 
 
 def tree_of(model: mujoco.MjModel, where: object = "the robot's model") -> Tree:
-    """The kinematic tree of a model whose first body floats and whose other joints are hinges, one a body at most.
+    """The kinematic tree of a model whose first body floats and whose other joints are hinges, several a body or none.
 
     Raises:
-        BadInput: no free joint at the first body, a slide or ball joint.
+        BadInput: no free joint at the first body, a slide or ball joint, a body that does not belong to the robot.
     """
     if model.nbody < 2 or model.njnt < 2 or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE or model.jnt_bodyid[0] != 1:
         raise BadInput(where, "a free joint on the first body", "none", "Give the robot's pelvis a freejoint.")
     for j in range(1, model.njnt):
         if model.jnt_type[j] != mujoco.mjtJoint.mjJNT_HINGE:
             raise BadInput(f"{where}: joint {model.joint(j).name}", "a hinge", "another type of joint")
+    for b in range(2, model.nbody):
+        if model.body_rootid[b] != 1:
+            came = f"body {model.body(b).name or b} apart from it"
+            raise BadInput(where, "one robot", came, "Give the robot's own file, not a scene.")
     bodies = model.nbody - 1
     joint_body = model.jnt_bodyid[1:] - 1
     parent = model.body_parentid[1:] - 1
