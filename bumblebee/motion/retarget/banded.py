@@ -3,15 +3,17 @@
 import numpy as np
 from scipy.linalg import solveh_banded
 
-REACH = 2
-"""How many frames apart two variables may meet: an acceleration spans three."""
-
 
 class Normal:
-    """Normal equations of T frames with n variables each: blocks (T, n, n) on the diagonal and on the two below it."""
+    """Normal equations of T frames with n variables each.
+
+    `blocks` (T, n, n) on the diagonal and (T - 1, n, n) below it; `far` (T - 2, n): two frames apart each variable
+    meets itself only, by its acceleration, which keeps the band narrow.
+    """
 
     def __init__(self, frames: int, size: int) -> None:
-        self.blocks = [np.zeros((frames - lag, size, size)) for lag in range(min(REACH, frames - 1) + 1)]
+        self.blocks = [np.zeros((frames, size, size)), np.zeros((max(frames - 1, 0), size, size))]
+        self.far = np.zeros((max(frames - 2, 0), size))
         self.slope = np.zeros((frames, size))
         self.cost = 0.0
 
@@ -42,19 +44,20 @@ class Normal:
         for i, one in enumerate(signs):
             self.slope[i : i + rows] += one * weight * residual
             for k, other in enumerate(signs[: i + 1]):
-                self.blocks[i - k][k : k + rows, each, each] += one * other * weight
+                if i - k == 2:
+                    self.far += one * other * weight
+                else:
+                    self.blocks[i - k][k : k + rows, each, each] += one * other * weight
 
     def solve(self, damping: np.ndarray) -> np.ndarray:
         """The step (T, n) that lowers the sum of squares, each variable held back by `damping` (n,)."""
         frames, size = self.slope.shape
-        band = np.zeros(((REACH + 1) * size, frames * size))
-        row, column = np.indices((size, size))
-        for lag, block in enumerate(self.blocks):
-            below = lag * size + row - column
-            keep = below >= 0
-            start = np.arange(len(block))[:, None] * size
-            band[below[keep], start + column[keep]] = block[:, row[keep], column[keep]]
-        band[0] += np.tile(damping, frames)
-        return -solveh_banded(band, self.slope.ravel(), lower=True, overwrite_ab=True, check_finite=False).reshape(
-            frames, size
-        )
+        band = np.zeros((frames, size, 2 * size + 1))  # of each column the values from the diagonal down, as LAPACK's
+        for column in range(size):
+            band[:, column, : size - column] = self.blocks[0][:, column:, column]
+            band[: frames - 1, column, size - column : 2 * size - column] = self.blocks[1][:, :, column]
+        band[: len(self.far), :, 2 * size] = self.far
+        band[:, :, 0] += damping
+        lower = band.reshape(frames * size, -1).T
+        step = solveh_banded(lower, self.slope.ravel(), lower=True, overwrite_ab=True, check_finite=False)
+        return -step.reshape(frames, size)

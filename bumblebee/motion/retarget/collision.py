@@ -39,23 +39,24 @@ def obstacles(robot: Robot) -> Obstacles:
     apart = _hops(robot.tree.parent)[shapes.body[first], shapes.body[second]] > _NEIGHBOURS
     pairs = np.stack([first, second], axis=1)[apart]
     at = poses(robot.tree, np.zeros((1, 3)), np.eye(3)[None], robot.rest[None])
-    distance = _closest(_world(at, shapes), shapes, pairs)[0]
+    distance = _between(_world(at, shapes), shapes, pairs)
     return Obstacles(shapes, pairs[distance[0] > 0])
 
 
 def keep_apart(normal: Normal, at: Poses, robot: Robot, kept: Obstacles, margin: float, sigma: float) -> None:
     """Adds what is nearer than `margin` [m]: links to each other, links other than feet to the floor; `sigma` [m]."""
     ends = _world(at, kept.shapes)
-    distance, first, second = _closest(ends, kept.shapes, kept.pairs)
-    distance = distance - margin
-    frame, pair = np.nonzero(distance < 0)
-    if len(frame):
-        gap = first[frame, pair] - second[frame, pair]
-        along = gap / np.maximum(np.linalg.norm(gap, axis=1, keepdims=True), 1e-9)
-        bodies = kept.shapes.body[kept.pairs[pair]]
-        rows = _rows(robot, at, frame, bodies[:, 0], first[frame, pair], along)
-        rows -= _rows(robot, at, frame, bodies[:, 1], second[frame, pair], along)
-        _add(normal, frame, rows, distance[frame, pair], sigma)
+    frame, pair = _near(ends, kept, margin)
+    one, other = kept.pairs[pair].T
+    length, first, second = _closest(ends[frame, one], ends[frame, other])
+    distance = length - kept.shapes.radius[one] - kept.shapes.radius[other] - margin
+    close = distance < 0
+    if close.any():
+        along = (first - second)[close] / np.maximum(length[close, None], 1e-9)
+        frame, one, other = frame[close], kept.shapes.body[one[close]], kept.shapes.body[other[close]]
+        rows = _rows(robot, at, frame, one, first[close], along)
+        rows -= _rows(robot, at, frame, other, second[close], along)
+        _add(normal, frame, rows, distance[close], sigma)
     low = ends[..., 2] - kept.shapes.radius[:, None] - margin
     frame, shape, end = np.nonzero((low < 0) & ~kept.shapes.foot[:, None])
     if len(frame):
@@ -66,7 +67,7 @@ def keep_apart(normal: Normal, at: Poses, robot: Robot, kept: Obstacles, margin:
 
 def depths(at: Poses, kept: Obstacles) -> np.ndarray:
     """How deep the worst pair of links overlaps in each frame, (T,) [m], 0 where none does."""
-    distance = _closest(_world(at, kept.shapes), kept.shapes, kept.pairs)[0]
+    distance = _between(_world(at, kept.shapes), kept.shapes, kept.pairs)
     return np.maximum(-distance, 0).max(axis=1, initial=0)
 
 
@@ -119,9 +120,23 @@ def _world(at: Poses, shapes: Shapes) -> np.ndarray:
     return at.pos[:, shapes.body, None] + turned
 
 
-def _closest(ends: np.ndarray, shapes: Shapes, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Distances between the surfaces of pairs (T, P) [m] and the nearest points of their axes (T, P, 3)."""
-    a, b = ends[:, pairs[:, 0]], ends[:, pairs[:, 1]]
+def _near(ends: np.ndarray, kept: Obstacles, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frames and pairs (E,) whose balls around the shapes meet: all others are apart, and most are."""
+    centre = ends.mean(axis=2)
+    reach = kept.shapes.radius + np.linalg.norm(kept.shapes.ends[:, 1] - kept.shapes.ends[:, 0], axis=1) / 2
+    first, second = kept.pairs.T
+    gap = centre[:, first] - centre[:, second]
+    return np.nonzero(_dot(gap, gap) < (reach[first] + reach[second] + margin) ** 2)
+
+
+def _between(ends: np.ndarray, shapes: Shapes, pairs: np.ndarray) -> np.ndarray:
+    """Distances between the surfaces of pairs, (T, P) [m], negative where they overlap."""
+    length = _closest(ends[:, pairs[:, 0]], ends[:, pairs[:, 1]])[0]
+    return length - shapes.radius[pairs[:, 0]] - shapes.radius[pairs[:, 1]]
+
+
+def _closest(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Distance of two segments with ends (..., 2, 3) [m], and the point of each that is nearest to the other."""
     u, v, w = a[..., 1, :] - a[..., 0, :], b[..., 1, :] - b[..., 0, :], a[..., 0, :] - b[..., 0, :]
     uu, vv, uv = _dot(u, u), _dot(v, v), _dot(u, v)
     uw, vw = _dot(u, w), _dot(v, w)
@@ -131,8 +146,7 @@ def _closest(ends: np.ndarray, shapes: Shapes, pairs: np.ndarray) -> tuple[np.nd
     t = np.clip((uv * s + vw) / np.maximum(vv, tiny), 0, 1)
     s = np.clip((uv * t - uw) / np.maximum(uu, tiny), 0, 1)
     first, second = a[..., 0, :] + s[..., None] * u, b[..., 0, :] + t[..., None] * v
-    reach = shapes.radius[pairs[:, 0]] + shapes.radius[pairs[:, 1]]
-    return np.linalg.norm(first - second, axis=-1) - reach, first, second
+    return np.linalg.norm(first - second, axis=-1), first, second
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from bumblebee.motion.retarget.solve import Trajectory, solve
 from bumblebee.motion.retarget.targets import Targets, at_rate, targets
 from bumblebee.robot.facts import joint_names
 
-VERSION = 1
+VERSION = 2
 """Of the method: a cached result of another version is made again."""
 _MOST_SECONDS = 3600.0
 _RATES = (1.0, 1000.0)  # Hz

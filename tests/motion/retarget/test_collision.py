@@ -6,7 +6,7 @@ import pytest
 
 from bumblebee.motion.retarget.banded import Normal
 from bumblebee.motion.retarget.collision import (
-    Shapes,
+    _between,
     _closest,
     _hops,
     depths,
@@ -29,15 +29,14 @@ def test_closest_points_of_capsules_are_those_of_brute_force():
     ends[1, :, 1] = ends[1, :, 0]  # two spheres
     ends[2, 1] = ends[2, 0] + [0, 0, 0.5]  # parallel
     ends[3, 1] = ends[3, 0] + 3 * (ends[3, 0, 1] - ends[3, 0, 0])  # one behind the other on a line
-    shapes = Shapes(np.arange(2), ends[0], np.array([0.1, 0.2]), np.zeros(2, bool))
-    distance, first, second = (a[:, 0] for a in _closest(ends, shapes, np.array([[0, 1]])))
+    distance, first, second = _closest(ends[:, 0], ends[:, 1])
     share = np.linspace(0, 1, 401)[:, None]
     for t in range(len(ends)):
         a = (1 - share) * ends[t, 0, 0] + share * ends[t, 0, 1]
         b = (1 - share) * ends[t, 1, 0] + share * ends[t, 1, 1]
-        truth = np.linalg.norm(a[:, None] - b, axis=-1).min() - 0.3
-        assert distance[t] == pytest.approx(truth, abs=2e-4 + 1e-2 * (truth < -0.25))
-        assert np.linalg.norm(first[t] - second[t]) == pytest.approx(distance[t] + 0.3)
+        truth = np.linalg.norm(a[:, None] - b, axis=-1).min()
+        assert distance[t] == pytest.approx(truth, abs=2e-4 + 1e-2 * (truth < 0.05))
+        assert np.linalg.norm(first[t] - second[t]) == pytest.approx(distance[t])
 
 
 def test_distances_of_the_small_robots_links_are_those_of_mujoco():
@@ -48,11 +47,11 @@ def test_distances_of_the_small_robots_links_are_those_of_mujoco():
     at = poses(robot.tree, np.zeros((20, 3)), np.tile(np.eye(3), (20, 1, 1)), joint)
     data = mujoco.MjData(robot.model)
     wanted = [g for g in range(robot.model.ngeom) if robot.model.geom_bodyid[g] - 1 not in robot.sole_body]
-    found = _closest(
+    found = _between(
         at.pos[:, kept.shapes.body, None] + np.einsum("tgij,gej->tgei", at.rot[:, kept.shapes.body], kept.shapes.ends),
         kept.shapes,
         kept.pairs,
-    )[0]
+    )
     feet = kept.shapes.foot[kept.pairs].any(axis=1)
     for t in range(20):
         data.qpos[:] = np.r_[0, 0, 0, 1, 0, 0, 0, joint[t]]
