@@ -90,7 +90,7 @@ def people(path: Path, references: Mapping[str, Clip]) -> list[tuple[HumanMotion
             if isinstance(motion, HumanMotion):
                 found.append((motion, references.get(motion.name)))
             elif isinstance(motion, RawMotion):
-                clip = clip_of(motion, FPS)
+                clip, _ = clip_of(motion, FPS)
                 found.append((person_of(clip), clip))
     return found
 
@@ -107,7 +107,7 @@ def main() -> None:
     raws = (
         {raw.name: raw for file in find_motions(options.reference) for raw in file.motions} if options.reference else {}
     )
-    motions = people(options.path, {name: clip_of(raw, FPS) for name, raw in raws.items()})[:: options.every]
+    motions = people(options.path, {name: clip_of(raw, FPS)[0] for name, raw in raws.items()})[:: options.every]
     found = compare({text: named(text) for text in options.retargeters}, motions)
     if raws:
         theirs = {m.name: against(m, raws[m.name], reference) for m, reference in motions if m.name in raws}

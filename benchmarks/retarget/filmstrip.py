@@ -34,7 +34,7 @@ _TITLE = 36  # pixels
 
 def strip(motion: HumanMotion, panels: int) -> Image.Image:
     """Two rows of pictures of one motion, the person above the robot."""
-    clip = clip_of(retarget(motion, FPS), FPS)
+    clip, _ = clip_of(retarget(motion, FPS), FPS)
     rows = np.linspace(0, clip.frames - 1, panels + 2).round().astype(int)[1:-1]
     frames, _ = pictures(clip, rows)
     height, width = frames.shape[1:3]
