@@ -1,7 +1,7 @@
 """Quality of sets of motions on the robot: `python -m benchmarks.retarget.quality FOLDER ... --out table.json`.
 
 A set is a folder with motion files, one file, or a motion library. `NAME=FOLDER` names it in the table; a name that
-ends in `:raw` has its folder read without our floor correction.
+ends in `:raw` has its folder read without our floor correction, one in `:lower` with the heights lowered alone.
 """
 
 import argparse
@@ -11,14 +11,21 @@ from pathlib import Path
 from benchmarks.retarget.table import markdown, summary
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.folder import ReadConfig, read_folder
-from bumblebee.motion.grounding import GroundingConfig
+from bumblebee.motion.grounding import GroundingConfig, Method
 from bumblebee.motion.quality import quality
 from bumblebee.progress import progress
 
+METHODS: dict[str, Method] = {":raw": "off", ":lower": "lower"}
 
-def read_set(folder: Path, grounded: bool, fps: float) -> list[Clip]:
+
+def method_of(name: str) -> Method:
+    """How the floor of a set of that name is corrected."""
+    return next((method for ending, method in METHODS.items() if name.endswith(ending)), "refit")
+
+
+def read_set(folder: Path, method: Method, fps: float) -> list[Clip]:
     """The whole motions of a folder, not cut into pieces."""
-    config = ReadConfig(csv_fps=fps, max_seconds=0.0, grounding=GroundingConfig(enabled=grounded))
+    config = ReadConfig(csv_fps=fps, max_seconds=0.0, grounding=GroundingConfig(method=method))
     return read_folder(folder, config).clips
 
 
@@ -35,7 +42,7 @@ def measured(name: str, clips: list[Clip]) -> dict[str, dict[str, float]]:
 def main() -> None:
     """Measure the sets named on the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("sets", nargs="+", help="a folder, NAME=folder, or NAME:raw=folder")
+    parser.add_argument("sets", nargs="+", help="a folder, NAME=folder, NAME:raw=folder or NAME:lower=folder")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--csv-fps", type=float, default=60.0)
     options = parser.parse_args()
@@ -43,7 +50,7 @@ def main() -> None:
     for given in options.sets:
         name, _, folder = given.rpartition("=")
         name = name or Path(folder).name
-        clips = read_set(Path(folder), not name.endswith(":raw"), options.csv_fps)
+        clips = read_set(Path(folder), method_of(name), options.csv_fps)
         rows = measured(name, clips)
         tables[name] = {"motions": rows, "summary": summary(rows), "frames": sum(clip.frames for clip in clips)}
     options.out.write_text(json.dumps(tables, indent=1) + "\n")

@@ -6,7 +6,7 @@ envelope of the robot's lowest point over about a second, which follows the drif
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from scipy import ndimage
@@ -16,13 +16,17 @@ from bumblebee.motion.kinematics import forward_bodies, lowest, sole_points
 from bumblebee.ranges import Range, Ranged
 from bumblebee.robot.facts import FEET, joint_names, joints
 
+Method = Literal["refit", "lower", "off"]
+
 
 @dataclass(frozen=True)
 class GroundingConfig(Ranged):
     """How a motion's height is corrected."""
 
-    enabled: bool = True
-    """Correct at all. Motions that were made on the floor (the embedded ones) never are."""
+    method: Method = "refit"
+    """`refit`: fit the whole trajectory again with the solver that retargets people; `lower`: take the floor out of the
+    heights and level the ankles; `off`: leave what floats. Motions that were made on the floor (the embedded ones) are
+    never changed."""
     tolerance: Annotated[float, Range(least=0, most=10)] = 0.025
     """A motion whose estimated floor stays within this distance of 0 is left as it is [m]."""
     jump_seconds: Annotated[float, Range(least=0, most=60)] = 1.0
@@ -40,7 +44,7 @@ def ground(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Corrected copies of `root_pos` (T, 3) [m] and `joint_pos` (T, 23) [rad]; only heights and ankles change."""
     floor = floor_height(lowest(root_pos, root_quat, joint_pos), fps, config)
-    if not config.enabled or np.abs(floor).max() <= config.tolerance:
+    if config.method == "off" or np.abs(floor).max() <= config.tolerance:
         return root_pos, joint_pos
     lowered = root_pos - floor[:, None] * np.array([0.0, 0.0, 1.0])
     if config.level_ankles:

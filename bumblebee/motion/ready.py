@@ -15,11 +15,12 @@ from bumblebee.motion.human.smpl_body import model_files
 from bumblebee.motion.one_file import read_one
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
+from bumblebee.motion.retarget.refit import VERSION as REFIT
+from bumblebee.motion.retarget.refit import refit
 from bumblebee.motion.retarget.retarget import VERSION, retarget
 from bumblebee.motion.settings import ReadConfig
 
-_HUMAN = (".bvh", ".npz")
-_READER = 1  # version of the readers of human motion, like `VERSION` part of a cached result's key
+_READER = 1  # version of the readers, like those of the methods part of a cached result's key
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,7 @@ def make_ready(job: Job, config: ReadConfig) -> list[Ready]:
         BadInput: what is wrong in it.
     """
     # Packed with and without a cache, which keeps float32: the result must not depend on it.
-    if job.cache is None or job.path.suffix.lower() not in _HUMAN:
+    if job.cache is None:
         return _unpacked(_packed(list(_made(job, config))), job.path)
     return _unpacked(cached(job.cache, _key(job, config), lambda: _packed(list(_made(job, config)))), job.path)
 
@@ -64,9 +65,15 @@ def _made(job: Job, config: ReadConfig) -> Iterator[Ready]:
             yield Ready(retarget(motion, config.fps, config.retarget), rate)
             continue
         check_raw(motion)
-        even = resample(motion, config.fps)
-        pos, joints = ground(even.root_pos, even.root_quat, even.joint_pos, even.fps, config.grounding)
-        yield Ready(replace(even, root_pos=pos, joint_pos=joints))
+        yield Ready(_on_floor(resample(motion, config.fps), config))
+
+
+def _on_floor(even: RawMotion, config: ReadConfig) -> RawMotion:
+    """A robot's motion where it stands, as `GroundingConfig.method` says."""
+    if config.grounding.method == "refit":
+        return refit(even, config.grounding, config.retarget)
+    pos, joints = ground(even.root_pos, even.root_quat, even.joint_pos, even.fps, config.grounding)
+    return replace(even, root_pos=pos, joint_pos=joints)
 
 
 def _key(job: Job, config: ReadConfig) -> str:
@@ -75,12 +82,13 @@ def _key(job: Job, config: ReadConfig) -> str:
         "file": job.sha256,
         "name": job.path.name,
         "fps": config.fps,
+        "csv_fps": job.csv_fps,
         "human": asdict(config.human),
         "robot": asdict(config.robot),
         "grounding": asdict(config.grounding),
         "retarget": asdict(config.retarget),
         "bodies": model_files() if job.path.suffix.lower() == ".npz" else [],
-        "version": [VERSION, _READER],
+        "version": [VERSION, REFIT, _READER],
     }
     return key_of(parts)
 

@@ -40,7 +40,7 @@ def test_a_jump_keeps_its_height_over_a_floor_that_is_wrong(standing):
 
 
 def test_a_motion_on_the_floor_and_a_disabled_correction_change_nothing(standing):
-    for height, config in ((0.0, GroundingConfig()), (0.02, GroundingConfig()), (0.1, GroundingConfig(enabled=False))):
+    for height, config in ((0.0, GroundingConfig()), (0.02, GroundingConfig()), (0.1, GroundingConfig(method="off"))):
         raised = heights(standing, np.full(300, height))
         root_pos, joint_pos = ground(raised, standing.root_quat, standing.joint_pos, FPS, config)
         np.testing.assert_array_equal(root_pos, raised)

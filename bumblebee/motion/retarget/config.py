@@ -48,6 +48,8 @@ class RetargetConfig(Ranged):
     """Acceleration of the root beyond the person's [m/s^2], and its rotation's [10 rad/s^2]."""
     posture: Small = 1.5
     """Joints against their angles at rest [rad]."""
+    refit_posture: Small = 0.05
+    """Joints of a robot's motion that is fitted again, against the angles that came [rad]."""
     limit: Small = 0.005
     """Joints beyond their range [rad]."""
     speed: Small = 0.5

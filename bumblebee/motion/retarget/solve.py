@@ -37,9 +37,9 @@ class Trajectory:
 
 
 def start(target: Targets, robot: Robot) -> Trajectory:
-    """The robot at rest in every joint, its root where the person's hips are."""
+    """The robot with its joints at rest, or as they are to be near, its root where the person's hips are."""
     frames = len(target.hips)
-    joint = np.tile(robot.rest, (frames, 1))
+    joint = target.near(robot)
     at = poses(robot.tree, np.zeros((frames, 3)), target.frame, joint)
     hips = points(at, robot.body[_HIPS], robot.local[_HIPS]).mean(axis=1)
     return Trajectory(target.hips - hips, target.frame, joint)
@@ -134,18 +134,20 @@ def _feet(normal: Normal, at: Poses, target: Targets, robot: Robot, config: Reta
 def _joints(normal: Normal, now: Trajectory, target: Targets, robot: Robot, config: RetargetConfig) -> None:
     """Accelerations, angles at rest, ranges and speeds of the joints."""
     size = len(robot.tree.joints)
+    away = now.joint - target.near(robot)
     wide = np.zeros((len(now.joint), ROOT + size))
-    wide[:, ROOT:] = now.joint
+    wide[:, ROOT:] = away  # the acceleration of a given posture is the motion's own
     weight = np.r_[np.zeros(ROOT), np.full(size, (config.acceleration / target.fps**2) ** -2.0)]
     normal.add_differences(2, wide[2:] - 2 * wide[1:-1] + wide[:-2], weight)
     each = np.arange(ROOT, ROOT + size)
     normal.blocks[0][:, each, each] += config.posture**-2.0
-    normal.slope[:, ROOT:] += config.posture**-2.0 * (now.joint - robot.rest)
-    normal.cost += config.posture**-2.0 * float(np.square(now.joint - robot.rest).sum())
+    normal.slope[:, ROOT:] += config.posture**-2.0 * away
+    normal.cost += config.posture**-2.0 * float(np.square(away).sum())
     beyond = now.joint - np.clip(now.joint, robot.tree.low + _MARGIN, robot.tree.high - _MARGIN)
     normal.blocks[0][:, each, each] += (beyond != 0) * config.limit**-2.0
     normal.slope[:, ROOT:] += config.limit**-2.0 * beyond
     normal.cost += config.limit**-2.0 * float(np.square(beyond).sum())
+    wide[:, ROOT:] = now.joint
     step = np.diff(wide, axis=0)
     most = np.r_[np.full(ROOT, np.inf), 0.95 * robot.fastest / target.fps]
     over = step - np.clip(step, -most, most)

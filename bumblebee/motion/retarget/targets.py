@@ -28,7 +28,8 @@ class Targets:
 
     `segments` (T, S + 1, 3) [m]: vectors of `SEGMENTS` and of the torso; `hips` (T, 3) [m]: the middle of the hips;
     `feet` (T, 2, 3) [m]: from heel to toe; `contact` (T, 8) from 0 to 1, of the soles' corners; `frame` (T, 3, 3): the
-    pelvis' orientation to start from; `floor` (T,) [m]: how high the floor was under the person.
+    pelvis' orientation to start from; `floor` (T,) [m]: how high the floor was under the person; `posture` (T, n)
+    [rad]: joint angles to stay near instead of those at rest.
     """
 
     fps: float
@@ -38,11 +39,17 @@ class Targets:
     contact: np.ndarray
     frame: np.ndarray
     floor: np.ndarray
+    posture: np.ndarray | None = None
 
     def part(self, start: int, end: int) -> "Targets":
         """The frames from `start` to before `end`."""
         arrays = (self.segments, self.hips, self.feet, self.contact, self.frame, self.floor)
-        return Targets(self.fps, *(array[start:end] for array in arrays))
+        posture = None if self.posture is None else self.posture[start:end]
+        return Targets(self.fps, *(array[start:end] for array in arrays), posture)
+
+    def near(self, robot: Robot) -> np.ndarray:
+        """Joint angles (T, n) [rad] that a robot stays near."""
+        return np.tile(robot.rest, (len(self.hips), 1)) if self.posture is None else self.posture
 
 
 def at_rate(motion: HumanMotion, fps: float, cutoff: float) -> np.ndarray:
