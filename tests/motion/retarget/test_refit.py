@@ -10,6 +10,9 @@ from bumblebee.motion.kinematics import lowest, sole_points
 from bumblebee.motion.resample import resample
 from bumblebee.motion.retarget.config import RetargetConfig
 from bumblebee.motion.retarget.refit import refit
+from bumblebee.robot.facts import joint_names, joints, stand_pose
+
+SETTINGS = GroundingConfig(), RetargetConfig()
 
 
 def low(raw):
@@ -54,3 +57,41 @@ def test_a_few_frames_are_left_as_they_are(swaying):
         swaying, root_pos=swaying.root_pos[:4] + 0.1, root_quat=swaying.root_quat[:4], joint_pos=swaying.joint_pos[:4]
     )
     assert refit(few, GroundingConfig(), RetargetConfig()) is few
+
+
+@pytest.fixture
+def bowing(motions):
+    """The G1 bowing on both feet for 2 s at 50 Hz, 0.1 m over the floor."""
+    frames = 100
+    joint_pos = np.tile(stand_pose(), (frames, 1))
+    joint_pos[:, joint_names().index("waist_pitch_joint")] += 0.2 * np.sin(np.arange(frames) / 17)
+    pos, quat = np.tile([0.0, 0.0, 0.8], (frames, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (frames, 1))
+    pos[:, 2] += 0.1 - lowest(pos, quat, joint_pos)
+    return motions.raw(frames, 50.0, root_pos=pos, root_quat=quat, joint_pos=joint_pos)
+
+
+def test_a_jump_keeps_its_flight(bowing):
+    time = np.arange(100) / 50 - 1
+    jump = np.where(np.abs(time) < 0.25, 0.3 * (1 - (time / 0.25) ** 2), 0)
+    after = low(refit(replace(bowing, root_pos=bowing.root_pos + np.outer(jump, [0, 0, 1])), *SETTINGS))
+    assert after.max() > 0.75 * 0.3  # blended contacts at take-off and landing take the rest
+    assert np.abs(after[np.abs(time) > 0.5]).max() < 0.01
+
+
+def test_who_lies_with_the_feet_up_is_not_pulled_onto_them(bowing):
+    on_back = np.tile([np.cos(np.pi / 4), 0.0, -np.sin(np.pi / 4), 0.0], (100, 1))
+    hips = [joint_names().index(f"{side}_hip_pitch_joint") for side in ("left", "right")]
+    bowing.joint_pos[:, hips] -= 1.2
+    bowing.root_pos[:, 2] += 0.1 - lowest(bowing.root_pos, on_back, bowing.joint_pos)
+    after = refit(replace(bowing, root_quat=on_back), *SETTINGS)
+    assert np.abs(after.joint_pos[:, hips] - bowing.joint_pos[:, hips]).max() < 0.1
+    assert np.abs(low(after)).max() < 0.03
+
+
+def test_ranges_and_motor_speeds_are_kept(bowing):
+    elbow = joint_names().index("right_elbow_joint")
+    least, most = joints()[elbow].range
+    bowing.joint_pos[:, elbow] = np.where(np.arange(100) < 50, least - 0.1, 0.8)
+    angle = refit(bowing, *SETTINGS).joint_pos[:, elbow]
+    assert least <= angle.min() and angle.max() <= most
+    assert np.abs(np.diff(angle)).max() * 50 < joints()[elbow].velocity_limit
