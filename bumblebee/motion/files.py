@@ -13,7 +13,7 @@ from bumblebee.io.limits import LIMITS
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.licence_table import LICENCES
 from bumblebee.motion.listing import csv_rate, reason_of
-from bumblebee.motion.ready import Job, Ready, make_ready
+from bumblebee.motion.ready import Job, Ready, Refused, make_ready
 from bumblebee.motion.settings import ReadConfig
 from bumblebee.motion.side_by_side import in_order
 from bumblebee.motion.sources import Source
@@ -31,6 +31,8 @@ class File:
     source: Source
     sha256: str = ""
     ready: tuple[Ready, ...] = ()
+    refused: tuple[Refused, ...] = ()
+    """Motions of a file of several that cannot be used."""
     clips: tuple[Clip, ...] = ()
     reason: str = ""
     place: Path | None = None
@@ -79,10 +81,12 @@ def _worked(loaded: _Loaded, config: ReadConfig, cache: Path | None) -> File:
         return File(source, reason=loaded.reason)
     digest = hashlib.sha256(loaded.data).hexdigest()
     job = Job(loaded.path, loaded.data, digest, loaded.csv_fps, cache)
-    ready = tried(partial(make_ready, job, config), loaded.path)
-    if isinstance(ready, str):
-        return File(source, digest, reason=ready)
-    return File(source, digest, tuple(ready), reason="" if ready else "no motion in it")
+    found = tried(partial(make_ready, job, config), loaded.path)
+    if isinstance(found, str):
+        return File(source, digest, reason=found)
+    ready = tuple(one for one in found if isinstance(one, Ready))
+    refused = tuple(one for one in found if isinstance(one, Refused))
+    return File(source, digest, ready, refused, reason="" if found else "no motion in it")
 
 
 def _gone(most: int) -> bytes:

@@ -106,6 +106,7 @@ def _groups(
         heard.files += not file.place
         if file.reason:
             heard.skipped.append((name, file.reason))
+        heard.skipped += [(f"{name}, {one.part}", one.reason) for one in file.refused]
         for group in _apart([split_long(clip, config.max_seconds) for clip in file.clips]):
             yield file.source.path, group
         for ready in file.ready:

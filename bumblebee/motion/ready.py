@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from bumblebee.errors import BadInput
 from bumblebee.motion.cache import Arrays, cached, key_of
 from bumblebee.motion.checks import check_raw
 from bumblebee.motion.grounding import ground
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.human.smpl_body import model_files
+from bumblebee.motion.listing import reason_of
 from bumblebee.motion.one_file import read_one
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
@@ -20,7 +22,7 @@ from bumblebee.motion.retarget.refit import refit
 from bumblebee.motion.retarget.retarget import VERSION, retarget
 from bumblebee.motion.settings import ReadConfig
 
-_READER = 1  # version of the readers, like those of the methods part of a cached result's key
+_READER = 2  # version of the readers, like those of the methods part of a cached result's key
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +48,19 @@ class Ready:
     """Rate at which AMASS states to have recorded it [Hz]."""
 
 
-def make_ready(job: Job, config: ReadConfig) -> list[Ready]:
-    """The motions of a file.
+@dataclass(frozen=True)
+class Refused:
+    """One motion of several in a file that cannot be used: which, and why."""
+
+    part: str
+    reason: str
+
+
+def make_ready(job: Job, config: ReadConfig) -> list[Ready | Refused]:
+    """The motions of a file; of several, one that is bad does not cost the others.
 
     Raises:
-        BadInput: what is wrong in it.
+        BadInput: what is wrong in the file, or in its only motion.
     """
     # Packed with and without a cache, which keeps float32: the result must not depend on it.
     if job.cache is None:
@@ -58,14 +68,23 @@ def make_ready(job: Job, config: ReadConfig) -> list[Ready]:
     return _unpacked(cached(job.cache, _key(job, config), lambda: _packed(list(_made(job, config)))), job.path)
 
 
-def _made(job: Job, config: ReadConfig) -> Iterator[Ready]:
-    for motion in read_one(job.path, job.data, replace(config, csv_fps=job.csv_fps)):
-        if isinstance(motion, HumanMotion):
-            rate = motion.fps if job.path.suffix.lower() == ".npz" else None
-            yield Ready(retarget(motion, config.fps, config.retarget), rate)
-            continue
-        check_raw(motion)
-        yield Ready(_on_floor(resample(motion, config.fps), config))
+def _made(job: Job, config: ReadConfig) -> Iterator[Ready | Refused]:
+    motions = read_one(job.path, job.data, replace(config, csv_fps=job.csv_fps))
+    for motion in motions:
+        try:
+            yield _one(motion, job, config)
+        except BadInput as error:
+            if len(motions) == 1:
+                raise
+            yield Refused(motion.part, reason_of(error, job.path))
+
+
+def _one(motion: RawMotion | HumanMotion, job: Job, config: ReadConfig) -> Ready:
+    if isinstance(motion, HumanMotion):
+        rate = motion.fps if job.path.suffix.lower() == ".npz" else None
+        return Ready(retarget(motion, config.fps, config.retarget), rate)
+    check_raw(motion)
+    return Ready(_on_floor(resample(motion, config.fps), config))
 
 
 def _on_floor(even: RawMotion, config: ReadConfig) -> RawMotion:
@@ -93,11 +112,14 @@ def _key(job: Job, config: ReadConfig) -> str:
     return key_of(parts)
 
 
-def _packed(found: list[Ready]) -> Arrays:
+def _packed(found: list[Ready | Refused]) -> Arrays:
     """Motions as arrays, what is said of them as JSON in bytes."""
     arrays: Arrays = {}
     about = []
     for number, one in enumerate(found):
+        if isinstance(one, Refused):
+            about.append({"refused": one.reason, "part": one.part})
+            continue
         raw = one.raw
         for name in ("root_pos", "root_quat", "joint_pos"):
             arrays[f"{name}{number}"] = getattr(raw, name).astype(np.float32)
@@ -106,9 +128,12 @@ def _packed(found: list[Ready]) -> Arrays:
     return arrays | {"about": np.frombuffer(json.dumps(about).encode(), np.uint8)}
 
 
-def _unpacked(arrays: Arrays, path: Path) -> list[Ready]:
-    found = []
+def _unpacked(arrays: Arrays, path: Path) -> list[Ready | Refused]:
+    found: list[Ready | Refused] = []
     for number, said in enumerate(json.loads(arrays["about"].tobytes())):
+        if "refused" in said:
+            found.append(Refused(said["part"], said["refused"]))
+            continue
         values = [arrays[f"{name}{number}"].astype(np.float64) for name in ("root_pos", "root_quat", "joint_pos")]
         amass = said.pop("amass_fps")
         raw = RawMotion(**{**said, "notes": tuple(said["notes"])}, file=path, **_named(values))

@@ -3,6 +3,7 @@
 import hashlib
 import zipfile
 
+import joblib
 import numpy as np
 import pytest
 
@@ -109,3 +110,16 @@ def test_long_motions_are_cut(motions):
 def test_names_are_safe_as_file_names(motions):
     (clip,) = read_file(motions.csv(motions.raw(), "weird name (1)#.csv"), CONFIG)
     assert clip.name == "weird_name_1"
+
+
+def test_a_bad_motion_of_a_pickle_does_not_cost_the_others(motions, tmp_path):
+    bad = motions.fields(motions.raw())
+    bad["dof"] = bad["dof"] * 60
+    joblib.dump(
+        {"a": motions.fields(motions.raw()), "b": bad, "c": motions.fields(motions.raw())}, tmp_path / "all.pkl"
+    )
+    for cache in (None, tmp_path / "cache", tmp_path / "cache"):
+        reading = read_folder(tmp_path / "all.pkl", CONFIG, cache=cache)
+        assert [clip.name for clip in reading.clips] == ["all_a", "all_c"]
+        ((file, reason),) = reading.skipped.itertuples(index=False, name=None)
+        assert file == "all.pkl, b" and "expected radians" in reason
