@@ -22,6 +22,7 @@ FLOORS = (
     {"discrepancy"},
     {"report"},
     {"gap"},
+    {"plan"},
 )
 ROOMS = [room for floor in FLOORS for room in sorted(floor) if (ROOT / room).is_dir()]
 GROUND = {"config", "budget"}  # modules that every room may import
