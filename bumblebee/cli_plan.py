@@ -23,6 +23,7 @@ def plan(
     seconds: Annotated[float, typer.Option(help="Length of a run with its rests.")] = 8.0,
     rate: Annotated[float | None, typer.Option(help="Rate of the targets [Hz]; the dataset's, or 50.")] = None,
     gains: Annotated[str, typer.Option(help="Factors on kp that the robot can be set to, as 0.5,1,2.")] = "1",
+    damping: Annotated[str, typer.Option(help="Factors on kd that the robot can be set to besides, as 0.3.")] = "",
     speed: Annotated[
         list[str] | None, typer.Option(metavar="[JOINT=]VALUE", help="Speed limit [rad/s, m/s]; repeat for joints.")
     ] = None,
@@ -55,7 +56,8 @@ def plan(
             "Run `bumblebee diagnose MODEL.xml DATASET --out FOUND`, then plan with DATASET --diagnosis FOUND.",
         )
     config = PlanConfig(
-        runs=runs, seconds=seconds, rate=rate, gains=_numbers("--gains", gains), pool=pool, seed=seed, start=start,
+        runs=runs, seconds=seconds, rate=rate, gains=_numbers("--gains", gains),
+        damping=_numbers("--damping", damping) if damping else (), pool=pool, seed=seed, start=start,
         speed=_by_joint("--speed", speed), torque=_by_joint("--torque", torque),
         travel=_by_joint("--travel", travel), kp=kp, kd=kd,
     )  # fmt: skip

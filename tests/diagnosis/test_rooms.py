@@ -32,6 +32,8 @@ NO_THRESHOLDS = {
     "simulation/simulate.py": {"_MOST_THREADS", "_CHUNK_BYTES", "_KEPT"},  # threads and memory
     "simulation/units.py": {"MEASURES"},  # factors of units
     "candidates/enumerate.py": {"_AXES"},  # indices
+    "plan/rehearsal.py": {"_BEFORE", "_TOGETHER"},  # rows of padding, memory
+    "plan/sheet.py": {"_PANELS"},  # what fits a page
     "residuals/problem.py": {"_GROUP"},  # memory
     "selection/proposals/packet_loss.py": {"_HALF"},  # half of the chi-square distribution's 95 % quantile
 }

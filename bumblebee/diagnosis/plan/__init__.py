@@ -1,7 +1,6 @@
 """The next experiment: runs within all limits that tell apart what a diagnosis could not."""
 
 from bumblebee.diagnosis.plan.config import PlanConfig
-from bumblebee.diagnosis.plan.document import document
 from bumblebee.diagnosis.plan.files import claim_plan, write_plan
 from bumblebee.diagnosis.plan.findings import findings_of, read_findings
 from bumblebee.diagnosis.plan.plan import Plan, make_plan, safe_pool, set_stage
@@ -11,7 +10,6 @@ __all__ = [
     "Plan",
     "PlanConfig",
     "claim_plan",
-    "document",
     "findings_of",
     "make_plan",
     "read_findings",

@@ -22,7 +22,7 @@ class Basis:
     found: dict[int, Finding]
     """Candidate -> what a diagnosis says of it."""
     usual: tuple[int, ...]
-    """Candidates that any robot may have."""
+    """Candidates that are fitted together on each joint."""
     unasked: tuple[str, ...] = ()
     """Findings without a candidate: what they predict is not known here."""
 
@@ -65,7 +65,7 @@ def basis_of(plant: Plant, rollouts: Sequence[Rollout], findings: Findings | Non
             others.append(c)
     chosen += [*rivals, *others]
     sizes += [np.ones(len(c.free)) for c in (*rivals, *others)]
-    usual = tuple(k for k, c in enumerate(chosen) if c.effect in rule.usual)
+    usual = tuple(k for k, c in enumerate(chosen) if c.effect in rule.fitted)
     return Basis(tuple(chosen), tuple(sizes), found, usual, tuple(unasked))
 
 

@@ -2,8 +2,21 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from bumblebee.diagnosis.thresholds import Thresholds
+
+
+class Gain(NamedTuple):
+    """Factors on the servos' gains."""
+
+    kp: float = 1.0
+    kd: float = 1.0
+
+    def __str__(self) -> str:
+        """In words."""
+        parts = [f"{name} x {value:g}" for name, value in self._asdict().items() if value != 1.0]
+        return ", ".join(parts) or "declared gains"
 
 
 @dataclass(frozen=True)
@@ -18,6 +31,8 @@ class PlanConfig:
     """Rate of the targets [Hz]; None: the dataset's, or 50."""
     gains: tuple[float, ...] = (1.0,)
     """Factors on kp at which runs may be made; 1 is the declared gain."""
+    damping: tuple[float, ...] = ()
+    """Factors on kd, at the declared kp, at which runs may be made besides."""
     pool: int = 48
     """Candidate motions that the runs are chosen from."""
     seed: int = 0
@@ -36,3 +51,9 @@ class PlanConfig:
     """The same on the velocity [N m s/rad, N s/m]."""
     thresholds: Thresholds = field(default_factory=Thresholds)
     """Every number that single decisions go by."""
+
+    @property
+    def all_gains(self) -> tuple[Gain, ...]:
+        """Gains at which runs may be made, each once."""
+        every = [*(Gain(kp=g) for g in self.gains), *(Gain(kd=d) for d in self.damping)]
+        return tuple(dict.fromkeys(every))

@@ -42,27 +42,35 @@ class Surroundings:
         points = [p for some in self.feet.values() for p in some]
         self.radius = inner_radius(np.array(points)) if points else 0.0
 
-    def clash(self, states: np.ndarray, period: float) -> Clash | None:
-        """The first thing wrong along states (n, nq), `period` s apart."""
+    def clash(self, qpos: np.ndarray, qvel: np.ndarray, period: float) -> Clash | None:
+        """The first thing wrong along states (n, nq), (n, nv), `period` s apart."""
         if not self.has_geometry and not self._floating:
             return None
-        mass, supports = [], []
-        for qpos in states:
-            self._place(qpos)
-            if found := self._too_near():
+        carried: list[_Carried] = []
+        for q, v in zip(qpos, qvel, strict=True):
+            self._place(q)
+            if found := (self._unsteady() if self._floating else None) or self._too_near():
                 return found
             if self._floating:
-                if found := self._unsteady():
-                    return found
-                mass.append(self._data.subtree_com[self._base].copy())
-                supports.append(np.array([p for some in self._touching_world().values() for p in some]))
-        return self._out_of_support(np.array(mass), supports, period) if self._floating else None
+                carried.append(self._carried(v))
+        return self._out_of_support(carried, period) if self._floating else None
 
     def _place(self, qpos: np.ndarray) -> None:
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, self._data)
         mujoco.mj_comPos(self.model, self._data)
         mujoco.mj_collision(self.model, self._data)
+
+    def _carried(self, qvel: np.ndarray) -> "_Carried":
+        data, base = self._data, self._base
+        data.qvel[:] = qvel
+        mujoco.mj_comVel(self.model, data)
+        mujoco.mj_subtreeVel(self.model, data)
+        points = [p for some in self._touching_world().values() for p in some]
+        return _Carried(
+            data.subtree_com[base].copy(), data.subtree_linvel[base].copy(), data.subtree_angmom[base].copy(),
+            np.array(points), float(np.mean([c.pos[2] for c in self._contacts()])),
+        )  # fmt: skip
 
     def _contacts(self) -> list[mujoco.MjContact]:
         return [self._data.contact[k] for k in range(self._data.ncon)]
@@ -110,21 +118,44 @@ class Surroundings:
                 return Clash(f"{name} slides by more than {1000 * self.rule.slide:.0f} mm")
         return None
 
-    def _out_of_support(self, mass: np.ndarray, supports: Sequence[np.ndarray], period: float) -> Clash | None:
-        """Centre of mass or zero-moment point (by the centre's acceleration) too near the edge of the support."""
+    def _out_of_support(self, carried: Sequence["_Carried"], period: float) -> Clash | None:
+        """Centre of mass or zero-moment point too near the edge of the support.
+
+        The zero-moment point is where the floor's forces must act for the whole robot's momentum and angular momentum
+        to change as they do (Vukobratovic).
+        """
         least = self.rule.support * self.radius
-        speed_up = np.gradient(np.gradient(mass, period, axis=0), period, axis=0) if len(mass) > 2 else 0.0 * mass
-        gravity = float(np.linalg.norm(self.model.opt.gravity))
-        height = mass[:, 2:] - self._floor()
-        moment = mass[:, :2] - height * speed_up[:, :2] / (gravity + speed_up[:, 2:])
-        for name, path in (("centre of mass", mass[:, :2]), ("zero-moment point", moment)):
-            for point, support in zip(path, supports, strict=True):
-                if inside_by(point, support) < least:
+        centre = np.array([c.centre for c in carried])
+        moment = centre[:, :2].copy()
+        if len(carried) > 2:
+            rate = np.gradient(np.array([c.velocity for c in carried]), period, axis=0)
+            turn = np.gradient(np.array([c.angular for c in carried]), period, axis=0)
+            mass = float(self.model.body_subtreemass[self._base])
+            lift = float(np.linalg.norm(self.model.opt.gravity)) + rate[:, 2]
+            height = centre[:, 2] - np.array([c.floor for c in carried])
+            moment[:, 0] -= height * rate[:, 0] / lift + turn[:, 1] / (mass * lift)
+            moment[:, 1] -= height * rate[:, 1] / lift - turn[:, 0] / (mass * lift)
+        for name, path in (("centre of mass", centre[:, :2]), ("zero-moment point", moment)):
+            for point, c in zip(path, carried, strict=True):
+                if inside_by(point, c.support) < least:
                     return Clash(f"the {name} comes within {1000 * least:.0f} mm of the edge of the support")
         return None
 
-    def _floor(self) -> float:
-        return float(np.mean([c.pos[2] for c in self._contacts()])) if self._data.ncon else 0.0
+
+@dataclass(frozen=True, eq=False)
+class _Carried:
+    """A standing robot at one time."""
+
+    centre: np.ndarray
+    """(3,) centre of mass [m]."""
+    velocity: np.ndarray
+    """(3,) of it [m/s]."""
+    angular: np.ndarray
+    """(3,) angular momentum about it [kg m^2/s]."""
+    support: np.ndarray
+    """(n, 2) points in contact with the floor [m]."""
+    floor: float
+    """Their height [m]."""
 
 
 def _pair(contact: mujoco.MjContact) -> tuple[int, int]:

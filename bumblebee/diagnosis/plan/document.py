@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from bumblebee.diagnosis.plan.config import Gain
 from bumblebee.diagnosis.plan.objective import Question
 from bumblebee.diagnosis.plan.plan import Plan
 from bumblebee.diagnosis.simulation import joint_units, unit_on
 from bumblebee.sim.effects import CATALOGUE
-
-SCHEMA = 1
 
 
 def run_names(plan: Plan) -> list[str]:
@@ -22,7 +21,7 @@ def document(plan: Plan, sha256: str) -> dict[str, Any]:
     """The whole document; `sha256` is that of the runs' CSV files, one after the other."""
     machine, config = plan.machine, plan.config
     return {
-        "schema": SCHEMA,
+        "schema": 1,
         "kind": "plan",
         "model": machine.name,
         "seed": config.seed,
@@ -83,13 +82,14 @@ def _run(plan: Plan, k: int) -> dict[str, Any]:
     reached = plan.reached[k]
     worst = reached.argmax(axis=1)
     gains: dict[str, Any] = {}
-    if motion.gain != 1.0 or machine.tracked:
-        gains = {"kp": _plain(motion.gain * machine.kp), "kd": _plain(machine.kd)}
+    if motion.gain != Gain() or machine.tracked:
+        gains = {"kp": _plain(motion.gain.kp * machine.kp), "kd": _plain(motion.gain.kd * machine.kd)}
     return {
         "run": run_names(plan)[k],
         "family": motion.family,
         "motion": motion.text,
-        "gain": motion.gain,
+        "gains": str(motion.gain),
+        "factors": motion.gain._asdict(),
         **gains,
         "reached": {
             name: {"share": float(reached[i].max()), "joint": machine.joints[int(worst[i])]}
@@ -233,14 +233,15 @@ def notes(plan: Plan) -> list[str]:
     for name in plan.basis.unasked:
         out.append(f"{name}: no candidate of this model stands for it; the plan does not ask about it")
     open_ = [row for row in classes(plan) if row["class"] in {f.name for f in plan.basis.found.values()}]
-    left = dict.fromkeys(f"{words_of(r['if'])} and {words_of(r['not'])}" for r in open_ if not r["resolved"]["after"])
+    pairs = (sorted((words_of(r["if"]), words_of(r["not"]))) for r in open_ if not r["resolved"]["after"])
+    left = list(dict.fromkeys(" and ".join(pair) for pair in pairs))
     if left:
-        most = list(left)[:6]
+        more = "; ..." if len(left) > 6 else ""
         out.append(
-            "these runs are not expected to tell apart: " + "; ".join(most) + ("; ..." if len(left) > 6 else "")
-            + ". Other limits (--speed, --travel), other gains (--gains) or another experiment may: see separate_by in "
-            "diagnosis.json"
-        )  # fmt: skip
+            f"these runs are not expected to tell apart: {'; '.join(left[:6])}{more}. "
+            "Other limits (--speed, --travel), "
+            "other gains (--gains, --damping) or another experiment may: `separate_by` in diagnosis.json"
+        )
     return out
 
 

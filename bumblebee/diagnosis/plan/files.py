@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from bumblebee.diagnosis.plan.config import Gain
 from bumblebee.diagnosis.plan.document import document, run_names
 from bumblebee.diagnosis.plan.plan import Plan
 from bumblebee.diagnosis.plan.sheet import sheet
@@ -71,9 +72,10 @@ def parquet_of(plan: Plan, k: int) -> bytes:
     """The same columns as float64; what the player must know besides is JSON under the key `bumblebee.plan`."""
     names, values = _table(plan, k)
     motion, machine = plan.motions[k], plan.machine
-    about = {"schema": 1, "run": run_names(plan)[k], "rate": machine.rate, "gain": motion.gain}
-    if motion.gain != 1.0 or machine.tracked:
-        about |= {"kp": (motion.gain * machine.kp).tolist(), "kd": machine.kd.tolist(), "joints": list(machine.joints)}
+    about = {"schema": 1, "run": run_names(plan)[k], "rate": machine.rate, "factors": motion.gain._asdict()}
+    if motion.gain != Gain() or machine.tracked:
+        about |= {"joints": list(machine.joints)}
+        about |= {"kp": (motion.gain.kp * machine.kp).tolist(), "kd": (motion.gain.kd * machine.kd).tolist()}
     table = pa.table(dict(zip(("time", *names), values.T, strict=True)))
     stream = io.BytesIO()
     pq.write_table(table.replace_schema_metadata({PARQUET_KEY: json.dumps(about)}), stream, compression="zstd")

@@ -61,7 +61,7 @@ def logs_of(machine: Machine, runs: Rehearsed, motions: Sequence[Motion]) -> lis
         time = np.arange(len(motion.shape)) / machine.rate
         out.append(
             Rollout(
-                f"p{motion.number:04d}g{motion.gain:g}", machine.joints, machine.rate, time, parts["joint_pos"],
+                f"p{motion.number:04d}", machine.joints, machine.rate, time, parts["joint_pos"],
                 parts["joint_vel"], meta=dict(example.meta), **columns,
             )
         )  # fmt: skip
@@ -70,7 +70,7 @@ def logs_of(machine: Machine, runs: Rehearsed, motions: Sequence[Motion]) -> lis
 
 def information_of(plant: Plant, layout: Layout, rollouts: Sequence[Rollout], lens: Lens, budget: int) -> np.ndarray:
     """Information (R, B + K, B + K) of rollouts, from at most `budget` windows each, as if all of them took part."""
-    size, rule = lens.thresholds.plan.information.together, lens.thresholds.plan.information
+    size = lens.thresholds.plan.information.together
     parts = []
     for first in range(0, len(rollouts), size):
         some = rollouts[first : first + size]
@@ -83,7 +83,7 @@ def information_of(plant: Plant, layout: Layout, rollouts: Sequence[Rollout], le
         rng = np.random.default_rng([lens.seed, first])
         problem = make_problem(plant, layout, windows, lens.sigma, lens.steps, [], rng, None, lens.thresholds)
         rows = np.concatenate((problem.nuisance.astype(np.float32), columns_of(problem, lens)))
-        parts.append(_grams(problem, rows, some, lens.horizon, rule.windows))
+        parts.append(_grams(problem, rows, some, lens.horizon))
     return np.concatenate(parts)
 
 
@@ -98,7 +98,7 @@ def columns_of(problem: Problem, lens: Lens) -> np.ndarray:
     return np.nan_to_num(out)
 
 
-def _grams(problem: Problem, rows: np.ndarray, rollouts: Sequence[Rollout], horizon: float, least: int) -> np.ndarray:
+def _grams(problem: Problem, rows: np.ndarray, rollouts: Sequence[Rollout], horizon: float) -> np.ndarray:
     """(R, N, N) products of rows (N, W, M), a rollout's windows standing for all that it holds."""
     out = np.zeros((len(rollouts), len(rows), len(rows)))
     for r, rollout in enumerate(rollouts):

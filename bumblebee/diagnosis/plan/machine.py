@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.dataset import Session, steps_of
-from bumblebee.diagnosis.plan.config import PlanConfig
+from bumblebee.diagnosis.plan.config import Gain, PlanConfig
 from bumblebee.diagnosis.simulation import Layout, Plant, fold_dampers, layout_of, make_plant, refuse_unlogged
 from bumblebee.diagnosis.thresholds.plan import SensorNoise, TrackingGains
 from bumblebee.errors import BadInput
@@ -24,10 +24,10 @@ class Machine:
 
     name: str
     """Of the model's file."""
-    driven: dict[float, Plant]
-    """Factor on kp -> the robot whose servos follow position targets."""
-    seen: dict[float, Plant]
-    """Factor on kp -> the robot as a diagnosis takes its logs: the same, or one that takes the logged torques."""
+    driven: dict[Gain, Plant]
+    """Gains -> the robot whose servos follow position targets."""
+    seen: dict[Gain, Plant]
+    """Gains -> the robot as a diagnosis takes its logs: the same, or one that takes the logged torques."""
     layout: Layout
     """Of what is simulated, with the base's position."""
     seen_layout: Layout
@@ -52,7 +52,7 @@ class Machine:
     @property
     def plant(self) -> Plant:
         """The robot at its declared gains."""
-        return self.driven[1.0]
+        return self.driven[Gain()]
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -74,16 +74,16 @@ def make_machine(spec: mujoco.MjSpec, name: str, session: Session | None, config
     torque = _takes_torque(spec, joints, rate, name)
     kp, kd = _gains(spec, joints, config, session, rules.plan.tracking) if torque else (None, None)
     driven, seen = {}, {}
-    for factor in dict.fromkeys((1.0, *config.gains)):
-        scaled = _scaled(spec, factor, joints, name)
-        gains = {} if kp is None else {"kp": (factor * kp).tolist(), "kd": kd.tolist()}
+    for gain in dict.fromkeys((Gain(), *config.all_gains)):
+        scaled = _scaled(spec, gain, joints, name)
+        gains = {} if kp is None else {"kp": (gain.kp * kp).tolist(), "kd": (gain.kd * kd).tolist()}
         example = _example(scaled, joints, rate, gains, ("joint_target",))
-        driven[factor] = make_plant(scaled, example, name, rules.simulation)
-        refuse_unlogged(driven[factor], name)
+        driven[gain] = make_plant(scaled, example, name, rules.simulation)
+        refuse_unlogged(driven[gain], name)
         logged = _logged(session, torque)
         example = _example(scaled, joints, rate, gains, logged)
-        seen[factor] = make_plant(scaled, example, name, rules.simulation)
-    plant = driven[1.0]
+        seen[gain] = make_plant(scaled, example, name, rules.simulation)
+    plant = driven[Gain()]
     if (plant.actuator < 0).all():
         raise BadInput(name, "a model with a drive on a hinge or slide", "none", "Add its actuators.")
     seen_layout = session.layout if session else layout_of(plant, plant.floating)
@@ -172,9 +172,9 @@ def _gains(
     )
 
 
-def _scaled(spec: mujoco.MjSpec, factor: float, joints: Sequence[str], name: str) -> mujoco.MjSpec:
-    """The model with `factor` on its position servos' kp; their kd stays, as a servo's damping does."""
-    if factor == 1.0:
+def _scaled(spec: mujoco.MjSpec, factor: Gain, joints: Sequence[str], name: str) -> mujoco.MjSpec:
+    """The model with factors on its position servos' gains."""
+    if factor == Gain():
         return spec
     model, spec = spec.compile(), spec.copy()
     servos = servos_of(model, [int(model.joint(j).id) for j in joints])
@@ -183,10 +183,10 @@ def _scaled(spec: mujoco.MjSpec, factor: float, joints: Sequence[str], name: str
             continue
         actuator = spec.actuators[int(a)]
         if int(model.actuator_gaintype[a]) != int(mujoco.mjtGain.mjGAIN_FIXED):
-            raise BadInput("--gains", "servos whose gains stand in gainprm", f"{joints[column]!r} of {name}")
+            raise BadInput("--gains, --damping", "servos whose gains stand in gainprm", f"{joints[column]!r} of {name}")
         if servos.bias[column, 1] != 0:  # a motor's tracking servo is scaled where it is made
             gain, bias = actuator.gainprm.copy(), actuator.biasprm.copy()
-            gain[0], bias[:2] = factor * gain[0], factor * bias[:2]
+            gain[0], bias[:2], bias[2] = factor.kp * gain[0], factor.kp * bias[:2], factor.kd * bias[2]
             actuator.gainprm, actuator.biasprm = gain, bias
     return spec
 

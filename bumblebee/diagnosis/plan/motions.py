@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bumblebee.diagnosis.plan.config import Gain
 from bumblebee.diagnosis.plan.limits import Limits
 from bumblebee.diagnosis.thresholds.plan import Motions
 
+_DECLARED = Gain()
 FAMILIES = ("multisine", "sweep", "steps", "holds", "reversals")
 
 
@@ -23,8 +25,8 @@ class Motion:
     family: str
     text: str
     """What it is, in words."""
-    gain: float
-    """Factor on kp."""
+    gain: Gain
+    """Factors on the servos' gains."""
     home: np.ndarray
     """(J,) start pose."""
     shape: np.ndarray
@@ -71,7 +73,9 @@ def smooth_step(share: np.ndarray) -> np.ndarray:
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
-def draw_motion(scope: Scope, seed: int, number: int, gain: float = 1.0, families: Sequence[str] = FAMILIES) -> Motion:
+def draw_motion(
+    scope: Scope, seed: int, number: int, gain: Gain = _DECLARED, families: Sequence[str] = FAMILIES
+) -> Motion:
     """Candidate `number` of a seed; the same whatever else is drawn."""
     rng = np.random.default_rng([seed, number, 19])
     family = families[number % len(families)]

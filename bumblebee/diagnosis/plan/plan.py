@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.plan.basis import Basis, basis_of
 from bumblebee.diagnosis.plan.choose import choose
-from bumblebee.diagnosis.plan.config import PlanConfig
+from bumblebee.diagnosis.plan.config import Gain, PlanConfig
 from bumblebee.diagnosis.plan.contacts import Surroundings
 from bumblebee.diagnosis.plan.findings import Findings
 from bumblebee.diagnosis.plan.information import Lens, information_of, lens_of, logs_of
@@ -19,7 +20,7 @@ from bumblebee.diagnosis.plan.machine import Machine, make_machine
 from bumblebee.diagnosis.plan.motions import FAMILIES, Motion, Scope, draw_motion
 from bumblebee.diagnosis.plan.objective import Objective, imitations, objective_of
 from bumblebee.diagnosis.plan.rehearsal import rehearse, settled
-from bumblebee.diagnosis.plan.safety import Safe, made_safe, refuse_none, refuse_unsteady
+from bumblebee.diagnosis.plan.safety import Safe, made_safe, refuse_fallen, refuse_none, refuse_unsteady
 from bumblebee.diagnosis.plan.unknowns import Case, cases_of
 from bumblebee.errors import BadInput
 
@@ -76,7 +77,19 @@ def make_plan(
     say: Callable[[str], None] = lambda text: None,
 ) -> Plan:
     """Plan runs on the robot of `spec`; with the session of a dataset and what its diagnosis found, what it lacks."""
-    config = config or PlanConfig()
+    with threadpool_limits(1, user_api="blas"):  # as in a diagnosis: many small matrices
+        return _make_plan(spec, name, config or PlanConfig(), session, findings, say)
+
+
+def _make_plan(
+    spec: mujoco.MjSpec,
+    name: str,
+    config: PlanConfig,
+    session: Session | None,
+    findings: Findings | None,
+    say: Callable[[str], None],
+) -> Plan:
+    """The same on the threads that there are."""
     horizon, rules = DiagnosisConfig().horizon, config.thresholds
     stage = set_stage(spec, name, config, session, findings)
     say(f"{len(stage.cases)} robots to be safe on; {config.pool} candidate motions")
@@ -84,8 +97,8 @@ def make_plan(
     lens = data = objective = None
     if session is not None:
         lens = _lens(machine, session.rollouts, findings, horizon, config)
-        seen = machine.seen[1.0]
-        data = information_of(seen, machine.seen_layout, session.rollouts, lens, 2 * rules.plan.information.windows)
+        seen = machine.seen[Gain()]
+        data = information_of(seen, machine.seen_layout, session.rollouts, lens, 2 * _windows(machine, config))
         objective = _objective(machine, lens, data.sum(axis=0), config, first=data.shape[1] - _rows(lens))
         stage = _with_rivals(stage, objective, data.sum(axis=0), findings, config)
     safe = safe_pool(stage, config)
@@ -96,7 +109,7 @@ def make_plan(
     logs = logs_of(machine, runs, safe.motions)
     if lens is None:
         lens = _lens(machine, logs, findings, horizon, config)
-    told = _told(machine, safe.motions, logs, lens)
+    told = _told(machine, safe.motions, logs, lens, _windows(machine, config))
     total = data.sum(axis=0) if data is not None else np.zeros(told.shape[1:])
     if objective is None:
         objective = _objective(machine, lens, None, config, first=told.shape[1] - _rows(lens))
@@ -113,7 +126,9 @@ def set_stage(
     limits = limits_of(machine, session, config)
     small = machine.plant.model.nv <= config.thresholds.dataset.time_steps.small_model
     step = machine.steps[0] if small else machine.steps[1]
+    start = Surroundings(machine.plant, machine.qpos, rules.safety)
     machine = settled(machine, step, rules.motions.settle)
+    refuse_fallen(machine, start)
     around = Surroundings(machine.plant, machine.qpos, rules.safety)
     cases = cases_of(machine, limits, findings, (), rules.unknowns)
     refuse_unsteady(machine, limits, around, cases, rules, step)
@@ -124,7 +139,7 @@ def set_stage(
 
 def safe_pool(stage: Stage, config: PlanConfig, families: tuple[str, ...] = FAMILIES) -> Safe:
     """The candidate motions of a seed, as far as they are safe."""
-    gains = list(dict.fromkeys(config.gains))
+    gains = config.all_gains
     motions = [
         draw_motion(stage.scope, config.seed, k, gains[(k // len(families)) % len(gains)], families)
         for k in range(config.pool)
@@ -139,14 +154,16 @@ def _refuse_config(config: PlanConfig) -> None:
     least = rule.lead + 2 * rule.ramp + rule.rest + 1.0
     if not least <= config.seconds <= 600:
         raise BadInput("--seconds", f"{least:g} to 600: rests, ramps and a second between them", f"{config.seconds:g}")
-    if not config.gains or any(not 0.05 <= g <= 20 for g in config.gains):
-        raise BadInput("--gains", "factors on kp from 0.05 to 20", ", ".join(f"{g:g}" for g in config.gains) or "none")
+    every = (*config.gains, *config.damping)
+    if not config.gains or any(not 0.05 <= g <= 20 for g in every):
+        came = ", ".join(f"{g:g}" for g in every) or "none"
+        raise BadInput("--gains, --damping", "factors from 0.05 to 20", came)
     if config.rate is not None and not 5 <= config.rate <= 5000:
         raise BadInput("--rate", "5 to 5000 Hz", f"{config.rate:g}")
 
 
 def _lens(machine: Machine, rollouts: list, findings: Findings | None, horizon: float, config: PlanConfig) -> Lens:
-    seen = machine.seen[1.0]
+    seen = machine.seen[Gain()]
     basis = basis_of(seen, rollouts, findings, config.thresholds)
     return lens_of(machine, seen, rollouts, basis, horizon, config.thresholds)
 
@@ -183,10 +200,15 @@ def _with_rivals(
     return Stage(stage.machine, stage.limits, stage.around, cases, stage.scope, stage.step)
 
 
-def _told(machine: Machine, motions: list[Motion], logs: list, lens: Lens) -> np.ndarray:
+def _windows(machine: Machine, config: PlanConfig) -> int:
+    """Windows that stand for a run."""
+    rule, small = config.thresholds.plan.information, config.thresholds.dataset.time_steps.small_model
+    return rule.windows if machine.plant.model.nv <= small else rule.few
+
+
+def _told(machine: Machine, motions: list[Motion], logs: list, lens: Lens, budget: int) -> np.ndarray:
     """Information (R, N, N) of the motions, each by the robot at its gain."""
     out: list[np.ndarray | None] = [None] * len(motions)
-    budget = lens.thresholds.plan.information.windows
     for gain in dict.fromkeys(m.gain for m in motions):
         some = [i for i, m in enumerate(motions) if m.gain == gain]
         told = information_of(machine.seen[gain], machine.seen_layout, [logs[i] for i in some], lens, budget)

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bumblebee.diagnosis.plan.config import Gain
 from bumblebee.diagnosis.plan.machine import Machine, at_rest
 from bumblebee.diagnosis.plan.motions import Motion
 from bumblebee.diagnosis.simulation import Layout, Plant, Variation, cut, residuals, vary
 from bumblebee.measured.rollout import Rollout
-from bumblebee.quaternions import conjugate, from_rotation_vector
+from bumblebee.quaternions import conjugate, from_rotation_vector, rotate
 from bumblebee.sim.effects import Effect
 from bumblebee.sim.servo import servos_of
 
@@ -45,6 +46,16 @@ class Rehearsed:
             out[..., plant.base_qpos + 3 : plant.base_qpos + 7] = self.quat
         return out
 
+    def qvel(self, plant: Plant) -> np.ndarray:
+        """(R, T, nv) velocities of the declared model."""
+        out = np.zeros((*self.position.shape[:2], plant.model.nv))
+        out[..., plant.dof] = self.velocity
+        if self.quat is not None:
+            v, parts = plant.base_dof, self.layout.slices
+            out[..., v : v + 3] = rotate(self.quat, self.reading[..., parts["base_lin_vel"]])
+            out[..., v + 3 : v + 6] = self.reading[..., parts["base_ang_vel"]]
+        return out
+
 
 def rehearse(
     machine: Machine, motions: Sequence[Motion], effects: Sequence[Effect], step: float, settle: float
@@ -66,11 +77,8 @@ def rehearse(
 def settled(machine: Machine, step: float, settle: float) -> Machine:
     """The machine that begins where the declared one comes to rest under the targets of the start pose."""
     still = np.zeros((2, len(machine.home)))
-    for gain in machine.driven:
-        hold = Motion(0, "holds", "", gain, machine.home, still, np.ones(len(machine.home)))
-        found = rehearse(machine, [hold], [], step, settle)
-        if gain == 1.0:
-            state = found.qpos(machine.plant, machine.qpos)[0, -1]
+    hold = Motion(0, "holds", "", Gain(), machine.home, still, np.ones(len(machine.home)))
+    state = rehearse(machine, [hold], [], step, settle).qpos(machine.plant, machine.qpos)[0, -1]
     return at_rest(machine, state) if np.isfinite(state).all() else machine
 
 

@@ -32,13 +32,13 @@ def judge(
     machine: Machine, limits: Limits, around: Surroundings, runs: Rehearsed, motions: Sequence[Motion]
 ) -> list[Verdict]:
     """One verdict a run."""
-    rest = machine.qpos
-    states = runs.qpos(machine.plant, rest)
-    every = max(1, round(around.rule.every * machine.rate))
+    qpos, qvel = runs.qpos(machine.plant, machine.qpos), runs.qvel(machine.plant)
+    # A standing robot's momentum is differentiated: every tick of it.
+    every = 1 if machine.plant.floating else max(1, round(around.rule.every * machine.rate))
     out = []
     for r in range(len(runs.position)):
         verdict = _by_joint(machine, limits, runs, r, motions[r], around.rule)
-        if not verdict.reason and (clash := around.clash(states[r, ::every], every / machine.rate)):
+        if not verdict.reason and (clash := around.clash(qpos[r, ::every], qvel[r, ::every], every / machine.rate)):
             verdict = Verdict(clash.reason, _carriers(machine, clash), verdict.reached)
         out.append(verdict)
     return out
@@ -56,10 +56,11 @@ def _by_joint(
     travel = (np.abs(both - machine.home) / np.maximum(room, 1e-9)).max(axis=0)
     reached = np.stack((travel, np.abs(v).max(axis=0) / limits.speed, np.abs(tau).max(axis=0) / limits.torque))
     reached[:, ~machine.moved] = 0.0
-    for name, share in zip(("range", "speed limit", "torque limit"), reached, strict=True):
-        if (share > 1.0).any():
-            worst = machine.joints[int(np.argmax(share))]
-            return Verdict(f"{worst} leaves its {name}", share > 1.0, reached)
+    broken = reached > 1.0
+    if broken.any():
+        kind, worst = np.unravel_index(int(np.argmax(reached)), reached.shape)
+        name = ("range", "speed limit", "torque limit")[int(kind)]
+        return Verdict(f"{machine.joints[int(worst)]} leaves its {name}", broken.any(axis=0), reached)
     moving = np.abs(v[[0, -1]]).max(axis=0) > rule.still
     if moving.any():
         return Verdict(f"{machine.joints[int(np.argmax(moving))]} is not at rest at the ends", moving, reached)
@@ -142,6 +143,20 @@ def _worst(
     return out
 
 
+_STAND = "Choose a keyframe with --start or stronger gains, or hang the robot up and declare its base fixed."
+
+
+def refuse_fallen(machine: Machine, start: Surroundings) -> None:
+    """`BadInput` for a free base whose robot does not stand where it starts; `start` is around the start pose."""
+    if not machine.plant.floating:
+        return
+    where, expected = f"{machine.name}: start pose", "a robot that stands on the floor under its servos"
+    if not start.feet:
+        raise BadInput(where, expected, "one that touches nothing", _STAND)
+    if clash := start.clash(machine.qpos[None], np.zeros((1, machine.plant.model.nv)), 1.0):
+        raise BadInput(where, expected, clash.reason, _STAND)
+
+
 def refuse_unsteady(
     machine: Machine, limits: Limits, around: Surroundings, cases: Sequence[Case], rules: PlanThresholds, step: float
 ) -> None:
@@ -155,12 +170,10 @@ def refuse_unsteady(
             found = judge(machine, limits, around, runs, [hold])[0].reason
             if found:
                 raise BadInput(
-                    f"{machine.name}: start pose, kp x {gain:g}, {case.name}",
+                    f"{machine.name}: start pose, {gain}, {case.name}",
                     "a robot that rests under its servos within the limits",
                     found,
-                    "Choose a keyframe with --start or stronger gains, or hang the robot up and declare its base fixed."
-                    if machine.plant.floating
-                    else "Choose a keyframe with --start, or other limits.",
+                    _STAND if machine.plant.floating else "Choose a keyframe with --start, or other limits.",
                 )
 
 

@@ -12,15 +12,18 @@ from bumblebee.diagnosis.report import number, table
 
 _PANELS = 12  # joints drawn of a run: what fits a page
 _STYLE = """@page{size:A4;margin:13mm}:root{color-scheme:light}
-body{font:13px/1.45 system-ui,-apple-system,'Segoe UI',sans-serif;color:#1d2430;background:#fff;margin:0 auto;max-width:47rem;
-padding:1.2rem}h1{font-size:1.5rem;margin:0 0 .2rem}h2{font-size:1.2rem;margin:0}h3{font-size:.95rem;margin:.9rem 0 .2rem}
+body{font:13px/1.45 system-ui,-apple-system,'Segoe UI',sans-serif;color:#1d2430;background:#fff;margin:0 auto;
+max-width:47rem;padding:1.2rem}h1{font-size:1.5rem;margin:0 0 .2rem}h2{font-size:1.2rem;margin:0}
+h3{font-size:.95rem;margin:.9rem 0 .2rem}
 p{margin:.3rem 0}.lead{font-size:1rem}.note{color:#6b7385;font-size:.85rem}
 section{break-before:page;border-top:2px solid #1d2430;padding-top:.8rem;margin-top:2rem}
-.head{display:flex;justify-content:space-between;align-items:baseline;gap:1rem}.tag{color:#6b7385;white-space:nowrap}
+.head{display:flex;justify-content:space-between;align-items:baseline;gap:1rem}.tag{color:#6b7385}
 .scroll{overflow-x:auto}table{border-collapse:collapse;margin:.3rem 0;font-size:.85rem;width:100%}
 td,th{padding:.18rem .6rem .18rem 0;border-bottom:1px solid #e4e7ee;text-align:left;vertical-align:top}
-th{color:#6b7385;font-weight:500}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-.panels{display:grid;grid-template-columns:1fr 1fr;gap:.2rem .9rem;margin:.4rem 0}.panels svg{width:100%;height:auto;display:block}
+th{color:#6b7385;font-weight:500}td.n,th.n{text-align:right;
+font-variant-numeric:tabular-nums;padding-right:1.2rem}td.n{white-space:nowrap}
+.panels{display:grid;grid-template-columns:1fr 1fr;gap:.2rem .9rem;margin:.4rem 0}.panels svg{
+width:100%;height:auto;display:block}
 ul.check{list-style:none;padding:0;margin:.3rem 0;columns:2;column-gap:1.4rem}
 ul.check li{break-inside:avoid;padding:.12rem 0 .12rem 1.5rem;position:relative}
 ul.check li::before{content:'';position:absolute;left:0;top:.28rem;width:.8rem;height:.8rem;border:1.2px solid #1d2430}
@@ -76,12 +79,12 @@ def _run_table(told: dict[str, Any]) -> str:
         [
             escape(run["run"]),
             escape(run["motion"]),
-            f"{run['gain']:g}",
+            escape(run["gains"]),
             *(f"{100 * run['reached'][k]['share']:.0f} %" for k in ("travel", "speed", "torque")),
         ]
         for run in told["runs"]
     ]
-    return table(["run", "motion", "kp x", "travel", "speed", "torque"], rows, (2, 3, 4, 5))
+    return table(["run", "motion", "gains", "travel", "speed", "torque"], rows, (3, 4, 5))
 
 
 def _expected(plan: Plan, told: dict[str, Any]) -> list[str]:
@@ -121,8 +124,8 @@ def _pair_table(pairs: Sequence[dict[str, Any]], most: int) -> str:
         [
             escape(words_of(r["if"])),
             escape(words_of(r["not"])),
-            number(r["chi2"]["before"], 2),
-            number(r["chi2"]["after"], 2),
+            _chi2(r["chi2"]["before"]),
+            _chi2(r["chi2"]["after"]),
             "<span class='good'>yes</span>" if r["resolved"]["after"] else "<span class='bad'>no</span>",
         ]
         for r in shown[:most]
@@ -130,6 +133,10 @@ def _pair_table(pairs: Sequence[dict[str, Any]], most: int) -> str:
     open_ = sum(not r["resolved"]["after"] for r in shown)
     more = f"<p class='note'>{len(shown)} pairs, {open_} of them not expected to be told apart; the hardest first.</p>"
     return table(["if it is", "and this is fitted", "chi² now", "expected", "told apart"], cells, (2, 3)) + more
+
+
+def _chi2(value: float) -> str:
+    return "&lt; 0.1" if value < 0.1 else number(value, 2)
 
 
 def _usual_table(plan: Plan, told: dict[str, Any]) -> str:
@@ -176,7 +183,7 @@ def _limit_table(told: dict[str, Any]) -> str:
 def _page(plan: Plan, told: dict[str, Any], k: int) -> str:
     run = told["runs"][k]
     name = run_names(plan)[k]
-    gain = f", kp x {run['gain']:g}" if run["gain"] != 1 else ""
+    gain = f", {run['gains']}" if "kp" in run else ""
     parts = [
         f"<div class='head'><h2>Run {name}</h2><span class='tag'>runs/{name}.csv, {told['seconds']:g} s at "
         f"{told['rate']:g} Hz{gain}</span></div>",
@@ -194,12 +201,13 @@ def _page(plan: Plan, told: dict[str, Any], k: int) -> str:
 
 
 def _gain_words(told: dict[str, Any], run: dict[str, Any]) -> str:
-    if run["gain"] == 1:
+    """The gains to be set, where they are not the drives' own."""
+    if "kp" not in run:
         return ""
-    values = ", ".join(
-        f"{name} {number(kp)}" for name, kp in zip(told["joints"], run.get("kp", []), strict=False) if kp
-    )
-    return f"<p class='warn'>Set kp x {run['gain']:g} for this run: {escape(values)}. Write kp into the log's metadata.</p>"
+    rows = zip(told["joints"], run["kp"], run["kd"], strict=True)
+    values = "; ".join(f"{name} {number(kp)}, {number(kd)}" for name, kp, kd in rows if kp or kd)
+    words = f"Gains of this run, {run['gains']} (joint kp, kd): {values}. Write kp and kd into the log's metadata."
+    return f"<p class='warn'>{escape(words)}</p>"
 
 
 def _reached_table(run: dict[str, Any]) -> str:
@@ -235,8 +243,8 @@ def _checks(told: dict[str, Any], run: dict[str, Any]) -> str:
     if told["limits"]["stance"]:
         items.append("robot on its gantry, slack; feet flat, floor dry")
         items.append("log: base orientation, angular and linear velocity")
-    if run["gain"] != 1:
-        items.append(f"kp x {run['gain']:g} set, and set back afterwards")
+    if "kp" in run:
+        items.append(f"gains set ({run['gains']}), and set back afterwards")
     return "<ul class='check'>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>"
 
 
@@ -272,7 +280,8 @@ def _panel(plan: Plan, k: int, j: int) -> str:
     for value in labels:
         x, line = at(0.0, value)
         parts.append(
-            f"<text x='{x - 4:.1f}' y='{line + 3.5:.1f}' font-size='10' text-anchor='end' fill='{_FAINT}'>{value:.3g}</text>"
+            f"<text x='{x - 4:.1f}' y='{line + 3.5:.1f}' font-size='10' text-anchor='end' fill='{_FAINT}'>"
+            f"{value:.3g}</text>"
         )
     for edge in (low, high):
         if bottom <= edge <= top:
@@ -287,5 +296,5 @@ def _panel(plan: Plan, k: int, j: int) -> str:
             f"<text x='{x:.1f}' y='{height - 2:.1f}' font-size='10' text-anchor='middle' fill='{_FAINT}'>{t} s</text>"
         )
     parts.append(f"<polyline fill='none' stroke='{_LINE}' stroke-width='1.3' points='{points}'/>")
-    title = f"targets of {machine.joints[j]}"
-    return f"<svg viewBox='0 0 {width:.0f} {height:.0f}' role='img' aria-label='{escape(title, quote=True)}'>{''.join(parts)}</svg>"
+    title = escape(f"targets of {machine.joints[j]}", quote=True)
+    return f"<svg viewBox='0 0 {width:.0f} {height:.0f}' role='img' aria-label='{title}'>{''.join(parts)}</svg>"

@@ -8,11 +8,12 @@ from bumblebee.diagnosis.plan.document import words_of
 def summary(told: dict[str, Any]) -> str:
     """Runs with what they reach, pairs that are told apart, intervals before and after."""
     lines = [
-        f"{len(told['runs'])} runs of {told['seconds']:g} s at {told['rate']:g} Hz, safe on {len(told['safe_on'])} robots:"
+        f"{len(told['runs'])} runs of {told['seconds']:g} s at {told['rate']:g} Hz, "
+        f"safe on {len(told['safe_on'])} robots:"
     ]
     for run in told["runs"]:
         shares = ", ".join(f"{k} {100 * run['reached'][k]['share']:.0f} %" for k in ("travel", "speed", "torque"))
-        lines.append(f"  {run['run']}  kp x {run['gain']:g}  {run['motion']}  ({shares})")
+        lines.append(f"  {run['run']}  {run['gains']}  {run['motion']}  ({shares})")
     pairs = told["predicted"]["classes"]
     if pairs:
         before, after = (sum(row["resolved"][when] for row in pairs) for when in ("before", "after"))

@@ -27,8 +27,8 @@ class SafetyMargins:
     """Distance [m] that a foot may slide."""
     support: float = 0.2
     """Share of the support polygon's inner radius that centre of mass and zero-moment point keep from its edge."""
-    touch: float = 0.004
-    """Gap [m] below which a foot counts as in contact: a stiff sole lifts a corner by less than this at rest."""
+    touch: float = 0.001
+    """Gap [m] below which a foot's point counts as in contact: soft contacts give by as much."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ class Motions:
     """Half-width of small reversals [rad, m]: what backlash and hysteresis show in."""
     shrink: float = 0.75
     """Factor on the amplitude of a motion that is not safe."""
-    shrinks: int = 8
-    """Times that a motion is made smaller before it is given up: 0.75^8 is a tenth."""
+    shrinks: int = 12
+    """Times that a motion is made smaller before it is given up: 0.75^12 is a thirtieth."""
     travel: float = 0.6
     """Share of pi that a hinge without a range is not turned beyond by drives' gains alone; see `--travel`."""
 
@@ -113,6 +113,8 @@ class Information:
 
     windows: int = 12
     """Windows of a run that stand for all of its windows."""
+    few: int = 6
+    """The same for models of many degrees of freedom, where each costs a third of a second."""
     together: int = 12
     """Runs that are whitened at once: memory, a window of a humanoid has a factor of a megabyte."""
     prior: float = 10.0
@@ -133,7 +135,17 @@ class Information:
         "link_mass",
         "link_com",
     )
-    """Effects that any robot may have: what a plan without a diagnosis informs of."""
+    """Effects that any robot may have, which are asked about whatever a diagnosis found."""
+    fitted: tuple[str, ...] = (
+        "coulomb_friction",
+        "viscous_friction",
+        "armature",
+        "motor_strength",
+        "command_delay",
+        "encoder_offset",
+        "link_mass",
+    )
+    """Those of a joint and its body that widths are computed for, together: PACE's set, strength and mass."""
     confused: tuple[tuple[str, str], ...] = (
         ("viscous_friction", "kd"),
         ("motor_strength", "kp"),
