@@ -11,6 +11,7 @@ from bumblebee.diagnosis.simulation import Plant
 from bumblebee.diagnosis.thresholds.plan import SafetyMargins
 
 _NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+_NO_SERVOS = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,10 @@ class Surroundings:
         self.model.opt.disableflags &= ~_NO_CONTACTS
         self._data = mujoco.MjData(self.model)
         self.has_geometry = bool((awake & (self.model.body_weldid[self.model.geom_bodyid] != 0)).any())
+        # The same robot moved by torques instead of its servos, for what the floor must bear.
+        self._pushed = copy.copy(plant.model)
+        self._pushed.opt.disableflags |= _NO_SERVOS
+        self._forces, self._dof = mujoco.MjData(self._pushed), plant.dof
         self._place(rest)
         self._known = {_pair(c) for c in self._contacts()}
         self.feet = self._touching_world() if plant.floating else {}
@@ -42,35 +47,23 @@ class Surroundings:
         points = [p for some in self.feet.values() for p in some]
         self.radius = inner_radius(np.array(points)) if points else 0.0
 
-    def clash(self, qpos: np.ndarray, qvel: np.ndarray, period: float) -> Clash | None:
-        """The first thing wrong along states (n, nq), (n, nv), `period` s apart."""
+    def clash(self, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> Clash | None:
+        """The first thing wrong along states (n, nq), (n, nv) of joints that are driven with `torque` (n, J)."""
         if not self.has_geometry and not self._floating:
             return None
-        carried: list[_Carried] = []
-        for q, v in zip(qpos, qvel, strict=True):
+        for q, v, tau in zip(qpos, qvel, torque, strict=True):
             self._place(q)
-            if found := (self._unsteady() if self._floating else None) or self._too_near():
+            found = (self._unsteady() if self._floating else None) or self._too_near()
+            found = found or (self._out_of_support(q, v, tau) if self._floating else None)
+            if found:
                 return found
-            if self._floating:
-                carried.append(self._carried(v))
-        return self._out_of_support(carried, period) if self._floating else None
+        return None
 
     def _place(self, qpos: np.ndarray) -> None:
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, self._data)
         mujoco.mj_comPos(self.model, self._data)
         mujoco.mj_collision(self.model, self._data)
-
-    def _carried(self, qvel: np.ndarray) -> "_Carried":
-        data, base = self._data, self._base
-        data.qvel[:] = qvel
-        mujoco.mj_comVel(self.model, data)
-        mujoco.mj_subtreeVel(self.model, data)
-        points = [p for some in self._touching_world().values() for p in some]
-        return _Carried(
-            data.subtree_com[base].copy(), data.subtree_linvel[base].copy(), data.subtree_angmom[base].copy(),
-            np.array(points), float(np.mean([c.pos[2] for c in self._contacts()])),
-        )  # fmt: skip
 
     def _contacts(self) -> list[mujoco.MjContact]:
         return [self._data.contact[k] for k in range(self._data.ncon)]
@@ -118,44 +111,35 @@ class Surroundings:
                 return Clash(f"{name} slides by more than {1000 * self.rule.slide:.0f} mm")
         return None
 
-    def _out_of_support(self, carried: Sequence["_Carried"], period: float) -> Clash | None:
+    def _out_of_support(self, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> Clash | None:
         """Centre of mass or zero-moment point too near the edge of the support.
 
-        The zero-moment point is where the floor's forces must act for the whole robot's momentum and angular momentum
-        to change as they do (Vukobratovic).
+        On a level floor the zero-moment point is the centre of pressure: the mean place of the floor's normal forces.
         """
         least = self.rule.support * self.radius
-        centre = np.array([c.centre for c in carried])
-        moment = centre[:, :2].copy()
-        if len(carried) > 2:
-            rate = np.gradient(np.array([c.velocity for c in carried]), period, axis=0)
-            turn = np.gradient(np.array([c.angular for c in carried]), period, axis=0)
-            mass = float(self.model.body_subtreemass[self._base])
-            lift = float(np.linalg.norm(self.model.opt.gravity)) + rate[:, 2]
-            height = centre[:, 2] - np.array([c.floor for c in carried])
-            moment[:, 0] -= height * rate[:, 0] / lift + turn[:, 1] / (mass * lift)
-            moment[:, 1] -= height * rate[:, 1] / lift - turn[:, 0] / (mass * lift)
-        for name, path in (("centre of mass", centre[:, :2]), ("zero-moment point", moment)):
-            for point, c in zip(path, carried, strict=True):
-                if inside_by(point, c.support) < least:
-                    return Clash(f"the {name} comes within {1000 * least:.0f} mm of the edge of the support")
+        support = np.array([p for some in self._touching_world().values() for p in some])
+        if inside_by(self._data.subtree_com[self._base, :2], support) < least:
+            return Clash(f"the centre of mass comes within {1000 * least:.0f} mm of the edge of the support")
+        pressure, weight = self._pressure(qpos, qvel, torque)
+        if weight < self.rule.weight:
+            return Clash(f"the floor carries less than {100 * self.rule.weight:.0f} % of the weight")
+        if inside_by(pressure, support) < least:
+            return Clash(f"the zero-moment point comes within {1000 * least:.0f} mm of the edge of the support")
         return None
 
-
-@dataclass(frozen=True, eq=False)
-class _Carried:
-    """A standing robot at one time."""
-
-    centre: np.ndarray
-    """(3,) centre of mass [m]."""
-    velocity: np.ndarray
-    """(3,) of it [m/s]."""
-    angular: np.ndarray
-    """(3,) angular momentum about it [kg m^2/s]."""
-    support: np.ndarray
-    """(n, 2) points in contact with the floor [m]."""
-    floor: float
-    """Their height [m]."""
+    def _pressure(self, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, float]:
+        """Centre of pressure (2,) [m], and the normal forces as a share of the weight."""
+        model, data, force = self._pushed, self._forces, np.zeros(6)
+        data.qpos[:], data.qvel[:], data.qfrc_applied[self._dof] = qpos, qvel, torque
+        mujoco.mj_forward(model, data)
+        total, moment = 0.0, np.zeros(2)
+        for k in range(data.ncon):
+            bodies = model.body_weldid[model.geom_bodyid[data.contact[k].geom]]
+            if (bodies == 0).any():
+                mujoco.mj_contactForce(model, data, k, force)
+                total, moment = total + force[0], moment + force[0] * data.contact[k].pos[:2]
+        weight = model.body_subtreemass[self._base] * float(np.linalg.norm(model.opt.gravity))
+        return moment / max(total, 1e-9), total / weight
 
 
 def _pair(contact: mujoco.MjContact) -> tuple[int, int]:

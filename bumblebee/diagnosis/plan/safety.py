@@ -14,6 +14,7 @@ from bumblebee.diagnosis.plan.rehearsal import Rehearsed, rehearse
 from bumblebee.diagnosis.plan.unknowns import Case
 from bumblebee.diagnosis.thresholds.plan import PlanThresholds, SafetyMargins
 from bumblebee.errors import BadInput
+from bumblebee.sim.servo import servos_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +34,13 @@ def judge(
 ) -> list[Verdict]:
     """One verdict a run."""
     qpos, qvel = runs.qpos(machine.plant, machine.qpos), runs.qvel(machine.plant)
-    # A standing robot's momentum is differentiated: every tick of it.
+    torque = np.clip(runs.torque, -limits.torque, limits.torque)  # a run that asks for more is refused before
+    # What the floor must bear of a standing robot jumps with every target.
     every = 1 if machine.plant.floating else max(1, round(around.rule.every * machine.rate))
     out = []
     for r in range(len(runs.position)):
         verdict = _by_joint(machine, limits, runs, r, motions[r], around.rule)
-        if not verdict.reason and (clash := around.clash(qpos[r, ::every], qvel[r, ::every], every / machine.rate)):
+        if not verdict.reason and (clash := around.clash(qpos[r, ::every], qvel[r, ::every], torque[r, ::every])):
             verdict = Verdict(clash.reason, _carriers(machine, clash), verdict.reached)
         out.append(verdict)
     return out
@@ -153,8 +155,16 @@ def refuse_fallen(machine: Machine, start: Surroundings) -> None:
     where, expected = f"{machine.name}: start pose", "a robot that stands on the floor under its servos"
     if not start.feet:
         raise BadInput(where, expected, "one that touches nothing", _STAND)
-    if clash := start.clash(machine.qpos[None], np.zeros((1, machine.plant.model.nv)), 1.0):
+    if clash := start.clash(machine.qpos[None], np.zeros((1, machine.plant.model.nv)), _holding(machine)[None]):
         raise BadInput(where, expected, clash.reason, _STAND)
+
+
+def _holding(machine: Machine) -> np.ndarray:
+    """(J,) what the servos give at rest in the settled pose."""
+    plant = machine.plant
+    servos = servos_of(plant.model, [int(plant.model.joint(name).id) for name in machine.joints])
+    still = np.zeros(len(machine.home))
+    return servos.torque(machine.qpos[plant.qpos], still, machine.home * servos.gear)
 
 
 def refuse_unsteady(

@@ -27,6 +27,8 @@ class SafetyMargins:
     """Distance [m] that a foot may slide."""
     support: float = 0.2
     """Share of the support polygon's inner radius that centre of mass and zero-moment point keep from its edge."""
+    weight: float = 0.5
+    """Share of a standing robot's weight that the floor carries at least: with less its feet are about to lift."""
     touch: float = 0.001
     """Gap [m] below which a foot's point counts as in contact: soft contacts give by as much."""
 

@@ -141,8 +141,8 @@ def test_surroundings_tell_a_far_arm_from_a_near_one() -> None:
     stage = set_stage(mujoco.MjSpec.from_string(BLOCKED), "arm", LIMITS, None, None)
     around = Surroundings(stage.machine.plant, stage.machine.qpos, LIMITS.thresholds.plan.safety)
     away, into = np.zeros(3), np.array([0.0, 0.9, 0.0])
-    assert around.clash(away[None], away[None], 0.02) is None
-    assert "l3" in around.clash(into[None], away[None], 0.02).reason
+    assert around.clash(away[None], away[None], away[None]) is None
+    assert "l3" in around.clash(into[None], away[None], away[None]).reason
 
 
 def test_the_margin_of_support_is_the_distance_from_the_edge() -> None:
