@@ -36,6 +36,7 @@ from bumblebee.diagnosis.residuals import window_weights
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import KIND as SHAFT
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import LIKE as SHAFT_LIKE
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import best_elasticity, is_of_series
+from bumblebee.diagnosis.selection.proposals.setpoints import setpoint_swaps
 from bumblebee.diagnosis.selection.score_tests import Scores, score_tests
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial, try_one
@@ -52,7 +53,7 @@ def swap(run: SearchState) -> bool:
     taken = [(c,) for c in free] + (list(combinations(free, 2)) if len(free) <= rule.few else [])
     best: tuple[float, Fit, float] | None = None
     start = criterion(run.problem, run.fit)
-    for gone, new, z in chain(*(_tried(run, gone) for gone in taken), _twisted(run, free)):
+    for gone, new, z in chain(*(_tried(run, gone) for gone in taken), _twisted(run, free), _shaped(run, free)):
         gain = criterion(run.problem, new) - start
         margin = rule.clearly * rules.criterion.parameter if len(gone) == 1 else 0.0
         if gain <= max(margin, best[0] if best else margin):
@@ -104,6 +105,14 @@ def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[_Tried]:
         least = run.problem.thresholds.selection.swap.part * own
         trial = best_elasticity(run.problem, rest, run.candidates, run.weights, where, least)
         new = _refitted(run, rest, trial) if trial else None
+        if new:
+            yield gone, *new
+
+
+def _shaped(run: SearchState, free: Sequence[Candidate]) -> Iterator[_Tried]:
+    """Fits with what a drive makes of its targets in the place of what that passes for."""
+    for gone, rest, trial in setpoint_swaps(run, free):
+        new = _refitted(run, rest, trial)
         if new:
             yield gone, *new
 

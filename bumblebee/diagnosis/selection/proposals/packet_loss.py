@@ -20,6 +20,7 @@ from scipy.special import logsumexp
 from bumblebee.diagnosis.comparison import Holdout
 from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.proposals.setpoints import explains_more
 from bumblebee.diagnosis.selection.state import Loss, SearchState
 from bumblebee.diagnosis.simulation import Windows, residuals, vary
 from bumblebee.diagnosis.thresholds.proposals import PacketLoss
@@ -235,7 +236,7 @@ def _explained(before: np.ndarray, after: np.ndarray) -> float:
 def find_packet_loss(run: SearchState) -> bool:
     """Look for packet loss; if some commands never arrived, go on with those that did."""
     found = None if run.loss else packet_loss_of(run.problem, run.holdout, run.fit)
-    if found is None:
+    if found is None or explains_more(run, found[0].where, found[0].gain):
         return False
     run.loss, run.problem, run.holdout = found
     run.say(f"found lost commands on {run.loss.where or 'the whole robot'}: {run.loss.share:.4f}")
