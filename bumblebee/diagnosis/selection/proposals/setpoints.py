@@ -16,6 +16,7 @@ from bumblebee.diagnosis.candidates import Candidate, is_chosen
 from bumblebee.diagnosis.comparison import columns_without, criterion, linear_cost
 from bumblebee.diagnosis.estimation import Fit, LeftOver, gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.profile import profile, stepped
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, joint_chi_squares
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
@@ -24,8 +25,8 @@ from bumblebee.sim.effects import SETPOINTS, Effect
 TIMING = ("command_delay", "torque_lag", "encoder_delay", *SETPOINTS)
 # What else a drive that follows its targets late or slowly passes for.
 LIKE = (*TIMING, "kp", "kd", "motor_strength", "viscous_friction", "armature", "load_dependent_friction")
-Swapped = tuple[Sequence[Candidate], Fit, Trial]
-"""Names that are gone, the fit without them, and what is tried in their place."""
+Swapped = tuple[Fit, Trial]
+"""A fit without some names, and what is tried in their place."""
 
 
 def setpoint_swaps(run: SearchState, free: Sequence[Candidate]) -> Iterator[Swapped]:
@@ -44,7 +45,7 @@ def setpoint_swaps(run: SearchState, free: Sequence[Candidate]) -> Iterator[Swap
             least = run.problem.thresholds.selection.swap.part * own
             trial = best_setpoint(run.problem, rest, run.candidates, run.weights, where, least, kinds)
             if trial is not None:
-                yield gone, rest, trial
+                yield rest, trial
 
 
 def best_setpoint(
@@ -93,21 +94,18 @@ def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tupl
     """The best of a candidate's series on some windows: its gain there and parameters (P,)."""
     rule = some.thresholds.selection.proposals.setpoints
 
-    def best_of(tried: Sequence[np.ndarray]) -> tuple[float, np.ndarray]:
-        none, *others = some.residual([fit.effects, *(_with(fit, candidate, v) for v in tried)])
-        worth = [float(falls(some, none, r, usual).sum()) for r in others]
-        k = int(np.argmax(worth))
-        return worth[k], tried[k]
+    first = candidate.start
 
-    def near(values: np.ndarray, factors: Sequence[float]) -> list[np.ndarray]:
-        scaled = values[None] * np.ones((len(factors), 1))
-        scaled[:, 0] *= factors
-        return list(scaled)
+    def at(size: float) -> np.ndarray:
+        return np.array([size, *first[1:]])
 
-    best = best_of(near(candidate.start, rule.factors))
-    for ratio in rule.finer:
-        best = max(best, best_of(near(best[1], (1 / ratio, ratio))), key=lambda f: f[0])
-    return best
+    def gains(sizes: Sequence[float]) -> list[float]:
+        none, *others = some.residual([fit.effects, *(_with(fit, candidate, at(size)) for size in sizes)])
+        return [float(falls(some, none, r, usual).sum()) for r in others]
+
+    series = profile(gains, [float(first[0]) * factor for factor in rule.factors])
+    size, gain = stepped(lambda size: gains([size])[0], series.size, series.gain, rule.finer)
+    return gain, at(size)
 
 
 def explains_more(run: SearchState, where: str, gain: float) -> bool:
