@@ -160,7 +160,6 @@ class _OnJoint:
             for factor in rule.speed_limit:
                 yield self._make("torque_speed_limit", 1.0 / (factor * s.fastest[j]), start=(0.0,))
 
-
     def _limited_targets(self) -> Iterator[Candidate]:
         """Limits of what the drive makes of its targets, by how steep and how curved these are."""
         s, j, rule = self.scales, self.j, self.rules.drive

@@ -66,11 +66,13 @@ TRAITS: dict[str, Traits] = {
     "command_filter": Traits("command a step and log the servo's own set-point, or its position at 500 Hz"),
     "command_rate_limit": Traits(
         "command steps of several sizes: a limited rate takes longer for a larger one",
-        inverse=True, not_beside=("command_filter",),
+        inverse=True,
+        not_beside=("command_filter",),
     ),
     "command_profile": Traits(
         "command steps of several sizes: an acceleration that is limited takes longer by the root of the size",
-        inverse=True, not_beside=("command_filter", "command_rate_limit"),
+        inverse=True,
+        not_beside=("command_filter", "command_rate_limit"),
     ),
     "torque_lag": Traits("command steps and log the torque at 500 Hz", column="late", fine_steps=True),
     "encoder_delay": Traits("film the joint, or log a second encoder", column="late", fine_steps=True),

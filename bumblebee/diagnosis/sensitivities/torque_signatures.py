@@ -14,7 +14,16 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.sensitivities.impulse_responses import Path
 from bumblebee.diagnosis.sensitivities.latency_signatures import LATE, Late
-from bumblebee.diagnosis.simulation import Plant, Variation, Windows, bent_before, inputs_of, remember, setpoints_of, yielded
+from bumblebee.diagnosis.simulation import (
+    Plant,
+    Variation,
+    Windows,
+    bent_before,
+    inputs_of,
+    remember,
+    setpoints_of,
+    yielded,
+)
 from bumblebee.diagnosis.thresholds.sensitivities import TorqueSignatures
 from bumblebee.sim.effects import SETPOINTS, Effect, bent, runtime_hooks, sloped, spread_inertia
 from bumblebee.sim.servo import servos_of

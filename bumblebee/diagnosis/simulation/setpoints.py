@@ -92,7 +92,9 @@ def _at_first_command(windows: Windows, point: SetPoint) -> tuple[np.ndarray, np
     path = _paths(tuple(windows.source[i] for i in some), point)
     issued = [windows.source[i].time[k] for i, k in zip(windows.rollout, windows.start, strict=True)]
     firsts = np.array(issued) + windows.command_time[:, 0]
-    ticks = [int(np.searchsorted(windows.source[i].time, t - 1e-9)) for i, t in zip(windows.rollout, firsts, strict=True)]
+    ticks = [
+        int(np.searchsorted(windows.source[i].time, t - 1e-9)) for i, t in zip(windows.rollout, firsts, strict=True)
+    ]
     return path[rows, ticks, 0], path[rows, ticks, 1]
 
 

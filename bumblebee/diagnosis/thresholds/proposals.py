@@ -205,7 +205,7 @@ class PacketLoss:
 
     longest: int = 3
     """Lost commands in a row at most, in ticks."""
-    most_ticks: int = 11
+    most_ticks: int = 12
     """Ticks of a window: of more the patterns are too many, and single ticks too short to matter."""
     odd_power: float = 1.6
     """Whitened power of a window that a lost command may have spoilt."""
@@ -238,6 +238,8 @@ class PacketLoss:
     """Share of lost commands from which expectation and maximisation begin."""
     iterations: int = 60
     """Of these."""
+    rounds: int = 3
+    """Of finding nuisances beside the commands that arrived, and these beside the nuisances."""
 
 
 @dataclass(frozen=True)

@@ -128,7 +128,11 @@ if unsaid := set(_FIELDS) ^ _ACTS.keys():
     raise TypeError(
         f"bumblebee/sim/effects/hooks.py: _ACTS needs a row for each array of RuntimeHooks; not so: {unsaid}"
     )
-_ABSENT = {"speed_limit": np.inf, "target_rate": np.inf, "profile": np.inf}  # where an effect is not there; the others at 0
+_ABSENT = {
+    "speed_limit": np.inf,
+    "target_rate": np.inf,
+    "profile": np.inf,
+}  # where an effect is not there; the others at 0
 _LISTS = [f.name for f in fields(RuntimeHooks) if f.default == ()]
 
 

@@ -17,7 +17,7 @@ from bumblebee.diagnosis.comparison import columns_without, criterion, linear_co
 from bumblebee.diagnosis.estimation import Fit, LeftOver, gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.profile import profile, stepped
-from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, joint_chi_squares
+from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, joint_chi_squares, odd_joints
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.sim.effects import SETPOINTS, Effect
@@ -109,11 +109,9 @@ def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tupl
 
 
 def explains_more(run: SearchState, where: str, gain: float) -> bool:
-    """Whether a set-point explains more than a log-likelihood `gain` of the fitted windows, and so is to go before.
-
-    Commands that a joint (or "", the robot) seems to have lost may be commands that it follows late.
-    """
-    places = [where] if where else ["", *run.problem.plant.joints]
+    """Whether a set-point of a joint (or "", of any that is far off, or of all) raises `criterion` by more than `gain`."""
+    far = odd_joints(run.problem, run.fit.clean(run.problem))
+    places = [where] if where else ["", *(joint for joint, _ in far)]
     for place in places:
         timing = [c for c in run.fit.chosen if c.where == place and c.effect in TIMING]
         rest = columns_without(run.problem, run.fit, timing)
