@@ -24,7 +24,7 @@ NOT_UNDONE = {
     "torque_limit": "a torque that the motor does not have cannot be asked of it",
     "torque_speed_limit": "a torque that the motor does not have at speed cannot be asked of it",
     "dropped_commands": "that a command is lost is not known when it is sent",
-    "command_filter": "the target that undoes it runs ahead as fast as the reference turns, and carries its noise along",
+    "command_filter": "a target that undoes it runs ahead of the reference by its speed, with the noise of that",
     "command_rate_limit": "the drive follows no target faster",
     "command_profile": "the drive follows no target faster",
     "encoder_quantisation": "what the encoder rounds away is not known",

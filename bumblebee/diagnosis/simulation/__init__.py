@@ -21,7 +21,7 @@ from bumblebee.diagnosis.simulation.readings import (
     measured_readings,
     simulated_readings,
 )
-from bumblebee.diagnosis.simulation.setpoints import SetPoint, setpoints_of
+from bumblebee.diagnosis.simulation.setpoints import setpoints_of
 from bumblebee.diagnosis.simulation.simulate import Starts, at_ticks, inputs_of, residuals, threads, with_step
 from bumblebee.diagnosis.simulation.units import (
     KINDS,
@@ -45,7 +45,6 @@ __all__ = [
     "Layout",
     "Plant",
     "Recall",
-    "SetPoint",
     "Starts",
     "Variation",
     "Windows",

@@ -10,7 +10,7 @@ written anew, so that MuJoCo's implicit treatment of both stays. The others are 
 | torque_speed_limit | forcerange: limit (1 - v / speed) in the direction of motion |
 | thermal_fade, strength_drift | gains times 1 - rate int (torque / limit)^2 dt - rate t |
 | encoder_delay, encoder_quantisation | the servo's torque at the old, rounded reading instead of the present one |
-| command_filter, command_rate_limit, command_profile | the servo's torque at its set-point (`setpoints`) instead of the target |
+| command_filter, _rate_limit, _profile | the servo's torque at its set-point (`setpoints.py`), not at the target |
 | torque_lag | the servo's torque after dx/dt = (torque - x) / time, instead of the present one |
 | cogging | sine sin(periods q) + cosine cos(periods q) |
 | external_wrench | xfrc_applied |
@@ -233,7 +233,7 @@ class StepHooks:
         return out
 
     def _shaped(self, told: np.ndarray) -> np.ndarray:
-        """What the servos follow (n, J) of the controls that they were told: the mean of the set-point over the step."""
+        """What the servos follow (n, J) of the controls that they are told: the mean set-point over the step."""
         h, step, scale = self._h, self._step, np.maximum(np.abs(self.servos.gear), 1e-12)
         mean, at, pace = told, told, self._pace
         for kind, some, values in (

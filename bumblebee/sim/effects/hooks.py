@@ -19,8 +19,8 @@ from bumblebee.sim.effects.terms import Term, read_term
 
 Acts = Literal["reading", "command", "start", "target", "gain", "loss", "limit", "feedback", "torque", "rotor", "terms"]
 """What a hook changes: what sensors report; which commands arrive; what is set once as a world begins; or, before each
-physics step, what the drive makes of its targets, the servo's gains, the dry friction, the torque's limit, the servo's feedback, a torque beside it, the
-servo's torque on a rotor. What discovered terms change, each says."""
+physics step, the set-point of the servo, its gains, the dry friction, the torque's limit, the servo's feedback, a
+torque beside it, its torque on a rotor. What discovered terms change, each says."""
 _BEFORE_STEPS: tuple[Acts, ...] = ("target", "gain", "loss", "limit", "feedback", "torque", "rotor", "terms")
 
 

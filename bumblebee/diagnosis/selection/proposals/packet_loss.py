@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bumblebee.diagnosis.comparison import Holdout, criterion
-from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
+from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.proposals.setpoints import explains_more
 from bumblebee.diagnosis.selection.state import Loss, SearchState

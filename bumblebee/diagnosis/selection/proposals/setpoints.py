@@ -109,7 +109,7 @@ def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tupl
 
 
 def explains_more(run: SearchState, where: str, gain: float) -> bool:
-    """Whether a set-point of a joint (or "", of any that is far off, or of all) raises `criterion` by more than `gain`."""
+    """Whether a set-point of a joint ("": of all, or of any that is far off) raises `criterion` by more than `gain`."""
     far = odd_joints(run.problem, run.fit.clean(run.problem))
     places = [where] if where else ["", *(joint for joint, _ in far)]
     for place in places:
