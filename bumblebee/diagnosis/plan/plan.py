@@ -22,6 +22,7 @@ from bumblebee.diagnosis.plan.objective import Objective, imitations, objective_
 from bumblebee.diagnosis.plan.rehearsal import rehearse, settled
 from bumblebee.diagnosis.plan.safety import Safe, made_safe, refuse_fallen, refuse_none, refuse_unsteady
 from bumblebee.diagnosis.plan.unknowns import Case, cases_of
+from bumblebee.diagnosis.simulation import Plant
 from bumblebee.errors import BadInput
 
 
@@ -96,8 +97,8 @@ def _make_plan(
     machine = stage.machine
     lens = data = objective = None
     if session is not None:
-        lens = _lens(machine, session.rollouts, findings, horizon, config)
-        seen = machine.seen[Gain()]
+        seen = session.plant  # which knows the conditions that its rollouts were recorded under
+        lens = _lens(machine, seen, session.rollouts, findings, horizon, config)
         data = information_of(seen, machine.seen_layout, session.rollouts, lens, 2 * _windows(machine, config))
         objective = _objective(machine, lens, data.sum(axis=0), config, first=data.shape[1] - _rows(lens))
         stage = _with_rivals(stage, objective, data.sum(axis=0), findings, config)
@@ -108,7 +109,7 @@ def _make_plan(
     runs = rehearse(machine, safe.motions, effects, stage.step, rules.plan.motions.settle)
     logs = logs_of(machine, runs, safe.motions)
     if lens is None:
-        lens = _lens(machine, logs, findings, horizon, config)
+        lens = _lens(machine, machine.seen[Gain()], logs, findings, horizon, config)
     told = _told(machine, safe.motions, logs, lens, _windows(machine, config))
     total = data.sum(axis=0) if data is not None else np.zeros(told.shape[1:])
     if objective is None:
@@ -162,8 +163,9 @@ def _refuse_config(config: PlanConfig) -> None:
         raise BadInput("--rate", "5 to 5000 Hz", f"{config.rate:g}")
 
 
-def _lens(machine: Machine, rollouts: list, findings: Findings | None, horizon: float, config: PlanConfig) -> Lens:
-    seen = machine.seen[Gain()]
+def _lens(
+    machine: Machine, seen: Plant, rollouts: list, findings: Findings | None, horizon: float, config: PlanConfig
+) -> Lens:
     basis = basis_of(seen, rollouts, findings, config.thresholds)
     return lens_of(machine, seen, rollouts, basis, horizon, config.thresholds)
 
