@@ -3,7 +3,8 @@
 from bumblebee.diagnosis.plan.config import PlanConfig
 from bumblebee.diagnosis.plan.files import claim_plan, write_plan
 from bumblebee.diagnosis.plan.findings import findings_of, read_findings
-from bumblebee.diagnosis.plan.plan import Plan, make_plan, safe_pool, set_stage
+from bumblebee.diagnosis.plan.plan import Plan, make_plan
+from bumblebee.diagnosis.plan.pool import safe_pool, set_stage
 from bumblebee.diagnosis.plan.terminal import summary
 
 __all__ = [

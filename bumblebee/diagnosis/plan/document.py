@@ -230,6 +230,8 @@ def notes(plan: Plan) -> list[str]:
     ]
     if not plan.checked:
         out.append("the model has no geometry that can touch: look for collisions yourself, at low speed first")
+    for name in plan.left_out:
+        out.append(f"not rehearsed on {name}: it does not even rest in the start pose")
     for name in plan.basis.unasked:
         out.append(f"{name}: no candidate of this model stands for it; the plan does not ask about it")
     open_ = [row for row in classes(plan) if row["class"] in {f.name for f in plan.basis.found.values()}]

@@ -68,10 +68,11 @@ def _travel(
         low = np.where(told, np.maximum(low, machine.home - asked), low)
         high = np.where(told, np.minimum(high, machine.home + asked), high)
         said.append("--travel")
-    if session is not None and not (limited | told).all():
+    free = machine.moved & ~limited & ~told
+    if session is not None and free.any():
         seen = np.concatenate([r.joint_pos for r in session.rollouts])
-        low = np.where(limited | told, low, np.minimum(seen.min(axis=0), machine.home))
-        high = np.where(limited | told, high, np.maximum(seen.max(axis=0), machine.home))
+        low = np.where(~free, low, np.minimum(seen.min(axis=0), machine.home))
+        high = np.where(~free, high, np.maximum(seen.max(axis=0), machine.home))
         said.append("the range that the dataset covers")
     _require(machine, np.isfinite(low) & np.isfinite(high), "a range in the model", "--travel")
     inside = np.where(np.isfinite(high - low), rule.travel * (high - low), 0.0)
@@ -87,6 +88,7 @@ def _speed(machine: Machine, session: Session | None, config: PlanConfig) -> tup
     if session is not None:
         fastest = np.max([np.abs(r.joint_vel).max(axis=0) for r in session.rollouts], axis=0)
         said = "the fastest that the dataset shows"
+        fastest = np.where(machine.moved, fastest, np.inf)
         return np.where(np.isfinite(asked), asked, fastest), f"--speed, {said}" if np.isfinite(asked).any() else said
     _require(machine, np.isfinite(asked), "a speed limit, which MJCF has none of", "--speed")
     return np.where(np.isfinite(asked), asked, np.inf), "--speed"

@@ -1,6 +1,6 @@
 """The next experiment: safe runs, chosen to tell apart what a diagnosis could not and to narrow what it knows."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -12,18 +12,20 @@ from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.plan.basis import Basis, basis_of
 from bumblebee.diagnosis.plan.choose import choose
 from bumblebee.diagnosis.plan.config import Gain, PlanConfig
-from bumblebee.diagnosis.plan.contacts import Surroundings
 from bumblebee.diagnosis.plan.findings import Findings
 from bumblebee.diagnosis.plan.information import Lens, information_of, lens_of, logs_of
-from bumblebee.diagnosis.plan.limits import Limits, limits_of
-from bumblebee.diagnosis.plan.machine import Machine, make_machine
-from bumblebee.diagnosis.plan.motions import FAMILIES, Motion, Scope, draw_motion
+from bumblebee.diagnosis.plan.limits import Limits
+from bumblebee.diagnosis.plan.machine import Machine
+from bumblebee.diagnosis.plan.motions import Motion
 from bumblebee.diagnosis.plan.objective import Objective, imitations, objective_of
-from bumblebee.diagnosis.plan.rehearsal import rehearse, settled
-from bumblebee.diagnosis.plan.safety import Safe, made_safe, refuse_fallen, refuse_none, refuse_unsteady
+from bumblebee.diagnosis.plan.pool import refuse_none, resting, safe_pool, set_stage
+from bumblebee.diagnosis.plan.rehearsal import rehearse
+from bumblebee.diagnosis.plan.safety import Safe, made_safe
+from bumblebee.diagnosis.plan.stage import Stage
 from bumblebee.diagnosis.plan.unknowns import Case, cases_of
 from bumblebee.diagnosis.simulation import Plant
 from bumblebee.errors import BadInput
+from bumblebee.measured.rollout import Rollout
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,24 +51,13 @@ class Plan:
     """Why other candidates were given up -> how many."""
     checked: bool
     """Whether the model has geometry by which self-collision could be looked for."""
+    left_out: tuple[str, ...]
+    """Robots that cannot even rest in the start pose, so that no run is safe on them."""
 
     @property
     def basis(self) -> Basis:
         """The effects asked about."""
         return self.objective.basis
-
-
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """A robot with its limits, the cases that it must be safe in, and what motions are drawn within."""
-
-    machine: Machine
-    limits: Limits
-    around: Surroundings
-    cases: list[Case]
-    scope: Scope
-    step: float
-    """Of rehearsals [s]."""
 
 
 def make_plan(
@@ -82,6 +73,16 @@ def make_plan(
         return _make_plan(spec, name, config or PlanConfig(), session, findings, say)
 
 
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """What the data say already, and how more of it is valued."""
+
+    lens: Lens
+    objective: Objective
+    data: np.ndarray
+    """(N, N) information; zeros for nothing."""
+
+
 def _make_plan(
     spec: mujoco.MjSpec,
     name: str,
@@ -91,87 +92,45 @@ def _make_plan(
     say: Callable[[str], None],
 ) -> Plan:
     """The same on the threads that there are."""
-    horizon, rules = DiagnosisConfig().horizon, config.thresholds
     stage = set_stage(spec, name, config, session, findings)
+    known = None if session is None else _measured(stage.machine, session, findings, config)
+    if known is not None:
+        stage = _with_rivals(stage, known, findings, config)
     say(f"{len(stage.cases)} robots to be safe on; {config.pool} candidate motions")
-    machine = stage.machine
-    lens = data = objective = None
-    if session is not None:
-        seen = session.plant  # which knows the conditions that its rollouts were recorded under
-        lens = _lens(machine, seen, session.rollouts, findings, horizon, config)
-        data = information_of(seen, machine.seen_layout, session.rollouts, lens, 2 * _windows(machine, config))
-        objective = _objective(machine, lens, data.sum(axis=0), config, first=data.shape[1] - _rows(lens))
-        stage = _with_rivals(stage, objective, data.sum(axis=0), findings, config)
     safe = safe_pool(stage, config)
     refuse_none(safe, say)
     say(f"{len(safe.motions)} of them are safe; what they would tell")
     effects = findings.effects if findings else ()
-    runs = rehearse(machine, safe.motions, effects, stage.step, rules.plan.motions.settle)
-    logs = logs_of(machine, runs, safe.motions)
-    if lens is None:
-        lens = _lens(machine, machine.seen[Gain()], logs, findings, horizon, config)
-    told = _told(machine, safe.motions, logs, lens, _windows(machine, config))
-    total = data.sum(axis=0) if data is not None else np.zeros(told.shape[1:])
-    if objective is None:
-        objective = _objective(machine, lens, None, config, first=told.shape[1] - _rows(lens))
-    return _chosen(stage, safe, objective, total, told, config, findings, say)
+    runs = rehearse(stage.machine, safe.motions, effects, stage.step, stage.rules.motions.settle)
+    logs = logs_of(stage.machine, runs, safe.motions)
+    if known is None:
+        known = _unmeasured(stage.machine, logs, config)
+    told = _told(stage.machine, safe.motions, logs, known.lens, _windows(stage.machine, config))
+    return _chosen(stage, safe, known, told, (config, findings), say)
 
 
-def set_stage(
-    spec: mujoco.MjSpec, name: str, config: PlanConfig, session: Session | None, findings: Findings | None
-) -> Stage:
-    """The robot at rest in its start pose, where it is safe; `BadInput` where limits are unknown or it is not."""
-    _refuse_config(config)
-    rules = config.thresholds.plan
-    machine = make_machine(spec, name, session, config)
-    limits = limits_of(machine, session, config)
-    small = machine.plant.model.nv <= config.thresholds.dataset.time_steps.small_model
-    step = machine.steps[0] if small else machine.steps[1]
-    start = Surroundings(machine.plant, machine.qpos, rules.safety)
-    machine = settled(machine, step, rules.motions.settle)
-    refuse_fallen(machine, start)
-    around = Surroundings(machine.plant, machine.qpos, rules.safety)
-    cases = cases_of(machine, limits, findings, (), rules.unknowns)
-    refuse_unsteady(machine, limits, around, cases, rules, step)
-    support = _supporting(machine, around)
-    scope = Scope(machine.home, machine.moved, support, limits, machine.rate, config.seconds, rules.motions)
-    return Stage(machine, limits, around, cases, scope, step)
+def _measured(machine: Machine, session: Session, findings: Findings | None, config: PlanConfig) -> _Known:
+    """What a dataset says."""
+    seen = session.plant  # which knows the conditions that its rollouts were recorded under
+    lens = _lens(machine, seen, session.rollouts, findings, config)
+    budget = 2 * _windows(machine, config)
+    data = information_of(seen, machine.seen_layout, session.rollouts, lens, budget).sum(axis=0)
+    return _Known(lens, _objective(machine, lens, data, config, len(data) - lens.basis.slices[-1].stop), data)
 
 
-def safe_pool(stage: Stage, config: PlanConfig, families: tuple[str, ...] = FAMILIES) -> Safe:
-    """The candidate motions of a seed, as far as they are safe."""
-    gains = config.all_gains
-    motions = [
-        draw_motion(stage.scope, config.seed, k, gains[(k // len(families)) % len(gains)], families)
-        for k in range(config.pool)
-    ]
-    return made_safe(
-        stage.machine, stage.limits, stage.around, motions, stage.cases, config.thresholds.plan, stage.step
-    )
-
-
-def _refuse_config(config: PlanConfig) -> None:
-    rule = config.thresholds.plan.motions
-    least = rule.lead + 2 * rule.ramp + rule.rest + 1.0
-    if not least <= config.seconds <= 600:
-        raise BadInput("--seconds", f"{least:g} to 600: rests, ramps and a second between them", f"{config.seconds:g}")
-    every = (*config.gains, *config.damping)
-    if not config.gains or any(not 0.05 <= g <= 20 for g in every):
-        came = ", ".join(f"{g:g}" for g in every) or "none"
-        raise BadInput("--gains, --damping", "factors from 0.05 to 20", came)
-    if config.rate is not None and not 5 <= config.rate <= 5000:
-        raise BadInput("--rate", "5 to 5000 Hz", f"{config.rate:g}")
+def _unmeasured(machine: Machine, logs: Sequence[Rollout], config: PlanConfig) -> _Known:
+    """Nothing yet; the sizes of signals are those of the candidate runs."""
+    lens = _lens(machine, machine.seen[Gain()], logs, None, config)
+    one = information_of(machine.seen[Gain()], machine.seen_layout, logs[:1], lens, 1)[0]
+    objective = _objective(machine, lens, None, config, len(one) - lens.basis.slices[-1].stop)
+    return _Known(lens, objective, np.zeros_like(one))
 
 
 def _lens(
-    machine: Machine, seen: Plant, rollouts: list, findings: Findings | None, horizon: float, config: PlanConfig
+    machine: Machine, seen: Plant, rollouts: Sequence[Rollout], findings: Findings | None, config: PlanConfig
 ) -> Lens:
     basis = basis_of(seen, rollouts, findings, config.thresholds)
-    return lens_of(machine, seen, rollouts, basis, horizon, config.thresholds)
-
-
-def _rows(lens: Lens) -> int:
-    return lens.basis.slices[-1].stop
+    return lens_of(machine, seen, rollouts, basis, DiagnosisConfig().horizon, config.thresholds)
 
 
 def _objective(machine: Machine, lens: Lens, data: np.ndarray | None, config: PlanConfig, first: int) -> Objective:
@@ -184,13 +143,11 @@ def _objective(machine: Machine, lens: Lens, data: np.ndarray | None, config: Pl
     return objective_of(lens.basis, first, data, bodies, config.thresholds.plan)
 
 
-def _with_rivals(
-    stage: Stage, objective: Objective, data: np.ndarray, findings: Findings | None, config: PlanConfig
-) -> Stage:
+def _with_rivals(stage: Stage, known: _Known, findings: Findings | None, config: PlanConfig) -> Stage:
     """The stage with the rivals' robots among its cases, at the size at which each imitates what was found."""
-    rule, basis = config.thresholds.plan.unknowns, objective.basis
+    rule, basis = config.thresholds.plan.unknowns, known.lens.basis
     rivals, count = [], dict.fromkeys(basis.found, 0)
-    for (k, other), steps in imitations(objective, data).items():
+    for (k, other), steps in imitations(known.objective, known.data).items():
         if count[k] < rule.rivals:
             c = basis.candidates[other]
             values = c.start
@@ -199,7 +156,7 @@ def _with_rivals(
             rivals.append((basis.found[k], c, c.clip(values)))
             count[k] += 1
     cases = cases_of(stage.machine, stage.limits, findings, rivals, rule)
-    return Stage(stage.machine, stage.limits, stage.around, cases, stage.scope, stage.step)
+    return resting(stage, cases)
 
 
 def _windows(machine: Machine, config: PlanConfig) -> int:
@@ -222,48 +179,30 @@ def _told(machine: Machine, motions: list[Motion], logs: list, lens: Lens, budge
 def _chosen(
     stage: Stage,
     safe: Safe,
-    objective: Objective,
-    data: np.ndarray,
+    known: _Known,
     told: np.ndarray,
-    config: PlanConfig,
-    findings: Findings | None,
+    asked: tuple[PlanConfig, Findings | None],
     say: Callable[[str], None],
 ) -> Plan:
     """The best runs that are safe in fine steps, too; a run that is not is left out and the choice made again."""
+    config, findings = asked
     shut: list[int] = []
     while True:
-        picked = choose(objective, data, told, config.runs, shut)
+        picked = choose(known.objective, known.data, told, config.runs, shut)
         if not picked:
-            raise BadInput(
-                "plan", "a motion that is safe in fine steps", "none", "Ask for smaller --travel or --speed."
-            )
-        some = [safe.motions[r] for r in picked]
-        fine = stage.machine.steps[0]
+            raise BadInput("plan", "a motion that is safe in fine steps", "none", "Ask for less --travel or --speed.")
+        some, fine = [safe.motions[r] for r in picked], stage.machine.steps[0]
         if fine == stage.step:
             reached = safe.reached[picked]
             break
         say("the chosen runs again, in fine steps")
-        again = made_safe(
-            stage.machine, stage.limits, stage.around, some, stage.cases, config.thresholds.plan, fine, shrinks=0
-        )
+        again = made_safe(stage, some, fine, shrinks=0)
         if len(again.motions) == len(some):
             reached = again.reached
             break
         kept = {m.number for m in again.motions}
         shut += [r for r in picked if safe.motions[r].number not in kept]
     return Plan(
-        stage.machine, stage.limits, config, findings, stage.cases, some, reached, objective, data, told[picked],
-        dict(safe.refused), stage.around.has_geometry,
+        stage.machine, stage.limits, config, findings, stage.cases, some, reached, known.objective, known.data,
+        told[picked], dict(safe.refused), stage.around.has_geometry, stage.left_out,
     )  # fmt: skip
-
-
-def _supporting(machine: Machine, around: Surroundings) -> np.ndarray:
-    """(J,) bool: joints between a standing base and the world that its feet touch."""
-    model = machine.plant.model
-    below = set()
-    for foot in around.feet:
-        body = int(foot)
-        while body:
-            below.add(body)
-            body = int(model.body_parentid[body])
-    return np.array([int(model.jnt_bodyid[model.joint(name).id]) in below for name in machine.joints])

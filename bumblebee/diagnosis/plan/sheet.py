@@ -50,7 +50,7 @@ def _front(plan: Plan, told: dict[str, Any]) -> str:
         f"<p class='lead'>{runs} runs of {seconds:g} s, position targets at {told['rate']:g} Hz, followed by "
         f"{escape(command['follow'])}.</p>",
         f"<p class='note'>seed {told['seed']}, sha256 {told['sha256'][:16]}</p>",
-        "".join(f"<p class='warn'>{escape(note)}</p>" for note in told["notes"][1:]),
+        "".join(f"<p class='warn'>{escape(_sentence(note))}</p>" for note in told["notes"][1:]),
         _safe_words(told),
         "<h3>Runs</h3>",
         _run_table(told),
@@ -59,9 +59,13 @@ def _front(plan: Plan, told: dict[str, Any]) -> str:
         _limit_table(told),
         f"<p class='note'>From: {escape('; '.join(f'{k}: {v}' for k, v in told['limits']['from'].items()))}. "
         "Margins are taken off already.</p>",
-        f"<p class='note'>{escape(told['notes'][0][0].upper() + told['notes'][0][1:])}.</p>",
+        f"<p class='note'>{escape(_sentence(told['notes'][0]))}</p>",
     ]
     return "\n".join(parts)
+
+
+def _sentence(note: str) -> str:
+    return f"{note[0].upper()}{note[1:]}."
 
 
 def _safe_words(told: dict[str, Any]) -> str:
@@ -131,7 +135,7 @@ def _pair_table(pairs: Sequence[dict[str, Any]], most: int) -> str:
         for r in shown[:most]
     ]
     open_ = sum(not r["resolved"]["after"] for r in shown)
-    more = f"<p class='note'>{len(shown)} pairs, {open_} of them not expected to be told apart; the hardest first.</p>"
+    more = f"<p class='note'>The hardest first; of {len(shown)} pairs {open_} not expected to be told apart.</p>"
     return table(["if it is", "and this is fitted", "chi² now", "expected", "told apart"], cells, (2, 3)) + more
 
 
@@ -188,8 +192,9 @@ def _page(plan: Plan, told: dict[str, Any], k: int) -> str:
         f"<div class='head'><h2>Run {name}</h2><span class='tag'>runs/{name}.csv, {told['seconds']:g} s at "
         f"{told['rate']:g} Hz{gain}</span></div>",
         f"<p class='lead'>{escape(run['motion'][0].upper() + run['motion'][1:])}.</p>",
+        f"<p>Start and end: {escape(_start_words(told))}.</p>",
         _gain_words(told, run),
-        f"<div class='panels'>{''.join(_panels(plan, k))}</div>",
+        f"<div class='panels'>{''.join(_panels(plan, k, told['units']))}</div>",
         "<h3>Reached in the worst of all rehearsals</h3>",
         _reached_table(run),
         *_purpose(run),
@@ -198,6 +203,14 @@ def _page(plan: Plan, told: dict[str, Any], k: int) -> str:
         "<p>Made at <span class='write'></span> by <span class='write'></span> log <span class='write'></span></p>",
     ]
     return f"<section>{''.join(parts)}</section>\n"
+
+
+def _start_words(told: dict[str, Any]) -> str:
+    """The start pose; of many joints those that are not at zero."""
+    named = {name: value for name, value in told["start"].items() if len(told["start"]) <= 8 or abs(value) > 1e-6}
+    words = [f"{name} {number(value)} {told['units'][name]['position']}" for name, value in named.items()]
+    rest = ", all others at 0" if len(named) < len(told["start"]) else ""
+    return ", ".join(words) + rest
 
 
 def _gain_words(told: dict[str, Any], run: dict[str, Any]) -> str:
@@ -248,15 +261,15 @@ def _checks(told: dict[str, Any], run: dict[str, Any]) -> str:
     return "<ul class='check'>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>"
 
 
-def _panels(plan: Plan, k: int) -> list[str]:
+def _panels(plan: Plan, k: int, units: dict[str, dict[str, str]]) -> list[str]:
     """Drawings of the targets of the joints that move most, in the joints' order."""
     machine, motion = plan.machine, plan.motions[k]
     span = np.ptp(motion.targets, axis=0) / np.maximum(plan.limits.high - plan.limits.low, 1e-9)
     drawn = [int(j) for j in np.argsort(-span, kind="stable")[:_PANELS] if machine.moved[j] and span[j] > 1e-3]
-    return [_panel(plan, k, j) for j in sorted(drawn)]
+    return [_panel(plan, k, j, units[machine.joints[j]]["position"]) for j in sorted(drawn)]
 
 
-def _panel(plan: Plan, k: int, j: int) -> str:
+def _panel(plan: Plan, k: int, j: int, unit: str) -> str:
     """One joint's targets over time, with the ends of its travel where they are near."""
     machine, motion = plan.machine, plan.motions[k]
     y = motion.targets[:, j]
@@ -272,7 +285,7 @@ def _panel(plan: Plan, k: int, j: int) -> str:
 
     every = max(1, len(y) // 400)
     points = " ".join(f"{a:.1f},{b:.1f}" for a, b in (at(t, v) for t, v in zip(time[::every], y[::every], strict=True)))
-    parts = [f"<text x='{left}' y='11' font-size='11' fill='{_INK}'>{escape(machine.joints[j])}</text>"]
+    parts = [f"<text x='{left}' y='11' font-size='11' fill='{_INK}'>{escape(machine.joints[j])} [{unit}]</text>"]
     for value in (float(y.min()), float(machine.home[j]), float(y.max())):
         x, line = at(0.0, value)
         parts.append(f"<line x1='{x:.1f}' x2='{width - 6:.1f}' y1='{line:.1f}' y2='{line:.1f}' stroke='{_GRID}'/>")

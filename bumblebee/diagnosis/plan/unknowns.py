@@ -19,6 +19,8 @@ class Case:
 
     name: str
     effects: Sequence[Effect]
+    must: bool = True
+    """Whether it must rest in the start pose; ends of intervals and rivals that cannot are not this robot."""
 
 
 def cases_of(
@@ -47,11 +49,11 @@ def cases_of(
     for finding in findings.listed:
         rest = [e for e in findings.effects if e is not finding.found]
         for end, values in zip(("lower", "upper"), finding.ends(rule.beyond), strict=True):
-            cases.append(Case(f"{finding.name} at the {end} end of its interval", [*rest, values]))
+            cases.append(Case(f"{finding.name} at the {end} end of its interval", [*rest, values], must=False))
     for finding, candidate, values in rivals:
         rest = [e for e in findings.effects if e is not finding.found]
         name = f"{candidate.effect} {candidate.where}".strip()
-        cases.append(Case(f"{name} in the place of {finding.name}", [*rest, candidate.at(values)]))
+        cases.append(Case(f"{name} in the place of {finding.name}", [*rest, candidate.at(values)], must=False))
     return cases
 
 

@@ -77,8 +77,6 @@ class Motions:
     """Factor on the amplitude of a motion that is not safe."""
     shrinks: int = 12
     """Times that a motion is made smaller before it is given up: 0.75^12 is a thirtieth."""
-    travel: float = 0.6
-    """Share of pi that a hinge without a range is not turned beyond by drives' gains alone; see `--travel`."""
 
 
 @dataclass(frozen=True)
@@ -183,8 +181,6 @@ class Choice:
     """Weight of halving the mean width of those of all usual effects: what was named may be the wrong name."""
     exchanges: int = 3
     """Passes in which each chosen run is held against all others."""
-    wide: float = 0.5
-    """Relative half-width of an interval above which it is listed as wide."""
 
 
 @dataclass(frozen=True)

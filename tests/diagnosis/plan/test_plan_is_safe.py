@@ -72,7 +72,7 @@ def test_a_motion_that_breaks_a_limit_is_made_smaller_and_then_keeps_it() -> Non
     stage = set_stage(mujoco.MjSpec.from_string(XML), "arm", LIMITS, None, None)
     narrow = replace(stage.limits, speed=np.full(3, 0.3))
     motions = [draw_motion(stage.scope, 0, k) for k in range(5)]
-    safe = made_safe(stage.machine, narrow, stage.around, motions, stage.cases, LIMITS.thresholds.plan, stage.step)
+    safe = made_safe(replace(stage, limits=narrow), motions)
     assert safe.motions
     assert all((new.amplitude < motions[new.number].amplitude).any() for new in safe.motions)
     model = mujoco.MjModel.from_xml_string(XML)
@@ -96,7 +96,7 @@ def test_runs_keep_clear_of_a_post_beside_the_arm() -> None:
     motions = [draw_motion(stage.scope, 0, k) for k in range(8)]
     model = mujoco.MjModel.from_xml_string(BLOCKED)
     home = stage.machine.home
-    safe = made_safe(stage.machine, stage.limits, stage.around, motions, stage.cases[:1], config.thresholds.plan, 0.005)
+    safe = made_safe(replace(stage, cases=stage.cases[:1]), motions, 0.005)
     assert any(near(model, follow(model, home, m.targets)[0]) <= 0 for m in motions)
     assert safe.motions
     assert all(near(model, follow(model, home, m.targets)[0]) > 0.0 for m in safe.motions)
