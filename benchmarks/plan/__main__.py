@@ -12,6 +12,7 @@ import argparse
 import json
 import sys
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -44,7 +45,8 @@ def run(options: argparse.Namespace) -> None:
     done = {row["case"] for row in read_lines(options.out)} if options.out.exists() else set()
     every = [case for case in cases(options.seed, options.cases) if case.number not in done]
     left = [c for c in every if not options.only or {c.kind, c.poor, str(c.number)} & set(options.only.split(","))]
-    left = left[: options.limit]
+    gains = {name: tuple(float(x) for x in getattr(options, name).split(",") if x) for name in ("gains", "damping")}
+    left = [replace(case, **gains) for case in left[: options.limit]]
     stamp = {"seed": options.seed, "commit": commit()}
     print(f"{len(left)} cases", flush=True)
     options.out.parent.mkdir(parents=True, exist_ok=True)
@@ -123,6 +125,8 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--cases", type=int, default=200, help="length of the list of cases")
     parser.add_argument("--workers", type=int, default=1, help="processes, one core each")
     parser.add_argument("--limit", type=int, default=None, help="cases at most")
+    parser.add_argument("--gains", default="1", help="factors on kp that planned runs may have, as 0.6,1")
+    parser.add_argument("--damping", default="", help="factors on kd that planned runs may have besides, as 0.5")
     parser.add_argument("--only", metavar="A,B", help="kinds, poor datasets or case numbers")
     parser.add_argument("--table", type=Path, nargs="+", metavar="FILE", help="print the table of results and end")
     return parser.parse_args(argv)

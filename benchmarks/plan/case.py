@@ -14,12 +14,12 @@ from benchmarks.undeclared.excite import HZ
 from benchmarks.undeclared.flight import Flight, fly, rollouts
 from benchmarks.undeclared.lottery import Case as Wanted
 from benchmarks.undeclared.robots import declared
-from bumblebee.deploy.undeclared.declared import Declared
+from bumblebee.deploy.undeclared.declared import Declared, describe
 from bumblebee.deploy.undeclared.kinds import CATALOGUE, fits
 from bumblebee.deploy.undeclared.law import Law
 from bumblebee.diagnosis.dataset import Session, make_session
 from bumblebee.diagnosis.diagnose import Diagnosis, diagnose
-from bumblebee.diagnosis.plan import Plan, PlanConfig, findings_of, make_plan, safe_pool, set_stage
+from bumblebee.diagnosis.plan import Gain, Motion, Plan, PlanConfig, findings_of, make_plan, safe_pool, set_stage
 from bumblebee.measured.rollout import Rollout
 
 VERSION = 1
@@ -39,6 +39,10 @@ class PlanCase:
     number: int
     kind: str
     poor: str
+    gains: tuple[float, ...] = (1.0,)
+    """Factors on kp that planned runs may have."""
+    damping: tuple[float, ...] = ()
+    """Factors on kd."""
 
 
 def cases(seed: int, count: int) -> list[PlanCase]:
@@ -100,18 +104,24 @@ def _run(case: PlanCase, seed: int) -> dict[str, Any]:
     if line["before"]["resolved"]:
         return line | {"skipped": "the poor data resolve it"}
     config = PlanConfig(
-        runs=RUNS, seconds=RUN_SECONDS, speed={"": SPEED}, travel={"": TRAVEL}, seed=int(rng.integers(1 << 31))
-    )
+        runs=RUNS, seconds=RUN_SECONDS, speed={"": SPEED}, travel={"": TRAVEL}, seed=int(rng.integers(1 << 31)),
+        gains=case.gains, damping=case.damping,
+    )  # fmt: skip
     began = time.monotonic()
     found = findings_of(before.document, before.effects)
     plan = make_plan(robot.spec, "arm", config, _session(robot, shown), found)
     line["plan_seconds"] = round(time.monotonic() - began, 1)
     line["predicted"] = _predicted(plan)
     random = _random(robot, config, _session(robot, shown), found)
-    for name, targets in (("planned", plan_targets(plan)), ("random", random)):
-        flight = fly(robot, [law], Targets(targets, plan.machine.qpos), rng)
-        line[f"kept_{name}"] = _kept(plan, flight)
-        both = [*shown, *rollouts(robot, flight, 1.0, rng, "x")]
+    for name, motions in (("planned", plan.motions), ("random", random)):
+        flights = [
+            (at, fly(at, [law], Targets(motion.targets[:, None], plan.machine.qpos), rng))
+            for motion in motions
+            for at in [robot_at(robot, motion.gain)]
+        ]
+        line[f"kept_{name}"] = _kept(plan, [flight for _, flight in flights])
+        logs = [rollouts(at, flight, 1.0, rng, f"x{k}") for k, (at, flight) in enumerate(flights)]
+        both = [*shown, *(log for some in logs for log in some)]
         line[name] = score(truth, diagnose(_session(robot, both)), line["before"])
     return line
 
@@ -131,32 +141,38 @@ def _poor(case: PlanCase, robot: Declared, rng: np.random.Generator) -> tuple[di
     return truth, law, rollouts(robot, run([law]), 1.0, rng, "r")
 
 
-def plan_targets(plan: Plan) -> np.ndarray:
-    """(T, R, J) targets of a plan's runs."""
-    return np.stack([motion.targets for motion in plan.motions], axis=1)
+def robot_at(robot: Declared, gain: Gain) -> Declared:
+    """The robot with its servos' gains set to other values, which its logs state."""
+    if gain == Gain():
+        return robot
+    spec = robot.spec.copy()
+    for actuator in spec.actuators:
+        bias, first = actuator.biasprm.copy(), actuator.gainprm.copy()
+        first[0], bias[1], bias[2] = gain.kp * first[0], gain.kp * bias[1], gain.kd * bias[2]
+        actuator.gainprm, actuator.biasprm = first, bias
+    return describe(robot.name, spec)
 
 
-def _random(robot: Declared, config: PlanConfig, session: Session, found: Any) -> np.ndarray:
+def _random(robot: Declared, config: PlanConfig, session: Session, found: Any) -> list[Motion]:
     """As many random multisines of the same length, within the same limits, safe on the same robots."""
-    other = replace(config, pool=RUNS + 4, seed=config.seed + 1)
+    other = replace(config, pool=RUNS + 4, seed=config.seed + 1, gains=(1.0,), damping=())
     stage = set_stage(robot.spec, "arm", other, session, found)
     safe = safe_pool(stage, other, ("multisine",)).motions[:RUNS]
     if len(safe) < RUNS:
         raise ValueError("too few random motions are safe")
-    return np.stack([motion.targets for motion in safe], axis=1)
+    return safe
 
 
-def _kept(plan: Plan, flight: Flight) -> dict[str, float]:
-    """Largest shares of the plan's limits that the true robot reached."""
-    limits, joints = plan.limits, len(plan.machine.joints)
-    q, v = flight.own_qpos[..., :joints], flight.qvel[..., -joints:]
-    home = plan.machine.home
-    room = np.where(q > home, limits.high - home, home - limits.low)
-    return {
-        "travel": float((np.abs(q - home) / room).max()),
-        "speed": float((np.abs(v) / limits.speed).max()),
-        "torque": float((np.abs(flight.torque) / limits.torque).max()),
-    }
+def _kept(plan: Plan, flights: Sequence[Flight]) -> dict[str, float]:
+    """Largest shares of the plan's limits that the true robot reached, by its readings."""
+    limits, home, joints = plan.limits, plan.machine.home, len(plan.machine.joints)
+    out = dict.fromkeys(("travel", "speed", "torque"), 0.0)
+    for flight in flights:
+        q, v = flight.qpos[..., -joints:], flight.qvel[..., -joints:]
+        room = np.where(q > home, limits.high - home, home - limits.low)
+        shares = np.abs(q - home) / room, np.abs(v) / limits.speed, np.abs(flight.torque) / limits.torque
+        out = {name: max(out[name], float(share.max())) for name, share in zip(out, shares, strict=True)}
+    return out
 
 
 def _predicted(plan: Plan) -> dict[str, Any]:
@@ -164,6 +180,7 @@ def _predicted(plan: Plan) -> dict[str, Any]:
     return {
         "classes": plan.objective.resolved(total),
         "families": [m.family for m in plan.motions],
+        "gains": [str(m.gain) for m in plan.motions],
         "unasked": list(plan.basis.unasked),
         "kept": float(plan.reached.max()),
     }

@@ -33,7 +33,7 @@ NO_THRESHOLDS = {
     "simulation/units.py": {"MEASURES"},  # factors of units
     "candidates/enumerate.py": {"_AXES"},  # indices
     "plan/rehearsal.py": {"_BEFORE", "_TOGETHER"},  # rows of padding, memory
-    "plan/sheet.py": {"_PANELS"},  # what fits a page
+    "plan/drawing.py": {"_PANELS"},  # what fits a page
     "residuals/problem.py": {"_GROUP"},  # memory
     "selection/proposals/packet_loss.py": {"_HALF"},  # half of the chi-square distribution's 95 % quantile
 }

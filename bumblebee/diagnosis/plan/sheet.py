@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-import numpy as np
-
-from bumblebee.diagnosis.plan.document import run_names, words_of
+from bumblebee.diagnosis.plan.document import run_names
+from bumblebee.diagnosis.plan.drawing import panels
 from bumblebee.diagnosis.plan.plan import Plan
+from bumblebee.diagnosis.plan.predicted import words_of
 from bumblebee.diagnosis.report import number, table
 
-_PANELS = 12  # joints drawn of a run: what fits a page
 _STYLE = """@page{size:A4;margin:13mm}:root{color-scheme:light}
 body{font:13px/1.45 system-ui,-apple-system,'Segoe UI',sans-serif;color:#1d2430;background:#fff;margin:0 auto;
 max-width:47rem;padding:1.2rem}h1{font-size:1.5rem;margin:0 0 .2rem}h2{font-size:1.2rem;margin:0}
@@ -30,7 +29,6 @@ ul.check li::before{content:'';position:absolute;left:0;top:.28rem;width:.8rem;h
 .write{border-bottom:1px solid #9aa3b5;display:inline-block;min-width:9rem}.good{color:#1b8a6b}.bad{color:#c8553d}
 .warn{border-left:4px solid #c8553d;background:#fbeeea;padding:.4rem .8rem;margin:.5rem 0}
 @media print{body{max-width:none;padding:0}section{border:0;padding:0;margin:0}a{color:inherit}}"""
-_INK, _GRID, _FAINT, _LINE, _EDGE = "#1d2430", "#e4e7ee", "#6b7385", "#1f5fa8", "#c8553d"
 
 
 def sheet(plan: Plan, told: dict[str, Any]) -> str:
@@ -194,7 +192,7 @@ def _page(plan: Plan, told: dict[str, Any], k: int) -> str:
         f"<p class='lead'>{escape(run['motion'][0].upper() + run['motion'][1:])}.</p>",
         f"<p>Start and end: {escape(_start_words(told))}.</p>",
         _gain_words(told, run),
-        f"<div class='panels'>{''.join(_panels(plan, k, told['units']))}</div>",
+        f"<div class='panels'>{''.join(panels(plan, k, told['units']))}</div>",
         "<h3>Reached in the worst of all rehearsals</h3>",
         _reached_table(run),
         *_purpose(run),
@@ -259,55 +257,3 @@ def _checks(told: dict[str, Any], run: dict[str, Any]) -> str:
     if "kp" in run:
         items.append(f"gains set ({run['gains']}), and set back afterwards")
     return "<ul class='check'>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>"
-
-
-def _panels(plan: Plan, k: int, units: dict[str, dict[str, str]]) -> list[str]:
-    """Drawings of the targets of the joints that move most, in the joints' order."""
-    machine, motion = plan.machine, plan.motions[k]
-    span = np.ptp(motion.targets, axis=0) / np.maximum(plan.limits.high - plan.limits.low, 1e-9)
-    drawn = [int(j) for j in np.argsort(-span, kind="stable")[:_PANELS] if machine.moved[j] and span[j] > 1e-3]
-    return [_panel(plan, k, j, units[machine.joints[j]]["position"]) for j in sorted(drawn)]
-
-
-def _panel(plan: Plan, k: int, j: int, unit: str) -> str:
-    """One joint's targets over time, with the ends of its travel where they are near."""
-    machine, motion = plan.machine, plan.motions[k]
-    y = motion.targets[:, j]
-    time = np.arange(len(y)) / machine.rate
-    low, high = float(plan.limits.low[j]), float(plan.limits.high[j])
-    room = 0.08 * max(float(np.ptp(y)), 1e-3)
-    bottom, top = float(y.min()) - room, float(y.max()) + room
-    width, height, left, above = 340.0, 112.0, 44.0, 16.0
-
-    def at(t: float, value: float) -> tuple[float, float]:
-        share = (top - value) / (top - bottom)
-        return left + t / time[-1] * (width - left - 6), above + share * (height - above - 16)
-
-    every = max(1, len(y) // 400)
-    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in (at(t, v) for t, v in zip(time[::every], y[::every], strict=True)))
-    parts = [f"<text x='{left}' y='11' font-size='11' fill='{_INK}'>{escape(machine.joints[j])} [{unit}]</text>"]
-    for value in (float(y.min()), float(machine.home[j]), float(y.max())):
-        x, line = at(0.0, value)
-        parts.append(f"<line x1='{x:.1f}' x2='{width - 6:.1f}' y1='{line:.1f}' y2='{line:.1f}' stroke='{_GRID}'/>")
-    labels = [float(y.max()), float(y.min())]
-    for value in labels:
-        x, line = at(0.0, value)
-        parts.append(
-            f"<text x='{x - 4:.1f}' y='{line + 3.5:.1f}' font-size='10' text-anchor='end' fill='{_FAINT}'>"
-            f"{value:.3g}</text>"
-        )
-    for edge in (low, high):
-        if bottom <= edge <= top:
-            x, line = at(0.0, edge)
-            parts.append(
-                f"<line x1='{x:.1f}' x2='{width - 6:.1f}' y1='{line:.1f}' y2='{line:.1f}' stroke='{_EDGE}' "
-                "stroke-dasharray='4 3'/>"
-            )
-    for t in range(0, int(time[-1]) + 1, max(1, int(time[-1]) // 4)):
-        x, _ = at(float(t), top)
-        parts.append(
-            f"<text x='{x:.1f}' y='{height - 2:.1f}' font-size='10' text-anchor='middle' fill='{_FAINT}'>{t} s</text>"
-        )
-    parts.append(f"<polyline fill='none' stroke='{_LINE}' stroke-width='1.3' points='{points}'/>")
-    title = escape(f"targets of {machine.joints[j]}", quote=True)
-    return f"<svg viewBox='0 0 {width:.0f} {height:.0f}' role='img' aria-label='{title}'>{''.join(parts)}</svg>"

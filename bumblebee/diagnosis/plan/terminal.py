@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from bumblebee.diagnosis.plan.document import words_of
+from bumblebee.diagnosis.plan.predicted import words_of
 
 
 def summary(told: dict[str, Any]) -> str:
