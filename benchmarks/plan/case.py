@@ -212,6 +212,7 @@ def score(truth: dict[str, Any], found: Diagnosis, before: dict[str, Any] | None
         ),
         "first": first,
         "class": members,
+        "equivalent": [f"{o['effect']} {' '.join(o['where'])}".strip() for e in exact for o in e["equivalent"]],
         "resolved": first and members == 0,
         "smaller": first and (members == 0 or (was is not None and members is not None and members < was)),
         "width": width,

@@ -88,11 +88,20 @@ class Objective:
     def resolved(self, total: np.ndarray) -> dict[str, float]:
         """Class -> how far it is told apart: the mean over its questions, 1 where each is answered."""
         scores: dict[str, list[float]] = {}
-        full = np.log1p(self.rule.enough)
         for question in self.questions:
-            chi2 = self._left(total, question.rows, question.size, question.others)
-            scores.setdefault(question.group, []).append(min(1.0, float(np.log1p(chi2) / full)))
+            scores.setdefault(question.group, []).append(self.answered(*self.left(total, question)))
         return {group: float(np.mean(values)) for group, values in scores.items()}
+
+    def answered(self, left: float, alone: float) -> float:
+        """How far a question is answered: by the chi-square that is left, and by its share of that without the rival.
+
+        1 where `enough` is left and it is as large a share as the largest allowed cosine leaves.
+        """
+        if alone <= 0.0:
+            return 0.0
+        seen = min(1.0, float(np.log1p(left) / np.log1p(self.rule.enough)))
+        share = min(1.0, left / alone / (1.0 - self.rule.cosine**2))
+        return seen * float(np.sqrt(share))
 
     def value(self, total: np.ndarray) -> float:
         """What is maximised: halvings of widths and classes, weighed."""

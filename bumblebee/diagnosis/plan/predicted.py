@@ -30,7 +30,10 @@ def classes(plan: Plan) -> list[dict[str, Any]]:
                 "not": _label(plan, question.fitted),
                 "chi2": {"before": before, "after": after},
                 "cosine": {"before": _cosine(before, alone), "after": _cosine(after, whole)},
-                "resolved": {"before": before >= objective.rule.enough, "after": after >= objective.rule.enough},
+                "resolved": {
+                    "before": objective.answered(before, alone) >= 1.0,
+                    "after": objective.answered(after, whole) >= 1.0,
+                },
             }
         )
     return rows

@@ -128,13 +128,17 @@ def _pair_table(pairs: Sequence[dict[str, Any]], most: int) -> str:
             escape(words_of(r["not"])),
             _chi2(r["chi2"]["before"]),
             _chi2(r["chi2"]["after"]),
+            number(r["cosine"]["after"], 4),
             "<span class='good'>yes</span>" if r["resolved"]["after"] else "<span class='bad'>no</span>",
         ]
         for r in shown[:most]
     ]
     open_ = sum(not r["resolved"]["after"] for r in shown)
     more = f"<p class='note'>The hardest first; of {len(shown)} pairs {open_} not expected to be told apart.</p>"
-    return table(["if it is", "and this is fitted", "chi² now", "expected", "told apart"], cells, (2, 3)) + more
+    return (
+        table(["if it is", "and this is fitted", "chi² now", "expected", "cosine", "told apart"], cells, (2, 3, 4))
+        + more
+    )
 
 
 def _chi2(value: float) -> str:

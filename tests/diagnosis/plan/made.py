@@ -1,5 +1,6 @@
 """Plans of the tiny arm and of the stander, each made once."""
 
+from dataclasses import replace
 from functools import cache
 
 import mujoco
@@ -34,5 +35,6 @@ def friction(half: float = 0.1) -> tuple[dict, list]:
 @cache
 def planned(damping: bool = False, seed: int = 0) -> Plan:
     """A plan after `friction`, with another kd to set or without."""
-    config = PlanConfig(**{**LIMITS.__dict__, "damping": (0.4,) if damping else (), "seed": seed})
+    more = {"damping": (0.2,), "runs": 3, "pool": 16} if damping else {}
+    config = replace(LIMITS, seed=seed, **more)
     return make_plan(mujoco.MjSpec.from_string(XML), "arm.xml", config, slow_session(), findings_of(*friction()))

@@ -36,7 +36,7 @@ def test_the_sheet_has_a_section_a_run_and_loads_nothing(tmp_path: Path) -> None
     page = (tmp_path / "plan" / "sheet.html").read_text()
     assert page.count("<section>") == len(plan.motions)
     assert "http" not in page and "<script" not in page and "src=" not in page
-    assert "kd x 0.4" in page
+    assert "kd x 0.2" in page
 
 
 def test_an_earlier_plan_is_replaced_when_told_and_nothing_else_ever(tmp_path: Path) -> None:

@@ -1,9 +1,11 @@
 """What a plan is chosen for: effects that it tells apart, intervals that it narrows."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.plan import PlanConfig, findings_of, make_plan
+from bumblebee.diagnosis.plan import findings_of, make_plan
 from bumblebee.diagnosis.plan.choose import choose
 from bumblebee.diagnosis.plan.document import document
 from bumblebee.diagnosis.plan.predicted import classes, intervals
@@ -24,13 +26,13 @@ def test_friction_and_kd_are_one_at_one_kd_and_two_at_another() -> None:
     assert min(cosines(one, "before")) > 0.999 and min(cosines(one, "after")) > 0.999
     assert not any(r["resolved"]["after"] for r in classes(one))
     assert any("not expected to tell apart" in note for note in document(one, "")["notes"])
-    assert max(cosines(two, "after")) < 0.98
+    assert max(cosines(two, "after")) < 0.94
     assert all(r["resolved"]["after"] for r in classes(two))
-    assert 0.4 in {motion.gain.kd for motion in two.motions}
+    assert 0.2 in {motion.gain.kd for motion in two.motions}
 
 
 def test_chosen_runs_are_worth_more_than_the_same_number_drawn_at_random() -> None:
-    plan = make_plan(mujoco.MjSpec.from_string(XML), "arm", PlanConfig(**{**LIMITS.__dict__, "runs": 10, "pool": 10}))
+    plan = make_plan(mujoco.MjSpec.from_string(XML), "arm", replace(LIMITS, runs=10))
     picked = choose(plan.objective, plan.data, plan.runs, 2)
     best = plan.objective.value(plan.data + plan.runs[picked].sum(axis=0))
     rng = np.random.default_rng(0)
@@ -59,7 +61,7 @@ def test_the_width_that_is_predicted_scales_the_one_that_the_diagnosis_gave() ->
 
 
 def test_a_plan_without_data_sees_every_joint() -> None:
-    plan = make_plan(mujoco.MjSpec.from_string(XML), "arm", PlanConfig(**{**LIMITS.__dict__, "runs": 3}))
+    plan = make_plan(mujoco.MjSpec.from_string(XML), "arm", replace(LIMITS, runs=3))
     rows = document(plan, "")["predicted"]["usual"]["effects"]
     for joint in ("j1", "j2", "j3"):
         seen = {row["effect"]: row for row in rows if row["where"] == [joint]}
