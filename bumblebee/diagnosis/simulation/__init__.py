@@ -36,7 +36,7 @@ from bumblebee.diagnosis.simulation.units import (
     rows,
     unit_on,
 )
-from bumblebee.diagnosis.simulation.variation import Variation, vary
+from bumblebee.diagnosis.simulation.variation import Variation, vary, vary_or_refuse
 from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, command_inputs, cut, select
 
 __all__ = [
@@ -86,6 +86,7 @@ __all__ = [
     "touching",
     "unit_on",
     "vary",
+    "vary_or_refuse",
     "with_step",
     "without",
     "yielded",

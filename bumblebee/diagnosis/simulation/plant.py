@@ -6,13 +6,14 @@ The columns have one command a joint. What a tendon or a propeller was told is i
 actuator that integrates its command, from which a window would have to start.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.simulation.actuators import drive_law, take_target, take_torque
+from bumblebee.diagnosis.simulation.failures import Failures
 from bumblebee.diagnosis.thresholds.simulation import DriveProbe, SimulationThresholds
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
@@ -69,6 +70,8 @@ class Plant:
     """Plants of the same robot with play, flexible shafts or yielding springs, by their places."""
     thresholds: SimulationThresholds = field(default_factory=SimulationThresholds, repr=False)
     """What it is simulated by."""
+    failures: Failures = field(default_factory=Failures, repr=False)
+    """Models of it that could not be made or simulated."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -101,7 +104,7 @@ def make_plant(
     for actuator in spec.actuators:
         actuator.nsample, actuator.delay = 0, 0.0
     torque_input = _set_inputs(spec, rollout, where, rules.drive)
-    model = spec.compile()
+    model = _with_movable_bodies(spec)
     model.opt.iterations = max(rules.solver.iterations, model.opt.iterations)
     model.opt.ls_iterations = max(rules.solver.line_search, model.opt.ls_iterations)
     free, joints = _match_joints(model, rollout, where)
@@ -130,10 +133,26 @@ def make_plant(
     )
 
 
+def _with_movable_bodies(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Compile `spec` so that every body may get another mass, centre and inertia.
+
+    A body alone on slides or a free joint, centred on its frame, is compiled as `simple`: of its rows in the mass
+    matrix the diagonal alone is stored, and MuJoCo refuses a centre that is moved afterwards.
+    """
+    model = spec.compile()
+    simple = [b for b in range(1, model.nbody) if model.body_simple[b]]
+    if not simple:
+        return model
+    for body in spec.bodies[1:]:
+        if body.id in simple:
+            body.simple = 0
+    return spec.compile()
+
+
 def plant_by(plant: Plant, thresholds: SimulationThresholds) -> Plant:
-    """The plant simulated by other thresholds; itself where they are the same."""
+    """The plant simulated by other thresholds, of which nothing has failed yet."""
     if thresholds == plant.thresholds:
-        return plant
+        return replace(plant, failures=Failures())
     return make_plant(plant.spec, plant.example, "declared model", thresholds)
 
 

@@ -11,12 +11,14 @@ from mujoco.batch import Batch
 
 from bumblebee.diagnosis.simulation.actuator_history import read_at, remember
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
+from bumblebee.diagnosis.simulation.failures import REFUSALS
 from bumblebee.diagnosis.simulation.hidden_states import Known, earlier, restructured, set_plastic, step_share
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.readings import Layout, difference, simulated_readings
 from bumblebee.diagnosis.simulation.setpoints import follow
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
+from bumblebee.errors import BadInput
 from bumblebee.quaternions import conjugate, from_rotation_vector, multiply, rotate_by_cross
 from bumblebee.sim.effects import Memory, StepHooks
 
@@ -56,7 +58,7 @@ def residuals(
     step: float,
     starts: Starts | None = None,
 ) -> np.ndarray:
-    """Return measured - simulated, (V, W, N, D); NaN where a simulation diverged.
+    """Return measured - simulated, (V, W, N, D); NaN where a simulation diverged or was not to be had.
 
     With `starts` of K start states, `variations` has one entry and the first axis is K.
     """
@@ -72,13 +74,40 @@ def residuals(
         chosen = [variations[0] if starts is not None else variations[v] for v in part]
         own = None if starts is None else starts.part(part)
         short = step * step_share(chosen[0].hidden, plant.thresholds.hidden)
-        count = int(np.ceil(windows.span / short - 1e-6))
-        inputs = [inputs_of(windows, variation, short, count, cache) for variation in chosen]
-        models = [] if chosen[0].plant is not None else list({id(v.model): v.model for v in chosen}.values())
-        with without(models, far):
-            out[part.start : part.stop] = _run(_Chunk(plant, windows, chosen, own, short), layout, inputs)
+        together = _Chunk(plant, windows, chosen, own, short)
+        out[part.start : part.stop] = _guarded(together, layout, cache, far)
         first = part.stop
     return out
+
+
+def _guarded(chunk: "_Chunk", layout: Layout, cache: dict[bytes, np.ndarray], far: np.ndarray) -> np.ndarray:
+    """Residuals (V, W, N, D) of one chunk; of a variation that cannot be simulated NaN, for it alone.
+
+    The declared model is no trial: where it cannot be simulated, the input is unusable.
+    """
+    lead, nothing = chunk.lead, np.full((len(chunk.chosen), *chunk.windows.measured.shape), np.nan)
+    if lead.impossible:
+        return nothing
+    try:
+        return _simulated(chunk, layout, cache, far)
+    except REFUSALS as error:
+        if len(chunk.chosen) > 1 and chunk.starts is None:
+            each = [_guarded(replace(chunk, chosen=[v]), layout, cache, far) for v in chunk.chosen]
+            return np.concatenate(each)
+        if not lead.effects:
+            raise BadInput("declared model", "one that MuJoCo can simulate", " ".join(str(error).split())) from error
+        chunk.plant.failures.add(lead.effects, error)
+        return nothing
+
+
+def _simulated(chunk: "_Chunk", layout: Layout, cache: dict[bytes, np.ndarray], far: np.ndarray) -> np.ndarray:
+    """Residuals (V, W, N, D) of one chunk."""
+    chosen, windows = chunk.chosen, chunk.windows
+    count = int(np.ceil(windows.span / chunk.step - 1e-6))
+    inputs = [inputs_of(windows, variation, chunk.step, count, cache) for variation in chosen]
+    models = [] if chosen[0].plant is not None else list({id(v.model): v.model for v in chosen}.values())
+    with without(models, far):
+        return _run(chunk, layout, inputs)
 
 
 def _together(variations: Sequence[Variation], first: int, chunk: int) -> range:

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.simulation.failures import REFUSALS, in_words
 from bumblebee.diagnosis.simulation.in_place import WRITE, Target
 from bumblebee.diagnosis.simulation.plant import Plant, make_plant
 from bumblebee.diagnosis.simulation.setpoints import SetPoint, setpoints_of
+from bumblebee.errors import BadInput
 from bumblebee.sim.effects import CATALOGUE, SETPOINTS, Effect, RuntimeHooks, add_to_spec, native, runtime_hooks
 
 _ORDER = tuple(CATALOGUE)
@@ -40,14 +42,47 @@ class Variation:
     """(3,) [rad] rotation vector multiplied onto the reading of the base's orientation."""
     hidden: tuple[tuple[str, str, tuple[float, ...]], ...] = field(default=())
     """(kind, joint, parameters) of the structural effects, for the state that no sensor reads."""
+    effects: tuple[Effect, ...] = ()
+    """What the declared model was given."""
+    impossible: bool = False
+    """Whether the model with these effects could not be made: `model` is then the declared one, residuals are NaN."""
 
     @property
     def plain(self) -> bool:
         """Whether a model and what becomes of single commands on their way are all there is to it."""
-        return self.plant is None and self.hooks is None and self.tilt is None and self.dropped is None
+        alone = self.plant is None and self.hooks is None and self.tilt is None and self.dropped is None
+        return alone and not self.impossible
 
 
 def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
+    """The plant with `effects`; an `impossible` one, written down in `plant.failures`, where that cannot be made."""
+    try:
+        return _made(plant, effects)
+    except REFUSALS as error:
+        plant.failures.add(_blamed(plant, effects), error)
+        return Variation(plant.model, plant.delay, plant.offset, effects=tuple(effects), impossible=True)
+
+
+def _blamed(plant: Plant, effects: Sequence[Effect]) -> Sequence[Effect]:
+    """The effect that cannot be made by itself; all of them where each can."""
+    for effect in effects if len(effects) > 1 else ():
+        try:
+            _made(plant, [effect])
+        except REFUSALS:
+            return [effect]
+    return effects
+
+
+def vary_or_refuse(plant: Plant, effects: Sequence[Effect]) -> Variation:
+    """The same for effects that a user demands: `BadInput` where the model cannot be made."""
+    try:
+        return _made(plant, effects)
+    except REFUSALS as error:
+        came = " ".join(str(error).split())[:300]
+        raise BadInput(f"effects {in_words(effects)}", "a model that MuJoCo can make of them", came) from error
+
+
+def _made(plant: Plant, effects: Sequence[Effect]) -> Variation:
     """The plant with `effects`; the same meaning as `sim.effects.spec.add_to_spec`, without compiling again."""
     if not effects:
         return Variation(plant.model, plant.delay, plant.offset)
@@ -76,6 +111,7 @@ def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
         dropped=_dropped(plant, hooks),
         tilt=hooks.imu if hooks.imu.any() else None,
         hidden=tuple(hidden),
+        effects=tuple(effects),
     )
 
 
