@@ -2,6 +2,7 @@
 
 from bumblebee.diagnosis.dataset.informative_split import informative, window_errors
 from bumblebee.diagnosis.dataset.session import JUDGED_TWICE, Session, make_session, open_session
+from bumblebee.diagnosis.dataset.time_steps import steps_of
 
 __all__ = [
     "JUDGED_TWICE",
@@ -9,5 +10,6 @@ __all__ = [
     "informative",
     "make_session",
     "open_session",
+    "steps_of",
     "window_errors",
 ]
