@@ -19,6 +19,7 @@ from bumblebee.diagnosis.selection.proposals.gain_parameters import merge_gain_p
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import joint_elasticity_trials
 from bumblebee.diagnosis.selection.proposals.packet_loss import find_packet_loss
 from bumblebee.diagnosis.selection.proposals.saturation import saturation_trials
+from bumblebee.diagnosis.selection.proposals.setpoints import setpoint_trials
 from bumblebee.diagnosis.selection.proposals.stribeck import add_dry_friction, add_stribeck_friction
 from bumblebee.diagnosis.selection.score_tests import Scores
 from bumblebee.diagnosis.selection.state import Loss, SearchState
@@ -122,6 +123,7 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
             tried = [t for t in tried if t.candidate not in run.closed]
         if not tried:
             tried, looked = run.trials()
+        tried += [t for t in setpoint_trials(run, tried) if t.candidate not in run.closed]
         some = _where_limits_matter(tried, run)
         if judged != (run.fit, some):
             judged = (run.fit, some)
