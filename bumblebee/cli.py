@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from bumblebee import __version__, cli_motions
-from bumblebee.errors import EXIT_BAD_INPUT
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 
 app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
@@ -45,8 +45,9 @@ def quiet(
 def diagnose(
     model: Model,
     dataset: Data,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the diagnosis.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for the diagnosis.")] = None,
     overwrite: Overwrite = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A first look: the three best leads; writes nothing.")] = False,
     max_windows: Annotated[int, typer.Option(min=8, help="Windows that take part in the fit.")] = 120,
     seed: Annotated[int, typer.Option(min=0, help="Of the perturbed starts.")] = 0,
 ) -> None:
@@ -56,8 +57,16 @@ def diagnose(
     from bumblebee.diagnosis.diagnose import diagnose
     from bumblebee.diagnosis.output import write_diagnosis
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
+    from bumblebee.diagnosis.quick import first_look, told
     from bumblebee.diagnosis.report import examples, plot, summary
 
+    if quick:
+        if out is not None:
+            raise BadInput("--out", "no folder with --quick, which writes nothing", str(out))
+        print(told(first_look(open_session(model, dataset), DiagnosisConfig(seed=seed), say=_teller())))
+        return
+    if out is None:
+        raise BadInput("--out", "a folder for the diagnosis, or --quick", "neither")
     claim_folder(out, DIAGNOSIS, overwrite, inputs_of(model, dataset))
     config = DiagnosisConfig(max_windows=max_windows, seed=seed)
     session = open_session(model, dataset, config.thresholds.dataset)
@@ -117,9 +126,13 @@ def gap(
 def import_(
     source: Annotated[Path, typer.Argument(metavar="SOURCE", help="Folder, zip archive or file of logs.")],
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="New folder for rollouts/*.parquet.")],
-    kind: Annotated[str, typer.Option("--kind", help="so101, csv, double_pendulum, asap or sysid.")],
+    kind: Annotated[
+        str, typer.Option("--kind", help="so101, csv, rosbag, lerobot, hdf5, double_pendulum, asap or sysid.")
+    ],
     model: Annotated[Path | None, typer.Option("--model", help="The declared MJCF; copied to model.xml.")] = None,
-    columns: Annotated[Path | None, typer.Option("--columns", help="Column map of CSV logs, a YAML file.")] = None,
+    columns: Annotated[
+        Path | None, typer.Option("--columns", help="Map of columns, joints and units, a YAML file.")
+    ] = None,
 ) -> None:
     """Turn logs of another layout into a dataset of the contract."""
     from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output

@@ -44,7 +44,7 @@ class Scene:
         problem, plant, windows = self.problem, self.problem.plant, self.problem.windows
         variation = vary(plant, self.effects)
         if variation.plant is None:
-            variation = Variation(variation.model, variation.delay, variation.offset)
+            variation = Variation(variation.model, variation.delay, variation.offset, setpoints=variation.setpoints)
         else:
             variation = vary(plant, [])
         only = plant.dof if self.joints is None else plant.dof[list(self.joints)]

@@ -64,7 +64,9 @@ def screen(
     """
     kept = [c for c in candidates if not shortlisted(c, len(problem.plant.joints))]
     variation = vary(problem.plant, effects)
-    plain = Variation(variation.model, variation.delay, variation.offset) if variation.plant is None else None
+    plain = None
+    if variation.plant is None:
+        plain = Variation(variation.model, variation.delay, variation.offset, setpoints=variation.setpoints)
     around = plain or vary(problem.plant, [])
     only = _near(problem.plant, before.effects, effects) if before is not None else np.arange(problem.plant.model.nv)
     rules, scene = problem.thresholds.sensitivities, (problem.plant, problem.layout, problem.windows)

@@ -21,6 +21,7 @@ from bumblebee.diagnosis.simulation.readings import (
     measured_readings,
     simulated_readings,
 )
+from bumblebee.diagnosis.simulation.setpoints import setpoints_of
 from bumblebee.diagnosis.simulation.simulate import Starts, at_ticks, inputs_of, residuals, threads, with_step
 from bumblebee.diagnosis.simulation.units import (
     KINDS,
@@ -78,6 +79,7 @@ __all__ = [
     "residuals",
     "rows",
     "select",
+    "setpoints_of",
     "simulated_readings",
     "state_before",
     "threads",

@@ -15,6 +15,7 @@ from bumblebee.diagnosis.simulation.failures import REFUSALS
 from bumblebee.diagnosis.simulation.hidden_states import Known, earlier, restructured, set_plastic, step_share
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.readings import Layout, difference, simulated_readings
+from bumblebee.diagnosis.simulation.setpoints import follow
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
 from bumblebee.errors import BadInput
@@ -120,9 +121,11 @@ def _together(variations: Sequence[Variation], first: int, chunk: int) -> range:
 def inputs_of(
     windows: Windows, variation: Variation, step: float, count: int, cache: dict[bytes, np.ndarray]
 ) -> np.ndarray:
-    """Controls (W, count, nu) of a variation: late, and on the mean as held as dropped commands leave them."""
+    """Controls (W, count, nu) of a variation: late, shaped, and on the mean as held as dropped commands leave them."""
     share = variation.dropped
-    key = variation.delay.tobytes() + (b"" if share is None else share.tobytes()) + bytes(f"{count} {step!r}", "ascii")
+    shaped = variation.setpoints
+    key = variation.delay.tobytes() + (b"" if share is None else share.tobytes())
+    key += bytes(f"{count} {step!r} {shaped or ''}", "ascii")
     known = _known.setdefault(windows, {})
     if key in known:
         cache[key] = known[key]
@@ -133,7 +136,10 @@ def inputs_of(
             for k in range(1, command.shape[1]):
                 command[:, k] = (1 - share) * command[:, k] + share * command[:, k - 1]
             sent = replace(windows, command=command)
-        known[key] = cache[key] = controls(sent, variation.delay, step, count)
+        made = controls(sent, variation.delay, step, count)
+        for point in shaped:
+            made[..., point.actuator] = follow(sent, point, float(variation.delay[point.actuator]), step, count)
+        known[key] = cache[key] = made
         if len(known) > _KEPT:
             known.pop(next(iter(known)))
     return cache[key]

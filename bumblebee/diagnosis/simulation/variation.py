@@ -10,8 +10,9 @@ import numpy as np
 from bumblebee.diagnosis.simulation.failures import REFUSALS, in_words
 from bumblebee.diagnosis.simulation.in_place import WRITE, Target
 from bumblebee.diagnosis.simulation.plant import Plant, make_plant
+from bumblebee.diagnosis.simulation.setpoints import SetPoint, setpoints_of
 from bumblebee.errors import BadInput
-from bumblebee.sim.effects import CATALOGUE, Effect, RuntimeHooks, add_to_spec, native, runtime_hooks
+from bumblebee.sim.effects import CATALOGUE, SETPOINTS, Effect, RuntimeHooks, add_to_spec, native, runtime_hooks
 
 _ORDER = tuple(CATALOGUE)
 # Effects that change the layout of MuJoCo's state: they are compiled, once for each set of places.
@@ -33,6 +34,8 @@ class Variation:
     """The plant of `model` where its structure differs from the declared one's."""
     hooks: RuntimeHooks | None = None
     """What must be done beside MuJoCo at every step."""
+    setpoints: tuple[SetPoint, ...] = ()
+    """What drives make of their targets, on the way to the servos; as a delay it is in the controls."""
     dropped: np.ndarray | None = None
     """(nu,) share of commands that never arrive."""
     tilt: np.ndarray | None = None
@@ -46,7 +49,7 @@ class Variation:
 
     @property
     def plain(self) -> bool:
-        """Whether a model and a delay are all there is to it."""
+        """Whether a model and what becomes of single commands on their way are all there is to it."""
         alone = self.plant is None and self.hooks is None and self.tilt is None and self.dropped is None
         return alone and not self.impossible
 
@@ -97,13 +100,14 @@ def _made(plant: Plant, effects: Sequence[Effect]) -> Variation:
     if any(effect.effect in _NEW_CONSTANTS for effect in effects):
         # set_const reads qpos0 through a scratch MjData; gains, friction and damping do not enter it.
         mujoco.mj_setConst(model, mujoco.MjData(model))
-    hooks = runtime_hooks(effects, model)
+    hooks = runtime_hooks([e for e in effects if e.effect not in SETPOINTS], model)
     return Variation(
         model,
         delay,
         offset,
         plant=own if structural else None,
         hooks=hooks if hooks.steps else None,
+        setpoints=setpoints_of(plant, effects),
         dropped=_dropped(plant, hooks),
         tilt=hooks.imu if hooks.imu.any() else None,
         hidden=tuple(hidden),
