@@ -116,7 +116,8 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
         f"invalid documents: {sum(bool(r['problems']) for r in done)}; with models or steps that failed: "
         f"{sum(bool(r['failures']) for r in done)}",
         f"one sealed effect: first in {sum(r['first_is_sealed'] for r in one)} of {len(one)}",
-        f"nothing sealed: effects named in {sum(bool(r['named']) for r in none)} of {len(none)}",
+        f"nothing sealed: effects named, beside the encoders' steps of quantised logs, in "
+        f"{sum(r['beside_steps'] > 0 for r in none)} of {len(none)}",
         f"unexplained significant: {sum(r['unexplained'] for r in done)} of {len(done)}, of nulls "
         f"{sum(r['unexplained'] for r in none)} of {len(none)}",
     ]

@@ -100,11 +100,13 @@ def _diagnosed(drawn: Drawn, folder: Path, config: DiagnosisConfig) -> dict[str,
     document = json.loads((out / "diagnosis.json").read_text())
     mujoco.MjModel.from_xml_path(str(out / "model.xml"))
     named = [{"effect": e["effect"], "where": e["where"]} for e in document["effects"]]
-    first = bool(named) and any((s.effect, [s.where]) == (named[0]["effect"], named[0]["where"]) for s in drawn.sealed)
+    physical = [n for n in named if n["effect"] != "encoder_quantisation" or "quantised" not in drawn.about]
+    sealed = [(s.effect, [s.where]) for s in drawn.sealed]
     return {
         "problems": problems(document),
         "named": named,
-        "first_is_sealed": first,
+        "first_is_sealed": bool(physical) and (physical[0]["effect"], physical[0]["where"]) in sealed,
+        "beside_steps": len(physical),
         "unexplained": document["unexplained"]["significant"],
         "set_aside": [s["reason"] for s in document["set_aside"]],
         "failures": [n for n in document["notes"] if n.startswith((LEFT_OUT, NOT_TRIED))],
