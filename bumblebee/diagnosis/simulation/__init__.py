@@ -13,6 +13,7 @@ from bumblebee.diagnosis.simulation.actuators import fold_dampers
 from bumblebee.diagnosis.simulation.cache import Changes, Recall
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
 from bumblebee.diagnosis.simulation.declared import declared_values, touching
+from bumblebee.diagnosis.simulation.failures import LEFT_OUT, NOT_TRIED
 from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, plant_by, refuse_unlogged
 from bumblebee.diagnosis.simulation.readings import (
     Layout,
@@ -41,6 +42,8 @@ from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, comma
 
 __all__ = [
     "KINDS",
+    "LEFT_OUT",
+    "NOT_TRIED",
     "Changes",
     "Layout",
     "Plant",
