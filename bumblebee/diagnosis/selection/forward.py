@@ -14,6 +14,7 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
 from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
 from bumblebee.diagnosis.selection.proposals.declared_scale import keep_declared_scale
+from bumblebee.diagnosis.selection.proposals.friction_family import complete_frictions
 from bumblebee.diagnosis.selection.proposals.gain_grid import gain_trials, start_with_gain_grid
 from bumblebee.diagnosis.selection.proposals.gain_parameters import merge_gain_parameters
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import joint_elasticity_trials
@@ -73,7 +74,7 @@ def search(
         if not budget.has_time_for("swap steps"):
             break
         say("each effect against its rivals")
-        if not (swap(run) or add_stribeck_friction(run)):
+        if not (swap(run) or add_stribeck_friction(run) or complete_frictions(run)):
             break
         _select(run, config, budget)
     run.prune()
