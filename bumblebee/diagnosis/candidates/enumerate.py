@@ -100,6 +100,7 @@ class _OnJoint:
         s, j, rule = self.scales, self.j, self.rules.joint
         yield self._make("coulomb_friction", self._torque)
         yield self._make("viscous_friction", self._torque / s.speed[j])
+        yield self._make("quadratic_friction", self._torque / s.speed[j] ** 2)
         for share in rule.stribeck:
             speed = share * s.speed[j]
             yield self._make("stribeck_friction", self._torque, speed, start=(0.0, 0.0), shape=rule.shape * speed)

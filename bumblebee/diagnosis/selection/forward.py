@@ -18,6 +18,7 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
 from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
 from bumblebee.diagnosis.selection.proposals.declared_scale import keep_declared_scale
+from bumblebee.diagnosis.selection.proposals.friction_family import complete_frictions
 from bumblebee.diagnosis.selection.proposals.gain_grid import gain_trials, start_with_gain_grid
 from bumblebee.diagnosis.selection.proposals.gain_parameters import merge_gain_parameters
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import joint_elasticity_trials
@@ -78,7 +79,8 @@ def search(
         if not budget.has_time_for("swap steps"):
             break
         say("each effect against its rivals")
-        if not attempt("swap steps", lambda: swap(run) or add_stribeck_friction(run), _no):
+        better = partial(_any_of, run, (swap, add_stribeck_friction, complete_frictions))
+        if not attempt("swap steps", better, _no):
             break
         _select(run, config, budget)
     for last in (SearchState.prune, keep_declared_scale, merge_gain_parameters, add_dry_friction):
@@ -164,6 +166,11 @@ def _limits(run: SearchState, some: Sequence[Candidate]) -> list[Trial]:
 
 def _of_joints(trials: Callable[..., list[Trial]], run: SearchState) -> list[Trial]:
     return trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+
+
+def _any_of(run: SearchState, steps: Sequence[Callable[[SearchState], bool]]) -> bool:
+    """Whether one of the steps changed the model; those after it are not taken."""
+    return any(step(run) for step in steps)
 
 
 def _no() -> bool:
