@@ -9,7 +9,7 @@ import typer
 from bumblebee.errors import BadInput
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
-Data = Annotated[Path | None, typer.Argument(metavar="[DATASET]", help="Folder that holds rollouts/*.parquet.")]
+Data = Annotated[Path | None, typer.Argument(metavar="DATASET", help="Folder that holds rollouts/*.parquet.")]
 
 
 def plan(
@@ -21,17 +21,18 @@ def plan(
     ] = None,
     runs: Annotated[int, typer.Option(min=1, max=40, help="Runs of the plan.")] = 4,
     seconds: Annotated[float, typer.Option(help="Length of a run with its rests.")] = 8.0,
-    rate: Annotated[float | None, typer.Option(help="Rate of the targets [Hz]; the dataset's, or 50.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Rate of the targets in Hz; the dataset's, or 50.")] = None,
     gains: Annotated[str, typer.Option(help="Factors on kp that the robot can be set to, as 0.5,1,2.")] = "1",
     damping: Annotated[str, typer.Option(help="Factors on kd that the robot can be set to besides, as 0.3.")] = "",
     speed: Annotated[
-        list[str] | None, typer.Option(metavar="[JOINT=]VALUE", help="Speed limit [rad/s, m/s]; repeat for joints.")
+        list[str] | None, typer.Option(metavar="[JOINT=]VALUE", help="Speed limit in rad/s or m/s; repeat for joints.")
     ] = None,
     torque: Annotated[
-        list[str] | None, typer.Option(metavar="[JOINT=]VALUE", help="Torque limit [N m, N], where the model has none.")
+        list[str] | None,
+        typer.Option(metavar="[JOINT=]VALUE", help="Torque limit in N m or N, if the model has none."),
     ] = None,
     travel: Annotated[
-        list[str] | None, typer.Option(metavar="[JOINT=]VALUE", help="Travel to either side of the start [rad, m].")
+        list[str] | None, typer.Option(metavar="[JOINT=]VALUE", help="Travel to either side of the start in rad or m.")
     ] = None,
     start: Annotated[str | None, typer.Option(help="Keyframe that runs start and end in.")] = None,
     kp: Annotated[float | None, typer.Option(help="Of the servo that tracks targets on torque drives.")] = None,

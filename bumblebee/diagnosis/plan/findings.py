@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bumblebee.diagnosis.simulation import Plant
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_json
 from bumblebee.sim.effects import CATALOGUE, Effect, read_effects
@@ -89,6 +90,19 @@ def read_findings(folder: Path) -> Findings:
         raise BadInput(document, "a diagnosis of schema 1", "something else")
     effects = read_effects(Path(folder) / "effects.yaml")
     return findings_of(content, effects, document)
+
+
+def refuse_strange(findings: Findings, plant: Plant) -> None:
+    """`BadInput` for an effect on a place that the model does not have."""
+    model = plant.model
+    geoms = {model.geom(g).name for g in range(model.ngeom)}
+    names = {"joint": set(plant.joints), "body": set(plant.bodies), "geom": geoms, "whole": set()}
+    for effect in findings.effects:
+        kind = CATALOGUE[effect.effect].on
+        for place in effect.where:
+            if place not in names[kind]:
+                where = f"diagnosis: effect {effect.effect}"
+                raise BadInput(where, f"a {kind} of the model", repr(place)[:80], "Plan with the model it is of.")
 
 
 def _entries(document: Mapping[str, Any], where: object) -> list[dict[str, Any]]:

@@ -9,7 +9,7 @@ import numpy as np
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.plan.config import Gain, PlanConfig
 from bumblebee.diagnosis.plan.contacts import Surroundings
-from bumblebee.diagnosis.plan.findings import Findings
+from bumblebee.diagnosis.plan.findings import Findings, refuse_strange
 from bumblebee.diagnosis.plan.limits import limits_of
 from bumblebee.diagnosis.plan.machine import Machine, make_machine
 from bumblebee.diagnosis.plan.motions import FAMILIES, Motion, Scope, draw_motion
@@ -30,6 +30,8 @@ def set_stage(
     _refuse_config(config)
     rules = config.thresholds.plan
     machine = make_machine(spec, name, session, config)
+    if findings is not None:
+        refuse_strange(findings, machine.plant)
     limits = limits_of(machine, session, config)
     small = machine.plant.model.nv <= config.thresholds.dataset.time_steps.small_model
     step = machine.steps[0] if small else machine.steps[1]
