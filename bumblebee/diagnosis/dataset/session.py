@@ -19,7 +19,7 @@ from bumblebee.diagnosis.simulation import (
     fold_dampers,
     layout_of,
     load_spec,
-    make_plant,
+    make_plants,
     refuse_unlogged,
 )
 from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, Usable
@@ -105,7 +105,9 @@ def make_session(
     rules = thresholds or DatasetThresholds()
     long, failed = _sorted_out(rollouts, dataset, errors, rules.usable)
     spec, folded = fold_dampers(spec)
-    plant = make_plant(spec, long[0], model)
+    plant, unmade = make_plants(spec, long, model)
+    failed += unmade
+    long = [r for r in long if r.rollout_id not in {name for name, _ in unmade}]
     refuse_unlogged(plant, model)
     undriven = tuple(undriven_warnings(plant, long, model))
     has_pos = all(r.base_pos is not None for r in long)

@@ -4,16 +4,19 @@ from bumblebee.diagnosis.simulation.actuator_history import (
     at_starts,
     bent_before,
     lagged,
+    plant_servos,
     read_at,
     remember,
     state_before,
+    window_servos,
     yielded,
 )
 from bumblebee.diagnosis.simulation.actuators import fold_dampers
 from bumblebee.diagnosis.simulation.cache import Changes, Recall
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
+from bumblebee.diagnosis.simulation.condition_plants import make_plants
 from bumblebee.diagnosis.simulation.declared import declared_values, touching
-from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, plant_by, refuse_unlogged
+from bumblebee.diagnosis.simulation.plant import Plant, load_spec, plant_by, refuse_unlogged
 from bumblebee.diagnosis.simulation.readings import (
     Layout,
     difference,
@@ -21,7 +24,14 @@ from bumblebee.diagnosis.simulation.readings import (
     measured_readings,
     simulated_readings,
 )
-from bumblebee.diagnosis.simulation.simulate import Starts, at_ticks, inputs_of, residuals, threads, with_step
+from bumblebee.diagnosis.simulation.simulate import (
+    Starts,
+    at_ticks,
+    inputs_of,
+    own_batch,
+    residuals,
+    with_step,
+)
 from bumblebee.diagnosis.simulation.units import (
     KINDS,
     joint_units,
@@ -61,7 +71,7 @@ __all__ = [
     "lagged",
     "layout_of",
     "load_spec",
-    "make_plant",
+    "make_plants",
     "measured_readings",
     "members",
     "mixed_notes",
@@ -69,8 +79,10 @@ __all__ = [
     "named",
     "of_joint",
     "out_of_reach",
+    "own_batch",
     "pick",
     "plant_by",
+    "plant_servos",
     "position_rows",
     "read_at",
     "refuse_unlogged",
@@ -80,10 +92,10 @@ __all__ = [
     "select",
     "simulated_readings",
     "state_before",
-    "threads",
     "touching",
     "unit_on",
     "vary",
+    "window_servos",
     "with_step",
     "without",
     "yielded",

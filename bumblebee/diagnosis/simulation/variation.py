@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -37,6 +37,18 @@ class Variation:
     """(3,) [rad] rotation vector multiplied onto the reading of the base's orientation."""
     hidden: tuple[tuple[str, str, tuple[float, ...]], ...] = field(default=())
     """(kind, joint, parameters) of the structural effects, for the state that no sensor reads."""
+    others: tuple[mujoco.MjModel, ...] = field(default=(), repr=False)
+    """The same under the plant's other conditions; `model` is that of its own."""
+
+    @property
+    def models(self) -> tuple[mujoco.MjModel, ...]:
+        """By number of the condition."""
+        return (self.model, *self.others)
+
+    @property
+    def bare(self) -> "Variation":
+        """Models, delays and offsets alone."""
+        return Variation(self.model, self.delay, self.offset, others=self.others)
 
     @property
     def plain(self) -> bool:
@@ -45,7 +57,16 @@ class Variation:
 
 
 def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
-    """The plant with `effects`; the same meaning as `sim.effects.spec.add_to_spec`, without compiling again."""
+    """The plant with `effects`; the same meaning as `sim.effects.spec.add_to_spec`, without compiling again.
+
+    Under several conditions it has a model for each: factors of gains multiply those of the condition.
+    """
+    own = _vary(plant, effects)
+    return replace(own, others=tuple(_vary(o, effects).model for o in plant.others)) if plant.others else own
+
+
+def _vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
+    """The same under the plant's own condition alone."""
     if not effects:
         return Variation(plant.model, plant.delay, plant.offset)
     structural = [e for e in effects if _is_structural(e)]
@@ -124,7 +145,7 @@ def _structure(plant: Plant, effects: Sequence[Effect]) -> Plant:
     if key not in plant.compiled:
         spec = plant.spec.copy()
         add_to_spec(spec, effects)
-        plant.compiled[key] = make_plant(spec, plant.example, "declared model", plant.thresholds)
+        plant.compiled[key] = make_plant(spec, plant.example, "declared model", plant.thresholds, plant.condition)
     return plant.compiled[key]
 
 
