@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from bumblebee import __version__, cli_motions
-from bumblebee.errors import EXIT_BAD_INPUT
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 
 app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
@@ -45,8 +45,9 @@ def quiet(
 def diagnose(
     model: Model,
     dataset: Data,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the diagnosis.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for the diagnosis.")] = None,
     overwrite: Overwrite = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A first look: the three best leads; writes nothing.")] = False,
     max_windows: Annotated[int, typer.Option(min=8, help="Windows that take part in the fit.")] = 120,
     seed: Annotated[int, typer.Option(min=0, help="Of the perturbed starts.")] = 0,
 ) -> None:
@@ -56,8 +57,16 @@ def diagnose(
     from bumblebee.diagnosis.diagnose import diagnose
     from bumblebee.diagnosis.output import write_diagnosis
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
+    from bumblebee.diagnosis.quick import first_look, told
     from bumblebee.diagnosis.report import examples, plot, summary
 
+    if quick:
+        if out is not None:
+            raise BadInput("--out", "no folder with --quick, which writes nothing", str(out))
+        print(told(first_look(open_session(model, dataset), DiagnosisConfig(seed=seed), say=_teller())))
+        return
+    if out is None:
+        raise BadInput("--out", "a folder for the diagnosis, or --quick", "neither")
     claim_folder(out, DIAGNOSIS, overwrite, inputs_of(model, dataset))
     config = DiagnosisConfig(max_windows=max_windows, seed=seed)
     session = open_session(model, dataset, config.thresholds.dataset)

@@ -49,6 +49,15 @@ def data(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def test_a_first_look_writes_nothing(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = sorted(data.rglob("*"))
+    assert run("diagnose", data / "model.xml", data / "set", "--quick") == 0
+    assert "furthest off" in capsys.readouterr().out
+    assert sorted(data.rglob("*")) == before
+    assert run("diagnose", data / "model.xml", data / "set", "--quick", "--out", data / "out") == 2
+    assert run("diagnose", data / "model.xml", data / "set") == 2
+
+
 def test_replay_and_gap_end_well(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Both write the error block, by horizon."""
     assert run("replay", data / "model.xml", data / "set", "--out", data / "errors.json") == 0

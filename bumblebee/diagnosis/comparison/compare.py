@@ -85,7 +85,7 @@ def _validation(c: Comparison, rule: Validation) -> bool:
     of many joints an effect of one is a small share of the whole chi-square, and none of its noise. `after` must gain
     its share of what it and all effects before it gain together: where one law stands for a slightly different one, the
     rest is significant, too. A part of what is left is enough: of a robot far from its model, a hundredth of what a
-    drive of half the strength explains is more than all friction.
+    drive of half the strength explains is more than all friction. So is most of what is left above the noise.
     """
     if c.validation is None:
         return True
@@ -95,8 +95,9 @@ def _validation(c: Comparison, rule: Validation) -> bool:
     bare = problem.residual([[]])[0]
     bare = bare - np.tensordot(cost_of(problem, bare, weights)[1], problem.nuisance, axes=1)
     powers = [float((weights[:, None] * r**2).sum()) for r in (bare, old, new)]
-    worth = min(rule.least_share * (powers[0] - powers[2]), rule.of_rest * powers[1])
-    if powers[1] - powers[2] < worth:
+    noise = float(weights.sum()) * new.shape[1]
+    excess = max(rule.of_excess * (powers[1] - noise), rule.of_noise * noise)
+    if powers[1] - powers[2] < min(rule.least_share * (powers[0] - powers[2]), rule.of_rest * powers[1], excess):
         return False
     if not (there(old, new, weights, rule.z) or falls(old, new, rule.z, rule.rank_windows)):
         return False

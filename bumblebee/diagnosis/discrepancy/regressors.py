@@ -52,6 +52,13 @@ class Quantities:
 
     def torque(self, term: Term, joint: int) -> np.ndarray:
         """(W, S) mean torque of a term on a joint for coefficient 1; dry friction against the direction of motion."""
+        if term.rubs or term.drives or term.states or term.names - {"t"}:
+            return self._torque(term, joint)
+        if (term.text,) not in self._known:  # of other joints and of time alone: the same on every joint
+            self._known[(term.text,)] = self._torque(term, joint)
+        return self._known[(term.text,)]
+
+    def _torque(self, term: Term, joint: int) -> np.ndarray:
         value = np.broadcast_to(term(self.values(joint)), self.t.shape)
         if term.drives:
             value = np.where(np.abs(self.tau[..., joint]) < self.limit[..., joint], value, 0.0)

@@ -3,12 +3,14 @@
 from bumblebee.diagnosis.selection.confounding import alike, detectable, rivals
 from bumblebee.diagnosis.selection.final_fit import Refined, half_widths, refine
 from bumblebee.diagnosis.selection.forward import Search, search
+from bumblebee.diagnosis.selection.leads import Lead, leads
 from bumblebee.diagnosis.selection.proposals.encoder_resolution import entries, grids
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.state import Loss
 from bumblebee.diagnosis.selection.trial import try_one
 
 __all__ = [
+    "Lead",
     "Loss",
     "Refined",
     "Search",
@@ -17,6 +19,7 @@ __all__ = [
     "entries",
     "grids",
     "half_widths",
+    "leads",
     "refine",
     "rivals",
     "score_tests",

@@ -13,6 +13,7 @@ from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
 from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
+from bumblebee.diagnosis.selection.proposals.declared_scale import keep_declared_scale
 from bumblebee.diagnosis.selection.proposals.gain_grid import gain_trials, start_with_gain_grid
 from bumblebee.diagnosis.selection.proposals.gain_parameters import merge_gain_parameters
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import joint_elasticity_trials
@@ -75,6 +76,7 @@ def search(
             break
         _select(run, config, budget)
     run.prune()
+    keep_declared_scale(run)
     merge_gain_parameters(run)
     add_dry_friction(run)
     steps = [s for s in run.steps if s.candidate in run.fit.chosen]

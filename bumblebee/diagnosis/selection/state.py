@@ -5,19 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate, effects_at, is_chosen, is_like, shortlisted
+from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate, is_chosen, is_like, shortlisted
 from bumblebee.diagnosis.comparison import (
     Holdout,
     Step,
-    compare,
     drop_insignificant,
     evidence,
-    is_physical,
-    wald,
 )
 from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, resolved
 from bumblebee.diagnosis.residuals import Problem, screening_windows, window_weights
+from bumblebee.diagnosis.selection.moves import Move, Now, Terms, refitted
 from bumblebee.diagnosis.selection.score_tests import Scores, least_z, score_tests
 from bumblebee.diagnosis.selection.screening import Stages, is_promising, restless
 from bumblebee.diagnosis.selection.trial import Trial, try_one
@@ -149,28 +147,32 @@ class SearchState:
         every = [self.stages.columns(self.problem, c, self.fit.effects) for c in looked]
         return Columns(looked, np.concatenate(every))
 
+    @property
+    def now(self) -> Now:
+        """What a move starts from and is judged by."""
+        return self.problem, self.holdout, self.fit
+
     def accept(self, candidate: Candidate, values: np.ndarray) -> bool:
         """Refit with the candidate; keep it if the joint fit and the held-out windows agree."""
-        chosen, start = (*self.fit.chosen, candidate), np.concatenate((self.fit.values, values))
-        # Windows that only this effect explains weighed little so far: weigh them as it leaves them.
-        residual = self.problem.residual([effects_at(chosen, start)])[0]
-        weights = window_weights(residual - np.tensordot(self.fit.nuisance, self.problem.nuisance, axes=1))
-        fit = gauss_newton(self.problem, chosen, start, weights, iterations=2, coarse=True, known=self.fit)
-        z = wald(self.problem, fit, weights, len(fit.chosen) - 1)
-        if z < self.bound:  # the windows that judge need not be simulated
-            return self.refuse(candidate)
-        rules, gain = self.problem.thresholds.comparison, compare(self.problem, self.holdout, self.fit, fit)
+        rules = self.problem.thresholds.comparison
         few = rules.where_felt if candidate.effect in (*SATURATIONS, *ABRUPT) else rules.where_rare
-        if not (gain.passes(rules.validation) or gain.passes(few)):
+        terms = Terms(self.bound, (rules.validation, few), iterations=2)
+        move = refitted(self.now, self.fit, candidate, [np.concatenate((self.fit.values, values))], terms)
+        if move is None or not move.passes():  # if not sure the windows that judge need not be simulated
             return self.refuse(candidate)
-        if not is_physical(self.problem, self.fit, fit, candidate, weights):
-            return self.refuse(candidate)
-        self.steps.append(evidence(candidate, z, len(self.candidates)))
-        self.say(f"found {candidate.effect} on {candidate.where or 'the whole robot'}: {fit.of(candidate).round(5)}")
         before = self.power()
-        self.renew(fit)
+        self.take(move)
         self.fall = 1.0 - self.power() / max(before, 1e-12)
         return True
+
+    def take(self, move: Move, rivals: int | None = None) -> None:
+        """Make a move; its p is shared among the `rivals`, all candidates if None."""
+        new = move.new
+        self.steps.append(evidence(new, move.z, len(self.candidates) if rivals is None else rivals))
+        instead = ", ".join(f"{c.effect} on {c.where or 'the whole robot'}" for c in move.gone)
+        place = f"{new.effect} on {new.where or 'the whole robot'}: {move.after.of(new).round(5)}"
+        self.say(f"found {place}" + (f", in place of {instead}" if instead else ""))
+        self.renew(move.after)
 
     @property
     def rule(self) -> Forward:

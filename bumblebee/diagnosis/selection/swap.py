@@ -23,16 +23,11 @@ import numpy as np
 from bumblebee.diagnosis.candidates import SATURATIONS, Candidate, is_chosen
 from bumblebee.diagnosis.comparison import (
     columns_without,
-    compare,
     criterion,
-    evidence,
-    is_physical,
     linear_cost,
-    wald,
-    z_value,
 )
-from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
-from bumblebee.diagnosis.residuals import window_weights
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.selection.moves import Move, Terms, by_loss, by_slopes, refitted
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import KIND as SHAFT
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import LIKE as SHAFT_LIKE
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import best_elasticity, is_of_series
@@ -41,37 +36,27 @@ from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial, try_one
 from bumblebee.diagnosis.sensitivities import Columns
 
-_Tried = tuple[Sequence[Candidate], Fit, float]
-"""Names that are gone, the fit without them and with their rival last, and the rival's z."""
-
 
 def swap(run: SearchState) -> bool:
     """Put one better name in the place of one or two of the search's; whether there was one."""
     rule, rules = run.problem.thresholds.selection.swap, run.problem.thresholds.comparison
     free = [c for c in run.fit.chosen[run.given :] if c.effect not in SATURATIONS]
     taken = [(c,) for c in free] + (list(combinations(free, 2)) if len(free) <= rule.few else [])
-    best: tuple[float, Fit, float] | None = None
+    best: tuple[float, Move] | None = None
     start = criterion(run.problem, run.fit)
-    for gone, new, z in chain(*(_tried(run, gone) for gone in taken), _twisted(run, free)):
-        gain = criterion(run.problem, new) - start
-        margin = rule.clearly * rules.criterion.parameter if len(gone) == 1 else 0.0
-        if gain <= max(margin, best[0] if best else margin):
-            continue
-        if compare(run.problem, run.holdout, run.fit, new).passes(rules.no_worse_on_average):
-            best = gain, new, z
+    for move in chain(*(_tried(run, gone) for gone in taken), _twisted(run, free)):
+        gain = criterion(run.problem, move.after) - start
+        margin = rule.clearly * rules.criterion.parameter if len(move.gone) == 1 else 0.0
+        if gain > max(margin, best[0] if best else margin) and move.passes():
+            best = gain, move
     if best is None:
         return False
-    _, new, z = best
-    rival = new.chosen[-1]
-    run.steps.append(evidence(rival, z, len(run.candidates)))
-    gone = ", ".join(f"{c.effect} on {c.where}" for c in run.fit.chosen if c not in new.chosen)
-    run.say(f"{rival.effect} on {rival.where or 'the whole robot'} in the place of {gone}")
-    run.renew(new)
+    run.take(best[1])
     run.closed.clear()
     return True
 
 
-def _tried(run: SearchState, gone: Sequence[Candidate]) -> Iterator[_Tried]:
+def _tried(run: SearchState, gone: Sequence[Candidate]) -> Iterator[Move]:
     """Fits with one rival in the place of some names, those that promise most."""
     rule = run.problem.thresholds.selection.swap
     weights, all_of = run.weights[run.keep], run.small_fit()
@@ -85,12 +70,12 @@ def _tried(run: SearchState, gone: Sequence[Candidate]) -> Iterator[_Tried]:
     for k in promising:
         rival = run.columns.candidates[k]
         trial = try_one(run.problem, rest, rival, tests.steps[k], run.weights)
-        new = _refitted(run, rest, trial) if trial else None
-        if new:
-            yield gone, *new
+        move = _refitted(run, rest, trial) if trial else None
+        if move:
+            yield move
 
 
-def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[_Tried]:
+def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
     """Fits with a shaft in the place of what its swing passes for, on each joint that has such a name."""
     for where in dict.fromkeys(c.where for c in free if c.where and c.effect in SHAFT_LIKE):
         if (SHAFT, where) in run.hopeless:
@@ -103,31 +88,16 @@ def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[_Tried]:
         run.hopeless.add((SHAFT, where))
         least = run.problem.thresholds.selection.swap.part * own
         trial = best_elasticity(run.problem, rest, run.candidates, run.weights, where, least)
-        new = _refitted(run, rest, trial) if trial else None
-        if new:
-            yield gone, *new
+        move = _refitted(run, rest, trial) if trial else None
+        if move:
+            yield move
 
 
-def _refitted(run: SearchState, rest: Fit, trial: Trial) -> tuple[Fit, float] | None:
-    """The joint fit with a rival and the rival's z, if it is sure of it."""
-    rival = trial.candidate
-    chosen, start = (*rest.chosen, rival), np.concatenate((rest.values, trial.values))
-    new = gauss_newton(run.problem, chosen, start, run.weights, iterations=3, coarse=True, known=run.fit)
-    weights = window_weights(new.clean(run.problem))
-    z = _certainty(run, rest, new, weights)
-    if z < run.bound or not is_physical(run.problem, rest, new, rival, weights):
-        return None
-    return new, z
-
-
-def _certainty(run: SearchState, rest: Fit, new: Fit, weights: np.ndarray) -> float:
-    """The z of a rival; of a shaft, half of which swings out of step, by what the fit loses without it if more."""
-    z = wald(run.problem, new, weights, len(new.chosen) - 1)
-    if new.chosen[-1].effect != SHAFT:
-        return z
-    fall = cost_of(run.problem, rest.residual, weights)[0] - new.cost
-    numbers = int(np.count_nonzero(new.chosen[-1].scales))
-    return max(z, z_value(max(fall, 0.0) / max(new.power(run.problem), 1.0), numbers, len(weights)))
+def _refitted(run: SearchState, rest: Fit, trial: Trial) -> Move | None:
+    """The joint fit with a rival, if it is sure of it; half of what is behind a shaft swings out of step."""
+    rules, certainty = run.problem.thresholds.comparison, by_loss if trial.candidate.effect == SHAFT else by_slopes
+    terms = Terms(run.bound, (rules.no_worse_on_average,), 3, run.weights, weighed_after=True, certainty=certainty)
+    return refitted(run.now, rest, trial.candidate, [np.concatenate((rest.values, trial.values))], terms)
 
 
 def _promising(

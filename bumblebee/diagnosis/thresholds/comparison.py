@@ -16,6 +16,10 @@ class Validation:
     """Share of what all effects gain together that it must reach: no law is exactly the catalogue's."""
     of_rest: float = 0.2
     """Share of what is left that is never a trifle."""
+    of_excess: float = 0.5
+    """Share of what is left above the noise that is none either, where that is ..."""
+    of_noise: float = 0.05
+    """... at least this share of the noise: below it differences between integrators are as large."""
     rank_windows: int = 8
     """Windows above which Wilcoxon's ranks are trusted beside the mean."""
 

@@ -250,6 +250,14 @@ class GainParameters:
 
 
 @dataclass(frozen=True)
+class DeclaredScale:
+    """Of strength, inertia and friction that only one common factor tells apart."""
+
+    iterations: int = 4
+    """Steps of the refit at the declared strengths: its start is on the scale, inertias are not yet."""
+
+
+@dataclass(frozen=True)
 class EncoderResolution:
     """Of encoders that read in steps."""
 
@@ -299,5 +307,6 @@ class ProposalThresholds:
     packet_loss: PacketLoss = field(default_factory=PacketLoss)
     stribeck: Stribeck = field(default_factory=Stribeck)
     gain_parameters: GainParameters = field(default_factory=GainParameters)
+    declared_scale: DeclaredScale = field(default_factory=DeclaredScale)
     encoder_resolution: EncoderResolution = field(default_factory=EncoderResolution)
     joint_misfit: JointMisfit = field(default_factory=JointMisfit)

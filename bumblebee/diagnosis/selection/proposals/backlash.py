@@ -7,7 +7,7 @@ a geometric series of gaps on those windows, and the best of them on all. Its ga
 as of `proposals.saturation`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate, is_chosen
 from bumblebee.diagnosis.estimation import Fit, LeftOver, typical_power
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.profile import profile, stepped
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, odd_joints
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.diagnosis.thresholds.proposals import Backlash
@@ -69,10 +70,16 @@ def _best(
         return float(falls(some, none, some.residual([at(gap)])[0], usual).sum())
 
     first = rule.first * float(problem.sigma[problem.plant.joints.index(candidate.where)])
-    gap, most = _best_of_series(gain, first, -2.0 * usual * none.shape[1] * rule.harm, rule)
-    if most < rule.least_gain_tried:
+    harm = -2.0 * usual * none.shape[1] * rule.harm
+
+    def ends(gains: Sequence[float]) -> bool:
+        last = gains[-rule.harmful_sizes :]
+        return len(last) == rule.harmful_sizes and max(last) < harm
+
+    series = profile(lambda gaps: [gain(g) for g in gaps], [first * rule.ratio**k for k in range(rule.count)], ends)
+    if series.gain < rule.least_gain_tried:
         return None
-    gap = _refined(gain, gap, most, rule.ratio)
+    gap, _ = stepped(gain, series.size, series.gain, (rule.ratio**0.5, rule.ratio**0.25))
     none, after = problem.residual([at(rule.none), at(gap)])
     if not _is_enough(falls(problem, none, after, usual), rule):
         return None
@@ -80,30 +87,6 @@ def _best(
     values = np.array([gap, *candidate.start[1:]])
     own = replace(candidate, step=(rule.step * gap, *candidate.step[1:]))
     return Trial(own, values, left_over.cost(after), left_over.left(change))
-
-
-def _best_of_series(gain: Callable[[float], float], first: float, harm: float, rule: Backlash) -> tuple[float, float]:
-    """The gap [rad] of the series from `first` on that gains most, and its gain; gains below `harm` may end it."""
-    gaps, gains, bad = [], [], 0
-    for k in range(rule.count):
-        gaps.append(first * rule.ratio**k)
-        gains.append(gain(gaps[-1]))
-        bad = bad + 1 if gains[-1] < harm else 0
-        if bad >= rule.harmful_sizes:
-            break
-    best = int(np.argmax(gains))
-    return gaps[best], gains[best]
-
-
-def _refined(gain: Callable[[float], float], gap: float, most: float, ratio: float) -> float:
-    """The gap [rad] after two finer steps to either side of one that gains `most`."""
-    for finer in (ratio**0.5, ratio**0.25):
-        for factor in (finer, 1 / finer):
-            new = gain(gap * factor)
-            if new > most:
-                gap, most = gap * factor, new
-                break
-    return gap
 
 
 def _is_enough(each: np.ndarray, rule: Backlash) -> bool:

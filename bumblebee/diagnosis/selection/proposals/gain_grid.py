@@ -22,6 +22,7 @@ from bumblebee.diagnosis.candidates import Candidate, effects_at
 from bumblebee.diagnosis.comparison import compare, evidence, wald
 from bumblebee.diagnosis.estimation import Fit, LeftOver, gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
+from bumblebee.diagnosis.selection.profile import Profile
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.diagnosis.simulation import Windows, choose_starts, cut, residuals, vary
@@ -192,9 +193,8 @@ def gain_trials(
     found = []
     for c in kinds:
         moved = problem.residual([[*fit.effects, c.at([f])] for f in rule.single], coarse=True)
-        costs = [left_over.cost(fit.residual - (declared - m)) for m in moved]
-        best = int(np.argmin(costs))
-        if costs[best] < rule.single_share * start:
-            change = left_over.left(declared - moved[best])
-            found.append(Trial(c, np.array([rule.single[best]]), costs[best], change))
+        series = Profile(rule.single, [-left_over.cost(fit.residual - (declared - m)) for m in moved])
+        if -series.gain < rule.single_share * start:
+            change = left_over.left(declared - moved[series.best])
+            found.append(Trial(c, np.array([series.size]), -series.gain, change))
     return found

@@ -15,6 +15,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate, is_chosen
 from bumblebee.diagnosis.estimation import Fit, LeftOver, typical_power
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.profile import profile
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, joint_chi_squares
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.diagnosis.simulation import Plant
@@ -96,10 +97,12 @@ def _sought(few: Problem, some: Problem, fit: Fit, candidate: Candidate, usual: 
         return values
 
     def best_of(problem: Problem, tried: Sequence[np.ndarray]) -> tuple[float, np.ndarray]:
-        none, *others = problem.residual([_with(fit, candidate, v) for v in (_stiff(some, candidate), *tried)])
-        worth = [float(falls(problem, none, r, usual).sum()) for r in others]
-        k = int(np.argmax(worth))
-        return worth[k], tried[k]
+        def gains(tried: Sequence[np.ndarray]) -> list[float]:
+            none, *others = problem.residual([_with(fit, candidate, v) for v in (_stiff(some, candidate), *tried)])
+            return [float(falls(problem, none, r, usual).sum()) for r in others]
+
+        found = profile(gains, tried)
+        return found.gain, found.size
 
     best = best_of(few, [at(soft / stiffness) for stiffness in series(bool(candidate.step[1]), rule)])
     if best[0] < 0:

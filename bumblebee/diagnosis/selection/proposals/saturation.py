@@ -8,7 +8,7 @@ fit's robust cost, 2 s M log(1 + power / s) summed over windows with s their med
 `problem.window_weights` are the weights.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from bumblebee.diagnosis.candidates import SATURATIONS, Candidate
 from bumblebee.diagnosis.comparison import plausible
 from bumblebee.diagnosis.estimation import Fit, LeftOver
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.profile import halved, profile
 from bumblebee.diagnosis.selection.proposals.joint_misfit import joint_chi_squares
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.diagnosis.simulation import Changes, Plant, Windows, command_inputs, plant_servos, vary
@@ -143,11 +144,11 @@ def _own_off(problem: Problem, clean: np.ndarray, odd: np.ndarray, usual: float)
 def _best(limit: _Limit) -> tuple[float, float] | None:
     """Value and gain of a limit; simulated anew if it looks well by what was simulated around an earlier fit."""
     limit.changes.taken = False
-    best = _profile(limit)
-    return _profile(limit, fresh=True) if best is not None and limit.changes.taken else best
+    best = _sought(limit)
+    return _sought(limit, fresh=True) if best is not None and limit.changes.taken else best
 
 
-def _profile(limit: _Limit, fresh: bool = False) -> tuple[float, float] | None:
+def _sought(limit: _Limit, fresh: bool = False) -> tuple[float, float] | None:
     """Value and gain of the best of the sizes tried.
 
     None where no size is worth a closer look; no gain where all that were tried only do harm. What the limit's
@@ -165,42 +166,25 @@ def _profile(limit: _Limit, fresh: bool = False) -> tuple[float, float] | None:
     if not counts:
         return None
     sizes = [float(0.5 * (felt[n - 1] + felt[n])) for n in counts]
-    gains: list[float] = []
-    for count, size in zip(counts, sizes, strict=True):
-        gains.append(gain(size))
-        harmful = len(gains) > 1 and max(gains[-2:]) < -2.0 * limit.usual * limit.clean.shape[1] * rule.harm
-        nothing = count >= rule.enough_windows and max(gains) < rule.earlier_share * rule.promising_share * cost
-        if harmful or nothing:
-            break  # smaller limits spoil these windows further, and others
-    best = int(np.argmax(gains))
-    if gains[best] <= 0 and harmful:
-        return limit.value(sizes[best]), 0.0
+
+    def harmful(gains: Sequence[float]) -> bool:
+        return len(gains) > 1 and max(gains[-2:]) < -2.0 * limit.usual * limit.clean.shape[1] * rule.harm
+
+    def ends(gains: Sequence[float]) -> bool:
+        """Smaller limits would spoil these windows further, and others."""
+        enough = counts[len(gains) - 1] >= rule.enough_windows
+        return harmful(gains) or (enough and max(gains) < rule.earlier_share * rule.promising_share * cost)
+
+    series = profile(lambda sizes: [gain(s) for s in sizes], sizes, ends)
+    if series.gain <= 0 and harmful(series.gains):
+        return limit.value(series.size), 0.0
     earlier = limit.changes.taken and not fresh
-    if gains[best] <= (rule.earlier_share if earlier else 1.0) * rule.promising_share * cost:
+    if series.gain <= (rule.earlier_share if earlier else 1.0) * rule.promising_share * cost:
         return None
     if earlier:
-        return limit.value(sizes[best]), gains[best]
-    low, high = sizes[max(best - 1, 0)], sizes[min(best + 1, len(gains) - 1)]
-    size, most = _closer(gain, (low, sizes[best], high), gains[best], rule.halvings)
+        return limit.value(series.size), series.gain
+    size, most = halved(gain, series.around, series.gain, rule.halvings)
     return limit.value(size), most
-
-
-def _closer(
-    gain: Callable[[float], float], interval: tuple[float, float, float], best: float, halvings: int
-) -> tuple[float, float]:
-    """The best of a few more sizes, halving the wider side of the interval around the best so far."""
-    low, middle, high = interval
-    for _ in range(halvings):
-        left = middle - low >= high - middle
-        new = 0.5 * (low + middle) if left else 0.5 * (middle + high)
-        value = gain(new)
-        if value > best:
-            low, middle, high, best = (low, new, middle, value) if left else (middle, new, high, value)
-        elif left:
-            low = new
-        else:
-            high = new
-    return middle, best
 
 
 def _change(problem: Problem, fit: Fit, candidate: Candidate, value: float, felt: np.ndarray) -> np.ndarray:

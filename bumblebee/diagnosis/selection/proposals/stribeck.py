@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from bumblebee.diagnosis.candidates import SHAPED, Candidate, is_chosen
-from bumblebee.diagnosis.comparison import compare, evidence, wald
-from bumblebee.diagnosis.estimation import Fit, gauss_newton
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.selection.moves import Terms, refitted
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.state import SearchState
 
@@ -39,21 +39,11 @@ def add_dry_friction(run: SearchState) -> None:
         dry = next((o for o in run.candidates if (o.effect, o.where) == ("coulomb_friction", c.where)), None)
         if dry is None or is_chosen(dry, run.fit.chosen):
             continue
-        chosen = (*run.fit.chosen, dry)
-        tried = [
-            gauss_newton(run.problem, chosen, start, run.weights, rule.iterations, coarse=True, known=run.fit)
-            for start in _on_level(run.fit, c, dry, rule.rest)
-        ]
-        fit = min(tried, key=lambda one: one.cost)
-        z = wald(run.problem, fit, run.weights, len(chosen) - 1)
-        if z < rule.dry_z or fit.of(dry)[0] < dry.nominal[0]:
-            continue
         no_worse = run.problem.thresholds.comparison.no_worse_on_average
-        if not compare(run.problem, run.holdout, run.fit, fit).passes(no_worse):
-            continue
-        run.say(f"{c.effect} on {c.where} sits on dry friction: {fit.of(dry).round(5)}")
-        run.steps.append(evidence(dry, z, 1))
-        run.renew(fit)
+        terms = Terms(rule.dry_z, (no_worse,), rule.iterations, run.weights, artefact=False)
+        move = refitted(run.now, run.fit, dry, _on_level(run.fit, c, dry, rule.rest), terms)
+        if move is not None and move.after.of(dry)[0] >= dry.nominal[0] and move.passes():
+            run.take(move, rivals=1)  # no further name but a parameter of the same
 
 
 def _on_level(fit: Fit, candidate: Candidate, dry: Candidate, rest: float) -> list[np.ndarray]:

@@ -1,0 +1,27 @@
+"""A first look names what a diagnosis would, with its size; where nothing is, it says so."""
+
+import pytest
+
+from bumblebee.diagnosis.quick import first_look, told
+from tests.diagnosis import arm
+from tests.diagnosis.strange_arm import simulate
+from tests.diagnosis.test_catalogue import CONFIG
+
+
+def test_the_first_lead_is_the_effect_that_is_there_with_its_size() -> None:
+    look = first_look(arm.session_of(simulate({("coulomb_friction", "j2"): (1.0,)}, seed=3)), CONFIG)
+    first = look.leads[0]
+    assert (first.candidate.effect, first.candidate.where) == ("coulomb_friction", "j2")
+    assert first.values[0] == pytest.approx(1.0, rel=0.1)
+    assert first.explains > 0.8
+    assert first.z > look.bound
+    assert [lead.explains for lead in look.leads] == sorted((lead.explains for lead in look.leads), reverse=True)
+    assert look.errors[0][0] == "j2"
+    assert "coulomb_friction" in told(look)
+    assert "N m" in told(look)
+
+
+def test_a_model_that_lacks_nothing_gets_no_lead() -> None:
+    look = first_look(arm.session_of(simulate({}, seed=3)), CONFIG)
+    assert look.leads == []
+    assert "no effect of the catalogue is sure alone" in told(look)
