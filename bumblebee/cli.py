@@ -129,15 +129,18 @@ def import_(
     kind: Annotated[str, typer.Option("--kind", help="so101, csv, double_pendulum, asap or sysid.")],
     model: Annotated[Path | None, typer.Option("--model", help="The declared MJCF; copied to model.xml.")] = None,
     columns: Annotated[Path | None, typer.Option("--columns", help="Column map of CSV logs, a YAML file.")] = None,
+    conditions: Annotated[
+        Path | None, typer.Option("--conditions", help="Table of gains, loads, labels ... of each log, CSV or YAML.")
+    ] = None,
 ) -> None:
     """Turn logs of another layout into a dataset of the contract."""
     from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output
     from bumblebee.measured.importers import import_dataset
 
-    refuse_overlap(dataset, [path for path in (source, model, columns) if path])
+    refuse_overlap(dataset, [path for path in (source, model, columns, conditions) if path])
     refuse_foreign(dataset, lambda path: False, "nothing")
     try_output(dataset)
-    ids = import_dataset(source, kind, dataset, model, columns)
+    ids = import_dataset(source, kind, dataset, model, columns, conditions)
     print(f"{len(ids)} rollouts: {', '.join(ids[:6])}{' ...' if len(ids) > 6 else ''}")
 
 

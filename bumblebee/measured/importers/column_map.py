@@ -37,6 +37,8 @@ class ColumnMap:
     """Order of base_quat as the file's columns are named in the map."""
     episode: str = ""
     """Column that numbers the episodes where a file holds several; each becomes a rollout."""
+    valid: str = ""
+    """Column that is 0 in rows that do not count, as `torque_enable` is once a servo was switched off."""
     scale: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Column of the contract -> factors, one a joint, on its values (in rad where they are angles)."""
     offset: dict[str, tuple[float, ...]] = field(default_factory=dict)
@@ -83,13 +85,16 @@ def read_map(path: Path) -> ColumnMap:
     episode = _names(f"{path}: episode", table["episode"]) if table.get("episode") else ("",)
     if len(episode) > 1:
         raise BadInput(f"{path}: episode", "the name of one column", ", ".join(episode)[:60])
+    valid = _names(f"{path}: valid", table["valid"]) if table.get("valid") else ("",)
+    if len(valid) > 1:
+        raise BadInput(f"{path}: valid", "the name of one column", ", ".join(valid)[:60])
     meta = table.get("meta", {})
     if not isinstance(meta, dict) or not all(isinstance(key, str) for key in meta):
         raise BadInput(f"{path}: meta", "keys and values", repr(meta)[:60])
     linear = {key: _linear(f"{path}: {key}", table.get(key), len(joints)) for key in ("scale", "offset")}
     if any(factor == 0 for factors in linear["scale"].values() for factor in factors):
         raise BadInput(f"{path}: scale", "factors other than 0", "0")
-    given = {"joints": joints, "columns": columns, "time": time, "episode": episode[0], "meta": meta}
+    given = {"joints": joints, "columns": columns, "time": time, "episode": episode[0], "meta": meta, "valid": valid[0]}
     return ColumnMap(**(table | given | linear))
 
 
