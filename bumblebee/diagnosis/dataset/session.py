@@ -1,12 +1,13 @@
 """What diagnose, replay and gap share: the data matched with the model, noise, the split, the steps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.dataset.held_out import HeldOut, split_by
 from bumblebee.diagnosis.dataset.noise import estimate_noise
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
 from bumblebee.diagnosis.dataset.split import accepting, split
@@ -57,14 +58,18 @@ class Session:
     """What must not be overlooked in any report of this model and these rollouts."""
     thresholds: DatasetThresholds = field(default_factory=DatasetThresholds)
     """What the use of its rollouts goes by."""
+    held_out: HeldOut | None = None
+    """The condition by which rollouts are held out; None: by motion."""
 
     def ids(self, which: Sequence[int]) -> list[str]:
         """Rollout ids of indices."""
         return [self.rollouts[i].rollout_id for i in which]
 
 
-def open_session(model: Path, dataset: Path, thresholds: DatasetThresholds | None = None) -> Session:
-    """Read and match a model and a dataset."""
+def open_session(
+    model: Path, dataset: Path, thresholds: DatasetThresholds | None = None, held_out: HeldOut | None = None
+) -> Session:
+    """Read and match a model and a dataset; rollouts are held out by motion, or by the condition `held_out`."""
     rollouts, errors, warnings = [], [], []
     files = rollout_files(dataset)
     if not files:
@@ -85,7 +90,8 @@ def open_session(model: Path, dataset: Path, thresholds: DatasetThresholds | Non
             errors.append((file.stem, refused))
     if not rollouts:
         raise errors[0][1]
-    return make_session(spec, rollouts, model, dataset, errors, warnings, thresholds)
+    session = make_session(spec, rollouts, model, dataset, errors, warnings, thresholds)
+    return session if held_out is None else hold_out(session, held_out)
 
 
 def make_session(
@@ -126,6 +132,15 @@ def make_session(
     return Session(
         spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, undriven, rules
     )
+
+
+def hold_out(session: Session, held_out: HeldOut) -> Session:
+    """The session with the rollouts of some conditions held out; those that are left decide on acceptance, too."""
+    train, holdout = split_by(session.rollouts, held_out)
+    _, some = split([session.rollouts[i] for i in train], session.thresholds.split) if len(train) > 1 else ([], [])
+    notes = [note for note in session.notes if note != JUDGED_TWICE]
+    accept = [train[k] for k in some]
+    return replace(session, train=train, holdout=holdout, accept=accept, notes=notes, held_out=held_out)
 
 
 def _sorted_out(
