@@ -27,6 +27,10 @@ class HeldOut:
         """As a diagnosis tells it."""
         return {"by": "condition", "condition": self.name, "values": list(self.values)}
 
+    def of(self, rollout: Rollout) -> Value | None:
+        """A rollout's value of the condition."""
+        return stated_conditions(rollout.meta, rollout.joints).get(self.name)
+
     def matches(self, value: Value | None) -> bool:
         """Whether a rollout of this value is held out; one that states none is not."""
         return value is not None and any(_same(value, own) for own in self.values)

@@ -10,7 +10,7 @@ import numpy as np
 from bumblebee.diagnosis.dataset.held_out import HeldOut, split_by
 from bumblebee.diagnosis.dataset.noise import estimate_noise
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
-from bumblebee.diagnosis.dataset.split import accepting, split
+from bumblebee.diagnosis.dataset.split import accepting, accepting_across, motion_names, split
 from bumblebee.diagnosis.dataset.time_steps import steps_of
 from bumblebee.diagnosis.dataset.undriven import undriven_warnings
 from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages
@@ -137,9 +137,11 @@ def make_session(
 def hold_out(session: Session, held_out: HeldOut) -> Session:
     """The session with the rollouts of some conditions held out; those that are left decide on acceptance, too."""
     train, holdout = split_by(session.rollouts, held_out)
-    _, some = split([session.rollouts[i] for i in train], session.thresholds.split) if len(train) > 1 else ([], [])
+    fitted = [session.rollouts[i] for i in train]
+    stated = [(session.plant.under.get(r.rollout_id, 0), held_out.of(r)) for r in fitted]
+    rule = session.thresholds.split
+    accept = [train[k] for k in accepting_across(motion_names(fitted, rule), stated, rule)]
     notes = [note for note in session.notes if note != JUDGED_TWICE]
-    accept = [train[k] for k in some]
     return replace(session, train=train, holdout=holdout, accept=accept, notes=notes, held_out=held_out)
 
 

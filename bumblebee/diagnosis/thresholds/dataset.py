@@ -118,8 +118,8 @@ class VelocityLatency:
     least: float = 5e-4
     """Age beyond which one must be, without doubt [s]: half a step of a millisecond is none."""
     periods: float = 1.5
-    """Periods of the log that an age must exceed where position targets are logged: a servo that answers within a period
-    passes for half of one."""
+    """Periods of the log that an age must exceed where position targets are logged: a servo that answers within a
+    period passes for half of one."""
     doubt: float = 4.0
     """Standard errors that make it beyond doubt."""
     most: float = 0.05
