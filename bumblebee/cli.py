@@ -130,9 +130,13 @@ def gap(
 def import_(
     source: Annotated[Path, typer.Argument(metavar="SOURCE", help="Folder, zip archive or file of logs.")],
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="New folder for rollouts/*.parquet.")],
-    kind: Annotated[str, typer.Option("--kind", help="so101, csv, double_pendulum, asap or sysid.")],
+    kind: Annotated[
+        str, typer.Option("--kind", help="so101, csv, rosbag, lerobot, hdf5, double_pendulum, asap or sysid.")
+    ],
     model: Annotated[Path | None, typer.Option("--model", help="The declared MJCF; copied to model.xml.")] = None,
-    columns: Annotated[Path | None, typer.Option("--columns", help="Column map of CSV logs, a YAML file.")] = None,
+    columns: Annotated[
+        Path | None, typer.Option("--columns", help="Map of columns, joints and units, a YAML file.")
+    ] = None,
     conditions: Annotated[
         Path | None, typer.Option("--conditions", help="Table of gains, loads, labels ... of each log, CSV or YAML.")
     ] = None,

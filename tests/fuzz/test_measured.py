@@ -20,8 +20,9 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
 from bumblebee.measured.importers.asap_npz import import_asap
-from bumblebee.measured.importers.column_map import ColumnMap, read_map
+from bumblebee.measured.importers.column_map import ColumnMap
 from bumblebee.measured.importers.csv_map import import_csv
+from bumblebee.measured.importers.map_file import read_map
 from bumblebee.measured.importers.so101 import import_so101
 from bumblebee.measured.importers.sysid_npz import import_sysid
 from bumblebee.measured.intake import UNFORESEEN, intake

@@ -27,6 +27,10 @@ class Scales:
     """(J,) range of positions [rad]."""
     inertia: np.ndarray
     """(J,) diagonal of the joint-space inertia [kg m^2]."""
+    target_rate: np.ndarray
+    """(J,) largest change of the targets a second [rad/s]; 0 where torques are logged."""
+    target_turn: np.ndarray
+    """(J,) largest change of that a second [rad/s^2]."""
     duration: float
     """Longest rollout [s]."""
 
@@ -56,8 +60,20 @@ def scales_of(
         fastest=np.max([np.quantile(np.abs(r.joint_vel), rule.peak, axis=0) for r in rollouts], axis=0) + 1e-3,
         travel=np.max([np.ptp(r.joint_pos, axis=0) for r in rollouts], axis=0),
         inertia=_inertia(plant),
+        target_rate=_steepest(plant, rollouts, 1, rule),
+        target_turn=_steepest(plant, rollouts, 2, rule),
         duration=float(max(r.time[-1] - r.time[0] for r in rollouts)),
     )
+
+
+def _steepest(plant: Plant, rollouts: Sequence[Rollout], order: int, rule: SignalScales) -> np.ndarray:
+    """Largest derivative (J,) of the targets of some order, by differences between commands."""
+    found = [np.zeros(len(plant.joints))]
+    for r in rollouts if not plant.torque_input else ():
+        values, dt = r.joint_target, float(np.median(np.diff(r.time)))
+        if values is not None and r.frames > order:
+            found.append(np.quantile(np.abs(np.diff(values, order, axis=0)), rule.peak, axis=0) / dt**order)
+    return np.max(found, axis=0)
 
 
 def _bias(plant: Plant, rollouts: Sequence[Rollout], rows: int) -> np.ndarray:

@@ -75,6 +75,7 @@ def _notes(session: Session, findings: Findings, rule: Verdicts) -> list[str]:
         *session.notes,
         *mixed_notes(session.plant),
         *findings.notes,
+        *session.plant.failures.notes(rule.failures),
         *latency_notes(findings.entries, driven, rule),
         *factor_notes(findings.entries, driven),
     ]

@@ -6,6 +6,7 @@ acceleration for an armature, the servo's own torque for its strength, and so on
 
 import copy
 from collections.abc import Sequence
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -20,11 +21,12 @@ from bumblebee.diagnosis.simulation import (
     bent_before,
     inputs_of,
     remember,
+    setpoints_of,
     window_servos,
     yielded,
 )
 from bumblebee.diagnosis.thresholds.sensitivities import TorqueSignatures
-from bumblebee.sim.effects import Effect, bent, runtime_hooks, sloped, spread_inertia
+from bumblebee.sim.effects import SETPOINTS, Effect, bent, runtime_hooks, sloped, spread_inertia
 
 _NO_SIGNATURE = '{} has no torque in sensitivities/torque_signatures.py: add it, or column="simulated" in traits.py'
 
@@ -124,21 +126,21 @@ class Signatures:
     def _commanded(self, c: Candidate, j: int) -> np.ndarray:
         """Delayed and lost commands of one joint, alone or with the others."""
         effect = c.at(np.array(c.nominal) + np.array(c.step))
-        if c.effect in ("command_delay", "dropped_commands"):
+        if c.effect in ("command_delay", "dropped_commands", *SETPOINTS):
             return self.servos.gain[..., j] * (self._moved_control(effect)[..., j] - self.u[..., j])
         raise ValueError(_NO_SIGNATURE.format(c.effect))
 
     def _moved_control(self, effect: Effect) -> np.ndarray:
-        """Controls (W, K, J) with a delay or lost commands on all joints, of which the caller takes one."""
+        """Controls (W, K, J) with delayed, shaped or lost commands on all joints, of which the caller takes one."""
         kind, value = effect.effect, effect.value()
-        key = (kind, round(1e9 * value))
+        key = (f"{kind} {effect.values()[1:]}", round(1e9 * value))
         if key not in self._inverse:
-            delay, dropped = self.plant.delay, None
+            delay, dropped, shaped = self.plant.delay, None, setpoints_of(self.plant, [replace(effect, where=())])
             if kind == "dropped_commands":
                 dropped = np.full(self.plant.model.nu, value)
-            else:
+            elif not shaped:
                 delay = np.full(self.plant.model.nu, value)
-            moved = Variation(self.plant.model, delay, self.plant.offset, dropped=dropped)
+            moved = Variation(self.plant.model, delay, self.plant.offset, setpoints=shaped, dropped=dropped)
             control = inputs_of(self.windows, moved, self.path.step, self.path.control.shape[1], {})
             self._inverse[key] = self.servos.controls(control)
         return self._inverse[key]

@@ -24,6 +24,7 @@ from bumblebee.diagnosis.simulation.readings import (
     measured_readings,
     simulated_readings,
 )
+from bumblebee.diagnosis.simulation.setpoints import setpoints_of
 from bumblebee.diagnosis.simulation.simulate import (
     Starts,
     at_ticks,
@@ -45,7 +46,7 @@ from bumblebee.diagnosis.simulation.units import (
     rows,
     unit_on,
 )
-from bumblebee.diagnosis.simulation.variation import Variation, vary
+from bumblebee.diagnosis.simulation.variation import Variation, vary, vary_or_refuse
 from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, command_inputs, cut, select
 
 __all__ = [
@@ -90,11 +91,13 @@ __all__ = [
     "residuals",
     "rows",
     "select",
+    "setpoints_of",
     "simulated_readings",
     "state_before",
     "touching",
     "unit_on",
     "vary",
+    "vary_or_refuse",
     "window_servos",
     "with_step",
     "without",

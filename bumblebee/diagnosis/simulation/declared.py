@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.sim.effects import CATALOGUE, native
+from bumblebee.sim.effects import CATALOGUE, NO_SPEED_LIMIT, native
 
 
 def touching(model: mujoco.MjModel, ground: int) -> list[int]:
@@ -79,6 +79,9 @@ _DECLARED: dict[str, _Declared] = {
     "torque_limit": _limit,
     "torque_speed_limit": _UNBOUNDED,
     "command_delay": _delay,
+    "command_filter": _NONE,
+    "command_rate_limit": _UNBOUNDED,
+    "command_profile": lambda plant, place: (np.inf, NO_SPEED_LIMIT),
     "torque_lag": _NONE,
     "encoder_delay": _NONE,
     "dropped_commands": _NONE,

@@ -17,6 +17,7 @@ from mujoco.batch import MODEL_FIELDS
 
 from bumblebee.diagnosis.simulation.actuators import drive_law, take_target, take_torque
 from bumblebee.diagnosis.simulation.conditions import Condition, refuse_unmade, set_gains, set_supply, with_loads
+from bumblebee.diagnosis.simulation.failures import Failures
 from bumblebee.diagnosis.thresholds.simulation import DriveProbe, SimulationThresholds
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
@@ -98,6 +99,9 @@ class Plant:
             n for n in names if any(not np.array_equal(getattr(models[0], n), getattr(m, n)) for m in models[1:])
         )
 
+    failures: Failures = field(default_factory=Failures, repr=False)
+    """Models of it that could not be made or simulated."""
+
     @property
     def bodies(self) -> tuple[str, ...]:
         """Named bodies that have a mass and can move."""
@@ -137,7 +141,7 @@ def make_plant(
         actuator.nsample, actuator.delay = 0, 0.0
     torque_input = _set_inputs(spec, rollout, where, rules.drive)
     set_gains(spec, rollout.joints, condition)
-    model = spec.compile()
+    model = _with_movable_bodies(spec)
     refuse_unmade(model, condition.loads, where)
     set_supply(model, condition.supply)
     model.opt.iterations = max(rules.solver.iterations, model.opt.iterations)
@@ -169,10 +173,26 @@ def make_plant(
     )
 
 
+def _with_movable_bodies(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Compile `spec` so that every body may get another mass, centre and inertia.
+
+    A body alone on slides or a free joint, centred on its frame, is compiled as `simple`: of its rows in the mass
+    matrix the diagonal alone is stored, and MuJoCo refuses a centre that is moved afterwards.
+    """
+    model = spec.compile()
+    simple = [b for b in range(1, model.nbody) if model.body_simple[b]]
+    if not simple:
+        return model
+    for body in spec.bodies[1:]:
+        if body.id in simple:
+            body.simple = 0
+    return spec.compile()
+
+
 def plant_by(plant: Plant, thresholds: SimulationThresholds) -> Plant:
-    """The plant simulated by other thresholds; itself where they are the same."""
+    """The plant simulated by other thresholds, of which nothing has failed yet."""
     if thresholds == plant.thresholds:
-        return plant
+        return replace(plant, failures=Failures())
     own = make_plant(plant.spec, plant.example, "declared model", thresholds, plant.condition)
     return replace(own, others=tuple(plant_by(other, thresholds) for other in plant.others), under=plant.under)
 

@@ -11,11 +11,14 @@ from mujoco.batch import Batch
 
 from bumblebee.diagnosis.simulation.actuator_history import read_at, remember
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
+from bumblebee.diagnosis.simulation.failures import REFUSALS
 from bumblebee.diagnosis.simulation.hidden_states import Known, earlier, restructured, set_plastic, step_share
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.readings import Layout, difference, simulated_readings
+from bumblebee.diagnosis.simulation.setpoints import follow
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
+from bumblebee.errors import BadInput
 from bumblebee.quaternions import conjugate, from_rotation_vector, multiply, rotate_by_cross
 from bumblebee.sim.effects import Memory, StepHooks, hook_joints
 from bumblebee.sim.servo import servos_each, servos_of
@@ -56,7 +59,7 @@ def residuals(
     step: float,
     starts: Starts | None = None,
 ) -> np.ndarray:
-    """Return measured - simulated, (V, W, N, D); NaN where a simulation diverged.
+    """Return measured - simulated, (V, W, N, D); NaN where a simulation diverged or was not to be had.
 
     With `starts` of K start states, `variations` has one entry and the first axis is K.
     """
@@ -72,14 +75,41 @@ def residuals(
         chosen = [variations[0] if starts is not None else variations[v] for v in part]
         own = None if starts is None else starts.part(part)
         short = step * step_share(chosen[0].hidden, plant.thresholds.hidden)
-        count = int(np.ceil(windows.span / short - 1e-6))
-        inputs = [inputs_of(windows, variation, short, count, cache) for variation in chosen]
-        some = [] if chosen[0].plant is not None else [m for v in chosen for m in v.models]
-        models = list({id(m): m for m in some}.values())
-        with without(models, far):
-            out[part.start : part.stop] = _run(_Chunk(plant, windows, chosen, own, short), layout, inputs)
+        together = _Chunk(plant, windows, chosen, own, short)
+        out[part.start : part.stop] = _guarded(together, layout, cache, far)
         first = part.stop
     return out
+
+
+def _guarded(chunk: "_Chunk", layout: Layout, cache: dict[bytes, np.ndarray], far: np.ndarray) -> np.ndarray:
+    """Residuals (V, W, N, D) of one chunk; of a variation that cannot be simulated NaN, for it alone.
+
+    The declared model is no trial: where it cannot be simulated, the input is unusable.
+    """
+    lead, nothing = chunk.lead, np.full((len(chunk.chosen), *chunk.windows.measured.shape), np.nan)
+    if lead.impossible:
+        return nothing
+    try:
+        return _simulated(chunk, layout, cache, far)
+    except REFUSALS as error:
+        if len(chunk.chosen) > 1 and chunk.starts is None:
+            each = [_guarded(replace(chunk, chosen=[v]), layout, cache, far) for v in chunk.chosen]
+            return np.concatenate(each)
+        if not lead.effects:
+            raise BadInput("declared model", "one that MuJoCo can simulate", " ".join(str(error).split())) from error
+        chunk.plant.failures.add(lead.effects, error)
+        return nothing
+
+
+def _simulated(chunk: "_Chunk", layout: Layout, cache: dict[bytes, np.ndarray], far: np.ndarray) -> np.ndarray:
+    """Residuals (V, W, N, D) of one chunk."""
+    chosen, windows = chunk.chosen, chunk.windows
+    count = int(np.ceil(windows.span / chunk.step - 1e-6))
+    inputs = [inputs_of(windows, variation, chunk.step, count, cache) for variation in chosen]
+    some = [] if chosen[0].plant is not None else [m for v in chosen for m in v.models]
+    models = list({id(m): m for m in some}.values())
+    with without(models, far):
+        return _run(chunk, layout, inputs)
 
 
 def _together(variations: Sequence[Variation], first: int, chunk: int) -> range:
@@ -93,9 +123,11 @@ def _together(variations: Sequence[Variation], first: int, chunk: int) -> range:
 def inputs_of(
     windows: Windows, variation: Variation, step: float, count: int, cache: dict[bytes, np.ndarray]
 ) -> np.ndarray:
-    """Controls (W, count, nu) of a variation: late, and on the mean as held as dropped commands leave them."""
+    """Controls (W, count, nu) of a variation: late, shaped, and on the mean as held as dropped commands leave them."""
     share = variation.dropped
-    key = variation.delay.tobytes() + (b"" if share is None else share.tobytes()) + bytes(f"{count} {step!r}", "ascii")
+    shaped = variation.setpoints
+    key = variation.delay.tobytes() + (b"" if share is None else share.tobytes())
+    key += bytes(f"{count} {step!r} {shaped or ''}", "ascii")
     known = _known.setdefault(windows, {})
     if key in known:
         cache[key] = known[key]
@@ -106,7 +138,10 @@ def inputs_of(
             for k in range(1, command.shape[1]):
                 command[:, k] = (1 - share) * command[:, k] + share * command[:, k - 1]
             sent = replace(windows, command=command)
-        known[key] = cache[key] = controls(sent, variation.delay, step, count)
+        made = controls(sent, variation.delay, step, count)
+        for point in shaped:
+            made[..., point.actuator] = follow(sent, point, float(variation.delay[point.actuator]), step, count)
+        known[key] = cache[key] = made
         if len(known) > _KEPT:
             known.pop(next(iter(known)))
     return cache[key]

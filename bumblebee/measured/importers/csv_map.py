@@ -15,18 +15,10 @@ import pandas as pd
 from bumblebee.errors import BadInput
 from bumblebee.io.read import require_real
 from bumblebee.measured.importers.column_map import SECONDS, ColumnMap
-from bumblebee.measured.importers.source import (
-    NO_VELOCITY,
-    Source,
-    differences,
-    measured_rate,
-    open_source,
-    rollout_names,
-)
-from bumblebee.measured.rollout import WIDTHS, Rollout
+from bumblebee.measured.importers.mapped import rollouts_of
+from bumblebee.measured.importers.source import Source, open_source, rollout_names
+from bumblebee.measured.rollout import Rollout
 from bumblebee.measured.tables import read_csv, read_parquet, separator
-
-ANGULAR = ("joint_pos", "joint_vel", "joint_target", "base_ang_vel")
 
 
 def import_csv(place: Path, maps: Sequence[ColumnMap], no_logs: Sequence[str] = ()) -> list[Rollout]:
@@ -36,13 +28,14 @@ def import_csv(place: Path, maps: Sequence[ColumnMap], no_logs: Sequence[str] = 
     for ending in (".csv", ".parquet"):
         names = [name for name in source.ending(ending) if name not in no_logs]
         ids = rollout_names(names, ending)
-        rollouts += [rollout for name in names for rollout in _read(source, name, ids[name], maps)]
+        rollouts += [rollout for name in names for rollout in read_table(source, name, ids[name], maps)]
     if not rollouts:
         raise BadInput(place, "CSV or Parquet files", "none")
     return rollouts
 
 
-def _read(source: Source, name: str, rollout_id: str, maps: Sequence[ColumnMap]) -> list[Rollout]:
+def read_table(source: Source, name: str, rollout_id: str, maps: Sequence[ColumnMap]) -> list[Rollout]:
+    """The rollouts of one CSV or Parquet file by the first map whose columns it has."""
     where = source.where(name)
     table = _table(source, name, maps)
     chosen = next((one for one in maps if not _missing(one, table)), None)
@@ -55,10 +48,11 @@ def _read(source: Source, name: str, rollout_id: str, maps: Sequence[ColumnMap])
     if not len(table):
         raise BadInput(where, "rows under the header", "none")
     if not chosen.episode:
-        return [_rollout(where, table, rollout_id, chosen)]
+        return _rollouts(where, table, rollout_id, chosen)
     return [
-        _rollout(f"{where}: episode {key}"[:200], table.iloc[rows], f"{rollout_id}_{key}", chosen)
+        rollout
         for key, rows in _episodes(f"{where}: column {chosen.episode}", table[chosen.episode], source.limits.members)
+        for rollout in _rollouts(f"{where}: episode {key}"[:200], table.iloc[rows], f"{rollout_id}_{key}", chosen)
     ]
 
 
@@ -82,34 +76,16 @@ def _short(key: object) -> str:
     return f"{int(key):04d}" if isinstance(key, int | float | np.number) and float(key).is_integer() else str(key)
 
 
-def _rollout(where: str, table: pd.DataFrame, rollout_id: str, chosen: ColumnMap) -> Rollout:
+def _rollouts(where: str, table: pd.DataFrame, rollout_id: str, chosen: ColumnMap) -> list[Rollout]:
     time = _stamps(where, table, chosen)
-    count = len(chosen.joints)
-    values = {
-        column: _numbers(where, table, names, count if WIDTHS[column] == "J" else int(WIDTHS[column]))
-        for column, names in chosen.columns.items()
-    }
-    lost = [f"{column}: {n} cells without a number" for column, v in values.items() if (n := int(np.isnan(v).sum()))]
-    for column in ANGULAR:
-        if column in values and chosen.angle_unit == "deg":
-            values[column] = np.deg2rad(values[column])
-    with np.errstate(all="ignore"):  # what is too large is a finding of the checks, with its row
-        for column in values:
-            values[column] = values[column] * np.array(chosen.scale.get(column, (1.0,)))
-            values[column] = values[column] + np.array(chosen.offset.get(column, (0.0,)))
-    if "base_quat" in values and chosen.quat_order == "xyzw":
-        values["base_quat"] = np.roll(values["base_quat"], 1, axis=1)
-    meta = {"motion": rollout_id} | chosen.meta
-    if "joint_vel" not in values:
-        values["joint_vel"] = differences(time, values["joint_pos"])
-        lost.insert(0, NO_VELOCITY)
-    if lost:
-        meta["notes"] = "; ".join(filter(None, (str(meta.get("notes") or ""), *lost)))
-    return Rollout(rollout_id, chosen.joints, measured_rate(time), time, **values, meta=meta)
+    values = {column: _numbers(where, table, names, chosen.width(column)) for column, names in chosen.columns.items()}
+    return rollouts_of(where, rollout_id, time, values, chosen)
 
 
 def _stamps(where: str, table: pd.DataFrame, chosen: ColumnMap) -> np.ndarray:
     """Time stamps (T,) [s]; seconds since 1970 lose no digits to the nanoseconds beside them."""
+    if chosen.hz:
+        return np.arange(len(table)) / chosen.hz
     stamps = _numbers(where, table, chosen.time, len(chosen.time))
     with np.errstate(all="ignore"):
         if len(chosen.time) == 1:
@@ -132,7 +108,12 @@ def _body(content: bytes) -> bytes:
 
 
 def _wanted(one: ColumnMap) -> list[str]:
-    names = [*one.time, *(name for names in one.columns.values() for name in names), one.episode, one.valid]
+    names = [
+        *(() if one.hz else one.time),
+        *(name for names in one.columns.values() for name in names),
+        one.episode,
+        one.valid,
+    ]
     return list(dict.fromkeys(name for name in names if name))
 
 

@@ -11,16 +11,22 @@ from bumblebee.errors import BadInput
 from bumblebee.io.names import distinct_stems
 from bumblebee.io.write import new_folder, try_output
 from bumblebee.measured.importers.asap_npz import import_asap
-from bumblebee.measured.importers.column_map import DOUBLE_PENDULUM, read_map
+from bumblebee.measured.importers.column_map import DOUBLE_PENDULUM
 from bumblebee.measured.importers.conditions_table import read_conditions, with_conditions
 from bumblebee.measured.importers.csv_map import import_csv
+from bumblebee.measured.importers.hdf5_log import import_hdf5
+from bumblebee.measured.importers.lerobot import import_lerobot
+from bumblebee.measured.importers.map_file import read_map
+from bumblebee.measured.importers.ros import import_rosbag
 from bumblebee.measured.importers.so101 import import_so101
 from bumblebee.measured.importers.source import open_source
 from bumblebee.measured.importers.sysid_npz import import_sysid
 from bumblebee.measured.model_file import copy_model, load_model
 from bumblebee.measured.rollout import Rollout, write_rollout
 
-KINDS = ("so101", "csv", "double_pendulum", "asap", "sysid")
+KINDS = ("so101", "csv", "double_pendulum", "asap", "sysid", "rosbag", "lerobot", "hdf5")
+MAPPED = ("csv", "rosbag", "lerobot", "hdf5")
+"""Layouts that a column map reads."""
 
 
 def read_rollouts(
@@ -34,7 +40,7 @@ def read_rollouts(
 
     Args:
         source: folder, zip archive or file.
-        kind: so101, csv (needs `column_map`), double_pendulum, asap or sysid (both need `model`).
+        kind: one of `KINDS`; asap and sysid need `model`, those of `MAPPED` a `column_map`.
         model: the declared model.
         column_map: YAML file with the fields of `ColumnMap`.
         conditions: table of what was different in each log, see `conditions_table`.
@@ -43,14 +49,18 @@ def read_rollouts(
     no_log = (table.member,) if table else ()
     if kind in ("asap", "sysid") and model is None:
         raise BadInput(kind, "the declared model, by whose joints the file is read", "none", "Give a model.xml.")
-    if kind == "csv" and column_map is None:
-        raise BadInput(kind, "a column map", "none", "Give a YAML file with joints and columns.")
+    if kind in MAPPED and column_map is None:
+        raise BadInput(kind, "a column map", "none", "Give a YAML file with joints, columns and units: --columns.")
+    mapped = read_map(column_map, kind) if kind in MAPPED and column_map else DOUBLE_PENDULUM[0]
     readers: dict[str, Callable[[], list[Rollout]]] = {
         "so101": lambda: import_so101(source),
-        "csv": lambda: import_csv(source, [read_map(column_map or Path())], no_log),
+        "csv": lambda: import_csv(source, [mapped], no_log),
         "double_pendulum": lambda: import_csv(source, DOUBLE_PENDULUM),
         "asap": lambda: import_asap(source, model),
         "sysid": lambda: import_sysid(source, model),
+        "rosbag": lambda: import_rosbag(source, mapped),
+        "lerobot": lambda: import_lerobot(source, mapped),
+        "hdf5": lambda: import_hdf5(source, mapped),
     }
     if kind not in readers:
         raise BadInput(kind, f"one of {', '.join(KINDS)}", repr(kind))

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
+from bumblebee.sim.effects.setpoints import NO_SPEED_LIMIT
 from bumblebee.sim.units import is_known
 
 # MuJoCo's default dry friction creeps where a real joint sticks; a joint with `coulomb_friction` gets it stiff.
@@ -95,6 +96,12 @@ CATALOGUE: dict[str, Kind] = {
     "torque_limit": _joint(("limit", "N m", 1e-3, _INF)),
     "torque_speed_limit": _joint(("speed", "rad/s", 0.05, _INF), native=False),
     "command_delay": _joint(("delay", "s", 0.0, 0.1), whole=True),
+    # What the drive makes of its targets; of a profile without a limit of speed the acceleration alone is given.
+    "command_filter": _joint(("time", "s", 0.0, 0.5), whole=True, native=False),
+    "command_rate_limit": _joint(("rate", "rad/s", 1e-3, _INF), native=False),
+    "command_profile": _joint(
+        ("acceleration", "rad/s^2", 1e-2, _INF), ("speed", "rad/s", 1e-3, NO_SPEED_LIMIT, NO_SPEED_LIMIT), native=False
+    ),
     "torque_lag": _joint(("time", "s", 0.0, 0.1), whole=True, native=False),
     "encoder_delay": _joint(("delay", "s", 0.0, 0.05), whole=True, native=False),
     "dropped_commands": _joint(("share", "", 0.0, 0.9), whole=True, native=False),

@@ -1,0 +1,130 @@
+"""What a drive makes of its targets, tried at many sizes in the place of what it passes for.
+
+A filter of 30 ms is far from the 5 ms at which it is screened, and in part it looks like a delay, like damping, or like
+commands that come late here and there; a limited rate or acceleration acts more on large steps than on small ones. So
+where an effect of that kind was found, filters, rates and profiles of a series of sizes are tried instead of it on the
+windows that are furthest off, and the best of them on all. It takes the place if the joint fit says so
+(`selection/swap.py`).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates import Candidate, is_chosen
+from bumblebee.diagnosis.comparison import columns_without, criterion, linear_cost
+from bumblebee.diagnosis.estimation import Fit, LeftOver, gauss_newton, typical_power
+from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.profile import profile, stepped
+from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, joint_chi_squares, odd_joints
+from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.selection.trial import Trial
+from bumblebee.sim.effects import SETPOINTS, Effect
+
+TIMING = ("command_delay", "torque_lag", "encoder_delay", *SETPOINTS)
+# What else a drive that follows its targets late or slowly passes for.
+LIKE = (*TIMING, "kp", "kd", "motor_strength", "viscous_friction", "armature", "load_dependent_friction")
+Swapped = tuple[Fit, Trial]
+"""A fit without some names, and what is tried in their place."""
+
+
+def setpoint_swaps(run: SearchState, free: Sequence[Candidate]) -> Iterator[Swapped]:
+    """Set-points in the place of what they pass for, for each place that has such a name among the `free` ones."""
+    for where in dict.fromkeys(c.where for c in free if c.effect in TIMING):
+        like = [c for c in free if c.where == where and c.effect in LIKE]
+        timing = [c for c in like if c.effect in TIMING]
+        for gone in [timing, like] if len(like) > len(timing) else [timing]:
+            key = (" ".join(sorted(c.effect for c in gone)), where)
+            if key in run.hopeless:
+                continue
+            run.hopeless.add(key)
+            rest = columns_without(run.problem, run.fit, gone)
+            own = linear_cost(run.problem, rest, run.weights) - linear_cost(run.problem, run.fit, run.weights)
+            kinds = {c.effect for c in gone if c.effect in SETPOINTS}
+            least = run.problem.thresholds.selection.swap.part * own
+            trial = best_setpoint(run.problem, rest, run.candidates, run.weights, where, least, kinds)
+            if trial is not None:
+                yield rest, trial
+
+
+def best_setpoint(
+    problem: Problem,
+    fit: Fit,
+    candidates: Sequence[Candidate],
+    weights: np.ndarray,
+    where: str,
+    least: float = 0.0,
+    spared: set[str] | None = None,
+) -> Trial | None:
+    """The set-point of a joint (or "", of all drives) that explains most beside a fit; None where none is worth it.
+
+    Args:
+        problem: the fitted windows.
+        fit: beside what it is tried.
+        candidates: among which the set-points of the place are.
+        weights: (W,) of the windows.
+        where: the joint.
+        least: fall of the robust cost on all windows that it must exceed.
+        spared: kinds that are not tried.
+    """
+    rule, clean = problem.thresholds.selection.proposals.setpoints, fit.clean(problem)
+    usual = max(typical_power(clean), 1.0)
+    open_ = [c for c in candidates if c.where == where and c.effect in SETPOINTS and c.effect not in (spared or ())]
+    open_ = [c for c in open_ if not is_chosen(c, fit.chosen)]
+    if not open_:
+        return None
+    off = (clean**2).mean(axis=1)
+    if where:
+        off = joint_chi_squares(problem, clean)[0][:, problem.plant.joints.index(where)]
+    some = problem.part(np.sort(np.argsort(-off)[: rule.windows]))
+    found = [(*_sought(some, fit, c, usual), c) for c in open_]
+    gain, values, c = max(found, key=lambda f: f[0])
+    if gain < rule.least_gain_tried:
+        return None
+    none, after = problem.residual([fit.effects, _with(fit, c, values)])
+    if falls(problem, none, after, usual).sum() < max(rule.least_gain, least):
+        return None
+    left_over = LeftOver(problem, fit, weights)
+    own = replace(c, step=(rule.step * float(values[0]), *c.step[1:]))
+    return Trial(own, values, left_over.cost(after), left_over.left(fit.residual - after))
+
+
+def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tuple[float, np.ndarray]:
+    """The best of a candidate's series on some windows: its gain there and parameters (P,)."""
+    rule = some.thresholds.selection.proposals.setpoints
+
+    first = candidate.start
+
+    def at(size: float) -> np.ndarray:
+        return np.array([size, *first[1:]])
+
+    def gains(sizes: Sequence[float]) -> list[float]:
+        none, *others = some.residual([fit.effects, *(_with(fit, candidate, at(size)) for size in sizes)])
+        return [float(falls(some, none, r, usual).sum()) for r in others]
+
+    series = profile(gains, [float(first[0]) * factor for factor in rule.factors])
+    size, gain = stepped(lambda size: gains([size])[0], series.size, series.gain, rule.finer)
+    return gain, at(size)
+
+
+def explains_more(run: SearchState, where: str, gain: float) -> bool:
+    """Whether a set-point of a joint ("": of all, or of any that is far off) raises `criterion` by more than `gain`."""
+    far = odd_joints(run.problem, run.fit.clean(run.problem))
+    places = [where] if where else ["", *(joint for joint, _ in far)]
+    for place in places:
+        timing = [c for c in run.fit.chosen if c.where == place and c.effect in TIMING]
+        rest = columns_without(run.problem, run.fit, timing)
+        trial = best_setpoint(run.problem, rest, run.candidates, run.weights, place)
+        if trial is None:
+            continue
+        chosen, start = (*rest.chosen, trial.candidate), np.concatenate((rest.values, trial.values))
+        new = gauss_newton(run.problem, chosen, start, run.weights, iterations=2, coarse=True, known=run.fit)
+        if criterion(run.problem, new) - criterion(run.problem, run.fit) > gain:
+            return True
+    return False
+
+
+def _with(fit: Fit, candidate: Candidate, values: np.ndarray) -> list[Effect]:
+    """The fit's effects and a set-point, not brought within the bounds of the candidate's own step."""
+    return [*fit.effects, replace(candidate, step=(float(values[0]), *candidate.step[1:])).at(values)]
