@@ -1,12 +1,11 @@
 """The logs as they are used: checked and smoothed, divided into fitted and held-out rollouts, with their noise."""
 
-from bumblebee.diagnosis.dataset.held_out import HeldOut, read_held_out, varied
+from bumblebee.diagnosis.dataset.held_out import read_held_out, varied
 from bumblebee.diagnosis.dataset.informative_split import informative, window_errors
 from bumblebee.diagnosis.dataset.session import JUDGED_TWICE, Session, make_session, open_session
 
 __all__ = [
     "JUDGED_TWICE",
-    "HeldOut",
     "Session",
     "informative",
     "make_session",

@@ -5,15 +5,15 @@ grounds that took no part is the harder and the better test of a diagnosis.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from bumblebee.diagnosis.thresholds.dataset import Conditions
 from bumblebee.errors import BadInput
 from bumblebee.measured.conditions import Value, stated_conditions
 from bumblebee.measured.rollout import Rollout
 
 _OPTION = "--hold-out"
-_SAME = 1e-3  # relative difference of numbers: 0.205 says 0.204966
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,8 @@ class HeldOut:
 
     name: str
     values: tuple[Value, ...]
+    rule: Conditions = field(default_factory=Conditions)
+    """Which numbers are the same."""
 
     def entry(self) -> dict[str, Any]:
         """As a diagnosis tells it."""
@@ -33,7 +35,13 @@ class HeldOut:
 
     def matches(self, value: Value | None) -> bool:
         """Whether a rollout of this value is held out; one that states none is not."""
-        return value is not None and any(_same(value, own) for own in self.values)
+        return value is not None and any(self.same(value, own) for own in self.values)
+
+    def same(self, a: Value, b: Value) -> bool:
+        """Whether two values are one: texts to the letter, numbers but for rounding."""
+        if isinstance(a, str) or isinstance(b, str):
+            return _said(a) == _said(b)
+        return abs(a - b) <= self.rule.relative * max(abs(a), abs(b))
 
 
 def read_held_out(text: str) -> HeldOut:
@@ -53,7 +61,7 @@ def split_by(rollouts: Sequence[Rollout], held: HeldOut) -> tuple[list[int], lis
         raise BadInput(_OPTION, f"a condition that the rollouts state ({', '.join(names[:12]) or 'none'})", held.name)
     known = _sorted({one[held.name] for one in stated if held.name in one})
     for value in held.values:
-        if not any(_same(value, own) for own in known):
+        if not any(held.same(value, own) for own in known):
             listed = ", ".join(_said(own) for own in known[:12])
             raise BadInput(f"{_OPTION} {held.name}", f"values that rollouts have ({listed})", _said(value))
     away = [i for i, one in enumerate(stated) if held.matches(one.get(held.name))]
@@ -78,12 +86,6 @@ def varied(rollouts: Sequence[Rollout]) -> dict[str, list[dict[str, Any]]]:
 
 def _sorted(values: set[Value]) -> list[Value]:
     return sorted(values, key=lambda value: (isinstance(value, str), value))
-
-
-def _same(a: Value, b: Value) -> bool:
-    if isinstance(a, str) or isinstance(b, str):
-        return _said(a) == _said(b)
-    return abs(a - b) <= _SAME * max(abs(a), abs(b))
 
 
 def _value(text: str) -> Value:
