@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from bumblebee.diagnosis.simulation import Condition, Plant, in_words
 from bumblebee.diagnosis.thresholds.dataset import Conditions
 from bumblebee.errors import BadInput
 from bumblebee.measured.conditions import Value, stated_conditions
@@ -28,6 +29,11 @@ class HeldOut:
     def entry(self) -> dict[str, Any]:
         """As a diagnosis tells it."""
         return {"by": "condition", "condition": self.name, "values": list(self.values)}
+
+    def note(self) -> str:
+        """The same in words."""
+        listed = ", ".join(map(_said, self.values))
+        return f"held out are rollouts with {self.name} = {listed}: they took no part in the fit or in acceptance"
 
     def of(self, rollout: Rollout) -> Value | None:
         """A rollout's value of the condition."""
@@ -82,6 +88,19 @@ def varied(rollouts: Sequence[Rollout]) -> dict[str, list[dict[str, Any]]]:
         if len(groups) > 1:
             out[name] = groups
     return out
+
+
+def condition_notes(plant: Plant, rollouts: Sequence[Rollout], rule: Conditions) -> list[str]:
+    """A line on what rollouts were simulated with instead of what the model declares, where they say so."""
+    counts: dict[int, int] = {}
+    for rollout in rollouts:
+        number = plant.under.get(rollout.rollout_id, 0)
+        counts[number] = counts.get(number, 0) + 1
+    said = [f"{in_words(plant.every[k].condition, plant.joints)} ({n} rollouts)" for k, n in sorted(counts.items())]
+    if all(plant.every[k].condition == Condition() for k in counts):
+        return []
+    more = f"; and {len(said) - rule.told} more" if len(said) > rule.told else ""
+    return [f"rollouts are simulated as their metadata state: {'; '.join(said[: rule.told])}{more}"]
 
 
 def _sorted(values: set[Value]) -> list[Value]:

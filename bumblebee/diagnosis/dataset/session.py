@@ -7,7 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.dataset.held_out import HeldOut, split_by
+from bumblebee.diagnosis.dataset.held_out import HeldOut, condition_notes, split_by
 from bumblebee.diagnosis.dataset.noise import estimate_noise
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
 from bumblebee.diagnosis.dataset.split import accepting, accepting_across, motion_names, split
@@ -83,7 +83,7 @@ def open_session(
             errors.append((file.stem, error))
             continue
         refused, found = review(rollout, declared, file.name)
-        warnings += found
+        warnings += [line for line in found if "rule gains" not in line]  # a note tells what is simulated instead
         if refused is None:
             rollouts.append(rollout)
         else:
@@ -121,7 +121,11 @@ def make_session(
     train, holdout = split(long, rules.split)
     accept = accepting(long, train, holdout, rules.split)
     notes = [f"set aside: {error}" for _, error in failed] + _check_notes(warnings, rules.usable.warnings)
-    notes += _model_notes(folded, plant.floating and not has_pos) + [JUDGED_TWICE] * bool(set(accept) & set(holdout))
+    notes += (
+        condition_notes(plant, long, rules.conditions)
+        + _model_notes(folded, plant.floating and not has_pos)
+        + [JUDGED_TWICE] * bool(set(accept) & set(holdout))
+    )
     period = float(np.median(np.diff(long[0].time)))
     steps, search_step = steps_of(period, float(spec.option.timestep), plant.model.nv, rules.time_steps)
     sigma = estimate_noise(long, layout, rules.noise)
@@ -141,7 +145,7 @@ def hold_out(session: Session, held_out: HeldOut) -> Session:
     stated = [(session.plant.under.get(r.rollout_id, 0), held_out.of(r)) for r in fitted]
     rule = session.thresholds.split
     accept = [train[k] for k in accepting_across(motion_names(fitted, rule), stated, rule)]
-    notes = [note for note in session.notes if note != JUDGED_TWICE]
+    notes = [held_out.note(), *(note for note in session.notes if note != JUDGED_TWICE)]
     return replace(session, train=train, holdout=holdout, accept=accept, notes=notes, held_out=held_out)
 
 

@@ -52,8 +52,11 @@ def accepting_across(motions: Sequence[str], conditions: Sequence[object], rule:
     """Rollouts to decide on where the same motions were recorded under several conditions: every fourth pair of both.
 
     The pairs are taken from as many motions and conditions as they go, so that what is decided by is neither one
-    motion's nor one condition's, and every motion and condition stays in the fit as far as it can.
+    motion's nor one condition's, and every motion and condition stays in the fit as far as it can. Of a
+    single motion every fourth rollout is taken.
     """
+    if len(set(motions)) == 1:
+        motions = [f"{i:06d}" for i in range(len(motions))]
     groups: dict[tuple[str, str], list[int]] = {}
     for i, key in enumerate(zip(motions, map(str, conditions), strict=True)):
         groups.setdefault(key, []).append(i)

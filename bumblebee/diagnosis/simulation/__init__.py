@@ -15,6 +15,7 @@ from bumblebee.diagnosis.simulation.actuators import fold_dampers
 from bumblebee.diagnosis.simulation.cache import Changes, Recall
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
 from bumblebee.diagnosis.simulation.condition_plants import make_plants
+from bumblebee.diagnosis.simulation.conditions import Condition, in_words
 from bumblebee.diagnosis.simulation.declared import declared_values, touching
 from bumblebee.diagnosis.simulation.plant import Plant, load_spec, plant_by, refuse_unlogged
 from bumblebee.diagnosis.simulation.readings import (
@@ -52,6 +53,7 @@ from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, comma
 __all__ = [
     "KINDS",
     "Changes",
+    "Condition",
     "Layout",
     "Plant",
     "Recall",
@@ -67,6 +69,7 @@ __all__ = [
     "declared_values",
     "difference",
     "fold_dampers",
+    "in_words",
     "inputs_of",
     "joint_units",
     "lagged",

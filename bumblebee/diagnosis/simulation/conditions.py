@@ -76,6 +76,17 @@ def _stated(rollout: Rollout, key: str, gains: np.ndarray, declared: Declared) -
     return tuple(map(float, values))
 
 
+def in_words(condition: Condition, joints: Sequence[str]) -> str:
+    """What a condition is: gains of the first joints, loads, voltage."""
+    said = []
+    for key, values in (("kp", condition.kp), ("kd", condition.kd)):
+        listed = ", ".join(f"{joint} {value:.4g}" for joint, value in zip(joints[:2], values[:2], strict=False))
+        said += [f"{key} {listed}{' ...' if len(values) > 2 else ''}"] if values else []
+    said += [f"{load.kg:g} kg added on {load.body}" for load in condition.loads if load.kg]
+    said += [f"supply voltage {condition.supply:.3g} of the nominal one"] if condition.supply != 1.0 else []
+    return " and ".join(said) or "as declared"
+
+
 def with_all_loads(conditions: Sequence[Condition]) -> list[Condition]:
     """The conditions, each with a load wherever one of them has one, if of 0 kg: their models have one structure."""
     places = sorted({(x.body, x.position) for c in conditions for x in c.loads})
