@@ -50,7 +50,8 @@ def _delay(plant: Plant, place: str) -> Sequence[float]:
 def _limit(plant: Plant, place: str) -> Sequence[float]:
     model, a = plant.model, plant.actuator[plant.joints.index(place)]
     limited = a >= 0 and model.actuator_forcelimited[a]
-    return (abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1] if limited else np.inf,)
+    given = abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1] if limited else np.inf
+    return (given / plant.condition.supply,)
 
 
 def _spring(plant: Plant, place: str) -> Sequence[float]:
@@ -69,6 +70,7 @@ _NONE, _FACTOR, _UNBOUNDED = _absent_at(0.0), _absent_at(1.0), _absent_at(np.inf
 _DECLARED: dict[str, _Declared] = {
     "coulomb_friction": _of_dof("dof_frictionloss"),
     "viscous_friction": _of_dof("dof_damping"),
+    "quadratic_friction": lambda plant, place: (plant.model.dof_dampingpoly[plant.dof[plant.joints.index(place)], 0],),
     "stribeck_friction": _NONE,
     "load_dependent_friction": _NONE,
     "armature": _of_dof("dof_armature"),

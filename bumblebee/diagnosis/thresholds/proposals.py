@@ -265,6 +265,22 @@ class Stribeck:
 
 
 @dataclass(frozen=True)
+class FrictionFamily:
+    """Of the sums of a joint's friction."""
+
+    sure: float = 4.0
+    """Standard errors that a further member must reach: as a number of the same friction, not one of all candidates."""
+    clearly: float = 1.0
+    """Log-likelihood by which a sum must be better beyond the price of its numbers."""
+    promising: float = 8.0
+    """Fall of the cost, in the residual's power, that the screening windows must promise."""
+    tried: int = 3
+    """Members tried at their size for each that is taken."""
+    iterations: int = 3
+    """Of the joint refit."""
+
+
+@dataclass(frozen=True)
 class GainParameters:
     """Of two effects on one servo's gains."""
 
@@ -333,6 +349,7 @@ class ProposalThresholds:
     all_joints: AllJoints = field(default_factory=AllJoints)
     packet_loss: PacketLoss = field(default_factory=PacketLoss)
     stribeck: Stribeck = field(default_factory=Stribeck)
+    friction_family: FrictionFamily = field(default_factory=FrictionFamily)
     gain_parameters: GainParameters = field(default_factory=GainParameters)
     declared_scale: DeclaredScale = field(default_factory=DeclaredScale)
     encoder_resolution: EncoderResolution = field(default_factory=EncoderResolution)
