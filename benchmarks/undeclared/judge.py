@@ -49,8 +49,8 @@ def _where(truth: Entry, where: Sequence[str]) -> bool:
 def _part(truth: Entry, found: Entry) -> bool:
     """A name under which a part of the truth is rightly found, or what was found on its joint of a strange effect."""
     kind = KINDS[truth["effect"]]
-    if kind.outside:
-        return found["effect"] == "discovered" and set(truth["where"]) & set(found["where"]) != set()
+    if kind.outside and found["effect"] == "discovered":
+        return set(truth["where"]) & set(found["where"]) != set()
     return found["effect"] in kind.parts and _where(truth, found["where"])
 
 
@@ -89,14 +89,16 @@ def _outside(truth: Sequence[Entry], document: dict[str, Any]) -> dict[str, bool
     strange = [t for t in truth if KINDS[t["effect"]].outside]
     structure = document.get("unexplained", {})
     discovered = [f for f in document["effects"] if f["effect"] == "discovered"]
-    flagged = bool(structure.get("significant")) or bool(discovered)
+    near = [f for f in document["effects"] for t in truth if KINDS[t["effect"]].outside and _part(t, f)]
+    near = [f for f in near if f["effect"] != "discovered"]  # a name that the catalogue now has for nearly the same
+    flagged = bool(structure.get("significant")) or bool(discovered) or bool(near)
     if not strange:
         return {"flagged": flagged, "place": False, "form": False}
     entry, kind = strange[0], KINDS[strange[0]["effect"]]
-    where = set(structure.get("where", [])) | {w for f in discovered for w in f["where"]}
+    where = set(structure.get("where", [])) | {w for f in (*discovered, *near) for w in f["where"]}
     words = [str(w).lower() for w in structure.get("depends_on", [])] + [_terms(f).lower() for f in discovered]
     place = not entry["where"] or bool(where & set(entry["where"]))
-    form = any(_speaks(word, kind.depends) for word in words)
+    form = bool(near) or any(_speaks(word, kind.depends) for word in words)
     return {"flagged": flagged, "place": flagged and place, "form": flagged and place and form}
 
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.deploy.undeclared.kinds import CATALOGUE, KINDS, OUTSIDE, fits
+from bumblebee.deploy.undeclared.kinds import CATALOGUE, KINDS, LATER, OUTSIDE, fits
 
-VERSION = 6  # of what a case's number means; a change of kinds, robots, motions or sizes raises it
+VERSION = 7  # of what a case's number means; a change of kinds, robots, motions or sizes raises it
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Suite:
     seed: int = 1
 
     def cases(self) -> list[Case]:
-        """In an order whose every beginning is a mixed sample."""
+        """In an order whose every beginning is a mixed sample; what came later is behind, so that numbers stay."""
         rng = np.random.default_rng([self.seed, 1])
         strata = [_nulls(), *_singles(), *_several(rng), *_outside()]
         placed = []
@@ -50,7 +50,8 @@ class Suite:
             order = rng.permutation(len(stratum))
             placed += [((k + 0.5) / len(stratum), index, stratum[i]) for k, i in enumerate(order)]
         placed.sort(key=lambda p: p[:2])
-        return [Case(number, **row) for number, (_, _, row) in enumerate(placed)]
+        rows = [row for _, _, row in placed] + _later()
+        return [Case(number, **row) for number, row in enumerate(rows)]
 
     def digest(self) -> str:
         """First 16 hexadecimal digits of the sha256 of version, seed and list."""
@@ -122,6 +123,18 @@ def _outside() -> list[list[dict[str, Any]]]:
                 rows += [_row(robot, "outside", (kind.name,), ratio, rivals=robot == "arm" and ratio == 20.0)
                          for ratio in ((10.0, 20.0, 40.0) if robot == "arm" else (20.0,))]  # fmt: skip
     return [rows]
+
+
+def _later() -> list[dict[str, Any]]:
+    """Kinds that came after the others were numbered, alone at 5, 20 and 2 times the detectable size."""
+    rows = []
+    for kind in LATER:
+        for ratio in (5.0, 20.0, 2.0):
+            robots = [robot for robot in ("arm", "stand", "track") if fits(kind, robot)]
+            rows += [_row(robot, "single", (kind.name,), ratio) for robot in robots]
+            rows += [_row("arm", "single", (kind.name,), ratio, noise=3.0, rollouts=8)]
+            rows += [_row("arm", "single", (kind.name,), ratio, rollouts=1)]
+    return rows
 
 
 def draw_signs(kind: str, robot_joints: tuple[str, ...], rng: np.random.Generator) -> dict[str, Any]:

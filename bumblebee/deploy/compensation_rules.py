@@ -24,6 +24,9 @@ NOT_UNDONE = {
     "torque_limit": "a torque that the motor does not have cannot be asked of it",
     "torque_speed_limit": "a torque that the motor does not have at speed cannot be asked of it",
     "dropped_commands": "that a command is lost is not known when it is sent",
+    "command_filter": "a target that undoes it runs ahead of the reference by its speed, with the noise of that",
+    "command_rate_limit": "the drive follows no target faster",
+    "command_profile": "the drive follows no target faster",
     "encoder_quantisation": "what the encoder rounds away is not known",
     "backlash": "within its play the motor does not touch the link",
     "series_elasticity": "the bend of the shaft is not measured, and undoing it needs the load's acceleration",
@@ -88,6 +91,12 @@ def _viscous(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str,
     taken = (draft.robot.kd - draft.kd_wanted)[columns]
     rest = "" if np.allclose(taken, excess) else f", {_range(excess - taken, 'N m s/rad')} fed forward"
     return "kd sent is lower by it; the rest along the intended velocity", f"{_range(taken, 'N m s/rad')} off kd{rest}"
+
+
+def _drag(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str, str]:
+    excess = effect.value() - draft.robot.model.dof_dampingpoly[draft.robot.dofs[columns], 0]
+    draft.terms += [(int(column), -float(more), "v*abs(v)") for column, more in zip(columns, excess, strict=True)]
+    return "its torque at the intended velocity is sent against it", _range(excess, "N m s^2/rad^2")
 
 
 def _coulomb(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str, str]:
@@ -206,6 +215,7 @@ _RULES: dict[str, Rule] = {
     "kd": _factor(False, False, True),
     "viscous_friction": _viscous,
     "coulomb_friction": _coulomb,
+    "quadratic_friction": _drag,
     "stribeck_friction": _stribeck,
     "load_dependent_friction": _load_friction,
     "asymmetric_friction": _asymmetric,

@@ -5,7 +5,7 @@ from typing import Any
 
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.report import error_block, horizon_whiteners, horizon_windows
-from bumblebee.diagnosis.simulation import vary
+from bumblebee.diagnosis.simulation import vary_or_refuse
 from bumblebee.diagnosis.thresholds.report import PredictionError
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import CATALOGUE, Effect
@@ -23,9 +23,12 @@ def replay(
         _known(session, effect)
     ids = list(range(len(session.rollouts)))
     cuts = horizon_windows(session, ids, budget, rule)
-    variation = vary(session.plant, effects)
+    variation = vary_or_refuse(session.plant, effects)
     whiteners = horizon_whiteners(cuts, variation, session.sigma, session.steps[1], seed)
-    return error_block(cuts, whiteners, variation, session.steps[0], seed)
+    errors = error_block(cuts, whiteners, variation, session.steps[0], seed)
+    for named, came in session.plant.failures.reasons:
+        raise BadInput(f"effects {named}", "a model that MuJoCo can simulate", came)
+    return errors
 
 
 def _known(session: Session, effect: Effect) -> None:

@@ -4,6 +4,8 @@ _ON_SLIDE = {
     "rad": "m",
     "mrad": "mm",
     "rad/s": "m/s",
+    "rad/s^2": "m/s^2",
+    "N m s^2/rad^2": "N s^2/m^2",
     "N m": "N",
     "N m/rad": "N/m",
     "N m s/rad": "N s/m",

@@ -1,5 +1,7 @@
 """Every other effect of the catalogue that adds no joint against its equation integrated in NumPy."""
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 import pytest
@@ -28,6 +30,7 @@ from tests.sim.hinge import (
 TORQUES = {
     "stribeck_friction": ((0.8, 1.0), lambda t, q, v: servo(t, q, v) - 0.8 * np.exp(-(v**2)) * sign(v)),
     "load_dependent_friction": ((0.2,), lambda t, q, v: servo(t, q, v) - 0.2 * abs(servo(t, q, v)) * sign(v)),
+    "quadratic_friction": ((0.4,), lambda t, q, v: servo(t, q, v) - 0.4 * v * abs(v)),
     "asymmetric_friction": ((0.6,), lambda t, q, v: servo(t, q, v) - 0.3),
     "torque_limit": ((2.0,), lambda t, q, v: float(np.clip(KP * (swing(t) - q) - KD * v, -2.0, 2.0))),
     "joint_spring": ((3.0, 0.7), lambda t, q, v: servo(t, q, v) - 3.0 * q + 0.7),
@@ -70,6 +73,49 @@ def test_a_lag_filters_the_servos_torque() -> None:
         return state[0]
 
     check([single("torque_lag", "j", 0.02)], reference(torque), share=0.08)
+
+
+def square(t: float) -> float:
+    """A target that jumps every 0.1 s by several sizes."""
+    return (0.0, 0.5, 0.3, -0.2, 0.4)[min(int(t / 0.1 + 1e-9), 4)]
+
+
+def shaped(follow: Callable[[float, float, float], tuple[float, float]]) -> Callable[[float, float, float], float]:
+    """The servo's torque where its set-point y, of speed w, goes by `follow(y, w, target)` in a step of FINE."""
+    state = [0.0, 0.0]
+
+    def torque(t: float, q: float, v: float) -> float:
+        state[:] = follow(*state, square(t))
+        return float(np.clip(KP * (state[0] - q) - KD * v, -LIMIT, LIMIT))
+
+    return torque
+
+
+def _profile(y: float, w: float, u: float) -> tuple[float, float]:
+    """Bang-bang to rest at u: speed up unless braking with all there is would overshoot."""
+    acceleration, limit = 40.0, 2.5
+    wanted = np.sign(u - y) * min(limit, np.sqrt(2 * acceleration * abs(u - y)))
+    w += float(np.clip(wanted - w, -FINE * acceleration, FINE * acceleration))
+    return y + FINE * w, w
+
+
+SETPOINTS = {
+    "command_filter": ((0.03,), lambda y, w, u: (y + FINE * (u - y) / 0.03, 0.0)),
+    "command_rate_limit": ((3.0,), lambda y, w, u: (y + float(np.clip(u - y, -FINE * 3.0, FINE * 3.0)), 0.0)),
+    "command_profile": ((40.0, 2.5), _profile),
+}
+
+
+@pytest.mark.parametrize("kind", SETPOINTS)
+def test_a_servo_follows_its_set_point(kind: str) -> None:
+    values, follow = SETPOINTS[kind]
+    check([single(kind, "j", *values)], reference(shaped(follow)), share=0.03, target=square)
+
+
+def test_a_joint_has_one_set_point() -> None:
+    effects = [single("command_filter", "j", 0.03), single("command_rate_limit", "j", 3.0)]
+    with pytest.raises(BadInput, match="command_rate_limit on joint 'j'"):
+        runtime_hooks(effects, model_with())
 
 
 def test_an_old_reading_reaches_the_servo() -> None:

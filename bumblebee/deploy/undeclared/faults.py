@@ -30,6 +30,7 @@ def _mass(p: Place) -> float:
 LARGEST: dict[str, Callable[[Place], float]] = {
     "coulomb_friction": _share("limit", 0.2),  # a gear without grease: 28 N m at the knee, 5 at the elbow
     "viscous_friction": _share("kd", 2.0),
+    "quadratic_friction": _share("kd", 0.5),  # more is not stable at 1 ms in a fall
     "stribeck_friction": _share("limit", 0.2),
     "load_dependent_friction": _fixed(0.6),  # share of what the drive gives that is lost
     "asymmetric_friction": _share("limit", 0.2),
@@ -40,6 +41,9 @@ LARGEST: dict[str, Callable[[Place], float]] = {
     "torque_limit": _fixed(4.0),  # 21 % of what half of the motions ask for: a drive that protects itself
     "torque_speed_limit": _fixed(60.0),  # no torque left at 72 % of the usual peak speed
     "command_delay": _fixed(0.06),  # three control periods
+    "command_filter": _fixed(0.08),  # four control periods
+    "command_rate_limit": _fixed(5.0),
+    "command_profile": _fixed(0.3),  # the usual peak rate is reached after 0.3 s
     "torque_lag": _fixed(0.05),
     "encoder_delay": _fixed(0.03),
     "dropped_commands": _fixed(0.6),

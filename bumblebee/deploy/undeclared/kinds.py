@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.deploy.undeclared import bodies, drives, friction, gears, outside, signals
+from bumblebee.deploy.undeclared import bodies, drives, friction, gears, outside, setpoints, signals
 from bumblebee.deploy.undeclared.declared import Declared
 from bumblebee.deploy.undeclared.law import Law
 from bumblebee.deploy.undeclared.ringing import softest
@@ -147,6 +147,12 @@ def _plain(law: Callable[[Place, float], Law], parameter: str) -> Callable[[Plac
     return lambda p, s: (law(p, s), {parameter: s})
 
 
+def _plain_of(
+    size: Callable[[Place, float], float], law: Callable[[str, float], Law], parameter: str, **others: float
+) -> Callable[[Place, float], Made]:
+    return lambda p, s: (law(p.name, size(p, s)), {parameter: size(p, s), **others})
+
+
 _L, _KP, _KD = (lambda x: _scaled("limit", x)), (lambda x: _scaled("kp", x)), (lambda x: _scaled("kd", x))
 
 CATALOGUE: tuple[Kind, ...] = (
@@ -249,21 +255,36 @@ OUTSIDE: tuple[Kind, ...] = (
          _L(0.01), _L(0.2), depends=("history", "velocity", "time")),
     Kind("rate_limit", "joint", lambda p, s: (outside.RateLimit(p.name, p.peak_rate / (1 + s)),
                                               {"rate": p.peak_rate / (1 + s)}),
-         _fixed(0.2), _fixed(5.0), depends=("command", "history", "velocity", "target")),
+         _fixed(0.2), _fixed(5.0), parts=("command_rate_limit",),
+         depends=("command", "history", "velocity", "target")),
     Kind("quantised_command", "joint", lambda p, s: (outside.QuantisedCommand(p.name, s), {"step": s}),
          _fixed(0.01), _fixed(0.2), depends=("command", "target")),
     Kind("loose_mount", "base", lambda p, s: (outside.LooseMount(1 / s), {"stiffness": 1 / s}),
          _fixed(1e-4), _fixed(1 / 300), least=_fixed(1e-5), robots="arm",
          depends=("another joint", "other", "history", "torque")),
     Kind("drag", "joint", lambda p, s: (outside.Drag(p.name, s), {"drag": s}),
-         _KD(0.01), _KD(0.5), depends=("velocity",)),
+         _KD(0.01), _KD(0.5), parts=("quadratic_friction",), depends=("velocity",)),
     Kind("dead_band", "joint", lambda p, s: (outside.DeadBand(p.name, s), {"band": s}),
          _fixed(0.005), _fixed(0.08), depends=("torque", "command", "target", "error")),
     Kind("ripple", "joint", lambda p, s: (outside.Ripple(p.name, s), {"amplitude": s}),
          _L(0.01), _L(0.15), depends=("time",)),
 )  # fmt: skip
 
-KINDS: dict[str, Kind] = {kind.name: kind for kind in (*CATALOGUE, *OUTSIDE)}
+LATER: tuple[Kind, ...] = (
+    Kind("command_filter", "joint", _plain(lambda p, s: setpoints.CommandFilter(p.name, s), "time"),
+         _fixed(0.003), _fixed(0.08)),
+    Kind("command_rate_limit", "joint",
+         _plain_of(lambda p, s: p.peak_rate / (0.7 + s), setpoints.CommandRateLimit, "rate"), _fixed(0.2), _fixed(5.0)),
+    Kind("command_profile", "joint",
+         _plain_of(lambda p, s: max(p.peak_rate, 0.1) / s, setpoints.CommandProfile, "acceleration", speed=1e3),
+         _fixed(0.01), _fixed(0.3)),
+    Kind("quadratic_friction", "joint", _plain(lambda p, s: outside.Drag(p.name, s), "coefficient"),
+         _KD(0.01), _KD(0.5)),
+)  # fmt: skip
+"""Kinds of the catalogue that came after the first suites: their cases stand behind those of the others, whose numbers
+and draws stay as they were."""
+
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (*CATALOGUE, *OUTSIDE, *LATER)}
 
 
 def fits(kind: Kind, robot: str) -> bool:

@@ -10,7 +10,7 @@ from bumblebee.diagnosis.candidates.candidate import (
     without,
 )
 from bumblebee.diagnosis.candidates.enumerate import all_candidates, still_joints
-from bumblebee.diagnosis.candidates.exclusion import is_chosen, is_like
+from bumblebee.diagnosis.candidates.exclusion import is_chosen, is_like, possible_beside
 from bumblebee.diagnosis.candidates.formula import Formula, formula
 from bumblebee.diagnosis.candidates.signal_scales import scales_of
 from bumblebee.diagnosis.candidates.traits import (
@@ -50,6 +50,7 @@ __all__ = [
     "is_simulated",
     "label",
     "naming_order",
+    "possible_beside",
     "rough",
     "scales_of",
     "shortlisted",

@@ -11,6 +11,7 @@ from bumblebee.diagnosis.candidates.signal_scales import Scales, scales_of
 from bumblebee.diagnosis.simulation import Plant, declared_values, touching
 from bumblebee.diagnosis.thresholds.candidates import BodySteps, CandidateThresholds, StillJoints
 from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effects import NO_SPEED_LIMIT
 
 _AXES = (0.0, 0.0)
 
@@ -31,14 +32,14 @@ def all_candidates(
     rollouts: Sequence[Rollout],
     still: Sequence[str],
     rules: CandidateThresholds | None = None,
-    model: mujoco.MjModel | None = None,
+    models: Sequence[mujoco.MjModel] = (),
 ) -> list[Candidate]:
     """Every candidate on joints that move, on bodies that they carry, on the ground and on the whole robot.
 
-    The first steps follow from the servos of `model`, the declared one if none is given.
+    The first steps follow from the servos of `models`, one for each condition, the declared ones if none are given.
     """
     rules = rules or CandidateThresholds()
-    scales = scales_of(plant, rollouts, rules.scales, model)
+    scales = scales_of(plant, rollouts, rules.scales, models)
     found: list[Candidate] = []
     for j, name in enumerate(plant.joints):
         if name not in still:
@@ -76,6 +77,7 @@ class _OnJoint:
         elif plant.scalable[j]:
             yield from self._of_servo()
             yield from self._saturations()
+            yield from self._limited_targets()
 
     def _make(
         self,
@@ -98,6 +100,7 @@ class _OnJoint:
         s, j, rule = self.scales, self.j, self.rules.joint
         yield self._make("coulomb_friction", self._torque)
         yield self._make("viscous_friction", self._torque / s.speed[j])
+        yield self._make("quadratic_friction", self._torque / s.speed[j] ** 2)
         for share in rule.stribeck:
             speed = share * s.speed[j]
             yield self._make("stribeck_friction", self._torque, speed, start=(0.0, 0.0), shape=rule.shape * speed)
@@ -123,13 +126,21 @@ class _OnJoint:
         s, j, rule, soft = self.scales, self.j, self.rules.drive, self.rules.transmission
         yield self._make("load_dependent_friction", rule.load)
         yield self._make("command_delay", rule.time)
+        yield self._make("command_filter", rule.time)
         yield self._make("dropped_commands", rule.dropped)
-        if s.peak[j] > 0:
+        if s.peak[j] > 0 and self._ends_its_body():
             for encoder in (0.0, 1.0):  # on the motor, on the joint
                 steps = (self._twist(encoder), encoder, soft.damping, soft.link_share)
                 yield self._make("series_elasticity", *steps, start=(0.0,) * 4, shape=soft.damping_shape)
                 gap = max(soft.backlash * s.travel[j], soft.least_backlash)
                 yield self._make("backlash", gap, encoder, start=(0.0, 0.0))
+
+    def _ends_its_body(self) -> bool:
+        """Whether no other joint lies between it and its body: behind it alone there is room for a second hinge."""
+        model = self.plant.model
+        joint = int(model.joint(self.name).id)
+        body = int(model.jnt_bodyid[joint])
+        return joint == int(model.body_jntadr[body] + model.body_jntnum[body]) - 1
 
     def _twist(self, encoder: float) -> float:
         """Compliance [rad/(N m)] that matters; a servo that reads the joint behind a soft shaft would swing it up."""
@@ -157,6 +168,19 @@ class _OnJoint:
             for factor in rule.speed_limit:
                 yield self._make("torque_speed_limit", 1.0 / (factor * s.fastest[j]), start=(0.0,))
 
+    def _limited_targets(self) -> Iterator[Candidate]:
+        """Limits of what the drive makes of its targets, by how steep and how curved these are."""
+        s, j, rule = self.scales, self.j, self.rules.drive
+        if min(s.target_rate[j], s.target_turn[j]) <= 0:
+            return
+        for share in rule.target_rate:
+            yield self._make("command_rate_limit", 1.0 / (share * s.target_rate[j]), start=(0.0,))
+        none = (0.0, NO_SPEED_LIMIT)
+        for share, fast in rule.target_turn:
+            speed = fast * s.target_rate[j]
+            steps = (1.0 / (share * s.target_turn[j]), speed - NO_SPEED_LIMIT if fast else 0.0)
+            yield self._make("command_profile", *steps, start=none, shape=self.rules.joint.shape * speed)
+
 
 def _on_whole(plant: Plant, rules: CandidateThresholds) -> list[Candidate]:
     rule = rules.drive
@@ -166,6 +190,7 @@ def _on_whole(plant: Plant, rules: CandidateThresholds) -> list[Candidate]:
         return found
     if np.ptp(plant.delay[plant.actuator[driven]]) == 0:
         found.append(Candidate("command_delay", "", (float(plant.delay[plant.actuator[driven]][0]),), (rule.time,)))
+    found.append(Candidate("command_filter", "", (0.0,), (rule.time,)))
     found.append(Candidate("dropped_commands", "", (0.0,), (rule.dropped,)))
     if not plant.torque_input and plant.scalable[driven].all():
         found += [Candidate(kind, "", (0.0,), (rule.time,)) for kind in ("torque_lag", "encoder_delay")]

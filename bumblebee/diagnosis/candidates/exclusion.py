@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.candidates.traits import exclude
+from bumblebee.sim.effects import Effect
 
 
 def is_chosen(c: Candidate, chosen: Sequence[Candidate]) -> bool:
@@ -15,3 +16,11 @@ def is_chosen(c: Candidate, chosen: Sequence[Candidate]) -> bool:
 def is_like(c: Candidate, others: Sequence[Candidate]) -> bool:
     """Whether enough of the same kind on the same place are already there, in other shapes."""
     return sum((c.effect, c.where) == (o.effect, o.where) for o in others) >= c.limits.shapes
+
+
+def possible_beside(effects: Sequence[Effect], c: Candidate) -> list[Effect]:
+    """`effects` less those that the candidate's place cannot have as well.
+
+    What a candidate changes is asked of all of them, for a swap step too: beside what it would replace no model has it.
+    """
+    return [e for e in effects if not (c.where in e.where and exclude(c.effect, e.effect))]

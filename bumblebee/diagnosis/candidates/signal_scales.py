@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.simulation import Plant, command_inputs
+from bumblebee.diagnosis.simulation import Plant, command_inputs, plant_servos
 from bumblebee.diagnosis.thresholds.candidates import SignalScales
 from bumblebee.measured.rollout import Rollout
-from bumblebee.sim.servo import servos_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,20 +27,27 @@ class Scales:
     """(J,) range of positions [rad]."""
     inertia: np.ndarray
     """(J,) diagonal of the joint-space inertia [kg m^2]."""
+    target_rate: np.ndarray
+    """(J,) largest change of the targets a second [rad/s]; 0 where torques are logged."""
+    target_turn: np.ndarray
+    """(J,) largest change of that a second [rad/s^2]."""
     duration: float
     """Longest rollout [s]."""
 
 
 def scales_of(
-    plant: Plant, rollouts: Sequence[Rollout], rule: SignalScales | None = None, model: mujoco.MjModel | None = None
+    plant: Plant,
+    rollouts: Sequence[Rollout],
+    rule: SignalScales | None = None,
+    models: Sequence[mujoco.MjModel] = (),
 ) -> Scales:
-    """Typical sizes by `model`, or by the declared one; floored for joints that rest."""
-    rule = rule or SignalScales()
-    servos = servos_of(model or plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
-    torques = [
-        servos.torque(r.joint_pos - plant.offset, r.joint_vel, servos.controls(command_inputs(plant, r)))
-        for r in rollouts
-    ]
+    """Typical sizes by `models`, one for each condition, or by the declared ones; floored for joints that rest."""
+    rule, torques = rule or SignalScales(), []
+    every = [plant_servos(plant, model) for model in models or [p.model for p in plant.every]]
+    for r in rollouts:
+        servos = every[plant.under.get(r.rollout_id, 0)]
+        control = servos.controls(command_inputs(plant, r))
+        torques.append(servos.torque(r.joint_pos - plant.offset, r.joint_vel, control))
     rms = np.sqrt(np.mean([(t**2).mean(axis=0) for t in torques], axis=0))
     if (plant.actuator < 0).any():
         rms = np.where(plant.actuator < 0, np.maximum(rms, _bias(plant, rollouts, rule.rows)), rms)
@@ -54,8 +60,20 @@ def scales_of(
         fastest=np.max([np.quantile(np.abs(r.joint_vel), rule.peak, axis=0) for r in rollouts], axis=0) + 1e-3,
         travel=np.max([np.ptp(r.joint_pos, axis=0) for r in rollouts], axis=0),
         inertia=_inertia(plant),
+        target_rate=_steepest(plant, rollouts, 1, rule),
+        target_turn=_steepest(plant, rollouts, 2, rule),
         duration=float(max(r.time[-1] - r.time[0] for r in rollouts)),
     )
+
+
+def _steepest(plant: Plant, rollouts: Sequence[Rollout], order: int, rule: SignalScales) -> np.ndarray:
+    """Largest derivative (J,) of the targets of some order, by differences between commands."""
+    found = [np.zeros(len(plant.joints))]
+    for r in rollouts if not plant.torque_input else ():
+        values, dt = r.joint_target, float(np.median(np.diff(r.time)))
+        if values is not None and r.frames > order:
+            found.append(np.quantile(np.abs(np.diff(values, order, axis=0)), rule.peak, axis=0) / dt**order)
+    return np.max(found, axis=0)
 
 
 def _bias(plant: Plant, rollouts: Sequence[Rollout], rows: int) -> np.ndarray:

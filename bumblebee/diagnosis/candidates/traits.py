@@ -50,6 +50,7 @@ TRAITS: dict[str, Traits] = {
         usual="joint",
         named_first=2,
     ),
+    "quadratic_friction": Traits("turn the unpowered joint at several constant speeds, fast ones among them"),
     "stribeck_friction": Traits("creep through zero speed", on_dry_friction=True),
     "load_dependent_friction": Traits("move at the same speed under two loads", usual="torque"),
     "armature": Traits(
@@ -63,6 +64,17 @@ TRAITS: dict[str, Traits] = {
         "move fast without load and slowly under load", fine_steps=True, saturation=True, inverse=True
     ),
     "command_delay": Traits("command steps and log the torque", usual="robot", named_first=5),
+    "command_filter": Traits("command a step and log the servo's own set-point, or its position at 500 Hz"),
+    "command_rate_limit": Traits(
+        "command steps of several sizes: a limited rate takes longer for a larger one",
+        inverse=True,
+        not_beside=("command_filter",),
+    ),
+    "command_profile": Traits(
+        "command steps of several sizes: an acceleration that is limited takes longer by the root of the size",
+        inverse=True,
+        not_beside=("command_filter", "command_rate_limit"),
+    ),
     "torque_lag": Traits("command steps and log the torque at 500 Hz", column="late", fine_steps=True),
     "encoder_delay": Traits("film the joint, or log a second encoder", column="late", fine_steps=True),
     "dropped_commands": Traits("log the commands as the drive receives them"),

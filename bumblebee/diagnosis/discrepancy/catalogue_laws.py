@@ -62,6 +62,9 @@ LAWS: dict[str, Law] = {
         _fixed((("friction(1)",), _VELOCITY, 1)), "friction(", lambda now, was: {"friction(1)": now[0] - was[0]}
     ),
     "viscous_friction": Law(_fixed((("v",), _VELOCITY, 1)), "v", lambda now, was: {"v": -(now[0] - was[0])}),
+    "quadratic_friction": Law(
+        _fixed((("v*abs(v)",), _VELOCITY, 2)), "v", lambda now, was: {"v*abs(v)": -(now[0] - was[0])}
+    ),
     "joint_spring": Law(
         _fixed((("1",), (), 1), (("q", "1"), _POSITION, 1)),
         "q",
@@ -86,6 +89,9 @@ NO_LAW = {
     "kd": "its torque is that of v, which is called viscous_friction",
     "torque_speed_limit": "no term is a limit that moves with the speed",
     "command_delay": "no term has an older target",
+    "command_filter": "no term has a filtered target",
+    "command_rate_limit": "its rate moves the target once a command, which is called slewed(r, T) - u",
+    "command_profile": "no term has a target of limited acceleration",
     "torque_lag": "no term has an older torque",
     "encoder_delay": "no term has an older reading",
     "dropped_commands": "which commands were lost is not in a log",

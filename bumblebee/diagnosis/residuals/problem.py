@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import Candidate, rough, without
+from bumblebee.diagnosis.candidates import Candidate, possible_beside, rough, without
 from bumblebee.diagnosis.residuals.imu_tilt import angles, retilted, tilt_columns, tilt_of
 from bumblebee.diagnosis.residuals.initial_state import restarted, start_moves
 from bumblebee.diagnosis.residuals.nuisances import nuisance_columns
@@ -80,9 +80,16 @@ class Problem:
         """How the prediction changes from a model to several others, (V, W, M), both sides simulated in one step."""
         if coarse:
             several = self.residual([effects, *moved], coarse=True)
-            return self.tamed(several[0] - several[1:])
+            return self.tamed(self.change(several[0], several[1:]))
         several = replace(self, fine=self.between).residual([effects, *moved])
-        return several[0] - several[1:]
+        return self.change(several[0], several[1:])
+
+    def change(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Change of the prediction (V, W, M) from residuals (W, M) to (V, W, M); none where a model is impossible."""
+        least = 0.5 * self.thresholds.residuals.outliers.impossible  # what a tilted sensor adds is far less
+        change = before - after
+        change[(np.abs(after) > least).all(axis=(1, 2)) | (np.abs(before) > least).all()] = 0.0
+        return change
 
     def on(self, keep: np.ndarray, effects: Sequence[Effect], coarse: bool = False) -> np.ndarray:
         """Whitened residuals (K, M) of one model on the windows at the indices `keep` (K,) alone."""
@@ -92,12 +99,16 @@ class Problem:
         return out if tilted is None else out + tilted[keep]
 
     def finite(self, raw: np.ndarray, keep: np.ndarray | None = None) -> np.ndarray:
-        """Whiten, on the windows `keep` if given; a window that diverged counts as a very bad one, not as none."""
-        bad = ~np.isfinite(raw).all(axis=(-1, -2))
+        """Whiten (V, W, N, D), on the windows `keep` if given.
+
+        A window that diverged counts as a very bad one, not as none; a model of which every window did, as impossible.
+        """
+        bad, rule = ~np.isfinite(raw).all(axis=(-1, -2)), self.thresholds.residuals.outliers
         out = self.whitener(raw) if keep is None else self.whitener.on(keep, raw)
         if bad.any():
             good = out[~bad]
-            out[bad] = self.thresholds.residuals.outliers.diverged * (np.sqrt((good**2).mean()) if good.size else 1.0)
+            out[bad] = rule.diverged * (np.sqrt((good**2).mean()) if good.size else 1.0)
+            out[bad.all(axis=-1)] = rule.impossible
         return out
 
     def columns(self, candidate: Candidate, base: Sequence[Effect] = ()) -> np.ndarray:
@@ -114,15 +125,22 @@ class Problem:
         out = np.empty((len(moves), *self.nuisance.shape[1:]), dtype=np.float32)
         for few in (True, False):
             some = np.flatnonzero(coarse == few)
-            reference = self.residual([base], coarse=few)[0] if len(some) else None
             for first in range(0, len(some), _GROUP):
                 part = some[first : first + _GROUP]
-                sets = [
-                    [*without(base, moves[k][0]), moves[k][0].at(moves[k][0].moved(moves[k][1], 1.0))] for k in part
-                ]
-                change = reference - self.residual(sets, coarse=few)
+                change = self._changes([moves[k] for k in part], base, few)
                 out[part] = self.tamed(change) if few and tame else change
         return out
+
+    def _changes(self, moves: Sequence[tuple[Candidate, int]], base: Sequence[Effect], coarse: bool) -> np.ndarray:
+        """Changes (V, W, M) by one step of free parameters, each beside those of `base` that can stand beside it."""
+        around = [possible_beside(base, c) for c, _ in moves]
+        sets = [[*without(e, c), c.at(c.moved(f, 1.0))] for e, (c, f) in zip(around, moves, strict=True)]
+        after, before = self.residual(sets, coarse=coarse), self.residual([base], coarse=coarse)[0]
+        change = self.change(before, after)
+        for k, effects in enumerate(around):
+            if len(effects) < len(base):
+                change[k] = self.change(self.residual([effects], coarse=coarse)[0], after[k : k + 1])[0]
+        return change
 
     def tamed(self, change: np.ndarray) -> np.ndarray:
         """Changes (..., W, M) that were simulated in coarse steps, on a floating base no window far above the others.

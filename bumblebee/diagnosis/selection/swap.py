@@ -31,6 +31,7 @@ from bumblebee.diagnosis.selection.moves import Move, Terms, by_loss, by_slopes,
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import KIND as SHAFT
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import LIKE as SHAFT_LIKE
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import best_elasticity, is_of_series
+from bumblebee.diagnosis.selection.proposals.setpoints import setpoint_swaps
 from bumblebee.diagnosis.selection.score_tests import Scores, score_tests
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial, try_one
@@ -44,7 +45,7 @@ def swap(run: SearchState) -> bool:
     taken = [(c,) for c in free] + (list(combinations(free, 2)) if len(free) <= rule.few else [])
     best: tuple[float, Move] | None = None
     start = criterion(run.problem, run.fit)
-    for move in chain(*(_tried(run, gone) for gone in taken), _twisted(run, free)):
+    for move in chain(*(_tried(run, gone) for gone in taken), _twisted(run, free), _shaped(run, free)):
         gain = criterion(run.problem, move.after) - start
         margin = rule.clearly * rules.criterion.parameter if len(move.gone) == 1 else 0.0
         if gain > max(margin, best[0] if best else margin) and move.passes():
@@ -91,6 +92,12 @@ def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
         move = _refitted(run, rest, trial) if trial else None
         if move:
             yield move
+
+
+def _shaped(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
+    """Fits with what a drive makes of its targets in the place of what that passes for."""
+    moves = (_refitted(run, rest, trial) for rest, trial in setpoint_swaps(run, free))
+    return (move for move in moves if move)
 
 
 def _refitted(run: SearchState, rest: Fit, trial: Trial) -> Move | None:

@@ -6,6 +6,7 @@ acceleration for an armature, the servo's own torque for its strength, and so on
 
 import copy
 from collections.abc import Sequence
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -13,10 +14,19 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.sensitivities.impulse_responses import Path
 from bumblebee.diagnosis.sensitivities.latency_signatures import LATE, Late
-from bumblebee.diagnosis.simulation import Plant, Variation, Windows, bent_before, inputs_of, remember, yielded
+from bumblebee.diagnosis.simulation import (
+    Plant,
+    Variation,
+    Windows,
+    bent_before,
+    inputs_of,
+    remember,
+    setpoints_of,
+    window_servos,
+    yielded,
+)
 from bumblebee.diagnosis.thresholds.sensitivities import TorqueSignatures
-from bumblebee.sim.effects import Effect, bent, runtime_hooks, sloped, spread_inertia
-from bumblebee.sim.servo import servos_of
+from bumblebee.sim.effects import SETPOINTS, Effect, bent, runtime_hooks, sloped, spread_inertia
 
 _NO_SIGNATURE = '{} has no torque in sensitivities/torque_signatures.py: add it, or column="simulated" in traits.py'
 
@@ -28,10 +38,11 @@ class Signatures:
         self, plant: Plant, windows: Windows, variation: Variation, path: Path, rule: TorqueSignatures
     ) -> None:
         self.plant, self.windows, self.path, self._variation = plant, windows, path, variation
-        self.servos = servos_of(variation.model, [int(plant.model.joint(name).id) for name in plant.joints])
+        self.servos = window_servos(plant, windows, variation.models)
         self.q = path.qpos[:, :-1, plant.qpos]
         self.v = path.qvel[:, :-1, plant.dof]
         self.a = np.diff(path.qvel[:, :, plant.dof], axis=1) / path.step
+        self.supply = np.atleast_1d(self.servos.supply)[..., 0]
         self.u = self.servos.controls(path.control)
         self.torque = self.servos.torque(self.q, self.v, self.u)
         self.sign = np.tanh(self.v / rule.creep)
@@ -68,12 +79,13 @@ class Signatures:
         simple = {
             "coulomb_friction": lambda: -sign,
             "viscous_friction": lambda: -v,
+            "quadratic_friction": lambda: -v * np.abs(v),
             "asymmetric_friction": lambda: np.full_like(q, -0.5),
             "armature": lambda: -self.a[..., j],
             "load_dependent_friction": lambda: -np.abs(torque) * sign,
             "motor_strength": lambda: torque,
-            "kp": lambda: torque - servos.bias[j, 2] * v,
-            "kd": lambda: servos.bias[j, 2] * v,
+            "kp": lambda: torque - servos.bias[..., j, 2] * v,
+            "kd": lambda: servos.bias[..., j, 2] * v,
             "strength_drift": lambda: -self.clock[..., 0] * torque,
             "thermal_fade": lambda: -self.heat[..., j] * torque,
         }
@@ -88,10 +100,10 @@ class Signatures:
         if c.effect == "hysteresis":
             return [self._hysteresis(c, j)]
         if c.effect == "torque_limit":
-            limit = c.start[0]
+            limit = c.start[0] * self.supply
             return [np.clip(torque, -limit, limit) - torque]
         if c.effect == "torque_speed_limit":
-            left = servos.limit[j] * np.clip(1.0 - np.abs(v) * c.step[0], 0.0, 1.0)
+            left = servos.limit[..., j] * np.clip(1.0 - np.abs(v) * c.step[0] / self.supply, 0.0, 1.0)
             return [np.where(torque * v > 0, np.clip(torque, -left, left) - torque, 0.0)]
         if c.effect in LATE:
             return [self.late.torque(c.effect, c.start[0], self.torque)[..., j]]
@@ -115,21 +127,21 @@ class Signatures:
     def _commanded(self, c: Candidate, j: int) -> np.ndarray:
         """Delayed and lost commands of one joint, alone or with the others."""
         effect = c.at(np.array(c.nominal) + np.array(c.step))
-        if c.effect in ("command_delay", "dropped_commands"):
-            return self.servos.gain[j] * (self._moved_control(effect)[..., j] - self.u[..., j])
+        if c.effect in ("command_delay", "dropped_commands", *SETPOINTS):
+            return self.servos.gain[..., j] * (self._moved_control(effect)[..., j] - self.u[..., j])
         raise ValueError(_NO_SIGNATURE.format(c.effect))
 
     def _moved_control(self, effect: Effect) -> np.ndarray:
-        """Controls (W, K, J) with a delay or lost commands on all joints, of which the caller takes one."""
+        """Controls (W, K, J) with delayed, shaped or lost commands on all joints, of which the caller takes one."""
         kind, value = effect.effect, effect.value()
-        key = (kind, round(1e9 * value))
+        key = (f"{kind} {effect.values()[1:]}", round(1e9 * value))
         if key not in self._inverse:
-            delay, dropped = self.plant.delay, None
+            delay, dropped, shaped = self.plant.delay, None, setpoints_of(self.plant, [replace(effect, where=())])
             if kind == "dropped_commands":
                 dropped = np.full(self.plant.model.nu, value)
-            else:
+            elif not shaped:
                 delay = np.full(self.plant.model.nu, value)
-            moved = Variation(self.plant.model, delay, self.plant.offset, dropped=dropped)
+            moved = Variation(self.plant.model, delay, self.plant.offset, setpoints=shaped, dropped=dropped)
             control = inputs_of(self.windows, moved, self.path.step, self.path.control.shape[1], {})
             self._inverse[key] = self.servos.controls(control)
         return self._inverse[key]

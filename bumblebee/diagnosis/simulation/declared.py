@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.simulation.plant import Plant
-from bumblebee.sim.effects import CATALOGUE, native
+from bumblebee.sim.effects import CATALOGUE, NO_SPEED_LIMIT, native
 
 
 def touching(model: mujoco.MjModel, ground: int) -> list[int]:
@@ -50,7 +50,8 @@ def _delay(plant: Plant, place: str) -> Sequence[float]:
 def _limit(plant: Plant, place: str) -> Sequence[float]:
     model, a = plant.model, plant.actuator[plant.joints.index(place)]
     limited = a >= 0 and model.actuator_forcelimited[a]
-    return (abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1] if limited else np.inf,)
+    given = abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1] if limited else np.inf
+    return (given / plant.condition.supply,)
 
 
 def _spring(plant: Plant, place: str) -> Sequence[float]:
@@ -69,6 +70,7 @@ _NONE, _FACTOR, _UNBOUNDED = _absent_at(0.0), _absent_at(1.0), _absent_at(np.inf
 _DECLARED: dict[str, _Declared] = {
     "coulomb_friction": _of_dof("dof_frictionloss"),
     "viscous_friction": _of_dof("dof_damping"),
+    "quadratic_friction": lambda plant, place: (plant.model.dof_dampingpoly[plant.dof[plant.joints.index(place)], 0],),
     "stribeck_friction": _NONE,
     "load_dependent_friction": _NONE,
     "armature": _of_dof("dof_armature"),
@@ -78,6 +80,9 @@ _DECLARED: dict[str, _Declared] = {
     "torque_limit": _limit,
     "torque_speed_limit": _UNBOUNDED,
     "command_delay": _delay,
+    "command_filter": _NONE,
+    "command_rate_limit": _UNBOUNDED,
+    "command_profile": lambda plant, place: (np.inf, NO_SPEED_LIMIT),
     "torque_lag": _NONE,
     "encoder_delay": _NONE,
     "dropped_commands": _NONE,

@@ -11,13 +11,17 @@ from mujoco.batch import Batch
 
 from bumblebee.diagnosis.simulation.actuator_history import read_at, remember
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
+from bumblebee.diagnosis.simulation.failures import REFUSALS
 from bumblebee.diagnosis.simulation.hidden_states import Known, earlier, restructured, set_plastic, step_share
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.readings import Layout, difference, simulated_readings
+from bumblebee.diagnosis.simulation.setpoints import follow
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
+from bumblebee.errors import BadInput
 from bumblebee.quaternions import conjugate, from_rotation_vector, multiply, rotate_by_cross
-from bumblebee.sim.effects import Memory, StepHooks
+from bumblebee.sim.effects import Memory, StepHooks, hook_joints
+from bumblebee.sim.servo import servos_each, servos_of
 
 THREADS: int | None = None
 """Threads of every simulation; None: see `threads`."""
@@ -55,7 +59,7 @@ def residuals(
     step: float,
     starts: Starts | None = None,
 ) -> np.ndarray:
-    """Return measured - simulated, (V, W, N, D); NaN where a simulation diverged.
+    """Return measured - simulated, (V, W, N, D); NaN where a simulation diverged or was not to be had.
 
     With `starts` of K start states, `variations` has one entry and the first axis is K.
     """
@@ -71,13 +75,41 @@ def residuals(
         chosen = [variations[0] if starts is not None else variations[v] for v in part]
         own = None if starts is None else starts.part(part)
         short = step * step_share(chosen[0].hidden, plant.thresholds.hidden)
-        count = int(np.ceil(windows.span / short - 1e-6))
-        inputs = [inputs_of(windows, variation, short, count, cache) for variation in chosen]
-        models = [] if chosen[0].plant is not None else list({id(v.model): v.model for v in chosen}.values())
-        with without(models, far):
-            out[part.start : part.stop] = _run(_Chunk(plant, windows, chosen, own, short), layout, inputs)
+        together = _Chunk(plant, windows, chosen, own, short)
+        out[part.start : part.stop] = _guarded(together, layout, cache, far)
         first = part.stop
     return out
+
+
+def _guarded(chunk: "_Chunk", layout: Layout, cache: dict[bytes, np.ndarray], far: np.ndarray) -> np.ndarray:
+    """Residuals (V, W, N, D) of one chunk; of a variation that cannot be simulated NaN, for it alone.
+
+    The declared model is no trial: where it cannot be simulated, the input is unusable.
+    """
+    lead, nothing = chunk.lead, np.full((len(chunk.chosen), *chunk.windows.measured.shape), np.nan)
+    if lead.impossible:
+        return nothing
+    try:
+        return _simulated(chunk, layout, cache, far)
+    except REFUSALS as error:
+        if len(chunk.chosen) > 1 and chunk.starts is None:
+            each = [_guarded(replace(chunk, chosen=[v]), layout, cache, far) for v in chunk.chosen]
+            return np.concatenate(each)
+        if not lead.effects:
+            raise BadInput("declared model", "one that MuJoCo can simulate", " ".join(str(error).split())) from error
+        chunk.plant.failures.add(lead.effects, error)
+        return nothing
+
+
+def _simulated(chunk: "_Chunk", layout: Layout, cache: dict[bytes, np.ndarray], far: np.ndarray) -> np.ndarray:
+    """Residuals (V, W, N, D) of one chunk."""
+    chosen, windows = chunk.chosen, chunk.windows
+    count = int(np.ceil(windows.span / chunk.step - 1e-6))
+    inputs = [inputs_of(windows, variation, chunk.step, count, cache) for variation in chosen]
+    some = [] if chosen[0].plant is not None else [m for v in chosen for m in v.models]
+    models = list({id(m): m for m in some}.values())
+    with without(models, far):
+        return _run(chunk, layout, inputs)
 
 
 def _together(variations: Sequence[Variation], first: int, chunk: int) -> range:
@@ -91,9 +123,11 @@ def _together(variations: Sequence[Variation], first: int, chunk: int) -> range:
 def inputs_of(
     windows: Windows, variation: Variation, step: float, count: int, cache: dict[bytes, np.ndarray]
 ) -> np.ndarray:
-    """Controls (W, count, nu) of a variation: late, and on the mean as held as dropped commands leave them."""
+    """Controls (W, count, nu) of a variation: late, shaped, and on the mean as held as dropped commands leave them."""
     share = variation.dropped
-    key = variation.delay.tobytes() + (b"" if share is None else share.tobytes()) + bytes(f"{count} {step!r}", "ascii")
+    shaped = variation.setpoints
+    key = variation.delay.tobytes() + (b"" if share is None else share.tobytes())
+    key += bytes(f"{count} {step!r} {shaped or ''}", "ascii")
     known = _known.setdefault(windows, {})
     if key in known:
         cache[key] = known[key]
@@ -104,7 +138,10 @@ def inputs_of(
             for k in range(1, command.shape[1]):
                 command[:, k] = (1 - share) * command[:, k] + share * command[:, k - 1]
             sent = replace(windows, command=command)
-        known[key] = cache[key] = controls(sent, variation.delay, step, count)
+        made = controls(sent, variation.delay, step, count)
+        for point in shaped:
+            made[..., point.actuator] = follow(sent, point, float(variation.delay[point.actuator]), step, count)
+        known[key] = cache[key] = made
         if len(known) > _KEPT:
             known.pop(next(iter(known)))
     return cache[key]
@@ -139,11 +176,9 @@ class _Chunk:
 
     def batch(self) -> Batch:
         """A batch of all windows under all variations, in the chunk's step."""
-        models = {id(v.model): with_step(v.model, self.step) for v in self.chosen}
-        batch = Batch(self.lead.model, len(self.chosen) * len(self.windows), threads())
-        if self.lead.plain:
-            batch.set_models([models[id(v.model)] for v in self.chosen for _ in range(len(self.windows))])
-        return batch
+        for model in {id(m): m for v in self.chosen for m in v.models}.values():
+            with_step(model, self.step)
+        return batch_of(self.plant, self.windows, self.chosen)
 
     def begun(self, late: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Start states (V, W, nq), (V, W, nv) of the simulated model; encoders are `late` (J,) [s]."""
@@ -161,6 +196,25 @@ class _Chunk:
         if lead.plant is not None:
             qpos, qvel = restructured(plant, windows, lead, qpos, qvel, _led_in(plant, windows, lead, self.step))
         return qpos, qvel
+
+
+def batch_of(plant: Plant, windows: Windows, chosen: Sequence[Variation]) -> Batch:
+    """A batch of all windows under each of the `chosen`, each window in the model of its condition."""
+    lead = chosen[0]
+    if lead.hooks is not None or not (lead.plain or lead.others):
+        return own_batch(plant, windows, lead, len(chosen))
+    batch = Batch(lead.model, len(chosen) * len(windows), threads())
+    batch.set_models([v.models[c] for v in chosen for c in windows.condition])
+    return batch
+
+
+def own_batch(plant: Plant, windows: Windows, lead: Variation, copies: int) -> Batch:
+    """A batch of copies of all windows with models of its own, as they are now, whose fields may be written."""
+    batch = Batch(lead.model, copies * len(windows), threads())
+    for name in plant.differing if lead.others else ():
+        rows = np.stack([getattr(model, name) for model in lead.models])[np.tile(windows.condition, copies)]
+        batch.expand(name)[:] = rows
+    return batch
 
 
 def _run(chunk: _Chunk, layout: Layout, inputs: list[np.ndarray]) -> np.ndarray:
@@ -201,7 +255,7 @@ def _led_in(plant: Plant, windows: Windows, lead: Variation, step: float) -> Kno
     early, span, whole = earlier(plant, windows)
     early.qpos[:, plant.qpos] -= lead.offset
     qpos, qvel = restructured(plant, early, lead, early.qpos, early.qvel)
-    batch = Batch(lead.model, len(early), threads())
+    batch = batch_of(plant, early, [lead])
     batch.bind("qpos")[:], batch.bind("qvel")[:] = qpos, qvel
     set_plastic(batch, plant, early, lead, 1)
     control = inputs_of(early, lead, step, max(1, round(span / step)), {})
@@ -235,7 +289,11 @@ def _roll(
     """States (n, count, nq) and (n, count, nv) after every step."""
     hooks = lead.hooks
     if hooks is not None:
-        running = StepHooks(hooks, lead.model, batch)
+        condition = np.tile(windows.condition, copies)
+        servos = servos_each([servos_of(model, hook_joints(model)) for model in lead.models], condition)
+        if lead.others:
+            servos = replace(servos, supply=np.array([p.condition.supply for p in plant.every])[condition, None])
+        running = StepHooks(hooks, lead.model, batch, servos)
         running.reset(np.arange(len(control)), _repeated(remember(plant, windows, hooks, step), copies))
     if hooks is None or not hooks.each_step:
         out = batch.rollout(control.shape[1], control, record=("qpos", "qvel"))

@@ -2,14 +2,17 @@
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.simulation.failures import REFUSALS, in_words
 from bumblebee.diagnosis.simulation.in_place import WRITE, Target
 from bumblebee.diagnosis.simulation.plant import Plant, make_plant
-from bumblebee.sim.effects import CATALOGUE, Effect, RuntimeHooks, add_to_spec, native, runtime_hooks
+from bumblebee.diagnosis.simulation.setpoints import SetPoint, setpoints_of
+from bumblebee.errors import BadInput
+from bumblebee.sim.effects import CATALOGUE, SETPOINTS, Effect, RuntimeHooks, add_to_spec, native, runtime_hooks
 
 _ORDER = tuple(CATALOGUE)
 # Effects that change the layout of MuJoCo's state: they are compiled, once for each set of places.
@@ -31,21 +34,79 @@ class Variation:
     """The plant of `model` where its structure differs from the declared one's."""
     hooks: RuntimeHooks | None = None
     """What must be done beside MuJoCo at every step."""
+    setpoints: tuple[SetPoint, ...] = ()
+    """What drives make of their targets, on the way to the servos; as a delay it is in the controls."""
     dropped: np.ndarray | None = None
     """(nu,) share of commands that never arrive."""
     tilt: np.ndarray | None = None
     """(3,) [rad] rotation vector multiplied onto the reading of the base's orientation."""
     hidden: tuple[tuple[str, str, tuple[float, ...]], ...] = field(default=())
     """(kind, joint, parameters) of the structural effects, for the state that no sensor reads."""
+    effects: tuple[Effect, ...] = ()
+    """What the declared model was given."""
+    impossible: bool = False
+    """Whether the model with these effects could not be made: `model` is then the declared one, residuals are NaN."""
+    others: tuple[mujoco.MjModel, ...] = field(default=(), repr=False)
+    """The same under the plant's other conditions; `model` is that of its own."""
+
+    @property
+    def models(self) -> tuple[mujoco.MjModel, ...]:
+        """By number of the condition."""
+        return (self.model, *self.others)
+
+    @property
+    def bare(self) -> "Variation":
+        """Models, offsets and what becomes of single commands alone."""
+        return Variation(self.model, self.delay, self.offset, setpoints=self.setpoints, others=self.others)
 
     @property
     def plain(self) -> bool:
-        """Whether a model and a delay are all there is to it."""
-        return self.plant is None and self.hooks is None and self.tilt is None and self.dropped is None
+        """Whether a model and what becomes of single commands on their way are all there is to it."""
+        alone = self.plant is None and self.hooks is None and self.tilt is None and self.dropped is None
+        return alone and not self.impossible
 
 
 def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
-    """The plant with `effects`; the same meaning as `sim.effects.spec.add_to_spec`, without compiling again."""
+    """The plant with `effects`; an `impossible` one, written down in `plant.failures`, where that cannot be made."""
+    try:
+        return _made(plant, effects)
+    except REFUSALS as error:
+        plant.failures.add(_blamed(plant, effects), error)
+        models = tuple(other.model for other in plant.others)
+        declared = Variation(plant.model, plant.delay, plant.offset, others=models)
+        return replace(declared, effects=tuple(effects), impossible=True)
+
+
+def _blamed(plant: Plant, effects: Sequence[Effect]) -> Sequence[Effect]:
+    """The effect that cannot be made by itself; all of them where each can."""
+    for effect in effects if len(effects) > 1 else ():
+        try:
+            _made(plant, [effect])
+        except REFUSALS:
+            return [effect]
+    return effects
+
+
+def vary_or_refuse(plant: Plant, effects: Sequence[Effect]) -> Variation:
+    """The same for effects that a user demands: `BadInput` where the model cannot be made."""
+    try:
+        return _made(plant, effects)
+    except REFUSALS as error:
+        came = " ".join(str(error).split())[:300]
+        raise BadInput(f"effects {in_words(effects)}", "a model that MuJoCo can make of them", came) from error
+
+
+def _made(plant: Plant, effects: Sequence[Effect]) -> Variation:
+    """The plant with `effects`; the same meaning as `sim.effects.spec.add_to_spec`, without compiling again.
+
+    Under several conditions it has a model for each: factors of gains multiply those of the condition.
+    """
+    own = _alone(plant, effects)
+    return replace(own, others=tuple(_alone(o, effects).model for o in plant.others)) if plant.others else own
+
+
+def _alone(plant: Plant, effects: Sequence[Effect]) -> Variation:
+    """The same under the plant's own condition alone."""
     if not effects:
         return Variation(plant.model, plant.delay, plant.offset)
     structural = [e for e in effects if _is_structural(e)]
@@ -62,16 +123,18 @@ def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
     if any(effect.effect in _NEW_CONSTANTS for effect in effects):
         # set_const reads qpos0 through a scratch MjData; gains, friction and damping do not enter it.
         mujoco.mj_setConst(model, mujoco.MjData(model))
-    hooks = runtime_hooks(effects, model)
+    hooks = runtime_hooks([e for e in effects if e.effect not in SETPOINTS], model)
     return Variation(
         model,
         delay,
         offset,
         plant=own if structural else None,
         hooks=hooks if hooks.steps else None,
+        setpoints=setpoints_of(plant, effects),
         dropped=_dropped(plant, hooks),
         tilt=hooks.imu if hooks.imu.any() else None,
         hidden=tuple(hidden),
+        effects=tuple(effects),
     )
 
 
@@ -124,7 +187,7 @@ def _structure(plant: Plant, effects: Sequence[Effect]) -> Plant:
     if key not in plant.compiled:
         spec = plant.spec.copy()
         add_to_spec(spec, effects)
-        plant.compiled[key] = make_plant(spec, plant.example, "declared model", plant.thresholds)
+        plant.compiled[key] = make_plant(spec, plant.example, "declared model", plant.thresholds, plant.condition)
     return plant.compiled[key]
 
 

@@ -63,6 +63,10 @@ class DriveSteps:
     """Load-dependent friction: share of the torque."""
     time: float = 0.005
     """Command delay, torque lag, encoder delay [s]."""
+    target_rate: tuple[float, ...] = (0.6, 0.2)
+    """Shares of the targets' steepest course at which a limit of their rate is tried."""
+    target_turn: tuple[tuple[float, float], ...] = ((1.0, 0.0), (0.2, 0.0), (0.5, 0.5))
+    """Shares of their largest acceleration, and of their steepest course (0: no limit), at which a profile is tried."""
     dropped: float = 0.2
     """Share of commands lost."""
     gain: float = -0.1

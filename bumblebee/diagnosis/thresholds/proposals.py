@@ -108,6 +108,30 @@ class JointElasticity:
 
 
 @dataclass(frozen=True)
+class SetPoints:
+    """Of filters, limits and profiles of the targets, tried at a series of sizes."""
+
+    windows: int = 24
+    """Windows that the series is tried on, those that are furthest off."""
+    factors: tuple[float, ...] = (0.35, 0.7, 1.2, 2.0, 3.2, 5.0, 8.0, 14.0, 25.0)
+    """On the size of a first step: of 5 ms they make filters of 2 to 125 ms."""
+    speeds: tuple[float, ...] = (1.0, 0.5, 0.25)
+    """The same on the speed of a profile that has one."""
+    turns: int = 3
+    """Times that size and speed are made finer in turn."""
+    finer: tuple[float, ...] = (1.25, 1.12, 1.06, 1.03)
+    """Factors to both sides of the best so far, one after the other."""
+    least_gain: float = 40.0
+    """Fall of the robust cost on all windows from which on a set-point is proposed."""
+    least_gain_tried: float = 15.0
+    """The same on the windows that were tried, below which the others are not simulated."""
+    step: float = 0.2
+    """Share of the size that matters: five times what sensitivities are differences of."""
+    near: float = 0.5
+    """Share of the best kind's gain on the windows tried, from which on another kind is refitted, too."""
+
+
+@dataclass(frozen=True)
 class GainGrid:
     """Of servo gains that are far from the declared ones, and dry friction with them."""
 
@@ -187,7 +211,7 @@ class PacketLoss:
 
     longest: int = 3
     """Lost commands in a row at most, in ticks."""
-    most_ticks: int = 11
+    most_ticks: int = 12
     """Ticks of a window: of more the patterns are too many, and single ticks too short to matter."""
     odd_power: float = 1.6
     """Whitened power of a window that a lost command may have spoilt."""
@@ -220,6 +244,8 @@ class PacketLoss:
     """Share of lost commands from which expectation and maximisation begin."""
     iterations: int = 60
     """Of these."""
+    rounds: int = 3
+    """Of finding nuisances beside the commands that arrived, and these beside the nuisances."""
 
 
 @dataclass(frozen=True)
@@ -236,6 +262,22 @@ class Stribeck:
     """Share of such a velocity that matters."""
     iterations: int = 5
     """Of the joint fit of the two."""
+
+
+@dataclass(frozen=True)
+class FrictionFamily:
+    """Of the sums of a joint's friction."""
+
+    sure: float = 4.0
+    """Standard errors that a further member must reach: as a number of the same friction, not one of all candidates."""
+    clearly: float = 1.0
+    """Log-likelihood by which a sum must be better beyond the price of its numbers."""
+    promising: float = 8.0
+    """Fall of the cost, in the residual's power, that the screening windows must promise."""
+    tried: int = 3
+    """Members tried at their size for each that is taken."""
+    iterations: int = 3
+    """Of the joint refit."""
 
 
 @dataclass(frozen=True)
@@ -302,10 +344,12 @@ class ProposalThresholds:
     saturation: Saturation = field(default_factory=Saturation)
     backlash: Backlash = field(default_factory=Backlash)
     joint_elasticity: JointElasticity = field(default_factory=JointElasticity)
+    setpoints: SetPoints = field(default_factory=SetPoints)
     gain_grid: GainGrid = field(default_factory=GainGrid)
     all_joints: AllJoints = field(default_factory=AllJoints)
     packet_loss: PacketLoss = field(default_factory=PacketLoss)
     stribeck: Stribeck = field(default_factory=Stribeck)
+    friction_family: FrictionFamily = field(default_factory=FrictionFamily)
     gain_parameters: GainParameters = field(default_factory=GainParameters)
     declared_scale: DeclaredScale = field(default_factory=DeclaredScale)
     encoder_resolution: EncoderResolution = field(default_factory=EncoderResolution)

@@ -96,6 +96,8 @@ class Verdicts:
     """Times what sensor noise leaves, from which on an error is called large."""
     trace: float = 1e-3
     """p of what is not called significant for being small, yet is no accident."""
+    failures: int = 12
+    """Lines on models that could not be made or simulated, which are one cause many times over; then their number."""
     better: float = 0.95
     """Times a joint's error before, below which the error after is coloured as better."""
     joint_worse: float = 1.05

@@ -58,6 +58,9 @@ class Outliers:
     """Share of the others' power that one window's change may have in coarse steps, on a floating base."""
     diverged: float = 10.0
     """Times the others' root mean square that a window which diverged counts as."""
+    impossible: float = 1e9
+    """Whitened residual of a model that cannot be made or diverges in every window: above any that can be compared, and
+    its square still far below what a float holds."""
     finite: float = 0.5
     """Share of the windows that the declared model must get through; else it is refused."""
 

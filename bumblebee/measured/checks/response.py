@@ -15,6 +15,7 @@ counts their products over 0.1 s (Newey and West 1987), and is never taken small
 
 import numpy as np
 
+from bumblebee.measured.checks.reversed_command import reversed_fits_better
 from bumblebee.measured.checks.sign import correlation
 from bumblebee.measured.checks.units import servo_gains
 from bumblebee.measured.checks.view import View
@@ -31,8 +32,9 @@ RIDGE = 1e-7  # of columns of length 1: keeps collinear ones apart, as a resting
 def check_response(view: View) -> None:
     """A joint that moves against its command: the sign of one of the two columns is wrong.
 
-    Fatal where the whole state could be taken into account; in a file too short for that only the joint's own was, and
-    a person is told. A position that merely follows the negative target is pointed out.
+    Fatal where the whole state could be taken into account, unless the declared model moves so by itself (its
+    neighbours drive the joint); in a file too short for that only the joint's own was, and a person is told. A position
+    that merely follows the negative target is pointed out.
     """
     rollout, limits = view.rollout, view.limits
     by_target = rollout.joint_target is not None
@@ -55,9 +57,17 @@ def check_response(view: View) -> None:
         against = strong and opposed and (not by_target or together < limits.response_correlation)
         mirrored = by_target and z < NOT_ALONG and together < MIRRORED and _follows_negative(view, place, given)
         if against or mirrored:
+            overruled = against and reversed_fits_better(view, joint, by_target) is False
             came = f"motion against it ({-z:.0f} standard errors, correlation of the changes {together:.2f})"
             column = view.label(name, joint)
-            view.add(column, None, "response-sign", "a joint that follows its command", came, fatal=against and whole)
+            view.add(
+                column,
+                None,
+                "response-sign",
+                "a joint that follows its command",
+                came,
+                fatal=against and whole and not overruled,
+            )
 
 
 def _declared_effects(view: View, by_target: bool) -> np.ndarray:

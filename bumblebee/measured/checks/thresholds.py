@@ -28,7 +28,11 @@ class Thresholds:
     freeze_seconds: float = 0.4
     """An exactly constant reading for this long, at least 10 rows, is a dead channel if its command moves."""
     freeze_command: float = 0.15
-    """Motion of the target [rad] that no servo answers with an unchanged encoder reading."""
+    """Motion of the target, or way by the velocity within a second [rad], that an unchanged encoder reading leaves
+    open. A servo of low gain answers no such target while it sticks (a real one stood for 3.7 s)."""
+    freeze_strain: float = 4.0
+    """Times the tracking errors at which a joint moves that one may reach while it stands; real sticking servos reach
+    1.8, one pressed against its torque limit 1.1."""
     freeze_speed: float = 0.3
     """Mean reported speed [rad/s] during which a position cannot stay the same."""
     freeze_share: float = 0.25
@@ -101,3 +105,6 @@ class Thresholds:
     """Mismatch of velocities [m/s, rms] below which frames are not told apart."""
     gains_relative: float = 0.02
     """Relative difference of gains: rounding in a file is smaller, a changed gain larger."""
+    gains_factor: float = 100.0
+    """Factor between stated and declared gains from which they are of another unit: people vary gains by ten or so,
+    a servo's own numbers (100 to 800 for 0.2 to 1.6 N m/rad) are 500 times as large."""

@@ -1,8 +1,10 @@
 """Checks of values: NaN, dead channels, steps that no joint can make, positions beyond the range."""
 
+import mujoco
 import numpy as np
 
-from bumblebee.measured.checks.view import View
+from bumblebee.measured.checks.view import View, integral
+from bumblebee.measured.rollout import Rollout
 
 
 def check_finite(view: View) -> None:
@@ -31,7 +33,12 @@ def longest_run(same: np.ndarray) -> tuple[int, int]:
 
 
 def check_frozen(view: View) -> None:
-    """A channel whose reading stays exactly the same while its command or the motion itself goes on."""
+    """A channel whose reading stays exactly the same while its velocity, its neighbours or its command go on.
+
+    A servo of low gain with dry friction stands for seconds while its command moves: that is what sticking looks like,
+    and a person is told no more than that. Fatal is what no standing joint shows: a velocity that adds up to a way, a
+    coupled joint that moves, a tracking error far beyond those at which this joint moves, all readings repeated.
+    """
     rollout, limits = view.rollout, view.limits
     if view.found("degrees"):
         return
@@ -41,22 +48,93 @@ def check_frozen(view: View) -> None:
         place = rollout.joint_pos[:, joint]
         at_stop = (place < ranges[joint, 0] + 0.02) | (place > ranges[joint, 1] - 0.02)
         start, length = longest_run((np.diff(place) == 0) & ~at_stop[1:])
-        rows = slice(start, start + length + 1)
-        speed = float(np.abs(rollout.joint_vel[rows, joint]).mean()) if length else 0.0
-        moved = np.ptp(rollout.joint_target[rows, joint]) if rollout.joint_target is not None and length else 0.0
-        if length >= need and (moved > limits.freeze_command or speed > limits.freeze_speed):
-            came = f"{length + 1} equal rows; the command moved {moved:.3g} rad, joint_vel said {speed:.3g} rad/s"
-            fatal = speed > limits.freeze_speed or not _may_stall(place, start, length, limits.freeze_share)
-            view.add(view.label("joint_pos", joint), start, "frozen", "a reading that follows", came, fatal=fatal)
+        if length >= need:
+            _judge_standing(view, joint, start, length)
         _check_frozen_rate(view, joint, need)
     _check_frozen_base(view, need)
+    _check_repeated(view, need)
+
+
+def _judge_standing(view: View, joint: int, start: int, length: int) -> None:
+    """One joint's longest run of equal readings: nothing, sticking, or a dead channel."""
+    rollout, limits = view.rollout, view.limits
+    rows = slice(start, start + length + 1)
+    moved = 0.0 if rollout.joint_target is None else float(np.ptp(rollout.joint_target[rows, joint]))
+    speed = float(np.abs(rollout.joint_vel[rows, joint]).mean())
+    travels = speed > limits.freeze_speed or _way(view, joint, rows) > limits.freeze_command
+    coupled = _coupled_travel(view, joint, rows)
+    if not (moved > limits.freeze_command or travels or coupled > limits.freeze_command):
+        return
+    came = f"{length + 1} equal rows; the command moved {moved:.3g} rad, joint_vel said {speed:.3g} rad/s"
+    strained = moved > limits.freeze_command and _strain(rollout, joint, rows) > limits.freeze_strain
+    dead = strained and not _may_stall(rollout.joint_pos[:, joint], start, length, limits.freeze_share)
+    fatal = travels or coupled > limits.freeze_command or dead
+    expected = "a reading that follows" if fatal else "a reading that follows, unless the joint sticks"
+    view.add(view.label("joint_pos", joint), start, "frozen", expected, came, fatal=fatal)
+
+
+def _way(view: View, joint: int, rows: slice) -> float:
+    """The largest way [rad] that joint_vel says was gone within a second of some rows.
+
+    Of a second at most: a coarse velocity that rests one step beside zero adds up to a way in a long standstill.
+    """
+    time, speed = view.rollout.time[rows], view.rollout.joint_vel[rows, joint]
+    window = min(view.window(1.0), len(time) - 1)
+    return float(np.abs(integral(time, speed, window)).max())
+
+
+def _coupled_travel(view: View, joint: int, rows: slice) -> float:
+    """How far [rad, m] a joint moved meanwhile that an equality of the model ties to this one; 0 for none."""
+    model, ids = view.model, view.joint_ids()
+    travel = 0.0
+    for e in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
+        pair = {int(model.eq_obj1id[e]), int(model.eq_obj2id[e])}
+        for other in (k for k, i in enumerate(ids) if i in pair and ids[joint] in pair and k != joint):
+            travel = max(travel, float(np.ptp(view.rollout.joint_pos[rows, other])))
+    return travel
+
+
+def _strain(rollout: Rollout, joint: int, rows: slice) -> float:
+    """Largest tracking error in some rows by the usual largest one at which the joint moves elsewhere; 0 for none.
+
+    A joint that sticks breaks away at errors of the size at which it then moves; a dead reading does not.
+    """
+    assert rollout.joint_target is not None
+    error = np.abs(rollout.joint_target[:, joint] - rollout.joint_pos[:, joint])
+    goes = np.concatenate([np.diff(rollout.joint_pos[:, joint]) != 0, [False]])
+    goes[rows] = False
+    usual = float(np.quantile(error[goes], 0.95)) if goes.any() else 0.0
+    return float(error[rows].max()) / usual if usual > 0 else 0.0
+
+
+def _check_repeated(view: View, need: int) -> None:
+    """A logger that repeats all its readings, of several joints, while their commands go on.
+
+    Coarse readings of joints that rest repeat themselves too: then they do so elsewhere as well.
+    """
+    rollout, limits = view.rollout, view.limits
+    command = rollout.joint_target
+    readings = [getattr(rollout, c) for c in rollout.columns if c not in ("joint_target", "joint_torque_cmd", "action")]
+    same = np.logical_and.reduce([(np.diff(v, axis=0) == 0).reshape(len(v) - 1, -1).all(axis=1) for v in readings])
+    start, length = longest_run(same)
+    if length < need or command is None or len(rollout.joints) < 2 or _repeats(same, start, length):
+        return
+    moved = np.ptp(command[start : start + length + 1], axis=0) > limits.freeze_command
+    if moved.sum() >= max(2, len(rollout.joints) / 2):
+        came = f"{length + 1} rows with the same readings throughout, while the commands of {moved.sum()} joints moved"
+        view.add("joint_pos", start, "frozen", "readings that are taken anew in every row", came, fatal=True)
 
 
 def _may_stall(place: np.ndarray, start: int, length: int, share: float) -> bool:
     """Whether equal readings may be a stalled joint: a coarse encoder, equal elsewhere too, that moves again."""
-    outside = np.delete(np.diff(place), np.s_[start : start + length])
     moves_again = start + length < len(place) - 1
-    return bool(len(outside) and (outside == 0).mean() > 0.05 and moves_again and length < share * len(place))
+    return _repeats(np.diff(place) == 0, start, length) and moves_again and length < share * len(place)
+
+
+def _repeats(same: np.ndarray, start: int, length: int) -> bool:
+    """Whether readings are the same as in the row before (T - 1,) outside a run, too."""
+    outside = np.delete(same, np.s_[start : start + length])
+    return bool(len(outside) and outside.mean() > 0.05)
 
 
 def _check_frozen_rate(view: View, joint: int, need: int) -> None:

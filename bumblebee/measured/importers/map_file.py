@@ -50,6 +50,7 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     for column, names in columns.items():
         same_order(f"{path}: columns: {column}", joints, names)
     given = {"joints": joints, "columns": columns, "time": ("time",), "episode": _one_name(path, table, "episode")}
+    given["valid"] = _one_name(path, table, "valid")
     given |= _clock(path, table, kind) | {"hz": _rate(f"{path}: hz", table.get("hz", 0.0))}
     given["angle_unit"] = _angle_unit(f"{path}: angle_unit", table.get("angle_unit", "rad"), len(joints))
     given["names"] = _renamed(f"{path}: names", table.get("names"), joints)

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
+from bumblebee.sim.effects.setpoints import NO_SPEED_LIMIT
 from bumblebee.sim.units import is_known
 
 # MuJoCo's default dry friction creeps where a real joint sticks; a joint with `coulomb_friction` gets it stiff.
@@ -86,6 +87,7 @@ _AXES = ("x", "y", "z")
 CATALOGUE: dict[str, Kind] = {
     "coulomb_friction": _joint(("frictionloss", "N m", 0.0, _INF)),
     "viscous_friction": _joint(("damping", "N m s/rad", 0.0, _INF)),
+    "quadratic_friction": _joint(("coefficient", "N m s^2/rad^2", 0.0, _INF)),
     "stribeck_friction": _joint(("stiction", "N m", 0.0, _INF), ("velocity", "rad/s", 1e-3, 100.0), native=False),
     "load_dependent_friction": _joint(("coefficient", "", 0.0, 2.0), native=False),
     "armature": _joint(("armature", "kg m^2", 0.0, _INF)),
@@ -95,6 +97,12 @@ CATALOGUE: dict[str, Kind] = {
     "torque_limit": _joint(("limit", "N m", 1e-3, _INF)),
     "torque_speed_limit": _joint(("speed", "rad/s", 0.05, _INF), native=False),
     "command_delay": _joint(("delay", "s", 0.0, 0.1), whole=True),
+    # What the drive makes of its targets; of a profile without a limit of speed the acceleration alone is given.
+    "command_filter": _joint(("time", "s", 0.0, 0.5), whole=True, native=False),
+    "command_rate_limit": _joint(("rate", "rad/s", 1e-3, _INF), native=False),
+    "command_profile": _joint(
+        ("acceleration", "rad/s^2", 1e-2, _INF), ("speed", "rad/s", 1e-3, NO_SPEED_LIMIT, NO_SPEED_LIMIT), native=False
+    ),
     "torque_lag": _joint(("time", "s", 0.0, 0.1), whole=True, native=False),
     "encoder_delay": _joint(("delay", "s", 0.0, 0.05), whole=True, native=False),
     "dropped_commands": _joint(("share", "", 0.0, 0.9), whole=True, native=False),

@@ -10,6 +10,7 @@ written anew, so that MuJoCo's implicit treatment of both stays. The others are 
 | torque_speed_limit | forcerange: limit (1 - v / speed) in the direction of motion |
 | thermal_fade, strength_drift | gains times 1 - rate int (torque / limit)^2 dt - rate t |
 | encoder_delay, encoder_quantisation | the servo's torque at the old, rounded reading instead of the present one |
+| command_filter, _rate_limit, _profile | the servo's torque at its set-point (`setpoints.py`), not at the target |
 | torque_lag | the servo's torque after dx/dt = (torque - x) / time, instead of the present one |
 | cogging | sine sin(periods q) + cosine cos(periods q) |
 | external_wrench | xfrc_applied |
@@ -26,8 +27,9 @@ import numpy as np
 from mujoco.batch import Batch
 
 from bumblebee.sim.effects.hooks import RuntimeHooks, hook_joints
+from bumblebee.sim.effects.setpoints import advance
 from bumblebee.sim.effects.states import states_of
-from bumblebee.sim.servo import servos_of
+from bumblebee.sim.servo import Servos, servos_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +60,7 @@ WRITTEN = {
     "actuator_forcerange": "_range",
 }
 # What is carried from step to step: saved, and on a GPU kept in place. tests/test_forgotten.py finds what is missing.
-_REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states", "bent")
+_REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states", "bent", "setpoint", "pace")
 
 
 def bent(z: np.ndarray, path: np.ndarray, width: float) -> np.ndarray:
@@ -76,9 +78,10 @@ def history_length(hooks: RuntimeHooks, step: float) -> int:
 class StepHooks:
     """Hooks that run beside one batch; call `reset` after its worlds were reset and `apply` before each step."""
 
-    def __init__(self, hooks: RuntimeHooks, model: mujoco.MjModel, batch: Batch) -> None:
+    def __init__(self, hooks: RuntimeHooks, model: mujoco.MjModel, batch: Batch, servos: Servos | None = None) -> None:
+        """`servos` are those of the worlds where they differ; by default `model`'s."""
         self._h, self._batch = hooks, batch
-        self.servos = servos_of(model, hook_joints(model))
+        self.servos = servos_of(model, hook_joints(model)) if servos is None else servos
         self._step = float(model.opt.timestep)
         count, joints = batch.nsim, len(hooks.joints)
         self._time, self._heat = np.zeros(count), np.zeros((count, joints))
@@ -90,11 +93,13 @@ class StepHooks:
         self._kept = states_of(hooks.terms)
         self._states = np.zeros((count, len(self._kept)))
         self._bent = np.zeros((count, len(hooks.hysteresis)))
+        self._setpoint, self._pace = np.zeros((count, joints)), np.zeros((count, joints))
         terms = [term for _, _, term in hooks.terms]
         self._fading, self._running_out, self._late = hooks.has("gain"), hooks.has("limit"), hooks.has("feedback")
+        self._shaping = hooks.has("target")
         self._rubbing = hooks.has("loss") or any(term.rubs for term in terms)
         self._driving = any(term.drives for term in terms)
-        self._pushing = self._late or hooks.has("torque") or any(not term.rubs for term in terms)
+        self._pushing = self._late or self._shaping or hooks.has("torque") or any(not term.rubs for term in terms)
         if self._fading:
             self._expand("actuator_gainprm", "actuator_biasprm")
         if self._rubbing:
@@ -126,7 +131,9 @@ class StepHooks:
         self._past_q[ids], self._past_v[ids] = q[ids][:, None], v[ids][:, None]
         if memory is not None and memory.position is not None and self._back > 0:
             self._past_q[ids], self._past_v[ids] = memory.position, memory.velocity
-        target = self.servos.given(self.servos.controls(self._batch.bind("ctrl")))[ids]
+        control = self.servos.controls(self._batch.bind("ctrl"))[ids]
+        self._setpoint[ids], self._pace[ids] = control, 0.0
+        target = self.servos.given(control)
         for k, s in enumerate(self._kept):
             self._states[ids, k] = s.first(target[:, s.column])
         if memory is not None and memory.states is not None:
@@ -172,13 +179,16 @@ class StepHooks:
         """Write everything that the next physics step needs."""
         h, servos = self._h, self.servos
         q, v = self._readings()
-        u = servos.controls(self._batch.bind("ctrl"))
+        told = servos.controls(self._batch.bind("ctrl"))
+        u = self._shaped(told) if self._shaping else told
         for k, s in enumerate(self._kept):
             self._states[:, k] = s.at(self._states[:, k], servos.given(u)[:, s.column], self._time, self._step)
         strength = self._fade() if self._fading else 1.0
         limit = self._torque_limit(v) if self._running_out else servos.limit
-        now = strength * servos.torque(q, v, u, limit / np.maximum(strength, 1e-9))
-        torque = self._delayed(q, v, u, strength, limit, now) if self._late else now
+        reach = limit / np.maximum(strength, 1e-9)
+        now = strength * servos.torque(q, v, told, reach)  # what MuJoCo's own servo does
+        torque = strength * servos.torque(q, v, u, reach) if self._shaping else now
+        torque = self._delayed(q, v, u, strength, limit, torque) if self._late else torque
         if self._rubbing:
             extra = h.stiction[:, 0] * np.exp(-((v / h.stiction[:, 1]) ** 2)) + h.load_friction * np.abs(torque)
             loss = self._loss0 + extra + self._discovered(q, v, u, torque, rubs=True)
@@ -223,6 +233,23 @@ class StepHooks:
             out[:, column] += coefficient * term(values)
         return out
 
+    def _shaped(self, told: np.ndarray) -> np.ndarray:
+        """What the servos follow (n, J) of the controls that they are told: the mean set-point over the step."""
+        h, step, scale = self._h, self._step, np.maximum(np.abs(self.servos.gear), 1e-12)
+        mean, at, pace = told, told, self._pace
+        for kind, some, values in (
+            ("command_filter", h.filter_time > 0, (h.filter_time,)),
+            ("command_rate_limit", np.isfinite(h.target_rate), (h.target_rate * scale,)),
+            ("command_profile", np.isfinite(h.profile[:, 0]), (h.profile[:, 0] * scale, h.profile[:, 1] * scale)),
+        ):
+            if some.any():
+                usable = [np.where(some, value, 1.0) for value in values]
+                area, then, speed = advance(kind, usable, self._setpoint, self._pace, told, step)
+                mean, at = np.where(some, area / step, mean), np.where(some, then, at)
+                pace = np.where(some, speed, pace)
+        self._setpoint, self._pace = at, pace
+        return mean
+
     def _fade(self) -> np.ndarray:
         h, servos = self._h, self.servos
         strength = np.maximum(1.0 - h.drift * self._time[:, None] - h.thermal * self._heat, 0.0)
@@ -235,10 +262,11 @@ class StepHooks:
     def _torque_limit(self, v: np.ndarray) -> np.ndarray:
         """Limits (n, J) of torques that drive the motion; those that brake keep the full one."""
         servos, speed = self.servos, self._h.speed_limit
-        some = np.isfinite(speed) & np.isfinite(servos.limit) & (servos.actuator >= 0)
-        left = np.clip(1.0 - np.abs(v) / speed, 0.0, 1.0)
+        finite = np.isfinite(servos.limit).all(axis=tuple(range(servos.limit.ndim - 1)))
+        some = np.isfinite(speed) & finite & (servos.actuator >= 0)
+        left = np.clip(1.0 - np.abs(v) / (speed * servos.supply), 0.0, 1.0)
         forward, backward = np.where(v > 0, left, 1.0), np.where(v < 0, left, 1.0)
-        a, force = servos.actuator[some], (servos.limit / np.maximum(np.abs(servos.gear), 1e-12))[some]
+        a, force = servos.actuator[some], (servos.limit / np.maximum(np.abs(servos.gear), 1e-12))[..., some]
         self._range[:, a, 0], self._range[:, a, 1] = -force * backward[:, some], force * forward[:, some]
         return np.where(some, servos.limit * left, servos.limit)
 

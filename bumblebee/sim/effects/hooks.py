@@ -14,13 +14,14 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects.catalogue import CATALOGUE, HOOKED, Effect
 from bumblebee.sim.effects.native import SUFFIX, is_hidden
+from bumblebee.sim.effects.setpoints import NO_SPEED_LIMIT, SETPOINTS
 from bumblebee.sim.effects.terms import Term, read_term
 
-Acts = Literal["reading", "command", "start", "gain", "loss", "limit", "feedback", "torque", "rotor", "terms"]
+Acts = Literal["reading", "command", "start", "target", "gain", "loss", "limit", "feedback", "torque", "rotor", "terms"]
 """What a hook changes: what sensors report; which commands arrive; what is set once as a world begins; or, before each
-physics step, the servo's gains, the dry friction, the torque's limit, the servo's feedback, a torque beside it, the
-servo's torque on a rotor. What discovered terms change, each says."""
-_BEFORE_STEPS: tuple[Acts, ...] = ("gain", "loss", "limit", "feedback", "torque", "rotor", "terms")
+physics step, the set-point of the servo, its gains, the dry friction, the torque's limit, the servo's feedback, a
+torque beside it, its torque on a rotor. What discovered terms change, each says."""
+_BEFORE_STEPS: tuple[Acts, ...] = ("target", "gain", "loss", "limit", "feedback", "torque", "rotor", "terms")
 
 
 def _none() -> np.ndarray:
@@ -45,6 +46,12 @@ class RuntimeHooks:
     """(J,) share of commands that never arrive; the last one is held."""
     dropped_together: bool = True
     """Whether all joints lose the same commands."""
+    filter_time: np.ndarray = field(default_factory=_none)
+    """(J,) [s]: time constant of a first-order lag of the target."""
+    target_rate: np.ndarray = field(default_factory=_none)
+    """(J,) [rad/s]: the fastest that the servo's set-point follows its target; infinite for none."""
+    profile: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    """(J, 2): largest acceleration [rad/s^2], infinite for none, and speed [rad/s] of the set-point."""
     stiction: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     """(J, 2): extra dry friction at rest [N m] and the speed [rad/s] at which it has gone."""
     load_friction: np.ndarray = field(default_factory=_none)
@@ -99,6 +106,9 @@ _ACTS: dict[str, Acts] = {
     "encoder_delay": "feedback",
     "torque_lag": "feedback",
     "dropped": "command",
+    "filter_time": "target",
+    "target_rate": "target",
+    "profile": "target",
     "stiction": "loss",
     "load_friction": "loss",
     "speed_limit": "limit",
@@ -111,12 +121,18 @@ _ACTS: dict[str, Acts] = {
     "wrench": "start",
     "imu": "reading",
 }
+SETPOINT_ARRAYS = dict(zip(SETPOINTS, ("filter_time", "target_rate", "profile"), strict=True))
+"""Effect on the set-point -> its array."""
 _FIELDS = [f.name for f in fields(RuntimeHooks) if f.name not in ("joints", "dropped_together")]
 if unsaid := set(_FIELDS) ^ _ACTS.keys():
     raise TypeError(
         f"bumblebee/sim/effects/hooks.py: _ACTS needs a row for each array of RuntimeHooks; not so: {unsaid}"
     )
-_ABSENT = {"speed_limit": np.inf}  # where an effect is not there; the others at 0
+_ABSENT = {
+    "speed_limit": np.inf,
+    "target_rate": np.inf,
+    "profile": np.inf,
+}  # where an effect is not there; the others at 0
 _LISTS = [f.name for f in fields(RuntimeHooks) if f.default == ()]
 
 
@@ -144,6 +160,7 @@ class _Making:
         arrays = {name: np.full(count, _ABSENT.get(name, 0.0)) for name in _ACTS if name not in _LISTS}
         self.made: dict[str, Any] = arrays | dict.fromkeys(_LISTS, ())
         self.made |= {"imu": np.zeros(3), "dropped_together": True, "stiction": np.tile((0.0, 1.0), (count, 1))}
+        self.made["profile"] = np.tile((np.inf, NO_SPEED_LIMIT), (count, 1))
 
     def column(self, kind: str, place: str) -> int:
         """Of the joint `place`."""
@@ -165,6 +182,18 @@ def _array(name: str) -> Callable[[_Making, Effect], None]:
 def _dropped(making: _Making, effect: Effect) -> None:
     making.made["dropped_together"] &= not effect.where
     _array("dropped")(making, effect)
+
+
+def _setpoint(name: str) -> Callable[[_Making, Effect], None]:
+    def hook(making: _Making, effect: Effect) -> None:
+        others = [making.made[other] for other in SETPOINT_ARRAYS.values() if other != name]
+        for column in making.columns(effect):
+            if any(np.isfinite(np.ravel(array[column])[0]) and np.ravel(array[column])[0] for array in others):
+                joint = making.joints[column]
+                raise BadInput(f"{effect.effect} on joint {joint!r}", f"one of {', '.join(SETPOINTS)}", "two")
+            making.made[name][column] = effect.values() if making.made[name].ndim == 2 else effect.value()
+
+    return hook
 
 
 def _stiction(making: _Making, effect: Effect) -> None:
@@ -211,6 +240,7 @@ HOOKS: dict[str, Callable[[_Making, Effect], None]] = {
     "encoder_delay": _array("encoder_delay"),
     "torque_lag": _array("torque_lag"),
     "dropped_commands": _dropped,
+    **{kind: _setpoint(name) for kind, name in SETPOINT_ARRAYS.items()},
     "stribeck_friction": _stiction,
     "load_dependent_friction": _array("load_friction"),
     "torque_speed_limit": _array("speed_limit"),

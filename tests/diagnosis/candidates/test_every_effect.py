@@ -144,7 +144,7 @@ def test_what_mjcf_cannot_carry_together_is_never_chosen_together(kind: str) -> 
 
 def _same(one: Variation, other: Variation) -> bool:
     """Whether two variations are one model with the same beside it."""
-    if one.model.nq != other.model.nq or not np.array_equal(one.delay, other.delay):
+    if one.model.nq != other.model.nq or one.setpoints != other.setpoints or not np.array_equal(one.delay, other.delay):
         return False
     if one.hooks is not None or other.hooks is not None or one.dropped is not None or other.dropped is not None:
         return False

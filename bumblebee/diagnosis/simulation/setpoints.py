@@ -1,0 +1,119 @@
+"""Set-points of drives that filter, limit or profile their targets, along windows that start mid-trajectory.
+
+They follow from the logged targets alone: a window's set-point begins where the targets since its rollout began have
+brought it, and its controls are known before anything is simulated.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.simulation.windows import Windows
+from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effects import SETPOINTS, Effect, advance
+
+
+@dataclass(frozen=True)
+class SetPoint:
+    """What one drive makes of its targets."""
+
+    kind: str
+    """One of `SETPOINTS`."""
+    values: tuple[float, ...]
+    """The effect's parameters."""
+    actuator: int
+    column: int
+    """Of the joint in the log."""
+    scale: float
+    """The actuator's input for a unit of what was logged."""
+    torque: bool
+    """Whether torques were logged, else targets."""
+
+    def logged(self, rollout: Rollout) -> np.ndarray:
+        """The joint's commands (T,) in a rollout, as they were logged."""
+        table = rollout.joint_torque_cmd if self.torque else rollout.joint_target
+        assert table is not None  # the plant was made for such rollouts
+        return table[:, self.column]
+
+
+def setpoints_of(plant: Plant, effects: Sequence[Effect]) -> tuple[SetPoint, ...]:
+    """Those of the plant's drives that `effects` say; on a joint without a drive there is none."""
+    found = []
+    for effect in effects:
+        for place in (effect.where or plant.joints) if effect.effect in SETPOINTS else ():
+            column = plant.joints.index(place)
+            a = int(plant.actuator[column])
+            if a >= 0 and np.isfinite(effect.value()) and effect.value() > 0:
+                gear = float(plant.model.actuator_gear[a, 0])
+                scale = 1.0 / (gear * float(plant.model.actuator_gainprm[a, 0])) if plant.torque_input else gear
+                found.append(SetPoint(effect.effect, effect.values(), a, column, scale, plant.torque_input))
+    return tuple(found)
+
+
+def follow(windows: Windows, point: SetPoint, delay: float, step: float, count: int) -> np.ndarray:
+    """The actuator's input (W, count): the mean over each step of the set-point of the commands, `delay` [s] late.
+
+    Between two commands the set-point and its integral are known in closed form.
+    """
+    time, command = windows.command_time, windows.command[..., point.actuator] / point.scale
+    place, speed, area = np.empty_like(command), np.empty_like(command), np.zeros_like(command)
+    place[:, 0], speed[:, 0] = _at_first_command(windows, point)
+    for c in range(command.shape[1] - 1):
+        lasts = time[:, c + 1] - time[:, c]
+        grown, place[:, c + 1], speed[:, c + 1] = _moved(point, place[:, c], speed[:, c], command[:, c], lasts)
+        area[:, c + 1] = area[:, c] + grown
+    at = np.arange(count + 1) * step - delay
+    k = np.maximum((time[:, None, :] <= at[:, None]).sum(axis=-1) - 1, 0)  # (W, count + 1)
+
+    def known(table: np.ndarray) -> np.ndarray:
+        return np.take_along_axis(table, k, axis=1)
+
+    since = at - known(time)
+    grown, *_ = _moved(point, known(place), known(speed), known(command), np.maximum(since, 0.0))
+    integral = known(area) + grown + known(place) * np.minimum(since, 0.0)
+    return point.scale * np.diff(integral, axis=1) / step
+
+
+def _moved(
+    point: SetPoint, at: np.ndarray, speed: np.ndarray, command: np.ndarray, time: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return advance(point.kind, point.values, at, speed, command, time)
+
+
+def _at_first_command(windows: Windows, point: SetPoint) -> tuple[np.ndarray, np.ndarray]:
+    """Place and speed (W,) of the set-point when the windows' first known commands are issued."""
+    if not windows.source:
+        first = windows.command[:, 0, point.actuator] / point.scale
+        return first, 0.0 * first
+    some, rows = np.unique(windows.rollout, return_inverse=True)
+    path = _paths(tuple(windows.source[i] for i in some), point)
+    issued = [windows.source[i].time[k] for i, k in zip(windows.rollout, windows.start, strict=True)]
+    firsts = np.array(issued) + windows.command_time[:, 0]
+    ticks = [
+        int(np.searchsorted(windows.source[i].time, t - 1e-9)) for i, t in zip(windows.rollout, firsts, strict=True)
+    ]
+    return path[rows, ticks, 0], path[rows, ticks, 1]
+
+
+@lru_cache(maxsize=16)
+def _paths(rollouts: tuple[Rollout, ...], point: SetPoint) -> np.ndarray:
+    """Place and speed (R, T, 2) of the set-point as each command is issued, at rest under a rollout's first one.
+
+    T is that of the longest rollout; a shorter one rests at its end.
+    """
+    longest = max(r.frames for r in rollouts)
+    command = np.empty((len(rollouts), longest))
+    lasts = np.zeros((len(rollouts), longest))
+    for row, rollout in enumerate(rollouts):
+        told = point.logged(rollout)
+        command[row] = np.concatenate((told, np.full(longest - len(told), told[-1])))
+        lasts[row, : rollout.frames - 1] = np.diff(rollout.time)
+    out = np.zeros((len(rollouts), longest, 2))
+    place, speed = command[:, 0], np.zeros(len(rollouts))
+    for k in range(longest):
+        out[:, k, 0], out[:, k, 1] = place, speed
+        _, place, speed = _moved(point, place, speed, command[:, k], lasts[:, k])
+    return out

@@ -1,0 +1,131 @@
+"""Whether the declared model, told a joint's command the other way round, predicts that joint better.
+
+A joint that swings with its neighbours goes against its own torque for seconds, and no regression that is linear in the
+state takes all of that away. The declared equations of motion know what neighbours, gravity and gears do. So short
+stretches are simulated from the measured state twice, with the command as logged and with its sign changed; where the
+two differ most, the command matters most, and there the reversed one has to be nearer by far in nearly all stretches.
+What the model lacks besides (friction, strength, masses) is in both.
+"""
+
+import mujoco
+import numpy as np
+
+from bumblebee.measured.checks.units import servo_gains
+from bumblebee.measured.checks.view import View
+
+SPAN = 0.06  # s of a stretch: long enough to move beyond the sensors' noise, too short for neighbours to drift off
+STRETCHES = 120  # at most, spread over the file
+STEP = 5e-4  # s of simulation at most
+MATTERS = 0.5  # share of the stretches, those in which the command's sign changes the prediction most
+AGREE = 0.75  # share of these in which the reversed command has to be nearer to what was measured
+
+
+def reversed_fits_better(view: View, joint: int, by_target: bool) -> bool | None:
+    """Whether most stretches speak for the command reversed; None where the model cannot tell.
+
+    That is on a floating base, whose contacts no log has, for a servo of unknown gains, and where simulations diverge.
+    """
+    model = view.model
+    if view.floating or min(view.joint_ids(), default=-1) < 0 or model.nq != len(view.rollout.joints):
+        return None
+    torque = _Torque(view, by_target)
+    if not torque.known[joint]:
+        return None
+    window = view.window(SPAN)
+    starts = np.unique(np.linspace(0, view.rollout.frames - 1 - window, STRETCHES).astype(int))
+    moved = view.rollout.joint_vel[starts + window, joint] - view.rollout.joint_vel[starts, joint]
+    plain, other = (_predicted(view, torque, starts, window, joint, sign) for sign in (1.0, -1.0))
+    apart = np.abs(plain - other)
+    good = np.isfinite(apart)
+    if good.mean() < MATTERS or not apart[good].any():
+        return None
+    matters = good & (apart >= np.quantile(apart[good], 1 - MATTERS)) & (apart > 0)
+    return bool((np.abs(moved - other) < np.abs(moved - plain))[matters].mean() >= AGREE)
+
+
+class _Torque:
+    """The torques of all joints as the declared drives give them."""
+
+    def __init__(self, view: View, by_target: bool) -> None:
+        rollout, gains = view.rollout, servo_gains(view.model)
+        self.by_target = by_target
+        self.command = view.values("joint_target" if by_target else "joint_torque_cmd")
+        pairs = np.array([gains.get(name, (0.0, 0.0)) for name in rollout.joints]) * _gears(view)[:, None] ** 2
+        self.kp, self.kd = pairs.T
+        self.limit = _limits(view)
+        self.known = self.kp > 0 if by_target else np.ones(len(rollout.joints), dtype=bool)
+
+    def at(self, row: int, place: np.ndarray, speed: np.ndarray, sign: np.ndarray) -> np.ndarray:
+        """(J,) [N m, N] under the commands of a row times `sign` (J,)."""
+        given = sign * self.command[row]
+        raw = self.kp * (given - place) - self.kd * speed if self.by_target else given
+        return np.clip(raw, -self.limit, self.limit)
+
+
+def _drives(view: View) -> list[int]:
+    """The last actuator on each joint, -1 for none."""
+    model, on = view.model, {}
+    for a in range(model.nu):
+        if int(model.actuator_trntype[a]) == int(mujoco.mjtTrn.mjTRN_JOINT):
+            on.setdefault(int(model.actuator_trnid[a, 0]), a)
+    return [on.get(j, -1) for j in view.joint_ids()]
+
+
+def _gears(view: View) -> np.ndarray:
+    """(J,) of the drives; 1 for none."""
+    return np.array([view.model.actuator_gear[a, 0] if a >= 0 else 1.0 for a in _drives(view)])
+
+
+def _limits(view: View) -> np.ndarray:
+    """(J,) largest torques; infinite for none."""
+    model = view.model
+    return np.array(
+        [
+            abs(model.actuator_gear[a, 0]) * np.abs(model.actuator_forcerange[a]).max()
+            if a >= 0 and model.actuator_forcelimited[a]
+            else np.inf
+            for a in _drives(view)
+        ]
+    )
+
+
+def _predicted(view: View, torque: _Torque, starts: np.ndarray, window: int, joint: int, sign: float) -> np.ndarray:
+    """Changes (N,) of the joint's velocity over the stretches, its command times `sign`; NaN where they diverge."""
+    model, rollout, ids = view.model, view.rollout, view.joint_ids()
+    data = mujoco.MjData(model)
+    at, dof = model.jnt_qposadr[ids], model.jnt_dofadr[ids]
+    signs = np.where(np.arange(len(ids)) == joint, sign, 1.0)
+    step, flags, integrator = float(model.opt.timestep), int(model.opt.disableflags), int(model.opt.integrator)
+    out = np.empty(len(starts))
+    try:
+        model.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+        model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+        for k, start in enumerate(starts):
+            mujoco.mj_resetData(model, data)
+            data.qpos[at], data.qvel[dof] = rollout.joint_pos[start], rollout.joint_vel[start]
+            _roll(model, data, torque, (start, window), (at, dof, signs), rollout.time)
+            out[k] = data.qvel[dof[joint]] - rollout.joint_vel[start, joint]
+            if data.warning.number.any():
+                out[k] = np.nan
+    finally:
+        model.opt.timestep, model.opt.disableflags, model.opt.integrator = step, flags, integrator
+    return out
+
+
+def _roll(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    torque: _Torque,
+    rows: tuple[int, int],
+    layout: tuple[np.ndarray, np.ndarray, np.ndarray],
+    time: np.ndarray,
+) -> None:
+    """Simulate `rows` (first, count) of the log from the state in `data`; `layout` is (qpos, dof, signs) of joints."""
+    at, dof, signs = layout
+    for row in range(rows[0], rows[0] + rows[1]):
+        period = float(time[row + 1] - time[row])
+        count = max(1, int(np.ceil(period / STEP)))
+        model.opt.timestep = period / count
+        for _ in range(count):
+            data.qfrc_applied[dof] = torque.at(row, data.qpos[at], data.qvel[dof], signs)
+            mujoco.mj_step(model, data)
