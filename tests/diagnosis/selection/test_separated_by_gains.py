@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import pytest
-
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import arm
@@ -20,19 +18,11 @@ def recorded(truth: dict[tuple[str, str], float], gains: tuple[tuple[float, floa
 
 
 def test_viscous_friction_is_told_from_the_drives_damping_by_three_gains() -> None:
-    truth = {("viscous_friction", "j2"): 2.0}
+    truth = {("viscous_friction", "j2"): 1.0}
     one, three = (diagnose(arm.session_of(recorded(truth, g)), CONFIG).document for g in (THREE[1:2], THREE))
     (at_one,), (at_three,) = one["effects"], three["effects"]
     assert {at_one["effect"], *(e["effect"] for e in at_one["equivalent"])} >= {"viscous_friction", "kd"}
     assert (at_three["effect"], at_three["where"], at_three["equivalent"]) == ("viscous_friction", ["j2"], [])
     low, high = at_three["parameters"]["damping"]["ci95"]
-    assert low < 2.0 < high and high - low < 0.2
+    assert low < 1.0 < high and high - low < 0.1
     assert set(three["conditions"]) == {f"{key}[{joint}]" for key in ("kp", "kd") for joint in arm.JOINTS}
-
-
-@pytest.mark.parametrize("strength", [0.8])
-def test_a_weak_drive_at_three_gains_is_a_factor_on_each(strength: float) -> None:
-    document = diagnose(arm.session_of(recorded({("motor_strength", "j2"): strength}, THREE)), CONFIG).document
-    (found,) = document["effects"]
-    assert (found["effect"], found["where"]) == ("motor_strength", ["j2"])
-    assert found["parameters"]["factor"]["value"] == pytest.approx(strength, abs=0.01)
