@@ -1,4 +1,4 @@
-"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`, `compensate`, `motions`.
+"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`, `plan`, `compensate`, `motions`.
 
 Status 0: done, 2: unusable input or output, 1: an error that should not happen; one line on standard error each.
 """
@@ -11,12 +11,13 @@ from typing import Annotated
 
 import typer
 
-from bumblebee import __version__, cli_motions
+from bumblebee import __version__, cli_motions, cli_plan
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 
 app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
 app.add_typer(cli_motions.app, name="motions")
+app.command()(cli_plan.plan)
 _UNUSABLE = typer.BadParameter.__bases__[0]  # the library's UsageError, which it does not export
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]

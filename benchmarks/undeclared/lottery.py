@@ -128,8 +128,8 @@ def _outside() -> list[list[dict[str, Any]]]:
 def _later() -> list[dict[str, Any]]:
     """Kinds that came after the others were numbered, alone at 5, 20 and 2 times the detectable size."""
     rows = []
-    for ratio in (5.0, 20.0, 2.0):
-        for kind in LATER:
+    for kind in LATER:
+        for ratio in (5.0, 20.0, 2.0):
             robots = [robot for robot in ("arm", "stand", "track") if fits(kind, robot)]
             rows += [_row(robot, "single", (kind.name,), ratio) for robot in robots]
             rows += [_row("arm", "single", (kind.name,), ratio, noise=3.0, rollouts=8)]

@@ -93,6 +93,12 @@ def _viscous(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str,
     return "kd sent is lower by it; the rest along the intended velocity", f"{_range(taken, 'N m s/rad')} off kd{rest}"
 
 
+def _drag(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str, str]:
+    excess = effect.value() - draft.robot.model.dof_dampingpoly[draft.robot.dofs[columns], 0]
+    draft.terms += [(int(column), -float(more), "v*abs(v)") for column, more in zip(columns, excess, strict=True)]
+    return "its torque at the intended velocity is sent against it", _range(excess, "N m s^2/rad^2")
+
+
 def _coulomb(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str, str]:
     excess = effect.value() - draft.robot.model.dof_frictionloss[draft.robot.dofs[columns]]
     draft.arrays["dry"][columns] = excess
@@ -209,6 +215,7 @@ _RULES: dict[str, Rule] = {
     "kd": _factor(False, False, True),
     "viscous_friction": _viscous,
     "coulomb_friction": _coulomb,
+    "quadratic_friction": _drag,
     "stribeck_friction": _stribeck,
     "load_dependent_friction": _load_friction,
     "asymmetric_friction": _asymmetric,

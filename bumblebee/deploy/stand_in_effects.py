@@ -31,6 +31,7 @@ UNITS = {
     "tendon": "N m/rad", "dwell_friction": "N m", "rate_limit": "rad/s", "quantised_command": "rad",
     "drag": "N m s^2/rad^2", "dead_band": "rad", "ripple": "N m", "load_dependent_friction": "", "motor_strength": "",
     "command_filter": "s", "command_rate_limit": "rad/s", "command_profile": "rad/s^2, rad/s",
+    "quadratic_friction": "N m s^2/rad^2",
     "kp": "", "kd": "", "dropped_commands": "", "ground_friction": "", "gain_cycle": "", "loose_mount": "N m/rad",
 }  # fmt: skip
 """Kind -> unit of its parameters; "" for a share or a factor."""

@@ -14,25 +14,26 @@ TICK = 20  # ms
 
 
 def filtered(joint: int, time: float) -> Drive:
-    """A first-order lag of one joint's target."""
+    """A first-order lag of one joint's target, the mean over each millisecond."""
 
     def drive(told: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        out = told.copy()
-        for k in range(1, len(told)):
-            out[k, joint] = out[k - 1, joint] + (told[k - 1, joint] - out[k - 1, joint]) * 0.001 / time
+        out, now, keep = told.copy(), told[0, joint], np.exp(-0.001 / time)
+        for k, u in enumerate(told[:, joint]):
+            out[k, joint] = u + (now - u) * (1 - keep) * time / 0.001
+            now = u + (now - u) * keep
         return out
 
     return drive
 
 
 def limited(joint: int, rate: float) -> Drive:
-    """A set-point that follows the target by at most `rate` [rad/s]."""
+    """A set-point that follows the target by at most `rate` [rad/s], the mean over each millisecond."""
 
     def drive(told: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        out = told.copy()
-        for k in range(1, len(told)):
-            away = told[k - 1, joint] - out[k - 1, joint]
-            out[k, joint] = out[k - 1, joint] + np.clip(away, -0.001 * rate, 0.001 * rate)
+        out, now = told.copy(), told[0, joint]
+        for k, u in enumerate(told[:, joint]):
+            before, now = now, now + np.clip(u - now, -0.001 * rate, 0.001 * rate)
+            out[k, joint] = 0.5 * (before + now)
         return out
 
     return drive
@@ -41,18 +42,22 @@ def limited(joint: int, rate: float) -> Drive:
 def profiled(joint: int, acceleration: float, speed: float) -> Drive:
     """A set-point that speeds up and slows down by `acceleration` [rad/s^2] and goes at most at `speed` [rad/s].
 
-    As a drive's firmware does it: every millisecond it takes the speed from which it could just stop at the target.
+    As a drive's firmware does it: every twentieth of a millisecond it takes the speed from which it can just stop.
     """
 
     def drive(told: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        out, now = told.copy(), 0.0
-        for k in range(1, len(told)):
-            away = told[k - 1, joint] - out[k - 1, joint]
-            wanted = np.sign(away) * min(speed, np.sqrt(2 * acceleration * abs(away)))
-            now += np.clip(wanted - now, -0.001 * acceleration, 0.001 * acceleration)
-            out[k, joint] = out[k - 1, joint] + 0.001 * now
-            if abs(away) < 1e-5 and abs(now) < 2e-3 * acceleration:
-                out[k, joint], now = told[k - 1, joint], 0.0
+        out, now, pace, dt = told.copy(), told[0, joint], 0.0, 0.001 / 20
+        most = acceleration * dt
+        for k, u in enumerate(told[:, joint].tolist()):
+            total = 0.0
+            for _ in range(20):
+                away = u - now
+                wanted = min(speed, np.sqrt(0.25 * most**2 + 2 * acceleration * abs(away)) - 0.5 * most)
+                gain = (wanted if away > 0 else -wanted) - pace
+                pace += min(max(gain, -most), most)
+                now += dt * pace
+                total += now
+            out[k, joint] = total / 20
         return out
 
     return drive

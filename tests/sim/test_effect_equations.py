@@ -30,6 +30,7 @@ from tests.sim.hinge import (
 TORQUES = {
     "stribeck_friction": ((0.8, 1.0), lambda t, q, v: servo(t, q, v) - 0.8 * np.exp(-(v**2)) * sign(v)),
     "load_dependent_friction": ((0.2,), lambda t, q, v: servo(t, q, v) - 0.2 * abs(servo(t, q, v)) * sign(v)),
+    "quadratic_friction": ((0.4,), lambda t, q, v: servo(t, q, v) - 0.4 * v * abs(v)),
     "asymmetric_friction": ((0.6,), lambda t, q, v: servo(t, q, v) - 0.3),
     "torque_limit": ((2.0,), lambda t, q, v: float(np.clip(KP * (swing(t) - q) - KD * v, -2.0, 2.0))),
     "joint_spring": ((3.0, 0.7), lambda t, q, v: servo(t, q, v) - 3.0 * q + 0.7),

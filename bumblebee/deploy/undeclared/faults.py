@@ -30,6 +30,7 @@ def _mass(p: Place) -> float:
 LARGEST: dict[str, Callable[[Place], float]] = {
     "coulomb_friction": _share("limit", 0.2),  # a gear without grease: 28 N m at the knee, 5 at the elbow
     "viscous_friction": _share("kd", 2.0),
+    "quadratic_friction": _share("kd", 0.5),  # more is not stable at 1 ms in a fall
     "stribeck_friction": _share("limit", 0.2),
     "load_dependent_friction": _fixed(0.6),  # share of what the drive gives that is lost
     "asymmetric_friction": _share("limit", 0.2),

@@ -263,7 +263,7 @@ OUTSIDE: tuple[Kind, ...] = (
          _fixed(1e-4), _fixed(1 / 300), least=_fixed(1e-5), robots="arm",
          depends=("another joint", "other", "history", "torque")),
     Kind("drag", "joint", lambda p, s: (outside.Drag(p.name, s), {"drag": s}),
-         _KD(0.01), _KD(0.5), depends=("velocity",)),
+         _KD(0.01), _KD(0.5), parts=("quadratic_friction",), depends=("velocity",)),
     Kind("dead_band", "joint", lambda p, s: (outside.DeadBand(p.name, s), {"band": s}),
          _fixed(0.005), _fixed(0.08), depends=("torque", "command", "target", "error")),
     Kind("ripple", "joint", lambda p, s: (outside.Ripple(p.name, s), {"amplitude": s}),
@@ -278,6 +278,8 @@ LATER: tuple[Kind, ...] = (
     Kind("command_profile", "joint",
          _plain_of(lambda p, s: max(p.peak_rate, 0.1) / s, setpoints.CommandProfile, "acceleration", speed=1e3),
          _fixed(0.01), _fixed(0.3)),
+    Kind("quadratic_friction", "joint", _plain(lambda p, s: outside.Drag(p.name, s), "coefficient"),
+         _KD(0.01), _KD(0.5)),
 )  # fmt: skip
 """Kinds of the catalogue that came after the first suites: their cases stand behind those of the others, whose numbers
 and draws stay as they were."""

@@ -1,4 +1,4 @@
-"""Laws of drives that make something of their targets: an input filter, a limited rate, a profile; by the millisecond."""
+"""Laws of drives that reshape their targets: an input filter, a limited rate, a profile; by the millisecond."""
 
 from dataclasses import dataclass, replace
 

@@ -50,6 +50,7 @@ TRAITS: dict[str, Traits] = {
         usual="joint",
         named_first=2,
     ),
+    "quadratic_friction": Traits("turn the unpowered joint at several constant speeds, fast ones among them"),
     "stribeck_friction": Traits("creep through zero speed", on_dry_friction=True),
     "load_dependent_friction": Traits("move at the same speed under two loads", usual="torque"),
     "armature": Traits(

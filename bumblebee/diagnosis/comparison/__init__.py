@@ -19,6 +19,7 @@ from bumblebee.diagnosis.comparison.submodel import (
     linear_cost,
     linearly_without,
     refitted,
+    refitted_without,
     simulated_without,
 )
 from bumblebee.diagnosis.comparison.wald import Step, costs_more_than, evidence, wald, z_value, z_values
@@ -48,6 +49,7 @@ __all__ = [
     "parameters",
     "plausible",
     "refitted",
+    "refitted_without",
     "simulated_without",
     "standing",
     "wald",

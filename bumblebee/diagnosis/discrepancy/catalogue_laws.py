@@ -62,6 +62,9 @@ LAWS: dict[str, Law] = {
         _fixed((("friction(1)",), _VELOCITY, 1)), "friction(", lambda now, was: {"friction(1)": now[0] - was[0]}
     ),
     "viscous_friction": Law(_fixed((("v",), _VELOCITY, 1)), "v", lambda now, was: {"v": -(now[0] - was[0])}),
+    "quadratic_friction": Law(
+        _fixed((("v*abs(v)",), _VELOCITY, 2)), "v", lambda now, was: {"v*abs(v)": -(now[0] - was[0])}
+    ),
     "joint_spring": Law(
         _fixed((("1",), (), 1), (("q", "1"), _POSITION, 1)),
         "q",

@@ -125,7 +125,6 @@ def _position(data: Quantities, j: int) -> Iterator[BasisFunction]:
 
 
 def _velocity() -> Iterator[BasisFunction]:
-    yield BasisFunction(("v*abs(v)",), _VELOCITY, 2)
     yield BasisFunction(("v^3",), _VELOCITY, 3)
     yield BasisFunction(("q*v",), (*_VELOCITY, *_POSITION), 3)
     yield BasisFunction(("q^2*v",), (*_VELOCITY, *_POSITION), 4)

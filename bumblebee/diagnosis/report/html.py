@@ -9,7 +9,8 @@ from bumblebee.diagnosis.simulation import rows as rows_of
 
 _STYLE = """:root{color-scheme:light}body{font:15px/1.55 system-ui,-apple-system,'Segoe UI',sans-serif;max-width:62rem;
 margin:2.2rem auto;padding:0 1.2rem;color:#1d2430;background:#fff}h1{font-size:1.7rem;margin:0 0 .3rem}
-h2{font-size:1.15rem;margin:2rem 0 .4rem}p{margin:.4rem 0}.lead{font-size:1.08rem;max-width:52rem}
+h2{font-size:1.15rem;margin:2rem 0 .4rem}h3{font-size:.98rem;margin:1.1rem 0 .2rem}
+p{margin:.4rem 0}.lead{font-size:1.08rem;max-width:52rem}
 .scroll{overflow-x:auto}table{border-collapse:collapse;margin:.5rem 0;font-size:.9rem}
 td,th{padding:.28rem .7rem .28rem 0;border-bottom:1px solid #e4e7ee;text-align:left;vertical-align:top}
 td:first-child{white-space:nowrap}

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+from bumblebee.diagnosis.report.headline import effect_groups, headline
 from bumblebee.diagnosis.report.html import error_rows, figure, html_page, items, number, probability, table, warning
+from bumblebee.diagnosis.report.left_table import what_is_left_table
 from bumblebee.diagnosis.report.notes import beside_noise, told_horizon, unexplained_error, what_is_left, worse_horizons
 from bumblebee.diagnosis.report.svg import NAMES, curve_picture, line_picture
 from bumblebee.diagnosis.simulation import named, of_joint, pick, position_rows
@@ -19,12 +21,13 @@ def render_report(
     bad = worse_horizons(document["error"], rules.verdicts)
     parts = [
         "<h1>What the model lacks</h1>",
-        f"<p class='lead'>{_lead(document, rules)}</p>",
+        *_opening(document, rules),
         *[warning(text) for text in [*document.get("warnings", []), *bad]],
         *[warning(f"{a['rollout']} was set aside: {a['reason']}") for a in document.get("set_aside", [])],
         *_pictures(examples),
+        what_is_left_table(document),
         "<h2>Effects</h2>",
-        _effects(document["effects"]),
+        _effects(document, rules),
         f"<h2>Prediction error on {'held-out rollouts' if held else 'the fitted rollout'}</h2>",
         error_rows({name: document["error"][k] for k, name in NAMES.items() if k in document["error"]}),
         "<h2>Error by joint</h2>",
@@ -36,6 +39,18 @@ def render_report(
         items(_notes(document)),
     ]
     return html_page("Diagnosis", parts)
+
+
+def _opening(document: dict[str, Any], rules: ReportThresholds) -> list[str]:
+    """What is gone, what is left, what to trust; of a document without that block, the effects and the error."""
+    told = headline(document, rules.matters)
+    if not document["effects"] or not told:
+        far = unexplained_error(document, rules.verdicts)
+        return [f"<p class='lead'>{_lead(document, rules)}</p>", *(f"<p>{escape(line)}</p>" for line in told if far)]
+    return [
+        f"<p class='lead'><b>{escape(told[0])}</b></p>",
+        *(f"<p class='lead'>{escape(line)}</p>" for line in told[1:]),
+    ]
 
 
 def _lead(document: dict[str, Any], rules: ReportThresholds) -> str:
@@ -85,9 +100,21 @@ def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
     return parts
 
 
-def _effects(effects: Sequence[dict[str, Any]]) -> str:
-    if not effects:
+def _effects(document: dict[str, Any], rules: ReportThresholds) -> str:
+    """The effects under what may be read from them."""
+    groups = effect_groups(document, rules.matters)
+    if not groups:
         return "<p>None.</p>"
+    titled = bool(document.get("summary"))
+    parts = [(f"<h3>{escape(title)}</h3>" if titled else "") + _listed(effects) for title, effects in groups]
+    text = (
+        "<p class='note'>explains: share of the excess chi-square over the best fit that returns when this effect "
+        "alone is removed. p: see diagnosis.json for the test.</p>"
+    )
+    return "".join(parts) + text
+
+
+def _listed(effects: Sequence[dict[str, Any]]) -> str:
     rows = []
     for e in effects:
         place = escape(", ".join(e["where"]) or "whole robot")
@@ -106,11 +133,7 @@ def _effects(effects: Sequence[dict[str, Any]]) -> str:
             ]
         )
     head = ["effect", "where", "value [95 % interval]", "declared", "explains", "p", "not distinguishable from"]
-    text = (
-        "<p class='note'>explains: share of the excess chi-square over the best fit that returns when this effect "
-        "alone is removed. p: see diagnosis.json for the test.</p>"
-    )
-    return table(head, rows, (5,)) + text
+    return table(head, rows, (5,))
 
 
 def _values(effect: dict[str, Any]) -> tuple[str, str]:

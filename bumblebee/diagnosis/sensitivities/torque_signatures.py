@@ -79,6 +79,7 @@ class Signatures:
         simple = {
             "coulomb_friction": lambda: -sign,
             "viscous_friction": lambda: -v,
+            "quadratic_friction": lambda: -v * np.abs(v),
             "asymmetric_friction": lambda: np.full_like(q, -0.5),
             "armature": lambda: -self.a[..., j],
             "load_dependent_friction": lambda: -np.abs(torque) * sign,

@@ -17,7 +17,8 @@ from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, witho
 from bumblebee.diagnosis.simulation.condition_plants import make_plants
 from bumblebee.diagnosis.simulation.conditions import Condition, in_words
 from bumblebee.diagnosis.simulation.declared import declared_values, touching
-from bumblebee.diagnosis.simulation.plant import Plant, load_spec, plant_by, refuse_unlogged
+from bumblebee.diagnosis.simulation.failures import LEFT_OUT, NOT_TRIED
+from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, plant_by, refuse_unlogged
 from bumblebee.diagnosis.simulation.readings import (
     Layout,
     difference,
@@ -52,6 +53,8 @@ from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, comma
 
 __all__ = [
     "KINDS",
+    "LEFT_OUT",
+    "NOT_TRIED",
     "Changes",
     "Condition",
     "Layout",
@@ -75,6 +78,7 @@ __all__ = [
     "lagged",
     "layout_of",
     "load_spec",
+    "make_plant",
     "make_plants",
     "measured_readings",
     "members",

@@ -70,6 +70,7 @@ _NONE, _FACTOR, _UNBOUNDED = _absent_at(0.0), _absent_at(1.0), _absent_at(np.inf
 _DECLARED: dict[str, _Declared] = {
     "coulomb_friction": _of_dof("dof_frictionloss"),
     "viscous_friction": _of_dof("dof_damping"),
+    "quadratic_friction": lambda plant, place: (plant.model.dof_dampingpoly[plant.dof[plant.joints.index(place)], 0],),
     "stribeck_friction": _NONE,
     "load_dependent_friction": _NONE,
     "armature": _of_dof("dof_armature"),

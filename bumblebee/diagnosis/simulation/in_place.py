@@ -61,6 +61,10 @@ def _damping(at: Target, value: float) -> None:
     at.model.dof_damping[at.dof] = value
 
 
+def _drag(at: Target, value: float) -> None:
+    at.model.dof_dampingpoly[at.dof, 0] = value
+
+
 def _armature(at: Target, value: float) -> None:
     at.model.dof_armature[at.dof] = value
 
@@ -146,6 +150,7 @@ def _slope(at: Target, x: float, y: float) -> None:
 
 WRITE: dict[str, Callable[..., None]] = {
     "coulomb_friction": _dry,
+    "quadratic_friction": _drag,
     "viscous_friction": _damping,
     "stribeck_friction": _stick,
     "load_dependent_friction": _stick,

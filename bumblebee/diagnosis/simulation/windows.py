@@ -90,7 +90,7 @@ def _shares(lengths: Sequence[int], budget: int) -> list[int]:
 def _stretches(time: np.ndarray, horizon: float, rule: Windowing) -> list[tuple[int, int]]:
     """Consecutive stretches (first, last) of `horizon` s within the stamps `time` (T,)."""
     period = float(np.median(np.diff(time)))
-    gaps = np.concatenate(([0], np.cumsum(np.diff(time) > rule.gap * period)))
+    gaps = np.concatenate(([0], np.cumsum(np.diff(time) > max(rule.gap * period, rule.brief))))
     last = np.searchsorted(time, time + horizon + 0.5 * period - 1e-9) - 1
     last = np.maximum(last, np.minimum(np.arange(len(time)) + 1, len(time) - 1))
     off = np.abs(time[last] - time - horizon)

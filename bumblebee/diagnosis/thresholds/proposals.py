@@ -115,7 +115,11 @@ class SetPoints:
     """Windows that the series is tried on, those that are furthest off."""
     factors: tuple[float, ...] = (0.35, 0.7, 1.2, 2.0, 3.2, 5.0, 8.0, 14.0, 25.0)
     """On the size of a first step: of 5 ms they make filters of 2 to 125 ms."""
-    finer: tuple[float, ...] = (1.25, 1.12, 1.06)
+    speeds: tuple[float, ...] = (1.0, 0.5, 0.25)
+    """The same on the speed of a profile that has one."""
+    turns: int = 3
+    """Times that size and speed are made finer in turn."""
+    finer: tuple[float, ...] = (1.25, 1.12, 1.06, 1.03)
     """Factors to both sides of the best so far, one after the other."""
     least_gain: float = 40.0
     """Fall of the robust cost on all windows from which on a set-point is proposed."""
@@ -123,6 +127,8 @@ class SetPoints:
     """The same on the windows that were tried, below which the others are not simulated."""
     step: float = 0.2
     """Share of the size that matters: five times what sensitivities are differences of."""
+    near: float = 0.5
+    """Share of the best kind's gain on the windows tried, from which on another kind is refitted, too."""
 
 
 @dataclass(frozen=True)
@@ -259,6 +265,22 @@ class Stribeck:
 
 
 @dataclass(frozen=True)
+class FrictionFamily:
+    """Of the sums of a joint's friction."""
+
+    sure: float = 4.0
+    """Standard errors that a further member must reach: as a number of the same friction, not one of all candidates."""
+    clearly: float = 1.0
+    """Log-likelihood by which a sum must be better beyond the price of its numbers."""
+    promising: float = 8.0
+    """Fall of the cost, in the residual's power, that the screening windows must promise."""
+    tried: int = 3
+    """Members tried at their size for each that is taken."""
+    iterations: int = 3
+    """Of the joint refit."""
+
+
+@dataclass(frozen=True)
 class GainParameters:
     """Of two effects on one servo's gains."""
 
@@ -327,6 +349,7 @@ class ProposalThresholds:
     all_joints: AllJoints = field(default_factory=AllJoints)
     packet_loss: PacketLoss = field(default_factory=PacketLoss)
     stribeck: Stribeck = field(default_factory=Stribeck)
+    friction_family: FrictionFamily = field(default_factory=FrictionFamily)
     gain_parameters: GainParameters = field(default_factory=GainParameters)
     declared_scale: DeclaredScale = field(default_factory=DeclaredScale)
     encoder_resolution: EncoderResolution = field(default_factory=EncoderResolution)

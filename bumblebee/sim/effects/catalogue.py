@@ -87,6 +87,7 @@ _AXES = ("x", "y", "z")
 CATALOGUE: dict[str, Kind] = {
     "coulomb_friction": _joint(("frictionloss", "N m", 0.0, _INF)),
     "viscous_friction": _joint(("damping", "N m s/rad", 0.0, _INF)),
+    "quadratic_friction": _joint(("coefficient", "N m s^2/rad^2", 0.0, _INF)),
     "stribeck_friction": _joint(("stiction", "N m", 0.0, _INF), ("velocity", "rad/s", 1e-3, 100.0), native=False),
     "load_dependent_friction": _joint(("coefficient", "", 0.0, 2.0), native=False),
     "armature": _joint(("armature", "kg m^2", 0.0, _INF)),

@@ -3,6 +3,7 @@
 | effect | MJCF |
 |---|---|
 | coulomb_friction, viscous_friction, armature | joint frictionloss (stiff), damping, armature |
+| quadratic_friction | the second coefficient of the joint's damping, -c v abs(v) |
 | asymmetric_friction | a constant torque, as a weak spring with a far reference, beside the dry friction |
 | motor_strength, kp, kd | the servo's gainprm and biasprm |
 | torque_limit | the servo's forcerange |
@@ -79,6 +80,11 @@ def _stiff_friction(spec: mujoco.MjSpec, name: str, *values: float) -> None:
 def _damping(spec: mujoco.MjSpec, name: str, value: float) -> None:
     joint = joint_of(spec, name)
     joint.damping = [value, *joint.damping[1:]]
+
+
+def _drag(spec: mujoco.MjSpec, name: str, value: float) -> None:
+    joint = joint_of(spec, name)
+    joint.damping = [joint.damping[0], value, joint.damping[2]]
 
 
 def _armature(spec: mujoco.MjSpec, name: str, value: float) -> None:
@@ -200,6 +206,7 @@ def _slope(spec: mujoco.MjSpec, name: str, x: float, y: float) -> None:
 ADDED: dict[str, Callable[..., None]] = {
     "coulomb_friction": _frictionloss,
     "viscous_friction": _damping,
+    "quadratic_friction": _drag,
     "stribeck_friction": _stiff_friction,
     "load_dependent_friction": _stiff_friction,
     "discovered": _stiff_friction,

@@ -37,10 +37,10 @@ class LossLikelihoods:
     """(P, T) bool, the first without a loss."""
     logs: np.ndarray
     """(W, P) log-likelihood of each pattern, less that of none."""
-    changes: np.ndarray
-    """(L, T, W, M) what single losses and runs of them do."""
     rule: PacketLoss = field(default_factory=PacketLoss)
     """How a share is sought."""
+    changes: np.ndarray | None = None
+    """(L, T, W, M) what single losses and runs of them do."""
 
     def total(self, share: float) -> float:
         """Log-likelihood of a share, summed over windows."""
@@ -196,7 +196,7 @@ def loss_likelihoods(
     logs = np.empty((len(clean), len(patterns)))
     for w in range(len(clean)):
         logs[w] = (table @ linear[w] - 0.5 * ((table @ square[w]) * table).sum(axis=1)) / usual
-    return LossLikelihoods(patterns, logs, changes, rule)
+    return LossLikelihoods(patterns, logs, rule, changes)
 
 
 def arrived(problem: Problem, lost: np.ndarray, place: str) -> Problem:

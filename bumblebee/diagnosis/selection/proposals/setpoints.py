@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import Candidate, is_chosen
+from bumblebee.diagnosis.candidates import Candidate, is_chosen, rough
 from bumblebee.diagnosis.comparison import columns_without, criterion, linear_cost
 from bumblebee.diagnosis.estimation import Fit, LeftOver, gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem
@@ -43,12 +43,11 @@ def setpoint_swaps(run: SearchState, free: Sequence[Candidate]) -> Iterator[Swap
             own = linear_cost(run.problem, rest, run.weights) - linear_cost(run.problem, run.fit, run.weights)
             kinds = {c.effect for c in gone if c.effect in SETPOINTS}
             least = run.problem.thresholds.selection.swap.part * own
-            trial = best_setpoint(run.problem, rest, run.candidates, run.weights, where, least, kinds)
-            if trial is not None:
+            for trial in setpoints_beside(run.problem, rest, run.candidates, run.weights, where, least, kinds):
                 yield rest, trial
 
 
-def best_setpoint(
+def setpoints_beside(
     problem: Problem,
     fit: Fit,
     candidates: Sequence[Candidate],
@@ -56,8 +55,8 @@ def best_setpoint(
     where: str,
     least: float = 0.0,
     spared: set[str] | None = None,
-) -> Trial | None:
-    """The set-point of a joint (or "", of all drives) that explains most beside a fit; None where none is worth it.
+) -> list[Trial]:
+    """The set-points of a joint (or "", of all drives), one of each kind, that explain most beside a fit.
 
     Args:
         problem: the fitted windows.
@@ -72,40 +71,79 @@ def best_setpoint(
     usual = max(typical_power(clean), 1.0)
     open_ = [c for c in candidates if c.where == where and c.effect in SETPOINTS and c.effect not in (spared or ())]
     open_ = [c for c in open_ if not is_chosen(c, fit.chosen)]
+    open_ = list({(c.effect, bool(c.shape_scale)): c for c in open_}.values())  # sizes are those of the series
     if not open_:
-        return None
+        return []
     off = (clean**2).mean(axis=1)
     if where:
         off = joint_chi_squares(problem, clean)[0][:, problem.plant.joints.index(where)]
     some = problem.part(np.sort(np.argsort(-off)[: rule.windows]))
-    found = [(*_sought(some, fit, c, usual), c) for c in open_]
-    gain, values, c = max(found, key=lambda f: f[0])
-    if gain < rule.least_gain_tried:
-        return None
-    none, after = problem.residual([fit.effects, _with(fit, c, values)])
-    if falls(problem, none, after, usual).sum() < max(rule.least_gain, least):
-        return None
-    left_over = LeftOver(problem, fit, weights)
-    own = replace(c, step=(rule.step * float(values[0]), *c.step[1:]))
-    return Trial(own, values, left_over.cost(after), left_over.left(fit.residual - after))
+    best: dict[str, tuple[float, np.ndarray, Candidate]] = {}
+    for c in open_:
+        gain, values = _sought(some, fit, c, usual)
+        if gain > best.get(c.effect, (rule.least_gain_tried,))[0]:
+            best[c.effect] = gain, values, c
+    most = max((gain for gain, *_ in best.values()), default=0.0)
+    found = [(values, c) for gain, values, c in best.values() if gain > rule.near * most]
+    if not found:
+        return []
+    none, *others = problem.residual([fit.effects, *(_with(fit, c, values) for values, c in found)])
+    least, left_over = max(rule.least_gain, least), LeftOver(problem, fit, weights)
+    return [
+        Trial(_own(c, values, rule.step), values, left_over.cost(after), left_over.left(fit.residual - after))
+        for after, (values, c) in zip(others, found, strict=True)
+        if falls(problem, none, after, usual).sum() > least
+    ]
+
+
+def _own(candidate: Candidate, values: np.ndarray, share: float) -> Candidate:
+    """The candidate with a step of this `share` of its size: of a first step it may be many."""
+    return replace(candidate, step=(share * float(values[0]), *candidate.step[1:]))
 
 
 def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tuple[float, np.ndarray]:
     """The best of a candidate's series on some windows: its gain there and parameters (P,)."""
-    rule = some.thresholds.selection.proposals.setpoints
+    rule, first = some.thresholds.selection.proposals.setpoints, candidate.start
+    coarse = rough(e.effect for e in fit.effects)
 
-    first = candidate.start
-
-    def at(size: float) -> np.ndarray:
-        return np.array([size, *first[1:]])
-
-    def gains(sizes: Sequence[float]) -> list[float]:
-        none, *others = some.residual([fit.effects, *(_with(fit, candidate, at(size)) for size in sizes)])
+    def gains(tried: Sequence[np.ndarray]) -> list[float]:
+        models = [fit.effects, *(_with(fit, candidate, values) for values in tried)]
+        none, *others = some.residual(models, coarse=coarse)
         return [float(falls(some, none, r, usual).sum()) for r in others]
 
-    series = profile(gains, [float(first[0]) * factor for factor in rule.factors])
-    size, gain = stepped(lambda size: gains([size])[0], series.size, series.gain, rule.finer)
-    return gain, at(size)
+    speeds = rule.speeds if candidate.shape_scale else (1.0,)
+    series = profile(gains, [_scaled(first, size, speed) for speed in speeds for size in rule.factors])
+    values, gain = series.size, series.gain
+    if gain <= 0:
+        return gain, values
+    for _ in speeds[: rule.turns]:
+        size, gain = stepped(lambda f, v=values: gains([_scaled(v, f)])[0], 1.0, gain, rule.finer)
+        values = _scaled(values, size)
+        if candidate.shape_scale:
+            speed, gain = stepped(lambda f, v=values: gains([_scaled(v, 1.0, f)])[0], 1.0, gain, rule.finer)
+            values = _scaled(values, 1.0, speed)
+    return gain, values
+
+
+def _scaled(values: np.ndarray, size: float, speed: float = 1.0) -> np.ndarray:
+    """Parameters (P,) with the first times `size` and the second, if there is one, times `speed`."""
+    return values * np.array([size, speed])[: len(values)]
+
+
+def setpoint_trials(run: SearchState, tried: Sequence[Trial]) -> list[Trial]:
+    """Set-points that explain more than the best of the trials, where that leaves much and may stand for one.
+
+    Each place is asked once, and again when something was found on it.
+    """
+    best = min(tried, key=lambda t: t.cost, default=None)
+    if best is None or best.candidate.effect not in LIKE or best.cost < run.config.many * run.fit.residual.size:
+        return []
+    key = (SETPOINTS[0], best.candidate.where)
+    if key in run.hopeless:
+        return []
+    run.hopeless.add(key)
+    found = setpoints_beside(run.problem, run.fit, run.candidates, run.weights, best.candidate.where)
+    return [trial for trial in found if trial.cost < best.cost]
 
 
 def explains_more(run: SearchState, where: str, gain: float) -> bool:
@@ -115,13 +153,11 @@ def explains_more(run: SearchState, where: str, gain: float) -> bool:
     for place in places:
         timing = [c for c in run.fit.chosen if c.where == place and c.effect in TIMING]
         rest = columns_without(run.problem, run.fit, timing)
-        trial = best_setpoint(run.problem, rest, run.candidates, run.weights, place)
-        if trial is None:
-            continue
-        chosen, start = (*rest.chosen, trial.candidate), np.concatenate((rest.values, trial.values))
-        new = gauss_newton(run.problem, chosen, start, run.weights, iterations=2, coarse=True, known=run.fit)
-        if criterion(run.problem, new) - criterion(run.problem, run.fit) > gain:
-            return True
+        for trial in setpoints_beside(run.problem, rest, run.candidates, run.weights, place):
+            chosen, start = (*rest.chosen, trial.candidate), np.concatenate((rest.values, trial.values))
+            new = gauss_newton(run.problem, chosen, start, run.weights, iterations=2, coarse=True, known=run.fit)
+            if criterion(run.problem, new) - criterion(run.problem, run.fit) > gain:
+                return True
     return False
 
 
