@@ -98,8 +98,6 @@ def _course(every: Sequence[Setting], truth: Truth, target: np.ndarray) -> tuple
             torque = torque - weight * np.sin(q) - truth.viscous * v
             v = v + _STEP / inertia * torque
             dry = _STEP / inertia * truth.dry
-            v = np.sign(v) * np.maximum(
-                np.abs(v) - dry, 0.0
-            )  # it stops and does not turn round
+            v = np.sign(v) * np.maximum(np.abs(v) - dry, 0.0)  # it stops and does not turn round
             q = q + _STEP * v
     return np.array(places), np.array(speeds)
