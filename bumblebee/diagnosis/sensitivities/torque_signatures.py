@@ -6,7 +6,6 @@ acceleration for an armature, the servo's own torque for its strength, and so on
 
 import copy
 from collections.abc import Sequence
-from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -132,11 +131,12 @@ class Signatures:
         raise ValueError(_NO_SIGNATURE.format(c.effect))
 
     def _moved_control(self, effect: Effect) -> np.ndarray:
-        """Controls (W, K, J) with delayed, shaped or lost commands on all joints, of which the caller takes one."""
+        """Controls (W, K, J) with delayed or lost commands on all joints, or with the effect's own set-points."""
         kind, value = effect.effect, effect.value()
-        key = (f"{kind} {effect.values()[1:]}", round(1e9 * value))
-        if key not in self._inverse:
-            delay, dropped, shaped = self.plant.delay, None, setpoints_of(self.plant, [replace(effect, where=())])
+        key = (kind, round(1e9 * value))
+        shaped = setpoints_of(self.plant, [effect])
+        if key not in self._inverse or shaped:
+            delay, dropped = self.plant.delay, None
             if kind == "dropped_commands":
                 dropped = np.full(self.plant.model.nu, value)
             elif not shaped:

@@ -31,6 +31,8 @@ class SetPoint:
     """The actuator's input for a unit of what was logged."""
     torque: bool
     """Whether torques were logged, else targets."""
+    memory: float
+    """[s] after which the set-point knows nothing of where it was."""
 
     def logged(self, rollout: Rollout) -> np.ndarray:
         """The joint's commands (T,) in a rollout, as they were logged."""
@@ -49,7 +51,8 @@ def setpoints_of(plant: Plant, effects: Sequence[Effect]) -> tuple[SetPoint, ...
             if a >= 0 and np.isfinite(effect.value()) and effect.value() > 0:
                 gear = float(plant.model.actuator_gear[a, 0])
                 scale = 1.0 / (gear * float(plant.model.actuator_gainprm[a, 0])) if plant.torque_input else gear
-                found.append(SetPoint(effect.effect, effect.values(), a, column, scale, plant.torque_input))
+                memory = plant.thresholds.history.set_point
+                found.append(SetPoint(effect.effect, effect.values(), a, column, scale, plant.torque_input, memory))
     return tuple(found)
 
 
@@ -89,31 +92,43 @@ def _at_first_command(windows: Windows, point: SetPoint) -> tuple[np.ndarray, np
         first = windows.command[:, 0, point.actuator] / point.scale
         return first, 0.0 * first
     some, rows = np.unique(windows.rollout, return_inverse=True)
-    path = _paths(tuple(windows.source[i] for i in some), point)
+    paths = _paths(tuple(windows.source[i] for i in some), point)
     issued = [windows.source[i].time[k] for i, k in zip(windows.rollout, windows.start, strict=True)]
     firsts = np.array(issued) + windows.command_time[:, 0]
     ticks = [
         int(np.searchsorted(windows.source[i].time, t - 1e-9)) for i, t in zip(windows.rollout, firsts, strict=True)
     ]
-    return path[rows, ticks, 0], path[rows, ticks, 1]
+    states = np.stack([paths[row][tick] for row, tick in zip(rows, ticks, strict=True)])
+    return states[:, 0], states[:, 1]
 
 
-@lru_cache(maxsize=16)
-def _paths(rollouts: tuple[Rollout, ...], point: SetPoint) -> np.ndarray:
-    """Place and speed (R, T, 2) of the set-point as each command is issued, at rest under a rollout's first one.
+@lru_cache(maxsize=64)
+def _paths(rollouts: tuple[Rollout, ...], point: SetPoint) -> tuple[np.ndarray, ...]:
+    """Place and speed (T, 2) of the set-point as each command of each rollout is issued.
 
-    T is that of the longest rollout; a shorter one rests at its end.
+    It is at rest under a rollout's first command. Long rollouts are followed in parts side by side, each from so much
+    earlier on that it no longer matters where the set-point was then.
     """
-    longest = max(r.frames for r in rollouts)
-    command = np.empty((len(rollouts), longest))
-    lasts = np.zeros((len(rollouts), longest))
-    for row, rollout in enumerate(rollouts):
-        told = point.logged(rollout)
+    parts = [(i, *part) for i, r in enumerate(rollouts) for part in _parts(r, point.memory)]
+    longest = max(last - start for _, start, _, last in parts)
+    command, lasts = np.empty((len(parts), longest)), np.zeros((len(parts), longest))
+    for row, (i, start, _, last) in enumerate(parts):
+        told, spans = point.logged(rollouts[i])[start:last], np.diff(rollouts[i].time[start : last + 1])
         command[row] = np.concatenate((told, np.full(longest - len(told), told[-1])))
-        lasts[row, : rollout.frames - 1] = np.diff(rollout.time)
-    out = np.zeros((len(rollouts), longest, 2))
-    place, speed = command[:, 0], np.zeros(len(rollouts))
+        lasts[row, : len(spans)] = spans
+    path = np.zeros((len(parts), longest, 2))
+    place, speed = command[:, 0], np.zeros(len(parts))
     for k in range(longest):
-        out[:, k, 0], out[:, k, 1] = place, speed
+        path[:, k, 0], path[:, k, 1] = place, speed
         _, place, speed = _moved(point, place, speed, command[:, k], lasts[:, k])
+    out = tuple(np.empty((r.frames, 2)) for r in rollouts)
+    for row, (i, start, first, last) in enumerate(parts):
+        out[i][first:last] = path[row, first - start : last - start]
     return out
+
+
+def _parts(rollout: Rollout, memory: float) -> list[tuple[int, int, int]]:
+    """Where to begin, and the ticks (first, last) that count, of each part of a rollout."""
+    length = max(1, round(memory / float(np.median(np.diff(rollout.time)))))
+    firsts = range(0, rollout.frames, length)
+    return [(max(first - length, 0), first, min(first + length, rollout.frames)) for first in firsts]

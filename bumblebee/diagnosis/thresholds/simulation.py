@@ -34,6 +34,8 @@ class ActuatorHistory:
     """Heat [s] by which two passes differ at most in the end."""
     forgotten: float = 20.0
     """Time constants after which a lag knows nothing of its start."""
+    set_point: float = 10.0
+    """Time [s] after which a filtered, limited or profiled target knows nothing of where it was."""
 
 
 @dataclass(frozen=True)

@@ -27,11 +27,11 @@ def diagnosis(drive: str) -> Diagnosis:
     ("drive", "effect", "where", "parameter", "truth"),
     [
         ("filter", "command_filter", ["j2"], "time", 0.03),
-        ("rate", "command_rate_limit", ["j2"], "rate", 1.0),
-        ("profile", "command_profile", ["j2"], "acceleration", 30.0),
+        pytest.param("rate", "command_rate_limit", ["j2"], "rate", 1.0, marks=pytest.mark.slow),
+        pytest.param("profile", "command_profile", ["j2"], "acceleration", 30.0, marks=pytest.mark.slow),
         ("loss", "dropped_commands", ["j2"], "share", 0.3),
-        ("loss of all", "dropped_commands", [], "share", 0.3),
-        ("delay", "command_delay", ["j2"], "delay", 0.025),
+        pytest.param("loss of all", "dropped_commands", [], "share", 0.3, marks=pytest.mark.slow),
+        pytest.param("delay", "command_delay", ["j2"], "delay", 0.025, marks=pytest.mark.slow),
     ],
 )
 def test_the_drive_is_named_alone_and_its_size_is_in_the_interval(

@@ -1,9 +1,11 @@
 """Set-points along windows that start mid-trajectory: as if the drive had been simulated since the rollout began."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.simulation.setpoints import setpoints_of
+from bumblebee.diagnosis.simulation.setpoints import _paths, setpoints_of
 from bumblebee.diagnosis.simulation.simulate import inputs_of
 from bumblebee.diagnosis.simulation.variation import vary
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
@@ -65,3 +67,14 @@ def test_a_joint_without_a_drive_has_no_set_point() -> None:
     xml = arm.XML.replace('<position name="j3" joint="j3" kp="30" kv="2" forcerange="-20 20"/>', "")
     plant = arm.session_of(simulate(filtered(0, 0.01), count=1, seconds=1.0), xml).plant
     assert [p.column for p in setpoints_of(plant, [single("command_filter", "", 0.03)])] == [0, 1]
+
+
+@pytest.mark.parametrize(("effect", "drive"), KINDS)
+def test_a_long_rollout_followed_in_parts_is_the_same(effect: Effect, drive: Drive) -> None:
+    """Parts of 10 s, each begun 10 s earlier, to 10 mrad where the drive lags behind nearly all the time."""
+    session = arm.session_of(simulate(drive, count=2, seconds=24.0))
+    (point,) = setpoints_of(session.plant, [effect])
+    whole = _paths(tuple(session.rollouts), replace(point, memory=100.0))
+    parts = _paths(tuple(session.rollouts), replace(point, memory=10.0))
+    for one, other in zip(whole, parts, strict=True):
+        np.testing.assert_allclose(one, other, atol=0.01)

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, is_chosen
-from bumblebee.diagnosis.comparison import compare, criterion, refitted_without
+from bumblebee.diagnosis.comparison import compare, criterion, refitted_without, wald
 from bumblebee.diagnosis.selection.moves import Move, Terms, refitted
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.state import SearchState
@@ -76,13 +76,14 @@ def _promising(run: SearchState, where: str) -> Iterator[tuple[Candidate, np.nda
 
 
 def _drop_members(run: SearchState, where: str) -> None:
-    """Members that are no longer worth their numbers beside the last one, the last one stays."""
+    """Members that beside the last one are no longer sure, or worth their numbers; the last one stays."""
     rule = run.problem.thresholds.selection.proposals.friction_family
     rules = run.problem.thresholds.comparison
     for c in [c for c in run.fit.chosen[run.given : -1] if c.where == where and c.effect in MEMBERS]:
+        sure = wald(run.problem, run.fit, run.weights, run.fit.chosen.index(c)) >= rule.sure
         less = refitted_without(run.problem, run.fit, [c], run.fit)
-        if criterion(run.problem, less) < criterion(run.problem, run.fit) - rule.clearly:
+        if sure and criterion(run.problem, less) < criterion(run.problem, run.fit) - rule.clearly:
             continue
-        if compare(run.problem, run.holdout, run.fit, less).passes(rules.no_worse_on_average):
+        if compare(run.problem, run.holdout, run.fit, less).passes(rules.no_worse_within_errors):
             run.say(f"needless beside the rest of its friction: {c.effect} on {where}")
             run.renew(less)

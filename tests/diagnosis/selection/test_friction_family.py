@@ -1,0 +1,72 @@
+"""A joint's friction is the sum of the members that are worth their numbers."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.selection.proposals.friction_family import complete_frictions
+from bumblebee.measured.rollout import Rollout
+from tests.diagnosis.selection.test_swap import begun, names
+
+MASS, DRY, DRAG = 5.0, 3.0, 1.5  # [kg, N, N s^2/m^2]
+XML = (
+    '<mujoco><option timestep="0.002"/><worldbody><body simple="false"><joint name="x" type="slide" axis="1 0 0"/>'
+    f'<geom type="box" size=".2 .1 .1" mass="{MASS}"/></body></worldbody>'
+    '<actuator><motor name="x" joint="x"/></actuator></mujoco>'
+)
+
+
+def record(drag: float) -> list[Rollout]:
+    """Three rollouts of a mass that slides with dry friction and, perhaps, drag; integrated in NumPy, at 100 Hz."""
+    rng = np.random.default_rng(3)
+    return [one(drag, f"r{i}", rng) for i in range(3)]
+
+
+def one(drag: float, name: str, rng: np.random.Generator) -> Rollout:
+    """A rollout under a multisine of forces."""
+    time, dt = np.arange(400) * 0.01, 1e-4
+    waves = [(f, rng.uniform(0, 6)) for f in rng.uniform(0.3, 1.5, 4)]
+    force = np.sum([7 * np.sin(2 * np.pi * f * time + p) for f, p in waves], axis=0)
+    states, (x, v) = np.empty((len(time), 2)), (0.0, 0.0)
+    for k, u in enumerate(force):
+        states[k] = x, v
+        for _ in range(100):
+            push = u - drag * v * abs(v)
+            free = v + dt * push / MASS
+            v = np.sign(free) * max(abs(free) - dt * DRY / MASS, 0.0)  # dry friction stops, it does not turn round
+            x += dt * v
+    states += rng.standard_normal(states.shape) * (1e-4, 2e-3)
+    return Rollout(
+        name, ("x",), 100.0, time, joint_pos=states[:, :1], joint_vel=states[:, 1:], joint_torque_cmd=force[:, None]
+    )
+
+
+def test_a_drag_beside_dry_friction_is_added_by_its_number() -> None:
+    run = begun(XML, record(DRAG), {("coulomb_friction", "x"): DRY})
+    assert complete_frictions(run)
+    assert names(run) == [("coulomb_friction", "x"), ("quadratic_friction", "x")]
+    assert run.fit.values == pytest.approx([DRY, DRAG], rel=0.05)
+
+
+def test_dry_friction_alone_stays_alone() -> None:
+    run = begun(XML, record(0.0), {("coulomb_friction", "x"): DRY})
+    assert not complete_frictions(run)
+    assert names(run) == [("coulomb_friction", "x")]
+
+
+def test_a_wrong_member_goes_when_the_right_one_has_come() -> None:
+    """Damping that stands for drag."""
+    run = begun(XML, record(DRAG), {("coulomb_friction", "x"): DRY, ("viscous_friction", "x"): 1.5})
+    assert complete_frictions(run)
+    assert names(run) == [("coulomb_friction", "x"), ("quadratic_friction", "x")]
+
+
+def test_the_drag_is_in_the_model() -> None:
+    """What MJCF carries by the second coefficient of a joint's damping is -c v abs(v)."""
+    spec = mujoco.MjSpec.from_string(XML)
+    spec.joint("x").damping = [0.0, DRAG, 0.0]
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.qvel[0] = -2.0
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_damper[0] == pytest.approx(DRAG * 4.0)
