@@ -32,14 +32,14 @@ def all_candidates(
     rollouts: Sequence[Rollout],
     still: Sequence[str],
     rules: CandidateThresholds | None = None,
-    model: mujoco.MjModel | None = None,
+    models: Sequence[mujoco.MjModel] = (),
 ) -> list[Candidate]:
     """Every candidate on joints that move, on bodies that they carry, on the ground and on the whole robot.
 
-    The first steps follow from the servos of `model`, the declared one if none is given.
+    The first steps follow from the servos of `models`, one for each condition, the declared ones if none are given.
     """
     rules = rules or CandidateThresholds()
-    scales = scales_of(plant, rollouts, rules.scales, model)
+    scales = scales_of(plant, rollouts, rules.scales, models)
     found: list[Candidate] = []
     for j, name in enumerate(plant.joints):
         if name not in still:

@@ -29,7 +29,7 @@ class _Frame:
     top: float
     width: float = 340.0
     height: float = 112.0
-    left: float = 44.0
+    left: float = 52.0
     right: float = 334.0
     above: float = 16.0
     below: float = 16.0

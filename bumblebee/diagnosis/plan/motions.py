@@ -1,4 +1,4 @@
-"""Candidate motions: multisines, sweeps, steps, holds and small reversals about random postures.
+"""Candidate motions: multisines, sweeps, steps, holds, small reversals and jumps about random postures.
 
 Each starts and ends at rest in the start pose: an envelope that grows and dies as a minimum-jerk polynomial multiplies
 the way to the posture and the excitation about it.
@@ -14,7 +14,7 @@ from bumblebee.diagnosis.plan.limits import Limits
 from bumblebee.diagnosis.thresholds.plan import Motions
 
 _DECLARED = Gain()
-FAMILIES = ("multisine", "sweep", "steps", "holds", "reversals")
+FAMILIES = ("multisine", "sweep", "steps", "holds", "reversals", "jumps")
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +81,9 @@ def draw_motion(
     family = families[number % len(families)]
     shape, text = _SHAPES[family](scope, rng)
     posture, radius = _posture(scope, rng)
-    if family == "reversals":
-        radius = np.minimum(radius, rng.uniform(*scope.rule.rocking, len(radius)))
+    small = {"reversals": scope.rule.rocking, "jumps": scope.rule.jumps}
+    if family in small:
+        radius = np.minimum(radius, rng.uniform(*small[family], len(radius)))
     some = _some(scope, rng)
     envelope = _envelope(scope)[:, None]
     way = envelope * ((posture - scope.home) + radius * some * shape)
@@ -120,8 +121,8 @@ def _some(scope: Scope, rng: np.random.Generator) -> np.ndarray:
 
 
 def _slow_enough(scope: Scope, way: np.ndarray) -> np.ndarray:
-    """(J,) amplitudes at which the targets keep the speed limit."""
-    fastest = np.abs(np.gradient(way, 1.0 / scope.rate, axis=0)).max(axis=0)
+    """(J,) amplitudes at which the targets keep the speed limit; jumps are the servo's to follow as it can."""
+    fastest = np.quantile(np.abs(np.gradient(way, 1.0 / scope.rate, axis=0)), scope.rule.mostly, axis=0)
     return np.minimum(1.0, scope.limits.speed / np.maximum(fastest, 1e-12))
 
 
@@ -170,6 +171,15 @@ def _reversals(scope: Scope, rng: np.random.Generator) -> tuple[np.ndarray, str]
     return wave, "small reversals about a posture, 0.5 to 2.5 Hz"
 
 
+def _jumps(scope: Scope, rng: np.random.Generator) -> tuple[np.ndarray, str]:
+    """(T, J) levels of 1 and -1, each reached in one tick: what delays, lags and filters show in."""
+    time, out = scope.time, np.empty((len(scope.time), len(scope.home)))
+    for j in range(out.shape[1]):
+        turns = np.cumsum(rng.uniform(0.12, 0.5, int(time[-1] / 0.12) + 2))
+        out[:, j] = 1.0 - 2.0 * (np.searchsorted(turns, time) % 2)
+    return out, "small jumps of the target, held 0.1 to 0.5 s"
+
+
 def _unit(wave: np.ndarray) -> np.ndarray:
     return wave / np.maximum(np.abs(wave).max(axis=0), 1e-12)
 
@@ -180,4 +190,5 @@ _SHAPES: dict[str, Callable[[Scope, np.random.Generator], tuple[np.ndarray, str]
     "steps": _steps,
     "holds": _holds,
     "reversals": _reversals,
+    "jumps": _jumps,
 }

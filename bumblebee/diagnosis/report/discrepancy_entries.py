@@ -120,14 +120,19 @@ def explained_share(found: Discovery, joint: JointLackOfFit) -> ExplainedShare:
     place = found.problem.plant.joints.index(joint.joint)
     if not joint.functions:
         value, count = scene.evidence.chi_square(place)
-        return ExplainedShare(float(np.clip((value - count) / excess, 0.0, 1.0)), ())
+        return ExplainedShare(_share((value - count) / excess), ())
     left, shares = scene.left, []
     for function, size in joint.functions:
         moved = scene.evidence.column(place, function.torque(scene.data, place))
         after = left - np.tensordot(size, moved, axes=1)
         shares.append(float(((left**2).sum() - (after**2).sum()) / excess))
         left = after
-    return ExplainedShare(float(np.clip(sum(shares), 0.0, 1.0)), tuple(shares))
+    return ExplainedShare(_share(sum(shares)), tuple(map(_share, shares)))
+
+
+def _share(value: float) -> float:
+    """Between 0 and 1; nothing where a window's residual is no number."""
+    return float(np.clip(np.nan_to_num(value, nan=0.0), 0.0, 1.0))
 
 
 def structure_table(found: Discovery, rule: MeasuredCurve) -> dict[str, dict[str, Any]]:

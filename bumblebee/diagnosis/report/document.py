@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.dataset import Session, varied
 from bumblebee.diagnosis.discrepancy import Discovery
 from bumblebee.diagnosis.prepare import Material
 from bumblebee.diagnosis.report.discrepancy_entries import NOT_TESTED, structure_table, unexplained
@@ -52,6 +52,7 @@ def document(
     told = (
         {"schema": 1, "train": session.ids(session.train)}
         | {"holdout": session.ids(session.holdout), "accept": session.ids(session.accept)}
+        | _recorded_under(session)
         | {"effects": list(findings.entries)}
         | {"unexplained": NOT_TESTED if beyond is None else unexplained(beyond, rules)}
         | ({} if beyond is None else {"structure": structure_table(beyond, rules.measured_curve)})
@@ -68,6 +69,13 @@ def document(
     lone = [] if session.holdout else [LONE]
     told["summary"] = what_matters(told, ends, rules.matters, config.seed)
     return told | {"warnings": [*session.warnings, *lone, *unexplained_error(told, rules.verdicts)]}
+
+
+def _recorded_under(session: Session) -> dict[str, Any]:
+    """By what rollouts were held out, if by a condition; and which conditions were not the same for all."""
+    entry = {} if session.held_out is None else {"split": session.held_out.entry()}
+    conditions = varied(session.rollouts)
+    return entry | ({"conditions": conditions} if conditions else {})
 
 
 def _notes(session: Session, findings: Findings, rule: Verdicts) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from bumblebee.diagnosis.report.html import number
 from bumblebee.diagnosis.report.what_matters import BESIDE, CARRY, WIDE
-from bumblebee.diagnosis.thresholds.report import Matters
+from bumblebee.diagnosis.thresholds.report import Matters, ReportThresholds
 
 GROUPS = {
     CARRY: "Carry the gain",
@@ -17,20 +17,20 @@ GROUPS = {
 """Group of effects -> its title."""
 
 
-def headline(document: Mapping[str, Any], rule: Matters) -> list[str]:
+def headline(document: Mapping[str, Any], rules: ReportThresholds) -> list[str]:
     """Sentences in the order in which they matter; none of a document without the block."""
-    told = document.get("summary")
+    told, rule = document.get("summary"), rules.matters
     if not told or told["horizon"] is None:
         return []
     lines = [_removed(document, told), _left(told, rule), _structure(told, rule)]
-    return [line for line in [*lines, trusted(document, rule)] if line]
+    return [line for line in [*lines, trusted(document, rules)] if line]
 
 
 def _removed(document: Mapping[str, Any], told: Mapping[str, Any]) -> str:
     """How much of the removable error is gone, at the horizon that is told first and at the others."""
     horizon, parts = told["horizon"], []
-    on = f"on {told['rollouts']} held-out rollouts" if told["rollouts"] else "on the fitted rollout"
-    on = on.replace("1 held-out rollouts", "1 held-out rollout") if told["rollouts"] == 1 else on
+    count = told["rollouts"]
+    on = f"on {count} held-out rollout{'s' if count > 1 else ''}" if count else "on the fitted rollout"
     for entry in told["removed"].get(horizon, []):
         size = f"{sized(entry['before'], entry['unit'])} RMS"
         if entry["share"] is None:
@@ -54,6 +54,10 @@ def _removed(document: Mapping[str, Any], told: Mapping[str, Any]) -> str:
 
 def _change(entry: Mapping[str, Any]) -> str:
     noise = f", noise {sized(entry['floor'], entry['unit'])}" if entry["floor"] else ""
+    if entry["floor"] and entry["after"] <= entry["floor"]:
+        noise = (
+            f", at the noise floor: the error of a complete model scatters about {sized(entry['floor'], entry['unit'])}"
+        )
     return f"{sized(entry['before'], entry['unit'])} to {sized(entry['after'], entry['unit'])} RMS{noise}"
 
 
@@ -108,8 +112,9 @@ def _on(entry: Mapping[str, Any]) -> str:
     return f"depends on {', '.join(entry['depends_on'])}" if entry["depends_on"] else "on no single quantity"
 
 
-def trusted(document: Mapping[str, Any], rule: Matters) -> str:
+def trusted(document: Mapping[str, Any], rules: ReportThresholds) -> str:
     """One sentence on what may be read from the effects."""
+    rule, most = rules.matters, rules.listing.effects
     told = document["summary"]
     groups = {group: [t for t in told["trust"] if t["group"] == group] for group in GROUPS}
     if not told["trust"]:
@@ -118,13 +123,24 @@ def trusted(document: Mapping[str, Any], rule: Matters) -> str:
     whole = f"Trust the corrected model as a whole (better after {', '.join(better)} s)"
     if not better:
         whole = "Do not trust the corrected model: at no horizon is it surely better"
-    known = [f"{t['effect']} on {', '.join(t['where']) or 'the whole robot'}" for t in groups[CARRY] if not t["wide"]]
-    text = f"{whole}, and by themselves of its effects {_listed(known, rule.places) or 'none'}"
+    carry = groups[CARRY]
+    known = [t for t in carry if not t["wide"] and not t["alike"]]
+    text = f"{whole}; its gain comes from {_listed(_named(carry), most) or 'no single effect'}"
+    sizes = _listed(_named(known), most) if known else "none"
     rest, wide = len(told["trust"]) - len(known), sum(t["wide"] for t in told["trust"])
-    if not rest:
-        return f"{text}."
-    unknown = f" ({wide} of these have intervals wider than {rule.wide:g}-fold, or with the declared value in them)"
-    return f"{text}; the other {rest} only together with them{unknown if wide else ''}."
+    text += f"; read as sizes by themselves {sizes}"
+    alike = sum(t["alike"] for t in told["trust"])
+    why = [f"{wide} have intervals wider than {rule.wide:g}-fold or with the declared value in them"] if wide else []
+    why += [f"{alike} look like another effect"] if alike else []
+    return text + (f"; take the other {rest} only together{_in_brackets(why)}." if rest else ".")
+
+
+def _in_brackets(texts: Sequence[str]) -> str:
+    return f" ({', '.join(texts)})" if texts else ""
+
+
+def _named(effects: Sequence[Mapping[str, Any]]) -> list[str]:
+    return [f"{e['effect']} on {', '.join(e['where']) or 'the whole robot'}" for e in effects]
 
 
 def effect_groups(document: Mapping[str, Any], rule: Matters) -> list[tuple[str, list[dict[str, Any]]]]:
@@ -135,10 +151,20 @@ def effect_groups(document: Mapping[str, Any], rule: Matters) -> list[tuple[str,
     out = []
     for group, title in GROUPS.items():
         width = f": interval wider than {rule.wide:g}-fold, or with the declared value in it" if group == WIDE else ""
-        mine = [e for e, t in zip(effects, document["summary"]["trust"], strict=True) if t["group"] == group]
+        pairs = zip(effects, document["summary"]["trust"], strict=True)
+        mine = [e | {"wide": t["wide"] and group != WIDE} for e, t in pairs if t["group"] == group]
         if mine:
             out.append((title + width, _together(mine)))
     return out
+
+
+def experiments(effects: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What would tell effects from those that look alike, each once, with the effects that it is for."""
+    wanted: dict[str, list[str]] = {}
+    for effect in effects:
+        for text in effect.get("separate_by", []):
+            wanted.setdefault(text, []).extend(_named([effect]))
+    return [f"{text} ({_listed(names, 3)})" for text, names in sorted(wanted.items(), key=lambda pair: -len(pair[1]))]
 
 
 def _together(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -154,8 +180,16 @@ def _together(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    keys = ("effect", "parameters", "equivalent")
-    return bool(one["parameters"]) and bool(other["where"]) and all(one[key] == other[key] for key in keys)
+    """Alike but for the joint, as far as digits are shown."""
+    if not one["parameters"] or not other["where"] or one["effect"] == "discovered":
+        return False
+    keys = ("effect", "equivalent")
+    return all(one[key] == other[key] for key in keys) and _shown(one) == _shown(other)
+
+
+def _shown(effect: Mapping[str, Any]) -> str:
+    sizes = [x for p in effect["parameters"].values() for x in (p["value"], *(p["ci95"] or ()), p["nominal"])]
+    return f"{100 * effect['explains']:.0f} " + " ".join("-" if x is None else f"{x:.4g}" for x in sizes)
 
 
 def _surely_better(entry: Mapping[str, Any]) -> bool:

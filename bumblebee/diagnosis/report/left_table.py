@@ -27,31 +27,32 @@ def what_is_left_table(document: Mapping[str, Any]) -> str:
         )
         rows[-1].append(_missing(missing.get(name)))
     rows += [
-        [f"end of a chain: {escape(entry['where'])}", *_sizes(entry["before"], entry), ""] for entry in told["ends"]
+        [f"{escape(entry['where'])} <span class='note'>(end)</span>", *_sizes(entry["before"], entry), ""]
+        for entry in told["ends"]
     ]
     head = [
         f"after {told['horizon']} s",
-        "declared",
         "left [95 % interval]",
+        "declared",
         "noise",
         "share",
         "missing torque with structure",
     ]
     text = (
         "<p class='note'>RMS error of windows that start from measured states. Share: of the squared error above the "
-        "noise, over all joints. Ends of chains: where the joints' errors put the last body, the base as measured. "
+        "noise, over all joints. (end): where the joints' errors put the last body of a chain, the base as measured. "
         "Grey: significant, but next to nothing of what is left.</p>"
     )
     return "<h2>What is left</h2>" + table(head, rows, (1, 2, 3, 4)) + text
 
 
 def _sizes(first: float | None, entry: Mapping[str, Any]) -> list[str]:
-    """Declared, left with its interval, noise and share."""
+    """Left with its interval, declared, noise and share."""
     unit, ends = entry["unit"], entry.get("ci95")
     span = f" <span class='note'>[{sized(ends[0], unit)}, {sized(ends[1], unit)}]</span>" if ends else ""
     share = f"{100 * entry['share']:.0f} %" if entry.get("share") is not None else ""
     noise = sized(entry["noise"], unit) if entry.get("noise") is not None else ""
-    return [sized(first, unit), f"<b>{sized(entry['value'], unit)}</b>{span}", noise, share]
+    return [f"<span class='strong'>{sized(entry['value'], unit)}</span>{span}", sized(first, unit), noise, share]
 
 
 def _missing(entry: Mapping[str, Any] | None) -> str:

@@ -110,13 +110,15 @@ def trust(effects: Sequence[Mapping[str, Any]], rule: Matters) -> list[dict[str,
     """Group and width of every effect, in the order of the list.
 
     `fold`: upper over lower end of the narrowest parameter; None where that includes no change, or has no end.
+    `alike`: these data cannot tell it from another effect.
     """
     out = []
     for effect in effects:
         fold = _narrowest(effect)
         wide = fold is None or fold > rule.wide
         group = CARRY if effect["explains"] >= rule.carries else WIDE if wide else BESIDE
-        out.append({"effect": effect["effect"], "where": effect["where"], "group": group, "fold": fold, "wide": wide})
+        told = {"effect": effect["effect"], "where": effect["where"], "group": group}
+        out.append(told | {"fold": fold, "wide": wide, "alike": bool(effect["equivalent"])})
     return out
 
 

@@ -63,7 +63,12 @@ def _of_first_order(variation: Variation) -> Variation | None:
 
 def _late_loop(plant: Plant, variation: Variation, part: str, rule: Nuisances) -> Variation:
     """Torque kp (u - q(t-e)) - kd qd(t-e), to first order in e: less damping by kp e, less inertia by kd e."""
-    model, own = copy.copy(variation.model), variation.plant or plant
+    models = [_late_model(model, variation.plant or plant, part, rule) for model in variation.models]
+    return replace(variation, model=models[0], others=tuple(models[1:]))
+
+
+def _late_model(declared: mujoco.MjModel, own: Plant, part: str, rule: Nuisances) -> mujoco.MjModel:
+    model = copy.copy(declared)
     for column, a in enumerate(own.actuator):
         if a >= 0:
             dof = own.dof[column]
@@ -74,7 +79,7 @@ def _late_loop(plant: Plant, variation: Variation, part: str, rule: Nuisances) -
             else:
                 lighter = model.dof_armature[dof] - kd * gear**2 * rule.unit
                 model.dof_armature[dof] = max(rule.least_armature * model.dof_armature[dof], lighter)
-    return replace(variation, model=model)
+    return model
 
 
 def _read_thrice(windows: Windows, after: float, before: float) -> Windows:

@@ -38,6 +38,8 @@ class Windows:
     """(W, C, nu) logged commands around the window, in the actuators' own input."""
     command_time: np.ndarray
     """(W, C) times at which they were issued, after the start [s]."""
+    condition: np.ndarray
+    """(W,) number of the condition that it was recorded under, as the plant counts them."""
     source: Sequence[Rollout] = ()
     """The rollouts that `rollout` counts, for what drives remember from before the start."""
 
@@ -140,6 +142,7 @@ def cut(
         quat=None if quats[0] is None else np.stack(quats),
         command=np.stack([_pad(row["command"], size) for row in rows]),
         command_time=np.stack([_pad(row["command_time"], size) for row in rows]),
+        condition=np.array([plant.under.get(rollouts[s[0]].rollout_id, 0) for s in starts]),
         source=rollouts,
     )
 

@@ -73,6 +73,10 @@ class Motions:
     """The same share for joints between a standing robot's base and its feet."""
     rocking: tuple[float, float] = (0.01, 0.05)
     """Half-width of small reversals [rad, m]: what backlash and hysteresis show in."""
+    jumps: tuple[float, float] = (0.01, 0.06)
+    """Half-height of jumps of the target [rad, m]: at a stiff servo's gain a fraction of its torque."""
+    mostly: float = 0.8
+    """Share of the time in which targets are no faster than the speed limit before a rehearsal: jumps are rarer."""
     shrink: float = 0.75
     """Factor on the amplitude of a motion that is not safe."""
     shrinks: int = 12

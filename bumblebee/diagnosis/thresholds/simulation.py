@@ -89,6 +89,16 @@ class DriveProbe:
 
 
 @dataclass(frozen=True)
+class Conditions:
+    """Of rollouts that were recorded under conditions other than the declared ones."""
+
+    relative: float = 1e-3
+    """Relative difference of gains or voltages below which they are the same: rounding in a file is smaller."""
+    most: int = 24
+    """Conditions at most of which each has a model of its own in every simulation; it bounds memory."""
+
+
+@dataclass(frozen=True)
 class SimulationThresholds:
     """All of them."""
 
@@ -99,3 +109,4 @@ class SimulationThresholds:
     hidden: HiddenStates = field(default_factory=HiddenStates)
     solver: Solver = field(default_factory=Solver)
     drive: DriveProbe = field(default_factory=DriveProbe)
+    conditions: Conditions = field(default_factory=Conditions)

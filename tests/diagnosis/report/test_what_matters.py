@@ -60,13 +60,14 @@ def document() -> dict:
 
 
 def test_the_first_sentence_is_the_share_that_is_gone_in_degrees_with_its_interval() -> None:
-    first, left, structured, trusted = headline(document(), RULE)
+    first, left, structured, trusted = headline(document(), ReportThresholds())
     assert first.startswith("After 0.2 s on 2 held-out rollouts, 78 % [70, 81] of the removable error")
     assert "5.7° to 1.4° RMS, noise 0.11°" in first
     assert left == "What is left after 0.2 s: b 2.3° (94 %), hand 12.3 mm off (declared 50 mm)."
     assert structured.startswith("Part of it has structure: 40 % of what is left, a missing torque at b (0.3 N m RMS")
     assert structured.endswith("Significant, but below 5 % of what is left: a.")
-    assert "by themselves of its effects kp on a; the other 3 only together with them (2 of these" in trusted
+    assert "its gain comes from kp on a, kd on a; read as sizes by themselves kp on a; take the other 3 only" in trusted
+    assert "(2 have intervals wider than 3-fold" in trusted
 
 
 def test_page_and_terminal_begin_with_it_and_end_with_the_tests() -> None:
@@ -121,8 +122,17 @@ def test_effects_of_like_size_on_several_joints_are_one_line() -> None:
 def test_a_model_that_is_worse_is_not_called_better() -> None:
     made = document()
     made["summary"]["removed"]["0.2"][0] |= {"after": 0.15, "share": -0.5, "ci95": [-0.9, -0.1]}
-    first, *_, trusted = headline(made, RULE)
+    first, *_, trusted = headline(made, ReportThresholds())
     assert "the error of the joints is larger: 5.7° to 8.6° RMS" in first and trusted.startswith("Do not trust")
+
+
+def test_an_error_below_the_expected_noise_is_no_better_than_one_at_it() -> None:
+    made = document()
+    made["summary"]["removed"]["0.2"][0] |= {"after": 0.0019, "share": 1.001, "ci95": [0.99, 1.01]}
+    first = headline(made, ReportThresholds())[0]
+    assert (
+        "100 % [99, 101]" in first and "at the noise floor: the error of a complete model scatters about 0.11°" in first
+    )
 
 
 def test_thresholds_decide_what_is_proclaimed() -> None:
