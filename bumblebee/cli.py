@@ -1,4 +1,4 @@
-"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`, `compensate`, `motions`.
+"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`, `plan`, `compensate`, `motions`.
 
 Status 0: done, 2: unusable input or output, 1: an error that should not happen; one line on standard error each.
 """
@@ -11,12 +11,13 @@ from typing import Annotated
 
 import typer
 
-from bumblebee import __version__, cli_motions
+from bumblebee import __version__, cli_motions, cli_plan
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 
 app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
 app.add_typer(cli_motions.app, name="motions")
+app.command()(cli_plan.plan)
 _UNUSABLE = typer.BadParameter.__bases__[0]  # the library's UsageError, which it does not export
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
@@ -48,28 +49,32 @@ def diagnose(
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the diagnosis.")] = None,
     overwrite: Overwrite = False,
     quick: Annotated[bool, typer.Option("--quick", help="A first look: the three best leads; writes nothing.")] = False,
+    held: Annotated[
+        str | None, typer.Option("--hold-out", help="Rollouts that take no part: NAME=VALUE[,VALUE] of a condition.")
+    ] = None,
     max_windows: Annotated[int, typer.Option(min=8, help="Windows that take part in the fit.")] = 120,
     seed: Annotated[int, typer.Option(min=0, help="Of the perturbed starts.")] = 0,
 ) -> None:
     """Find which effect the model lacks, add it, and report the error before and after."""
     from bumblebee.diagnosis.config import DiagnosisConfig
-    from bumblebee.diagnosis.dataset import open_session
+    from bumblebee.diagnosis.dataset import open_session, read_held_out
     from bumblebee.diagnosis.diagnose import diagnose
     from bumblebee.diagnosis.output import write_diagnosis
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
     from bumblebee.diagnosis.quick import first_look, told
     from bumblebee.diagnosis.report import examples, plot, summary
 
+    held_out = read_held_out(held) if held else None
     if quick:
         if out is not None:
             raise BadInput("--out", "no folder with --quick, which writes nothing", str(out))
-        print(told(first_look(open_session(model, dataset), DiagnosisConfig(seed=seed), say=_teller())))
+        print(told(first_look(open_session(model, dataset, None, held_out), DiagnosisConfig(seed=seed), say=_teller())))
         return
     if out is None:
         raise BadInput("--out", "a folder for the diagnosis, or --quick", "neither")
     claim_folder(out, DIAGNOSIS, overwrite, inputs_of(model, dataset))
     config = DiagnosisConfig(max_windows=max_windows, seed=seed)
-    session = open_session(model, dataset, config.thresholds.dataset)
+    session = open_session(model, dataset, config.thresholds.dataset, held_out)
     result = diagnose(session, config, _teller())
     print(summary(result.document, result.problem.thresholds.report))  # said first: the disk may fail now
     shown = examples(result.session, result.effects, count=1)
@@ -133,15 +138,18 @@ def import_(
     columns: Annotated[
         Path | None, typer.Option("--columns", help="Map of columns, joints and units, a YAML file.")
     ] = None,
+    conditions: Annotated[
+        Path | None, typer.Option("--conditions", help="Table of gains, loads, labels ... of each log, CSV or YAML.")
+    ] = None,
 ) -> None:
     """Turn logs of another layout into a dataset of the contract."""
     from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output
     from bumblebee.measured.importers import import_dataset
 
-    refuse_overlap(dataset, [path for path in (source, model, columns) if path])
+    refuse_overlap(dataset, [path for path in (source, model, columns, conditions) if path])
     refuse_foreign(dataset, lambda path: False, "nothing")
     try_output(dataset)
-    ids = import_dataset(source, kind, dataset, model, columns)
+    ids = import_dataset(source, kind, dataset, model, columns, conditions)
     print(f"{len(ids)} rollouts: {', '.join(ids[:6])}{' ...' if len(ids) > 6 else ''}")
 
 

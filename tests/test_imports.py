@@ -62,8 +62,8 @@ def test_the_library_knows_nothing_of_the_orchestration():
 
 
 def test_typer_appears_in_the_command_line_only():
-    found = offences("bumblebee", {"typer"})
-    assert [line for line in found if not line.startswith(("bumblebee/cli.py", "bumblebee/cli_motions.py"))] == []
+    commands = ("bumblebee/cli.py", "bumblebee/cli_motions.py", "bumblebee/cli_plan.py")
+    assert [line for line in offences("bumblebee", {"typer"}) if not line.startswith(commands)] == []
 
 
 def test_tasks_know_neither_prefect_nor_flows():

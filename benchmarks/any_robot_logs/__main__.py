@@ -79,8 +79,8 @@ def _child(seeds: Sequence[int], quick: bool) -> int:
     """Run cases in this process, a line each."""
     import mujoco
 
-    import bumblebee.diagnosis.simulation.simulate as simulate
     from benchmarks.any_robot_logs.case import FULL, QUICK, run_case
+    from bumblebee.diagnosis.simulation import simulate
 
     mujoco.set_mju_user_warning(lambda text: None)
     simulate.THREADS = 1
@@ -113,10 +113,11 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     lines = [
         f"{len(rows)} cases: {', '.join(f'{n} {o}' for o, n in counts.items())}; not well "
         f"{sum(not is_well(r) for r in rows)}",
-        f"invalid documents: {sum(bool(r['problems']) for r in done)}; with models that failed: "
+        f"invalid documents: {sum(bool(r['problems']) for r in done)}; with models or steps that failed: "
         f"{sum(bool(r['failures']) for r in done)}",
         f"one sealed effect: first in {sum(r['first_is_sealed'] for r in one)} of {len(one)}",
-        f"nothing sealed: effects named in {sum(bool(r['named']) for r in none)} of {len(none)}",
+        f"nothing sealed: effects named, beside the encoders' steps of quantised logs, in "
+        f"{sum(r['beside_steps'] > 0 for r in none)} of {len(none)}",
         f"unexplained significant: {sum(r['unexplained'] for r in done)} of {len(done)}, of nulls "
         f"{sum(r['unexplained'] for r in none)} of {len(none)}",
     ]
@@ -124,6 +125,7 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
         middle, high = seconds[len(seconds) // 2], seconds[int(0.95 * (len(seconds) - 1))]
         peak = max(r["peak_mb"] for r in done)
         lines.append(f"seconds: median {middle:.0f}, 95 % {high:.0f}, most {seconds[-1]:.0f}; peak {peak} MB")
+    lines += [f"{r['seed']}: {note}" for r in done for note in r["failures"]]
     return "\n".join(lines + [brief(r) for r in rows if not is_well(r)])
 
 

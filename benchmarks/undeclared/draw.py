@@ -54,7 +54,7 @@ def draw(case: Case, seed: int, policy: Path | None = None) -> Drawn:
         null = run([])
         eye = make_eye(robot, null, case.noise, np.random.default_rng(seeds[4]))
         for name in case.kinds:
-            entry, law = _one(name, case, robot, null, eye, run, rng)
+            entry, law = draw_one(name, case, robot, null, eye, run, rng)
             truth.append(entry)
             laws.append(law)
     noise = np.random.default_rng(seeds[5])
@@ -63,7 +63,7 @@ def draw(case: Case, seed: int, policy: Path | None = None) -> Drawn:
     return Drawn(robot, truth, shown, judge)
 
 
-def _one(
+def draw_one(
     name: str, case: Case, robot: Declared, null: Flight, eye: Eye, run: Any, rng: np.random.Generator
 ) -> tuple[dict[str, Any], Law]:
     """A place where the wanted size is possible, or of those tried the one that comes nearest."""

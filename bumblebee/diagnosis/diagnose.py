@@ -115,7 +115,16 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
     say("what is left")
     offers, budget = offers_of(found, material.candidates), Budget(larger * config.beyond_seconds)
     activity = JointActivity(material.typical, material.still)
-    beyond = discover(last.problem, holdout, last.fit, activity, say, offers, budget)
+
+    def tested() -> Discovery:
+        left = lack_of_fit(last.problem, holdout.problem, last.fit, activity)
+        return Discovery(last.problem, holdout, last.fit, left, {}, {}, [])
+
+    beyond = material.session.plant.failures.attempt(
+        "model discrepancy",
+        lambda: discover(last.problem, holdout, last.fit, activity, say, offers, budget),
+        tested,
+    )
     last = _with(beyond, last)
     return _Found(with_catalogue_effects(found, last.fit), last, beyond.holdout, beyond, (time, budget))
 

@@ -34,10 +34,10 @@ class Material:
         """Candidates with steps for a model with some effects, and its joints' typical torques (J,) [N m]."""
         plant, rollouts = self.session.plant, self.session.rollouts
         varied = vary(plant, effects)
-        model = varied.model if varied.plant is None else None
+        models = varied.models if varied.plant is None else ()
         rules = self.problem.thresholds.candidates
-        typical = scales_of(plant, rollouts, rules.scales, model).torque
-        return all_candidates(plant, rollouts, self.still, rules, model), typical
+        typical = scales_of(plant, rollouts, rules.scales, models).torque
+        return all_candidates(plant, rollouts, self.still, rules, models), typical
 
 
 def gather(session: Session, config: DiagnosisConfig, rng: np.random.Generator, say: Callable[[str], None]) -> Material:

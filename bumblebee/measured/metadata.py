@@ -10,6 +10,7 @@ from typing import Any
 from bumblebee.errors import BadInput
 from bumblebee.io.names import require_stem
 from bumblebee.io.read import decode, parse_json
+from bumblebee.measured.conditions import check_conditions
 
 METADATA_KEY = b"bumblebee.rollout"
 SCHEMA = 1
@@ -18,6 +19,7 @@ LARGEST = 1e9  # of a rate or gain
 REQUIRED_KEYS = ("schema", "rollout_id", "joints", "control_hz")
 OPTIONAL_KEYS = ("robot", "kp", "kd", "motion", "cluster", "policy", "recorded_at", "operator", "notes")
 OPTIONAL_KEYS += ("compensation",)  # sha256 of what was undone at the joints meanwhile
+OPTIONAL_KEYS += ("conditions",)  # what was different meanwhile, see `measured.conditions`
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,8 @@ def _check_fields(path: Path, table: dict[str, Any], bad: Callable[[str, str, st
             isinstance(values, list) and len(values) == len(joints) and all(_is_number(value) for value in values)
         ):
             raise bad("metadata", f"{key}: {len(joints)} numbers", repr(values)[:80])
+    if table.get("conditions") is not None:
+        check_conditions(table["conditions"], lambda name, expected, came: bad(name, expected, came))
 
 
 def _is_name(value: object) -> bool:

@@ -83,7 +83,7 @@ class Rollout:
     foot_force: np.ndarray | None = None
     """(T, F, 3) [N] world."""
     meta: dict[str, Any] = field(default_factory=dict)
-    """robot, kp, kd, motion, cluster, policy, recorded_at, operator, notes; each may be absent."""
+    """robot, kp, kd, conditions, motion, cluster, policy, recorded_at, operator, notes; each may be absent."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joints", tuple(self.joints))

@@ -1,6 +1,7 @@
 """The position servos of a model as arrays over its joints: the torque that they give, computed beside MuJoCo."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -10,7 +11,10 @@ ON_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPAREN
 
 @dataclass(frozen=True, eq=False)
 class Servos:
-    """J joints; a joint without an actuator has zeros and the actuator -1."""
+    """J joints; a joint without an actuator has zeros and the actuator -1.
+
+    Of worlds that differ in gains, bias and limit these have leading axes, which broadcast against the states'.
+    """
 
     actuator: np.ndarray
     """(J,) index, -1 for none."""
@@ -20,24 +24,26 @@ class Servos:
     """(J,) addresses in qvel."""
     gear: np.ndarray
     gain: np.ndarray
-    """(J,) torque for a unit of control [N m]."""
+    """(..., J) torque for a unit of control [N m]."""
     bias: np.ndarray
-    """(J, 3) torque: constant, for a unit of position, for a unit of velocity."""
+    """(..., J, 3) torque: constant, for a unit of position, for a unit of velocity."""
     limit: np.ndarray
-    """(J,) largest torque [N m]; infinite for none."""
+    """(..., J) largest torque [N m]; infinite for none."""
+    supply: np.ndarray | float = 1.0
+    """(..., 1) supply voltage as a share of that at which a speed leaves no torque."""
 
     def torque(
         self, position: np.ndarray, velocity: np.ndarray, control: np.ndarray, limit: np.ndarray | None = None
     ) -> np.ndarray:
         """Torque (..., J) [N m] at positions, velocities and controls (..., J) of the servos."""
         bias = self.bias
-        raw = self.gain * control + bias[:, 0] + bias[:, 1] * position + bias[:, 2] * velocity
+        raw = self.gain * control + bias[..., 0] + bias[..., 1] * position + bias[..., 2] * velocity
         bound = self.limit if limit is None else limit
         return np.clip(raw, -bound, bound)
 
     def given(self, control: np.ndarray) -> np.ndarray:
         """What was asked for (..., J), from the servos' controls: a position [rad], or a torque [N m] of a motor."""
-        follows = self.bias[:, 1] != 0
+        follows = self.bias[..., 1] != 0
         return np.where(follows, control / np.where(self.gear != 0, self.gear, 1.0), self.gain * control)
 
     def controls(self, ctrl: np.ndarray) -> np.ndarray:
@@ -70,6 +76,15 @@ def servos_of(model: mujoco.MjModel, joints: list[int]) -> Servos:
         bias=bias,
         limit=limit,
     )
+
+
+def servos_each(servos: Sequence[Servos], which: np.ndarray) -> Servos:
+    """One of several models' servos for each world: `which` (...) is its index; of one model they stay as they are."""
+    first = servos[0]
+    if len(servos) == 1:
+        return first
+    rows = {name: np.stack([getattr(s, name) for s in servos])[which] for name in ("gain", "bias", "limit")}
+    return replace(first, **rows)
 
 
 def actuator_of(model: mujoco.MjModel, joint: int) -> int:

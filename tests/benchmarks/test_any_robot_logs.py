@@ -13,6 +13,7 @@ from benchmarks.any_robot_logs.case import draw
 from benchmarks.any_robot_logs.robot import SMALL, Size, make_robot
 from benchmarks.any_robot_logs.validate import problems
 from bumblebee.diagnosis.diagnose import Diagnosis
+from bumblebee.diagnosis.simulation import LEFT_OUT
 from tests.diagnosis import arm
 
 COUNT = 30
@@ -26,6 +27,11 @@ def rows() -> list[dict]:
 def test_every_diagnosis_ends_with_a_valid_document_or_with_one_line(rows: list[dict]) -> None:
     assert sorted(row["seed"] for row in rows) == list(range(COUNT))
     assert [row for row in rows if not is_well(row)] == []
+
+
+def test_no_step_of_the_search_had_to_be_left_out(rows: list[dict]) -> None:
+    """Models may be impossible; a step that cannot be computed is a mistake of ours."""
+    assert [note for row in rows for note in row.get("failures", []) if note.startswith(LEFT_OUT)] == []
 
 
 def test_most_of_them_are_diagnosed_and_some_refused(rows: list[dict]) -> None:

@@ -4,6 +4,7 @@ And what every test of a room does first with rollouts, whatever robot made them
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -50,12 +51,21 @@ def problem_of(
 
 
 def simulate(
-    effects: dict[tuple[str, str], float], count: int = 3, seconds: float = 4.0, seed: int = 0, still: int | None = None
+    effects: dict[tuple[str, str], float],
+    count: int = 3,
+    seconds: float = 4.0,
+    seed: int = 0,
+    still: int | None = None,
+    gains: tuple[float, float] | None = None,
 ) -> list[Rollout]:
-    """Rollouts at 50 Hz of the arm with `effects` {(id, place): value}; joint `still` is neither moved nor free."""
+    """Rollouts at 50 Hz of the arm with `effects` {(id, place): value}; joint `still` is neither moved nor free.
+
+    With `gains`, factors of kp and kd, the servos have these times their declared ones, and the metadata say so.
+    """
     rng = np.random.default_rng(seed)
     model = mujoco.MjModel.from_xml_string(XML)
     kp, kd = model.actuator_gainprm[:, 0].copy(), -model.actuator_biasprm[:, 2]
+    kp, kd = (kp, kd) if gains is None else (gains[0] * kp, gains[1] * kd)
     limit = model.actuator_forcerange[:, 1].copy()
     model.opt.timestep, model.opt.integrator = 0.001, mujoco.mjtIntegrator.mjINT_EULER
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
@@ -70,7 +80,8 @@ def simulate(
         else:
             table[kind][JOINTS.index(place)] = value
     mujoco.mj_setConst(model, mujoco.MjData(model))
-    return [_rollout(model, kp, kd, limit, table, seconds, rng, f"r{i:02d}", still) for i in range(count)]
+    made = [_rollout(model, kp, kd, limit, table, seconds, rng, f"r{i:02d}", still) for i in range(count)]
+    return made if gains is None else [replace(r, meta={"kp": kp.tolist(), "kd": kd.tolist()}) for r in made]
 
 
 _NEUTRAL = {

@@ -22,6 +22,7 @@ FLOORS = (
     {"discrepancy"},
     {"report"},
     {"gap"},
+    {"plan"},
 )
 ROOMS = [room for floor in FLOORS for room in sorted(floor) if (ROOT / room).is_dir()]
 GROUND = {"config", "budget"}  # modules that every room may import
@@ -31,6 +32,8 @@ NO_THRESHOLDS = {
     "simulation/simulate.py": {"_MOST_THREADS", "_CHUNK_BYTES", "_KEPT"},  # threads and memory
     "simulation/units.py": {"MEASURES"},  # factors of units
     "candidates/enumerate.py": {"_AXES"},  # indices
+    "plan/rehearsal.py": {"_BEFORE", "_TOGETHER"},  # rows of padding, memory
+    "plan/drawing.py": {"_PANELS"},  # what fits a page
     "residuals/problem.py": {"_GROUP"},  # memory
     "selection/proposals/packet_loss.py": {"_HALF"},  # half of the chi-square distribution's 95 % quantile
 }

@@ -141,7 +141,8 @@ ARM_CHANGES: dict[str, tuple[Change, str, str]] = {
     "joint reversed": (flip_joint, "response-sign", "joint_target[elbow]"),
     "target reversed": (scale("joint_target", -1, 1), "response-sign", "joint_target[elbow]"),
     "unknown joint": (lambda r: replace(r, joints=("shoulder", "elbov", "wrist")), "joint-names", "joints"),
-    "other gains": (lambda r: replace(r, meta=r.meta | {"kp": [40.0, 60.0, 40.0]}), "gains", "kp[elbow]"),
+    "gains of another unit": (lambda r: replace(r, meta=r.meta | {"kp": [40.0, 6000.0, 40.0]}), "gains", "kp[elbow]"),
+    "negative gains": (lambda r: replace(r, meta=r.meta | {"kd": [2.0, 2.0, -2.0]}), "gains", "kd[wrist]"),
 }
 
 

@@ -32,14 +32,14 @@ def all_candidates(
     rollouts: Sequence[Rollout],
     still: Sequence[str],
     rules: CandidateThresholds | None = None,
-    model: mujoco.MjModel | None = None,
+    models: Sequence[mujoco.MjModel] = (),
 ) -> list[Candidate]:
     """Every candidate on joints that move, on bodies that they carry, on the ground and on the whole robot.
 
-    The first steps follow from the servos of `model`, the declared one if none is given.
+    The first steps follow from the servos of `models`, one for each condition, the declared ones if none are given.
     """
     rules = rules or CandidateThresholds()
-    scales = scales_of(plant, rollouts, rules.scales, model)
+    scales = scales_of(plant, rollouts, rules.scales, models)
     found: list[Candidate] = []
     for j, name in enumerate(plant.joints):
         if name not in still:
@@ -128,12 +128,19 @@ class _OnJoint:
         yield self._make("command_delay", rule.time)
         yield self._make("command_filter", rule.time)
         yield self._make("dropped_commands", rule.dropped)
-        if s.peak[j] > 0:
+        if s.peak[j] > 0 and self._ends_its_body():
             for encoder in (0.0, 1.0):  # on the motor, on the joint
                 steps = (self._twist(encoder), encoder, soft.damping, soft.link_share)
                 yield self._make("series_elasticity", *steps, start=(0.0,) * 4, shape=soft.damping_shape)
                 gap = max(soft.backlash * s.travel[j], soft.least_backlash)
                 yield self._make("backlash", gap, encoder, start=(0.0, 0.0))
+
+    def _ends_its_body(self) -> bool:
+        """Whether no other joint lies between it and its body: behind it alone there is room for a second hinge."""
+        model = self.plant.model
+        joint = int(model.joint(self.name).id)
+        body = int(model.jnt_bodyid[joint])
+        return joint == int(model.body_jntadr[body] + model.body_jntnum[body]) - 1
 
     def _twist(self, encoder: float) -> float:
         """Compliance [rad/(N m)] that matters; a servo that reads the joint behind a soft shaft would swing it up."""

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.simulation import Plant, command_inputs
+from bumblebee.diagnosis.simulation import Plant, command_inputs, plant_servos
 from bumblebee.diagnosis.thresholds.candidates import SignalScales
 from bumblebee.measured.rollout import Rollout
-from bumblebee.sim.servo import servos_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,15 +36,18 @@ class Scales:
 
 
 def scales_of(
-    plant: Plant, rollouts: Sequence[Rollout], rule: SignalScales | None = None, model: mujoco.MjModel | None = None
+    plant: Plant,
+    rollouts: Sequence[Rollout],
+    rule: SignalScales | None = None,
+    models: Sequence[mujoco.MjModel] = (),
 ) -> Scales:
-    """Typical sizes by `model`, or by the declared one; floored for joints that rest."""
-    rule = rule or SignalScales()
-    servos = servos_of(model or plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
-    torques = [
-        servos.torque(r.joint_pos - plant.offset, r.joint_vel, servos.controls(command_inputs(plant, r)))
-        for r in rollouts
-    ]
+    """Typical sizes by `models`, one for each condition, or by the declared ones; floored for joints that rest."""
+    rule, torques = rule or SignalScales(), []
+    every = [plant_servos(plant, model) for model in models or [p.model for p in plant.every]]
+    for r in rollouts:
+        servos = every[plant.under.get(r.rollout_id, 0)]
+        control = servos.controls(command_inputs(plant, r))
+        torques.append(servos.torque(r.joint_pos - plant.offset, r.joint_vel, control))
     rms = np.sqrt(np.mean([(t**2).mean(axis=0) for t in torques], axis=0))
     if (plant.actuator < 0).any():
         rms = np.where(plant.actuator < 0, np.maximum(rms, _bias(plant, rollouts, rule.rows)), rms)

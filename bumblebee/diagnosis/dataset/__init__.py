@@ -1,7 +1,9 @@
 """The logs as they are used: checked and smoothed, divided into fitted and held-out rollouts, with their noise."""
 
+from bumblebee.diagnosis.dataset.held_out import read_held_out, varied
 from bumblebee.diagnosis.dataset.informative_split import informative, window_errors
 from bumblebee.diagnosis.dataset.session import JUDGED_TWICE, Session, make_session, open_session
+from bumblebee.diagnosis.dataset.time_steps import steps_of
 
 __all__ = [
     "JUDGED_TWICE",
@@ -9,5 +11,8 @@ __all__ = [
     "informative",
     "make_session",
     "open_session",
+    "read_held_out",
+    "steps_of",
+    "varied",
     "window_errors",
 ]

@@ -4,7 +4,7 @@ A drive reaches its limit, or loses strength, in few moments of few runs. Where 
 aside, nothing that is fitted can tell of them, however plainly they show. So all rollouts are compared once with the
 declared model, restarted every 0.2 s; a run with windows that are far further off than any of a fitted run is exchanged
 for a fitted one. The runs that are put aside then lack such moments, too: what happens in few windows is judged by
-these (`comparison`'s rule `WhereFelt`). Repeats of one motion stay together.
+these (`comparison`'s rule `WhereFelt`). Repeats of one motion stay together, and what a condition holds out stays out.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ def informative(session: Session, horizon: float) -> Session:
     worst = {i: some for i, some in errors.items() if _alone(names, i)}
     for _ in range(rule.exchanges):
         fitted = [i for i in session.train if i not in session.accept and i in worst]
-        aside = [i for i in worst if i not in fitted]
+        aside = [i for i in worst if i not in fitted and (session.held_out is None or i not in session.holdout)]
         if not fitted or not aside:
             break
         most = max(worst[i][0] for i in fitted)

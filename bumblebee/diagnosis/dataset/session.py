@@ -1,15 +1,16 @@
 """What diagnose, replay and gap share: the data matched with the model, noise, the split, the steps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.dataset.held_out import HeldOut, condition_notes, split_by
 from bumblebee.diagnosis.dataset.noise import estimate_noise
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
-from bumblebee.diagnosis.dataset.split import accepting, split
+from bumblebee.diagnosis.dataset.split import accepting, accepting_across, motion_names, split
 from bumblebee.diagnosis.dataset.time_steps import steps_of
 from bumblebee.diagnosis.dataset.undriven import undriven_warnings
 from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages
@@ -19,7 +20,7 @@ from bumblebee.diagnosis.simulation import (
     fold_dampers,
     layout_of,
     load_spec,
-    make_plant,
+    make_plants,
     refuse_unlogged,
 )
 from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, Usable
@@ -57,14 +58,18 @@ class Session:
     """What must not be overlooked in any report of this model and these rollouts."""
     thresholds: DatasetThresholds = field(default_factory=DatasetThresholds)
     """What the use of its rollouts goes by."""
+    held_out: HeldOut | None = None
+    """The condition by which rollouts are held out; None: by motion."""
 
     def ids(self, which: Sequence[int]) -> list[str]:
         """Rollout ids of indices."""
         return [self.rollouts[i].rollout_id for i in which]
 
 
-def open_session(model: Path, dataset: Path, thresholds: DatasetThresholds | None = None) -> Session:
-    """Read and match a model and a dataset."""
+def open_session(
+    model: Path, dataset: Path, thresholds: DatasetThresholds | None = None, held_out: HeldOut | None = None
+) -> Session:
+    """Read and match a model and a dataset; rollouts are held out by motion, or by the condition `held_out`."""
     rollouts, errors, warnings = [], [], []
     files = rollout_files(dataset)
     if not files:
@@ -78,14 +83,15 @@ def open_session(model: Path, dataset: Path, thresholds: DatasetThresholds | Non
             errors.append((file.stem, error))
             continue
         refused, found = review(rollout, declared, file.name)
-        warnings += found
+        warnings += [line for line in found if "rule gains" not in line]  # a note tells what is simulated instead
         if refused is None:
             rollouts.append(rollout)
         else:
             errors.append((file.stem, refused))
     if not rollouts:
         raise errors[0][1]
-    return make_session(spec, rollouts, model, dataset, errors, warnings, thresholds)
+    session = make_session(spec, rollouts, model, dataset, errors, warnings, thresholds)
+    return session if held_out is None else hold_out(session, held_out)
 
 
 def make_session(
@@ -105,7 +111,9 @@ def make_session(
     rules = thresholds or DatasetThresholds()
     long, failed = _sorted_out(rollouts, dataset, errors, rules.usable)
     spec, folded = fold_dampers(spec)
-    plant = make_plant(spec, long[0], model)
+    plant, unmade = make_plants(spec, long, model)
+    failed += unmade
+    long = [r for r in long if r.rollout_id not in {name for name, _ in unmade}]
     refuse_unlogged(plant, model)
     undriven = tuple(undriven_warnings(plant, long, model))
     has_pos = all(r.base_pos is not None for r in long)
@@ -113,7 +121,11 @@ def make_session(
     train, holdout = split(long, rules.split)
     accept = accepting(long, train, holdout, rules.split)
     notes = [f"set aside: {error}" for _, error in failed] + _check_notes(warnings, rules.usable.warnings)
-    notes += _model_notes(folded, plant.floating and not has_pos) + [JUDGED_TWICE] * bool(set(accept) & set(holdout))
+    notes += (
+        condition_notes(plant, long, rules.conditions)
+        + _model_notes(folded, plant.floating and not has_pos)
+        + [JUDGED_TWICE] * bool(set(accept) & set(holdout))
+    )
     period = float(np.median(np.diff(long[0].time)))
     steps, search_step = steps_of(period, float(spec.option.timestep), plant.model.nv, rules.time_steps)
     sigma = estimate_noise(long, layout, rules.noise)
@@ -124,6 +136,17 @@ def make_session(
     return Session(
         spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, undriven, rules
     )
+
+
+def hold_out(session: Session, held_out: HeldOut) -> Session:
+    """The session with the rollouts of some conditions held out; those that are left decide on acceptance, too."""
+    train, holdout = split_by(session.rollouts, held_out)
+    fitted = [session.rollouts[i] for i in train]
+    stated = [(session.plant.under.get(r.rollout_id, 0), held_out.of(r)) for r in fitted]
+    rule = session.thresholds.split
+    accept = [train[k] for k in accepting_across(motion_names(fitted, rule), stated, rule)]
+    notes = [held_out.note(), *(note for note in session.notes if note != JUDGED_TWICE)]
+    return replace(session, train=train, holdout=holdout, accept=accept, notes=notes, held_out=held_out)
 
 
 def _sorted_out(

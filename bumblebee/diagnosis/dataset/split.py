@@ -48,6 +48,32 @@ def accepting(rollouts: Sequence[Rollout], train: Sequence[int], holdout: Sequen
     return [train[k] for k in some]
 
 
+def accepting_across(motions: Sequence[str], conditions: Sequence[object], rule: Split) -> list[int]:
+    """Rollouts to decide on where the same motions were recorded under several conditions: every fourth pair of both.
+
+    The pairs are taken from as many motions and conditions as they go, so that what is decided by is neither one
+    motion's nor one condition's, and every motion and condition stays in the fit as far as it can. Of a
+    single motion every fourth rollout is taken.
+    """
+    if len(set(motions)) == 1:
+        motions = [f"{i:06d}" for i in range(len(motions))]
+    groups: dict[tuple[str, str], list[int]] = {}
+    for i, key in enumerate(zip(motions, map(str, conditions), strict=True)):
+        groups.setdefault(key, []).append(i)
+    left = sorted(groups)
+    if len(left) < 2:
+        return []
+    count = -(-len(left) // min(rule.every, len(left)))
+    usual = np.unique(np.linspace(min(rule.every, len(left)) - 1, len(left) - 1, count).round().astype(int))
+    taken: list[tuple[str, str]] = []
+    for place in usual:
+        used = [sum(key[part] == other[part] for other in taken for part in (0, 1)) for key in left]
+        order = [(n, abs(k - place)) for k, n in enumerate(used)]
+        order = [(len(left), 0) if key in taken else one for key, one in zip(left, order, strict=True)]
+        taken.append(left[order.index(min(order))])
+    return sorted(i for key in taken for i in groups[key])
+
+
 def split(rollouts: Sequence[Rollout], rule: Split) -> tuple[list[int], list[int]]:
     """Indices to fit and to hold out: of each cluster's motions every fourth, with all their repeats.
 

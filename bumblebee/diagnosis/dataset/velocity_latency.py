@@ -5,9 +5,9 @@ too slow where the joint speeds up, and what that does grows with the horizon: 4
 a joint accelerates by 12 rad/s^2. Over a span the integral of velocities of age e is less than the way made by e times
 the change of velocity; the change that the positions show is the instrument, so that noise of the velocities makes the
 age no smaller. A simulation that moves its positions by the new velocities has them half a step apart: that much, at
-steps of a millisecond, is no age. Logs of position targets are left as they are: a servo answers a new target within
-the period, and a joint that speeds up at its beginning goes further than the velocities at the ticks say, which would
-pass for an age.
+steps of a millisecond, is no age. In logs of position targets a servo answers a new target within the
+period, and a joint that speeds up at its beginning goes further than the velocities at the ticks say, which passes for
+an age of up to half a period: there only ages of more than a period count.
 """
 
 from collections.abc import Sequence
@@ -20,18 +20,16 @@ from bumblebee.measured.rollout import Rollout
 
 
 def velocity_ages(rollouts: Sequence[Rollout], rule: VelocityLatency) -> np.ndarray:
-    """Ages (J,) [s] of the logged joint velocities against the positions; 0 where none is beyond doubt.
-
-    Also where any log is of position targets.
-    """
+    """Ages (J,) [s] of the logged joint velocities against the positions; 0 where none is beyond doubt."""
     joints = len(rollouts[0].joints)
     ages, sure = np.zeros(joints), np.zeros(joints, dtype=bool)
-    if any(rollout.joint_target is not None for rollout in rollouts):
-        return ages
+    aimed = any(rollout.joint_target is not None for rollout in rollouts)
+    period = max(float(np.median(np.diff(rollout.time))) for rollout in rollouts)
+    least = rule.least + (rule.periods * period if aimed else 0.0)
     for _ in range(rule.rounds):
         found, error = _ages([in_step(r, ages) for r in rollouts], rule)
         ages = ages + found
-        sure = np.abs(ages) - rule.least > rule.doubt * error
+        sure = np.abs(ages) - least > rule.doubt * error
         ages = np.where(np.abs(ages) <= rule.most, ages, 0.0)
     return np.where(sure, ages, 0.0)
 

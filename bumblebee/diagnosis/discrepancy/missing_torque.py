@@ -11,7 +11,7 @@ from bumblebee.diagnosis.discrepancy.torque_scores import Evidence, joint_answer
 from bumblebee.diagnosis.estimation import Fit, project, solve
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.sensitivities import answers_of, pulse_sizes
-from bumblebee.diagnosis.simulation import Variation, vary
+from bumblebee.diagnosis.simulation import vary
 from bumblebee.sim.effects import Effect
 
 
@@ -43,16 +43,13 @@ class Scene:
         """From the answers to pulses on the joints; the declared model's where effects change the layout."""
         problem, plant, windows = self.problem, self.problem.plant, self.problem.windows
         variation = vary(plant, self.effects)
-        if variation.plant is None:
-            variation = Variation(variation.model, variation.delay, variation.offset, setpoints=variation.setpoints)
-        else:
-            variation = vary(plant, [])
+        variation = variation.bare if variation.plant is None else vary(plant, [])
         only = plant.dof if self.joints is None else plant.dof[list(self.joints)]
         sizes, segments = pulse_sizes(problem, self.torque), problem.thresholds.sensitivities.impulses.segments
         answers = answers_of(plant, problem.layout, windows, variation, problem.coarse, sizes, only, segments)
         white = joint_answers(problem, answers)
         evidence = make_evidence(problem, white, self.residual, self.columns, self.weights)
-        return evidence, quantities(plant, windows, answers.path, variation.model, problem.thresholds.discrepancy)
+        return evidence, quantities(plant, windows, answers.path, variation.models, problem.thresholds.discrepancy)
 
     @property
     def evidence(self) -> Evidence:

@@ -5,17 +5,16 @@ joint has done before the window comes from the log: how long it has rested, whe
 where the joint stands in a play.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.sensitivities import Path
-from bumblebee.diagnosis.simulation import Plant, Windows, at_starts, state_before
+from bumblebee.diagnosis.simulation import Plant, Windows, at_starts, state_before, window_servos
 from bumblebee.diagnosis.thresholds.discrepancy import DiscrepancyThresholds
 from bumblebee.sim.effects import State, Term
-from bumblebee.sim.servo import servos_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +61,7 @@ class Quantities:
     def _torque(self, term: Term, joint: int) -> np.ndarray:
         value = np.broadcast_to(term(self.values(joint)), self.t.shape)
         if term.drives:
-            value = np.where(np.abs(self.tau[..., joint]) < self.limit[joint], value, 0.0)
+            value = np.where(np.abs(self.tau[..., joint]) < self.limit[..., joint], value, 0.0)
         return self.path.mean(value * self.against(joint) if term.rubs else value)
 
     def against(self, joint: int) -> np.ndarray:
@@ -110,10 +109,14 @@ class _Values(Mapping[str, np.ndarray]):
 
 
 def quantities(
-    plant: Plant, windows: Windows, path: Path, model: mujoco.MjModel, thresholds: DiscrepancyThresholds
+    plant: Plant,
+    windows: Windows,
+    path: Path,
+    models: Sequence[mujoco.MjModel],
+    thresholds: DiscrepancyThresholds,
 ) -> Quantities:
-    """From the paths of windows under `model`'s servos."""
-    servos = servos_of(model, [int(plant.model.joint(name).id) for name in plant.joints])
+    """From the paths of windows under the servos of `models`, one for each condition."""
+    servos = window_servos(plant, windows, models)
     q, v = path.qpos[:, :-1, plant.qpos], path.qvel[:, :-1, plant.dof]
     control = servos.controls(path.control)
     clock = at_starts(windows, lambda r: r.time - r.time[0])

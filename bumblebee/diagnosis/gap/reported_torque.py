@@ -5,14 +5,12 @@ torque is the drive's (gain, delay, limit); what is wrong although the torque is
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from bumblebee.diagnosis.simulation import Plant, command_inputs
+from bumblebee.diagnosis.simulation import Plant, command_inputs, plant_servos
 from bumblebee.diagnosis.thresholds.gap import ReportedTorque
 from bumblebee.measured.rollout import Rollout
-from bumblebee.sim.servo import servos_of
 
 
 def reported_torque(
@@ -26,16 +24,13 @@ def reported_torque(
     some = [r for r in rollouts if r.joint_torque is not None and r.frames >= rule.fewest]
     if not some:
         return {}
-    servos = servos_of(plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
     period = float(np.median([np.median(np.diff(r.time)) for r in some]))
     shifts = np.arange(0, max(1, int(rule.latest / period)) + 1)
     out = {}
     for j, name in enumerate(plant.joints):
         if plant.actuator[j] < 0:
             continue
-        best = max(
-            (_fit(_pairs(plant, servos, some, j, int(k))) | {"delay": float(k * period)} for k in shifts), key=_tie
-        )
+        best = max((_fit(_pairs(plant, some, j, int(k))) | {"delay": float(k * period)} for k in shifts), key=_tie)
         if np.isfinite(best["correlation"]):
             out[name] = best
     return out
@@ -45,10 +40,11 @@ def _tie(entry: dict[str, float]) -> float:
     return entry["correlation"] if np.isfinite(entry["correlation"]) else -2.0
 
 
-def _pairs(plant: Plant, servos: Any, rollouts: Sequence[Rollout], joint: int, shift: int) -> tuple[np.ndarray, ...]:
+def _pairs(plant: Plant, rollouts: Sequence[Rollout], joint: int, shift: int) -> tuple[np.ndarray, ...]:
     """The model's torque, `shift` rows earlier, and the reported one."""
     model, reported = [], []
     for r in rollouts:
+        servos = plant_servos(plant.of(r))
         control = servos.controls(command_inputs(plant, r))
         torque = servos.torque(r.joint_pos - plant.offset, r.joint_vel, control)[:, joint]
         model.append(torque[: len(torque) - shift])

@@ -20,13 +20,14 @@ from bumblebee.diagnosis.simulation import (
     command_inputs,
     cut,
     declared_values,
+    plant_servos,
     residuals,
     vary,
 )
 from bumblebee.diagnosis.thresholds.gap import MissingTorque
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect, single
-from bumblebee.sim.servo import Servos, servos_of
+from bumblebee.sim.servo import Servos
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,11 +176,11 @@ def _described(
     """The windows with what the missing torque (N, J) may depend on."""
     plant, rollouts = session.plant, session.rollouts
     used = {s[0] for s in starts}
-    servos = servos_of(plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
-    controls = {i: servos.controls(command_inputs(plant, rollouts[i])) for i in used}
+    servos = {i: plant_servos(plant.of(rollouts[i])) for i in used}
+    controls = {i: servos[i].controls(command_inputs(plant, rollouts[i])) for i in used}
     travel = np.max([np.ptp(rollouts[i].joint_pos, axis=0) for i in used], axis=0)
     past = {i: _backlash_states(rollouts[i].joint_pos, travel, rule.backlash) for i in used}
-    rows = [_row(rollouts[i], k, last, servos, controls[i]) | {"history": past[i][k - 1]} for i, k, last in starts]
+    rows = [_row(rollouts[i], k, last, servos[i], controls[i]) | {"history": past[i][k - 1]} for i, k, last in starts]
     tables = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     times = [_middle(rollouts[i], k, last) for i, k, last in starts]
     spans = [float(rollouts[i].time[last + 1] - rollouts[i].time[k - 1]) for i, k, last in starts]

@@ -5,6 +5,7 @@ Measured curves: the mean of a joint's missing torque over one quantity, in equa
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.stats import norm
 from bumblebee.diagnosis.candidates import Formula
 from bumblebee.diagnosis.discrepancy import BasisFunction, Discovery, JointLackOfFit, quantities_of
 from bumblebee.diagnosis.simulation import joint_units
-from bumblebee.diagnosis.thresholds.report import MeasuredCurve, Unexplained
+from bumblebee.diagnosis.thresholds.report import MeasuredCurve, ReportThresholds
 
 NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
 _NOWHERE = "no single joint has a significant residual torque, but the reduced chi-square is {:.2f}"
@@ -46,11 +47,11 @@ def discovered_entry(
     }
 
 
-def unexplained(found: Discovery, rule: Unexplained) -> dict[str, Any]:
+def unexplained(found: Discovery, rules: ReportThresholds) -> dict[str, Any]:
     """The contract's `unexplained`: what is left with all effects in force."""
     left, whole = sorted((j for j in found.left.joints if j.significant), key=lambda j: -j.excess), found.left.whole
     p = min((j.p for j in found.left.joints), default=1.0)
-    said = _described(left, found.unconfirmed, joint_units(found.problem.plant), rule.joints)
+    said = _described(left, found, rules)
     if whole.significant and not left:
         said = _NOWHERE.format(whole.reduced_chi_square)
     return {
@@ -67,16 +68,17 @@ def _depends_on(left: JointLackOfFit, forms: Mapping[str, Mapping[str, float]]) 
     return tuple(dict.fromkeys((*quantities_of(tuple(forms.get(left.joint, ()))), *left.depends_on)))
 
 
-def _described(
-    left: Sequence[JointLackOfFit],
-    forms: Mapping[str, Mapping[str, float]],
-    units: Mapping[str, Mapping[str, str]],
-    most: int,
-) -> str:
-    """One sentence a joint, of `most` joints: how much is left, on what it depends, and a form that was not kept."""
-    lines = []
-    for j in left[:most]:
-        on = ", ".join(_depends_on(j, forms)) or "no single quantity"
+def _described(left: Sequence[JointLackOfFit], found: Discovery, rules: ReportThresholds) -> str:
+    """One sentence a joint: its share of what is left, on what it depends, and a form that was not kept.
+
+    Of `Unexplained.joints` joints that explain enough to be proclaimed; the others are listed.
+    """
+    lines, forms, units = [], found.unconfirmed, joint_units(found.problem.plant)
+    shares = {j.joint: explained_share(found, j).whole for j in left}
+    told = sorted((j for j in left if shares[j.joint] >= rules.matters.structure), key=lambda j: -shares[j.joint])
+    told, slight = told[: rules.unexplained.joints], len(left) - len(told)
+    for j in told:
+        on = _cut(_depends_on(j, forms), rules.matters.quantities) or "no single quantity"
         line = f"{j.joint}: residual torque depends on {on}"
         if j.functions:
             share = 100 * j.rms / max(j.typical, 1e-12)
@@ -87,10 +89,50 @@ def _described(
             terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in forms[j.joint].items())
             terms = _TABLE.sub(r"\1(\2, ...)", terms)
             line += f"; approximately {terms}, not confirmed on validation windows"
-        lines.append(line)
-    if len(left) > most:
-        lines.append(f"and {len(left) - most} joints more")
+        lines.append(f"{line}; {100 * shares[j.joint]:.0f} % of what is left")
+    if more := len(left) - len(told) - slight:
+        lines.append(f"and {more} joints more")
+    if slight:
+        below = f"each less than {100 * rules.matters.structure:.0f} % of what is left"
+        lines.append(f"{slight} {'joint' if slight == 1 else 'joints'}{' more' if lines else ''} with {below}")
     return "; ".join(lines)
+
+
+def _cut(names: Sequence[str], most: int) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+@dataclass(frozen=True)
+class ExplainedShare:
+    """Of what is left above the noise, in chi-square, on windows that took no part where there are any."""
+
+    whole: float
+    """By the joint's laws together; without any, by a torque of its own in every fifth of every window, at most."""
+    laws: tuple[float, ...]
+    """By each law, the earlier ones taken out."""
+
+
+def explained_share(found: Discovery, joint: JointLackOfFit) -> ExplainedShare:
+    """What a joint's missing torque explains of what is left."""
+    scene = found.left.validation or found.left.scene
+    excess = max(float((scene.left**2).sum() - scene.left.size), 1e-12)
+    place = found.problem.plant.joints.index(joint.joint)
+    if not joint.functions:
+        value, count = scene.evidence.chi_square(place)
+        return ExplainedShare(_share((value - count) / excess), ())
+    left, shares = scene.left, []
+    for function, size in joint.functions:
+        moved = scene.evidence.column(place, function.torque(scene.data, place))
+        after = left - np.tensordot(size, moved, axes=1)
+        shares.append(float(((left**2).sum() - (after**2).sum()) / excess))
+        left = after
+    return ExplainedShare(_share(sum(shares)), tuple(map(_share, shares)))
+
+
+def _share(value: float) -> float:
+    """Between 0 and 1; nothing where a window's residual is no number."""
+    return float(np.clip(np.nan_to_num(value, nan=0.0), 0.0, 1.0))
 
 
 def structure_table(found: Discovery, rule: MeasuredCurve) -> dict[str, dict[str, Any]]:
@@ -105,8 +147,18 @@ def structure_table(found: Discovery, rule: MeasuredCurve) -> dict[str, dict[str
             "depends_on": list(j.depends_on),
             "laws": [_law(function, size) for function, size in j.functions],
         }
-        | ({"curves": _curves(found, index, rule)} if j.significant else {})
+        | (_told(found, j) | {"curves": _curves(found, index, rule)} if j.significant else {})
         for index, j in enumerate(found.left.joints)
+    }
+
+
+def _told(found: Discovery, joint: JointLackOfFit) -> dict[str, Any]:
+    """How much of what is left a joint's torque explains, and each of its laws with its quantities."""
+    share = explained_share(found, joint)
+    return {
+        "explains": share.whole,
+        "law_shares": list(share.laws),
+        "law_quantities": [list(function.on) for function, _ in joint.functions],
     }
 
 

@@ -5,12 +5,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.dataset import Session, varied
 from bumblebee.diagnosis.discrepancy import Discovery
 from bumblebee.diagnosis.prepare import Material
 from bumblebee.diagnosis.report.discrepancy_entries import NOT_TESTED, structure_table, unexplained
 from bumblebee.diagnosis.report.notes import LONE, factor_notes, latency_notes, unexplained_error
-from bumblebee.diagnosis.report.prediction_error import error_block, floor_block, horizon_whiteners, horizon_windows
+from bumblebee.diagnosis.report.prediction_error import (
+    block_of,
+    floor_block,
+    horizon_whiteners,
+    horizon_windows,
+    window_residuals,
+)
+from bumblebee.diagnosis.report.removed_error import Ends
+from bumblebee.diagnosis.report.what_matters import what_matters
 from bumblebee.diagnosis.residuals import NAMES
 from bumblebee.diagnosis.selection import Refined, Search, detectable
 from bumblebee.diagnosis.simulation import joint_units, mixed_notes, vary
@@ -40,15 +48,17 @@ def document(
 ) -> dict[str, Any]:
     """Which rollouts took which part, the effects, the error with them, what is left and what to know."""
     session, rules = material.session, config.thresholds.report
+    errors, ends = _errors(session, findings.effects, config)
     told = (
         {"schema": 1, "train": session.ids(session.train)}
         | {"holdout": session.ids(session.holdout), "accept": session.ids(session.accept)}
+        | _recorded_under(session)
         | {"effects": list(findings.entries)}
-        | {"unexplained": NOT_TESTED if beyond is None else unexplained(beyond, rules.unexplained)}
+        | {"unexplained": NOT_TESTED if beyond is None else unexplained(beyond, rules)}
         | ({} if beyond is None else {"structure": structure_table(beyond, rules.measured_curve)})
         | {
             "units": joint_units(session.plant),
-            "error": _errors(session, findings.effects, config),
+            "error": errors,
             "unidentifiable": [{"where": [name], "why": _STILL} for name in material.still],
             "smallest_detectable": detectable(found),
             "set_aside": session.set_aside,
@@ -57,7 +67,15 @@ def document(
         }
     )
     lone = [] if session.holdout else [LONE]
+    told["summary"] = what_matters(told, ends, rules.matters, config.seed)
     return told | {"warnings": [*session.warnings, *lone, *unexplained_error(told, rules.verdicts)]}
+
+
+def _recorded_under(session: Session) -> dict[str, Any]:
+    """By what rollouts were held out, if by a condition; and which conditions were not the same for all."""
+    entry = {} if session.held_out is None else {"split": session.held_out.entry()}
+    conditions = varied(session.rollouts)
+    return entry | ({"conditions": conditions} if conditions else {})
 
 
 def _notes(session: Session, findings: Findings, rule: Verdicts) -> list[str]:
@@ -93,15 +111,19 @@ def _driven(session: Session) -> list[str]:
     return [name for name, a in zip(session.plant.joints, session.plant.actuator, strict=True) if a >= 0]
 
 
-def _errors(session: Session, effects: Sequence[Effect], config: DiagnosisConfig) -> dict[str, Any]:
-    """The contract's block: of the declared and of the corrected model, and what sensor noise alone leaves."""
+def _errors(session: Session, effects: Sequence[Effect], config: DiagnosisConfig) -> tuple[dict[str, Any], Ends]:
+    """The contract's block: of the declared and of the corrected model, and what sensor noise alone leaves.
+
+    Beside it the residuals of both.
+    """
     ids = session.holdout or session.train
     cuts = horizon_windows(session, ids, config.report_windows, config.thresholds.report.prediction_error)
     before, after = vary(session.plant, []), vary(session.plant, effects)
     whiteners = horizon_whiteners(cuts, after, session.sigma, session.steps[1], config.seed)
     fine = session.steps[0]
+    ends = Ends(cuts, window_residuals(cuts, before, fine), window_residuals(cuts, after, fine))
     return {
-        "before": error_block(cuts, whiteners, before, fine, config.seed),
-        "after": error_block(cuts, whiteners, after, fine, config.seed),
+        "before": block_of(cuts, whiteners, ends.before, config.seed),
+        "after": block_of(cuts, whiteners, ends.after, config.seed),
         "floor": floor_block(cuts, whiteners, session.sigma, config.seed),
-    }
+    }, ends

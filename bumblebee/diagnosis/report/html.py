@@ -9,11 +9,14 @@ from bumblebee.diagnosis.simulation import rows as rows_of
 
 _STYLE = """:root{color-scheme:light}body{font:15px/1.55 system-ui,-apple-system,'Segoe UI',sans-serif;max-width:62rem;
 margin:2.2rem auto;padding:0 1.2rem;color:#1d2430;background:#fff}h1{font-size:1.7rem;margin:0 0 .3rem}
-h2{font-size:1.15rem;margin:2rem 0 .4rem}p{margin:.4rem 0}.lead{font-size:1.08rem;max-width:52rem}
+h2{font-size:1.15rem;margin:2rem 0 .4rem}h3{font-size:.98rem;margin:1.1rem 0 .2rem}
+p{margin:.4rem 0}.lead{font-size:1.08rem;max-width:52rem}.first,.strong{font-weight:600}
 .scroll{overflow-x:auto}table{border-collapse:collapse;margin:.5rem 0;font-size:.9rem}
 td,th{padding:.28rem .7rem .28rem 0;border-bottom:1px solid #e4e7ee;text-align:left;vertical-align:top}
 td:first-child{white-space:nowrap}
 th{color:#6b7385;font-weight:500}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
+.place{display:inline-block;white-space:normal;max-width:10.5rem}td.group{padding-top:1rem;font-weight:600}
+td.group span{display:inline-block;white-space:normal;max-width:min(84vw,52rem)}
 .note{color:#6b7385;font-size:.86rem}.warn{border-left:4px solid #c8553d;background:#fbeeea;padding:.5rem .9rem;
 margin:.8rem 0}
 .share{white-space:nowrap}.bar{display:inline-block;height:.6rem;background:#1b8a6b;border-radius:2px;vertical-align:middle;margin-right:.4rem}
@@ -35,13 +38,17 @@ def html_page(title: str, parts: Sequence[str]) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """A table of ready-made cells; the columns `numbers` are set flush right."""
+    """A table of ready-made cells; the columns `numbers` are set flush right, a row of one cell is a title."""
     kinds = [" class='n'" if k in numbers else "" for k in range(len(head))]
     top = "".join(f"<th{kind}>{h}</th>" for h, kind in zip(head, kinds, strict=True))
-    body = "".join(
-        "<tr>" + "".join(f"<td{kind}>{c}</td>" for c, kind in zip(row, kinds, strict=True)) + "</tr>" for row in rows
-    )
+    body = "".join(f"<tr>{_cells(row, kinds)}</tr>" for row in rows)
     return f"<div class='scroll'><table><tr>{top}</tr>{body}</table></div>"
+
+
+def _cells(row: Sequence[str], kinds: Sequence[str]) -> str:
+    if len(row) == 1 < len(kinds):
+        return f"<td class='group' colspan='{len(kinds)}'><span>{row[0]}</span></td>"
+    return "".join(f"<td{kind}>{cell}</td>" for cell, kind in zip(row, kinds, strict=True))
 
 
 def figure(picture: str, caption: str) -> str:

@@ -157,28 +157,6 @@ def what_is_left(document: Mapping[str, Any], rule: Verdicts) -> str:
     return "no significant structure in the residual"
 
 
-def beside_noise(after: Mapping[str, Any], noise: Mapping[str, Any], unit: str, scale: float) -> str:
-    """How an error compares with what sensor noise alone leaves, in words; empty where that is not known.
-
-    Noise alone leaves an error that is drawn anew with every window: a complete model's lies at the expected value, now
-    above it and now below. An error below it is therefore no better than one at it.
-
-    Args:
-        after: `value` and `ci95` of the error.
-        noise: the same of the block `floor`.
-        unit: of what is printed.
-        scale: from SI to it.
-    """
-    value, floor = after.get("value"), noise.get("value")
-    if value is None or not floor:
-        return ""
-    ends = f" [{scale * noise['ci95'][0]:.3g}, {scale * noise['ci95'][1]:.3g}]" if noise.get("ci95") else ""
-    expected = f"{scale * floor:.3g}{ends} {unit}"
-    if value <= floor:
-        return f"at the noise floor: the error of a complete model scatters about {expected}"
-    return f"noise floor {expected}"
-
-
 def nothing_seen(document: Mapping[str, Any], joint: str, rule: Verdicts) -> str:
     """What to say of a joint whose missing torque has no structure: no comfort where it errs by much."""
     horizon = told_horizon(document["error"])

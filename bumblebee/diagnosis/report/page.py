@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+from bumblebee.diagnosis.report.headline import effect_groups, experiments, headline
 from bumblebee.diagnosis.report.html import error_rows, figure, html_page, items, number, probability, table, warning
-from bumblebee.diagnosis.report.notes import beside_noise, told_horizon, unexplained_error, what_is_left, worse_horizons
+from bumblebee.diagnosis.report.left_table import what_is_left_table
+from bumblebee.diagnosis.report.notes import unexplained_error, what_is_left, worse_horizons
 from bumblebee.diagnosis.report.svg import NAMES, curve_picture, line_picture
-from bumblebee.diagnosis.simulation import named, of_joint, pick, position_rows
+from bumblebee.diagnosis.simulation import named, of_joint
 from bumblebee.diagnosis.thresholds.report import ReportThresholds, Verdicts
 
 
@@ -19,12 +21,13 @@ def render_report(
     bad = worse_horizons(document["error"], rules.verdicts)
     parts = [
         "<h1>What the model lacks</h1>",
-        f"<p class='lead'>{_lead(document, rules)}</p>",
+        *_opening(document, rules),
         *[warning(text) for text in [*document.get("warnings", []), *bad]],
         *[warning(f"{a['rollout']} was set aside: {a['reason']}") for a in document.get("set_aside", [])],
         *_pictures(examples),
+        what_is_left_table(document),
         "<h2>Effects</h2>",
-        _effects(document["effects"]),
+        _effects(document, rules),
         f"<h2>Prediction error on {'held-out rollouts' if held else 'the fitted rollout'}</h2>",
         error_rows({name: document["error"][k] for k, name in NAMES.items() if k in document["error"]}),
         "<h2>Error by joint</h2>",
@@ -38,33 +41,15 @@ def render_report(
     return html_page("Diagnosis", parts)
 
 
-def _lead(document: dict[str, Any], rules: ReportThresholds) -> str:
-    most, effects, error = rules.listing.effects, document["effects"], document["error"]
-    if effects:
-        names = [
-            f"<b>{escape(e['effect'])}</b> on {escape(', '.join(e['where']) or 'the whole robot')}" for e in effects
-        ]
-        more = f" and {len(names) - most} more" if len(names) > most else ""
-        text = f"{len(effects)} effect{'s' if len(effects) > 1 else ''}: {'; '.join(names[:most])}{more}."
-    elif far := unexplained_error(document, rules.verdicts):
-        return escape(" ".join(far))
-    else:
-        return "No effect of the catalogue is missing, as far as these data can tell."
-    horizon = told_horizon(error["before"])
-    if horizon is None:
-        return text
-    where = "held-out RMS error" if document["holdout"] else "RMS error on the fitted rollout"
-    said = []
-    for what, unit, scale, key in position_rows(error["before"][horizon]):
-        before, after, floor = (pick(error[k].get(horizon, {}), key) for k in ("before", "after", "floor"))
-        if before.get("value") and after.get("value"):
-            noise = beside_noise(after, floor, unit, scale)
-            goes = "falls" if after["value"] < before["value"] else "goes"
-            said.append(
-                f" After {horizon} s the {where} of the {what} {goes} from {number(scale * before['value'])} to "
-                f"{number(scale * after['value'])} {unit}{f' ({noise})' if noise else ''}."
-            )
-    return text + "".join(said)
+def _opening(document: dict[str, Any], rules: ReportThresholds) -> list[str]:
+    """What is gone, what is left, what to trust; where nothing was found, first that."""
+    lines = headline(document, rules)
+    if not document["effects"]:
+        far = unexplained_error(document, rules.verdicts)
+        nothing = "No effect of the catalogue is missing, as far as these data can tell."
+        lines = [" ".join(far), *lines] if far else [nothing]
+    kinds = ["lead first", *["lead"] * len(lines)]
+    return [f"<p class='{kind}'>{escape(line)}</p>" for kind, line in zip(kinds, lines, strict=False)]
 
 
 def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
@@ -85,32 +70,38 @@ def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
     return parts
 
 
-def _effects(effects: Sequence[dict[str, Any]]) -> str:
-    if not effects:
+def _effects(document: dict[str, Any], rules: ReportThresholds) -> str:
+    """The effects under what may be read from them."""
+    groups = effect_groups(document, rules.matters)
+    if not groups:
         return "<p>None.</p>"
-    rows = []
-    for e in effects:
-        place = escape(", ".join(e["where"]) or "whole robot")
-        share = 100 * e["explains"]
-        bar = f"<span class='share'><span class='bar' style='width:{0.04 * share:.2f}rem'></span>{share:.0f} %</span>"
-        values, declared = _values(e)
-        rows.append(
-            [
-                f"<b>{escape(e['effect'])}</b>",
-                place,
-                f"<span class='values'>{values}</span>",
-                declared,
-                bar,
-                probability(e["evidence"]["p"]),
-                _same(e),
-            ]
-        )
-    head = ["effect", "where", "value [95 % interval]", "declared", "explains", "p", "not distinguishable from"]
+    titled, rows = bool(document.get("summary")), []
+    for title, effects in groups:
+        rows += [*([[escape(title)]] if titled else []), *(_effect(e) for e in effects)]
+    head = ["effect", "explains", "value [95 % interval]", "declared", "p", "not distinguishable from"]
     text = (
         "<p class='note'>explains: share of the excess chi-square over the best fit that returns when this effect "
         "alone is removed. p: see diagnosis.json for the test.</p>"
     )
-    return table(head, rows, (5,)) + text
+    asked = experiments(document["effects"])
+    told = f"<h3>To distinguish what is alike</h3>{items(asked)}" if asked else ""
+    return table(head, rows, (4,)) + text + told
+
+
+def _effect(e: dict[str, Any]) -> list[str]:
+    place, share = escape(", ".join(e["where"]) or "whole robot"), 100 * e["explains"]
+    bar = f"<span class='share'><span class='bar' style='width:{0.04 * share:.2f}rem'></span>{share:.0f} %</span>"
+    values, declared = _values(e)
+    wide = "<br><span class='note'>size uncertain</span>" if e.get("wide") else ""
+    name = f"<b>{escape(e['effect'])}</b><br><span class='place'>{place}</span>"
+    return [
+        name,
+        bar,
+        f"<span class='values'>{values}{wide}</span>",
+        declared,
+        probability(e["evidence"]["p"]),
+        _same(e),
+    ]
 
 
 def _values(effect: dict[str, Any]) -> tuple[str, str]:
@@ -140,10 +131,12 @@ def _with_ends(value: float, ends: Sequence[float | None] | None) -> str:
 
 
 def _same(effect: dict[str, Any]) -> str:
-    same = [f"{s['effect']} ({', '.join(s['where']) or 'whole'})" for s in effect["equivalent"]]
-    text = escape(", ".join(same)) or "-"
-    advice = "; ".join(effect.get("separate_by", []))
-    return text + (f"<br><span class='note'>to distinguish them: {escape(advice)}</span>" if advice else "")
+    """Effects that look alike; with their place where it is another."""
+    names = []
+    for other in effect["equivalent"]:
+        place = "" if other["where"] == effect["where"] else f" ({', '.join(other['where']) or 'whole'})"
+        names.append(f"{other['effect']}{place}")
+    return escape(", ".join(names)) or "-"
 
 
 def _joints(document: dict[str, Any], rule: Verdicts) -> str:

@@ -45,6 +45,9 @@ class HorizonWindows:
 Whiteners = dict[str, tuple[np.ndarray, Whitener]]
 """For every horizon some of its windows (indices) and their whitener."""
 
+Residuals = dict[str, np.ndarray]
+"""For every horizon what is measured less what is simulated, see `window_residuals`."""
+
 
 def horizon_windows(
     session: Session, ids: Sequence[int], budget: int, rule: PredictionError | None = None
@@ -72,15 +75,25 @@ def horizon_whiteners(
     return found
 
 
+def window_residuals(cuts: HorizonWindows, variation: Variation, step: float) -> Residuals:
+    """Horizon -> (W, 1, D) measured - simulated at the end of every window; NaN where a simulation diverged."""
+    return {name: residuals(cuts.plant, cuts.layout, part, [variation], step)[0] for name, part in cuts.windows.items()}
+
+
 def error_block(
     cuts: HorizonWindows, whiteners: Whiteners, variation: Variation, step: float, seed: int = 0
 ) -> dict[str, Any]:
     """`before` or `after`: horizon -> measure -> value, ci95 and, for joints, per_joint."""
+    return block_of(cuts, whiteners, window_residuals(cuts, variation, step), seed)
+
+
+def block_of(cuts: HorizonWindows, whiteners: Whiteners, ends: Residuals, seed: int = 0) -> dict[str, Any]:
+    """The same of residuals that are there already."""
     rng = np.random.default_rng(seed)
     block = {}
     for name, part in cuts.windows.items():
         keep, whitener = whiteners[name]
-        raw = residuals(cuts.plant, cuts.layout, part, [variation], step)[0]
+        raw = ends[name]
         good = np.isfinite(raw).all(axis=(1, 2))
         chi = (whitener(raw[keep]) ** 2).mean(axis=1)[good[keep]]
         chi_groups = part.rollout[keep][good[keep]]
@@ -116,16 +129,16 @@ def _measures(
     (error, groups), draws, out = errors, cuts.rule.resamples, {}
     for name in ("joint_pos", "joint_vel"):
         squares = error[:, cuts.layout.slices[name]] ** 2
-        whole = _with_interval(squares.mean(axis=1), groups, rng, draws)
+        whole = with_interval(squares.mean(axis=1), groups, rng, draws)
         whole |= _by_kind(cuts, name, squares, groups)
         joints = enumerate(cuts.plant.joints)
-        whole["per_joint"] = {joint: _with_interval(squares[:, j], groups, rng, draws) for j, joint in joints}
+        whole["per_joint"] = {joint: with_interval(squares[:, j], groups, rng, draws) for j, joint in joints}
         out[f"{name}_rmse"] = whole
     for name in ("base_pos", "base_rot"):
         if name in cuts.layout.slices:
             squares = (error[:, cuts.layout.slices[name]] ** 2).sum(axis=1)
-            out[f"{name}_rmse"] = _with_interval(squares, groups, rng, draws)
-    out["chi2"] = _with_interval(*chi, rng, draws, root=False)
+            out[f"{name}_rmse"] = with_interval(squares, groups, rng, draws)
+    out["chi2"] = with_interval(*chi, rng, draws, root=False)
     return out
 
 
@@ -137,28 +150,36 @@ def _by_kind(cuts: HorizonWindows, name: str, squares: np.ndarray, groups: np.nd
         return {"unit": next(iter(units.values()))}
     rng = np.random.default_rng(0)
     apart = {
-        kind: _with_interval(squares[:, columns].mean(axis=1), groups, rng, cuts.rule.resamples) | {"unit": units[kind]}
+        kind: with_interval(squares[:, columns].mean(axis=1), groups, rng, cuts.rule.resamples) | {"unit": units[kind]}
         for kind, columns in kinds.items()
     }
     return {"unit": f"{units['hinge']}, 1 {units['slide']} as 1 {units['hinge']}", "by_kind": apart}
 
 
-def _with_interval(
+def with_interval(
     values: np.ndarray, groups: np.ndarray, rng: np.random.Generator, resamples: int, root: bool = True
 ) -> dict[str, Any]:
     """Mean (or its root) of per-window values and its 95 % bootstrap interval over rollouts; None with one rollout."""
-    names, index = np.unique(groups, return_inverse=True)
+    _, index = np.unique(groups, return_inverse=True)
     sums, counts = np.bincount(index, values), np.bincount(index).astype(float)
     if not len(values):
         return {"value": None, "ci95": None}
     mean = float(sums.sum() / counts.sum())
     finish = np.sqrt if root else np.asarray
-    if len(names) < 2:
+    if len(sums) < 2:
         return {"value": float(finish(mean)), "ci95": None}
-    draws = rng.integers(0, len(names), size=(resamples, len(names)))
+    draws = rng.integers(0, len(sums), size=(resamples, len(sums)))
     means = sums[draws].sum(axis=1) / counts[draws].sum(axis=1)
-    value, ends = float(finish(mean)), np.quantile(finish(means), [0.025, 0.975])
-    # Percentiles of few rollouts are too narrow: widened as Student's t is wider than the normal distribution.
-    few = student.ppf(0.975, len(names) - 1) / 1.96 * np.sqrt(len(names) / (len(names) - 1))
+    value = float(finish(mean))
+    low, high = widened(value, np.quantile(finish(means), [0.025, 0.975]), len(sums))
+    return {"value": value, "ci95": [max(low, 0.0), high]}
+
+
+def widened(value: float, ends: np.ndarray, rollouts: int) -> tuple[float, float]:
+    """Ends of a bootstrap interval over few rollouts, whose percentiles are too narrow.
+
+    Widened as Student's t is wider than the normal distribution.
+    """
+    few = student.ppf(0.975, rollouts - 1) / 1.96 * np.sqrt(rollouts / (rollouts - 1))
     low, high = value + few * (ends - value)
-    return {"value": value, "ci95": [float(max(low, 0.0)), float(high)]}
+    return float(low), float(high)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from bumblebee.diagnosis.report.headline import effect_groups, experiments, headline
 from bumblebee.diagnosis.report.notes import nothing_seen, what_is_left, worse_horizons
 from bumblebee.diagnosis.simulation import motion_error, named, of_joint, pick, rows
 from bumblebee.diagnosis.thresholds.report import Listing, ReportThresholds, Verdicts
@@ -17,9 +18,8 @@ _COLUMNS = {"before": "declared", "after": "corrected", "oracle": "true", "floor
 def summary(document: dict[str, Any], rules: ReportThresholds | None = None) -> str:
     """Effects with intervals, error before, after and floor, what is left."""
     rules = rules or ReportThresholds()
-    lines = [line for e in document["effects"] for line in _effect(e, rules.listing)]
-    lines = ["effects:", *lines] if lines else ["no effect found"]
-    lines = [*(f"WARNING: {text}" for text in document.get("warnings", [])), *lines]
+    lines = [f"WARNING: {text}" for text in document.get("warnings", [])]
+    lines += [*headline(document, rules), "", *_grouped(document, rules)]
     columns = {k: document["error"][k] for k in _COLUMNS if k in document["error"]}
     where = "held-out rollouts" if document["holdout"] else "the fitted rollout"
     lines += ["", f"RMS prediction error on {where}:", *_errors(columns)]
@@ -29,6 +29,18 @@ def summary(document: dict[str, Any], rules: ReportThresholds | None = None) -> 
     lines += [f"note: {note}" for note in document.get("notes", [])]
     lines += [f"unidentifiable: {', '.join(u['where'])}: {u['why']}" for u in document.get("unidentifiable", [])]
     return "\n".join(lines)
+
+
+def _grouped(document: dict[str, Any], rules: ReportThresholds) -> list[str]:
+    """The effects under what may be read from them."""
+    lines = []
+    for title, effects in effect_groups(document, rules.matters):
+        lines.append(f"{title[:1].lower()}{title[1:]}:")
+        lines += [line for e in effects for line in _effect(e, rules.listing)]
+    asked = experiments(document["effects"])
+    if asked:
+        lines += ["to distinguish what is alike:", *(f"  {text}" for text in asked)]
+    return lines or ["no effect found"]
 
 
 def _effect(effect: dict[str, Any], rule: Listing) -> list[str]:
@@ -43,13 +55,12 @@ def _effect(effect: dict[str, Any], rule: Listing) -> list[str]:
         declared = "" if p["nominal"] is None else f" (declared {p['nominal']:.4g})"
         lines.append(
             f"  {effect['effect']:<18} {place:<28} {name} = {p['value']:.4g} [{low}, {high}] {p['unit']}{declared},"
-            f" explains {100 * effect['explains']:.0f} %"
+            f" explains {100 * effect['explains']:.0f} %{', size uncertain' if effect.get('wide') else ''}"
         )
     if effect["equivalent"]:
         some = effect["equivalent"][: rule.equivalent]
         same = ", ".join(f"{s['effect']} on {', '.join(s['where']) or 'all'}" for s in some)
         lines.append(f"  {'':<18} not distinguishable from: {same}")
-        lines += [f"  {'':<18} to distinguish them: {text}" for text in effect.get("separate_by", [])]
     return lines
 
 

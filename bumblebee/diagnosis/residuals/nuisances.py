@@ -3,7 +3,8 @@
 Truth comes from a robot, or from another integrator at another step. What such a difference does is of first order in
 the step and the same for every joint, so each kind is one column with one coefficient for the whole dataset:
 
-- integrator: this simulation at its step against itself at twice the step;
+- integrator: this simulation at its step against itself at twice the step; of Runge and Kutta's method, which makes
+  hardly an error, against one of first order at the same step;
 - position loop and velocity loop: the servo acts on readings that are a little old, q(t - e) and qd(t - e);
 - velocity clock: velocities are read a little before positions;
 - height, only where the base's height is not measured but taken from stance: all heights shifted, 1 for a millimetre.
@@ -15,6 +16,7 @@ more, the curvature of the start's noise (`whiten`).
 import copy
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.simulation import Layout, Plant, Starts, Variation, Windows, residuals
@@ -39,7 +41,9 @@ def nuisance_columns(
     start = _faster(plant, windows, rule.unit * gained / (2 * step))
     clock = double - residuals(plant, layout, windows, [variation], 2 * step, start)[0]
     clock[..., layout.slices["joint_vel"]] += (base - early)[..., layout.slices["joint_vel"]]
-    columns = [(base - double) * (rule.unit / step), double - late[0], double - late[1], clock]
+    coarser = _of_first_order(variation)
+    other = double if coarser is None else residuals(plant, layout, windows, [coarser], step)[0]
+    columns = [(base - other) * (rule.unit / step), double - late[0], double - late[1], clock]
     if plant.floating and "base_pos" not in layout.slices:
         higher = windows.qpos.copy()
         higher[:, plant.base_qpos + 2] += rule.height
@@ -48,9 +52,23 @@ def nuisance_columns(
     return np.stack(columns)
 
 
+def _of_first_order(variation: Variation) -> Variation | None:
+    """The variation in steps whose error is of first order; None where its own steps are."""
+    if int(variation.model.opt.integrator) != int(mujoco.mjtIntegrator.mjINT_RK4):
+        return None
+    model = copy.copy(variation.model)
+    model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+    return replace(variation, model=model)
+
+
 def _late_loop(plant: Plant, variation: Variation, part: str, rule: Nuisances) -> Variation:
     """Torque kp (u - q(t-e)) - kd qd(t-e), to first order in e: less damping by kp e, less inertia by kd e."""
-    model, own = copy.copy(variation.model), variation.plant or plant
+    models = [_late_model(model, variation.plant or plant, part, rule) for model in variation.models]
+    return replace(variation, model=models[0], others=tuple(models[1:]))
+
+
+def _late_model(declared: mujoco.MjModel, own: Plant, part: str, rule: Nuisances) -> mujoco.MjModel:
+    model = copy.copy(declared)
     for column, a in enumerate(own.actuator):
         if a >= 0:
             dof = own.dof[column]
@@ -61,7 +79,7 @@ def _late_loop(plant: Plant, variation: Variation, part: str, rule: Nuisances) -
             else:
                 lighter = model.dof_armature[dof] - kd * gear**2 * rule.unit
                 model.dof_armature[dof] = max(rule.least_armature * model.dof_armature[dof], lighter)
-    return replace(variation, model=model)
+    return model
 
 
 def _read_thrice(windows: Windows, after: float, before: float) -> Windows:

@@ -1,7 +1,11 @@
-"""Which effects: score tests of every candidate given those chosen, trials in the simulator, held-out gain, pruning."""
+"""Which effects: score tests of every candidate given those chosen, trials in the simulator, held-out gain, pruning.
+
+A step that cannot be computed is left out and written down (`simulation.failures`); the search goes on without it.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -67,20 +71,20 @@ def search(
     `remake` gives the candidates with steps for a model with some effects, and its joints' typical torques (J,) [N m].
     """
     run, budget = begin(problem, holdout, remake, config, say), budget or Budget()
+    attempt = problem.plant.failures.attempt
     _select(run, config, budget)
-    if find_packet_loss(run):
+    if attempt("lost commands", partial(find_packet_loss, run), _no):
         _select(run, config, budget)
     for _ in range(problem.thresholds.selection.forward.swaps):
         if not budget.has_time_for("swap steps"):
             break
         say("each effect against its rivals")
-        if not (swap(run) or add_stribeck_friction(run) or complete_frictions(run)):
+        better = partial(_any_of, run, (swap, add_stribeck_friction, complete_frictions))
+        if not attempt("swap steps", better, _no):
             break
         _select(run, config, budget)
-    run.prune()
-    keep_declared_scale(run)
-    merge_gain_parameters(run)
-    add_dry_friction(run)
+    for last in (SearchState.prune, keep_declared_scale, merge_gain_parameters, add_dry_friction):
+        attempt(last.__name__.replace("_", " "), partial(last, run), _no)
     steps = [s for s in run.steps if s.candidate in run.fit.chosen]
     return Search(
         run.fit,
@@ -106,35 +110,36 @@ def begin(
 ) -> SearchState:
     """A search at its beginning: with servos far from the declared ones if need be, and all candidates screened."""
     run = SearchState(problem, holdout, remake, config, say)
-    start_with_gain_grid(run)
+    problem.plant.failures.attempt("gains far from the declared ones", partial(start_with_gain_grid, run), _no)
     run.open()
     return run
 
 
 def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
     """Forward selection until nothing is worth a trial, too many in a row were in vain, or the time is over."""
-    vain, judged, limits = 0, None, []
+    vain, judged, limits, attempt = 0, None, [], run.problem.plant.failures.attempt
     while len(run.fit.chosen) < config.most + run.given and vain < run.patience:
         if not budget.has_time_for("more effects"):
             break
         tried, looked = [], []
-        start_with_all_joints(run)
+        attempt("the usual effects of all joints", partial(start_with_all_joints, run), _no)
         if not run.given:
-            tried = gain_trials(run.problem, run.fit, run.candidates, run.weights, config.far)
+            tried = attempt("gains far from the declared ones", partial(_gains, run), list)
             tried = [t for t in tried if t.candidate not in run.closed]
         if not tried:
-            tried, looked = run.trials()
-        tried += [t for t in setpoint_trials(run, tried) if t.candidate not in run.closed]
+            tried, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
+        late = attempt("drives that follow their targets late", partial(setpoint_trials, run, tried), list)
+        tried += [t for t in late if t.candidate not in run.closed]
         some = _where_limits_matter(tried, run)
         if judged != (run.fit, some):
             judged = (run.fit, some)
-            limits = saturation_trials(run.problem, run.fit, some, run.weights, run.hopeless, run.changes)
+            limits = attempt("limits of drives", partial(_limits, run, some), list)
         tried += [t for t in limits if t.candidate not in run.closed]
         if not tried:
-            tried = backlash_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+            tried = attempt("backlash", partial(_of_joints, backlash_trials, run), list)
             tried = [t for t in tried if t.candidate not in run.closed]
         if not tried or vain == run.patience - 1:
-            tried += joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+            tried += attempt("joint elasticity", partial(_of_joints, joint_elasticity_trials, run), list)
         if not tried and not looked:
             break
         if not tried:
@@ -142,12 +147,34 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
             vain += 1
             continue
         best = simplest(tried, run.fit.cost, run.problem.thresholds.selection.trials)
-        if best.candidate.effect in SATURATIONS and find_packet_loss(run):
+        if best.candidate.effect in SATURATIONS and attempt("lost commands", partial(find_packet_loss, run), _no):
             continue  # a lost command, too, spoils a few windows
-        accepted, place = run.accept(best.candidate, best.values), best.candidate.where
+        place, name = best.candidate.where, f"the fit with {best.candidate.effect} on {best.candidate.where}"
+        accepted = attempt(name, partial(run.accept, best.candidate, best.values), partial(run.refuse, best.candidate))
         vain = 0 if accepted else vain + 1
         if accepted:
             run.hopeless = {(kind, where) for kind, where in run.hopeless if place and where != place}
+
+
+def _gains(run: SearchState) -> list[Trial]:
+    return gain_trials(run.problem, run.fit, run.candidates, run.weights, run.config.far)
+
+
+def _limits(run: SearchState, some: Sequence[Candidate]) -> list[Trial]:
+    return saturation_trials(run.problem, run.fit, some, run.weights, run.hopeless, run.changes)
+
+
+def _of_joints(trials: Callable[..., list[Trial]], run: SearchState) -> list[Trial]:
+    return trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
+
+
+def _any_of(run: SearchState, steps: Sequence[Callable[[SearchState], bool]]) -> bool:
+    """Whether one of the steps changed the model; those after it are not taken."""
+    return any(step(run) for step in steps)
+
+
+def _no() -> bool:
+    return False
 
 
 def _where_limits_matter(tried: Sequence[Trial], run: SearchState) -> tuple[Candidate, ...]:

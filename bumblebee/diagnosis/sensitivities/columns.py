@@ -9,7 +9,7 @@ from bumblebee.diagnosis.candidates import Candidate, is_simulated, shortlisted
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.sensitivities.impulse_responses import Answers, answers_of
 from bumblebee.diagnosis.sensitivities.torque_signatures import Signatures
-from bumblebee.diagnosis.simulation import Plant, Variation, vary
+from bumblebee.diagnosis.simulation import Plant, vary
 from bumblebee.sim.effects import Effect
 
 
@@ -64,9 +64,7 @@ def screen(
     """
     kept = [c for c in candidates if not shortlisted(c, len(problem.plant.joints))]
     variation = vary(problem.plant, effects)
-    plain = None
-    if variation.plant is None:
-        plain = Variation(variation.model, variation.delay, variation.offset, setpoints=variation.setpoints)
+    plain = variation.bare if variation.plant is None else None
     around = plain or vary(problem.plant, [])
     only = _near(problem.plant, before.effects, effects) if before is not None else np.arange(problem.plant.model.nv)
     rules, scene = problem.thresholds.sensitivities, (problem.plant, problem.layout, problem.windows)

@@ -19,8 +19,8 @@ from bumblebee.diagnosis.simulation import (
     difference,
     inputs_of,
     out_of_reach,
+    own_batch,
     simulated_readings,
-    threads,
     with_step,
     without,
 )
@@ -76,9 +76,9 @@ def answers_of(
     count = max(1, int(np.ceil(windows.span / step - 1e-6)))
     control = inputs_of(windows, variation, step, count, {})
     edges = np.unique(np.linspace(0, count, min(segments, count) + 1).round().astype(int))
-    model, size = with_step(variation.model, step), len(windows)
-    with without([model], out_of_reach(plant, windows)):  # a batch runs on a copy
-        plain, batch = Batch(model, size, threads()), Batch(model, len(pushed) * size, threads())
+    models, size = [with_step(model, step) for model in variation.models], len(windows)
+    with without(models, out_of_reach(plant, windows)):  # a batch runs on a copy
+        plain, batch = (own_batch(plant, windows, variation, copies) for copies in (1, len(pushed)))
     qpos = windows.qpos.copy()
     qpos[:, plant.qpos] -= variation.offset
     path = _free_path(plain, qpos, windows.qvel, step, control, edges)

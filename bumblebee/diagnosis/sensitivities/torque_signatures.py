@@ -21,11 +21,11 @@ from bumblebee.diagnosis.simulation import (
     inputs_of,
     remember,
     setpoints_of,
+    window_servos,
     yielded,
 )
 from bumblebee.diagnosis.thresholds.sensitivities import TorqueSignatures
 from bumblebee.sim.effects import SETPOINTS, Effect, bent, runtime_hooks, sloped, spread_inertia
-from bumblebee.sim.servo import servos_of
 
 _NO_SIGNATURE = '{} has no torque in sensitivities/torque_signatures.py: add it, or column="simulated" in traits.py'
 
@@ -37,10 +37,11 @@ class Signatures:
         self, plant: Plant, windows: Windows, variation: Variation, path: Path, rule: TorqueSignatures
     ) -> None:
         self.plant, self.windows, self.path, self._variation = plant, windows, path, variation
-        self.servos = servos_of(variation.model, [int(plant.model.joint(name).id) for name in plant.joints])
+        self.servos = window_servos(plant, windows, variation.models)
         self.q = path.qpos[:, :-1, plant.qpos]
         self.v = path.qvel[:, :-1, plant.dof]
         self.a = np.diff(path.qvel[:, :, plant.dof], axis=1) / path.step
+        self.supply = np.atleast_1d(self.servos.supply)[..., 0]
         self.u = self.servos.controls(path.control)
         self.torque = self.servos.torque(self.q, self.v, self.u)
         self.sign = np.tanh(self.v / rule.creep)
@@ -82,8 +83,8 @@ class Signatures:
             "armature": lambda: -self.a[..., j],
             "load_dependent_friction": lambda: -np.abs(torque) * sign,
             "motor_strength": lambda: torque,
-            "kp": lambda: torque - servos.bias[j, 2] * v,
-            "kd": lambda: servos.bias[j, 2] * v,
+            "kp": lambda: torque - servos.bias[..., j, 2] * v,
+            "kd": lambda: servos.bias[..., j, 2] * v,
             "strength_drift": lambda: -self.clock[..., 0] * torque,
             "thermal_fade": lambda: -self.heat[..., j] * torque,
         }
@@ -98,10 +99,10 @@ class Signatures:
         if c.effect == "hysteresis":
             return [self._hysteresis(c, j)]
         if c.effect == "torque_limit":
-            limit = c.start[0]
+            limit = c.start[0] * self.supply
             return [np.clip(torque, -limit, limit) - torque]
         if c.effect == "torque_speed_limit":
-            left = servos.limit[j] * np.clip(1.0 - np.abs(v) * c.step[0], 0.0, 1.0)
+            left = servos.limit[..., j] * np.clip(1.0 - np.abs(v) * c.step[0] / self.supply, 0.0, 1.0)
             return [np.where(torque * v > 0, np.clip(torque, -left, left) - torque, 0.0)]
         if c.effect in LATE:
             return [self.late.torque(c.effect, c.start[0], self.torque)[..., j]]
@@ -126,7 +127,7 @@ class Signatures:
         """Delayed and lost commands of one joint, alone or with the others."""
         effect = c.at(np.array(c.nominal) + np.array(c.step))
         if c.effect in ("command_delay", "dropped_commands", *SETPOINTS):
-            return self.servos.gain[j] * (self._moved_control(effect)[..., j] - self.u[..., j])
+            return self.servos.gain[..., j] * (self._moved_control(effect)[..., j] - self.u[..., j])
         raise ValueError(_NO_SIGNATURE.format(c.effect))
 
     def _moved_control(self, effect: Effect) -> np.ndarray:

@@ -4,15 +4,20 @@ from bumblebee.diagnosis.simulation.actuator_history import (
     at_starts,
     bent_before,
     lagged,
+    plant_servos,
     read_at,
     remember,
     state_before,
+    window_servos,
     yielded,
 )
 from bumblebee.diagnosis.simulation.actuators import fold_dampers
 from bumblebee.diagnosis.simulation.cache import Changes, Recall
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
+from bumblebee.diagnosis.simulation.condition_plants import make_plants
+from bumblebee.diagnosis.simulation.conditions import Condition, in_words
 from bumblebee.diagnosis.simulation.declared import declared_values, touching
+from bumblebee.diagnosis.simulation.failures import LEFT_OUT, NOT_TRIED
 from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, plant_by, refuse_unlogged
 from bumblebee.diagnosis.simulation.readings import (
     Layout,
@@ -22,7 +27,14 @@ from bumblebee.diagnosis.simulation.readings import (
     simulated_readings,
 )
 from bumblebee.diagnosis.simulation.setpoints import setpoints_of
-from bumblebee.diagnosis.simulation.simulate import Starts, at_ticks, inputs_of, residuals, threads, with_step
+from bumblebee.diagnosis.simulation.simulate import (
+    Starts,
+    at_ticks,
+    inputs_of,
+    own_batch,
+    residuals,
+    with_step,
+)
 from bumblebee.diagnosis.simulation.units import (
     KINDS,
     joint_units,
@@ -41,7 +53,10 @@ from bumblebee.diagnosis.simulation.windows import Windows, choose_starts, comma
 
 __all__ = [
     "KINDS",
+    "LEFT_OUT",
+    "NOT_TRIED",
     "Changes",
+    "Condition",
     "Layout",
     "Plant",
     "Recall",
@@ -57,12 +72,14 @@ __all__ = [
     "declared_values",
     "difference",
     "fold_dampers",
+    "in_words",
     "inputs_of",
     "joint_units",
     "lagged",
     "layout_of",
     "load_spec",
     "make_plant",
+    "make_plants",
     "measured_readings",
     "members",
     "mixed_notes",
@@ -70,8 +87,10 @@ __all__ = [
     "named",
     "of_joint",
     "out_of_reach",
+    "own_batch",
     "pick",
     "plant_by",
+    "plant_servos",
     "position_rows",
     "read_at",
     "refuse_unlogged",
@@ -82,11 +101,11 @@ __all__ = [
     "setpoints_of",
     "simulated_readings",
     "state_before",
-    "threads",
     "touching",
     "unit_on",
     "vary",
     "vary_or_refuse",
+    "window_servos",
     "with_step",
     "without",
     "yielded",

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
+import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.simulation.plant import Plant
@@ -15,18 +16,26 @@ from bumblebee.diagnosis.simulation.windows import Windows, command_inputs
 from bumblebee.diagnosis.thresholds.simulation import ActuatorHistory
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Memory, RuntimeHooks, State, bent, history_length, states_of
-from bumblebee.sim.servo import Servos, servos_of
+from bumblebee.sim.servo import Servos, servos_each, servos_of
 
 
-def plant_servos(plant: Plant) -> Servos:
-    """The servos of the plant's joints, in the log's column order."""
-    return servos_of(plant.model, [int(plant.model.joint(name).id) for name in plant.joints])
+def plant_servos(plant: Plant, model: mujoco.MjModel | None = None) -> Servos:
+    """The servos of the plant's joints, in the log's column order, or those that `model` has there."""
+    model = plant.model if model is None else model
+    return servos_of(model, [int(model.joint(name).id) for name in plant.joints])
+
+
+def window_servos(plant: Plant, windows: Windows, models: Sequence[mujoco.MjModel]) -> Servos:
+    """The servos of each window's model, one of those under each condition, for states (W, K, J)."""
+    servos = servos_each([plant_servos(plant, model) for model in models], windows.condition[:, None])
+    supply = np.array([p.condition.supply for p in plant.every])[windows.condition][:, None, None]
+    return servos if len(models) == 1 else replace(servos, supply=supply)
 
 
 @lru_cache(maxsize=256)
 def logged_torques(plant: Plant, rollout: Rollout) -> tuple[np.ndarray, np.ndarray]:
     """Servo torque (T, J) [N m] by the declared gains just before each tick and just after it."""
-    servos = plant_servos(plant)
+    servos = plant_servos(plant.of(rollout))
     command = servos.controls(command_inputs(plant, rollout))
     held = np.concatenate((command[:1], command[:-1]))
     place = rollout.joint_pos - plant.offset
@@ -43,7 +52,7 @@ def mean_squares(plant: Plant, rollout: Rollout) -> np.ndarray:
     A command that arrives makes a torque that is gone before the next tick: the mean of the squares at both ends is a
     tenth too much. Between ticks the joint is on the cubic that has the readings' positions and speeds.
     """
-    servos, dt = plant_servos(plant), np.diff(rollout.time)[:, None]
+    servos, dt = plant_servos(plant.of(rollout)), np.diff(rollout.time)[:, None]
     place, speed = rollout.joint_pos - plant.offset, rollout.joint_vel
     gone, command = np.diff(place, axis=0), servos.controls(command_inputs(plant, rollout))[:-1]
     ends = speed[:-1] - gone / dt, gone / dt - speed[1:]
@@ -66,13 +75,12 @@ def at_starts(windows: Windows, of: Callable[[Rollout], np.ndarray]) -> np.ndarr
 def remember(plant: Plant, windows: Windows, hooks: RuntimeHooks, step: float) -> Memory:
     """The memory of every window; its columns are the hooks' joints."""
     order = [plant.joints.index(name) for name in hooks.joints]
-    limit = plant_servos(plant).limit
-    scale = np.where(np.isfinite(limit), limit, 1.0)
     thermal, drift = np.zeros(len(order)), np.zeros(len(order))
     thermal[order], drift[order] = hooks.thermal, hooks.drift
 
     def heat(rollout: Rollout) -> np.ndarray:
-        time = rollout.time - rollout.time[0]
+        time, limit = rollout.time - rollout.time[0], plant_servos(plant.of(rollout)).limit
+        scale = np.where(np.isfinite(limit), limit, 1.0)
         return heated(time, mean_squares(plant, rollout) / scale**2, thermal, drift, plant.thresholds.history)
 
     back = history_length(hooks, step)
@@ -139,7 +147,7 @@ def state_before(plant: Plant, windows: Windows, state: State) -> np.ndarray:
 
     Speeds are means over a few ticks: what a sensor's noise would wear off is no motion.
     """
-    servos = plant_servos(plant)
+    servos = plant_servos(plant)  # targets are read off alike whatever the gains
 
     def of(rollout: Rollout) -> np.ndarray:
         wide = np.ones(2 * plant.thresholds.history.smooth + 1)

@@ -102,7 +102,7 @@ def fold_dampers(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, list[str]]:
     order. A force limit of the position servo now holds for the sum, as a drive's current limit does; the velocity
     servo's own is dropped.
     """
-    pairs = [(i, k) for i, a in enumerate(spec.actuators) if _follows_position(a) for k in _dampers_on(spec, a.target)]
+    pairs = [(i, k) for i, a in enumerate(spec.actuators) if follows_position(a) for k in _dampers_on(spec, a.target)]
     if not pairs:
         return spec, []
     spec = spec.copy()
@@ -115,7 +115,8 @@ def fold_dampers(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, list[str]]:
     return spec, sorted({spec.actuators[i].target for i, _ in pairs})
 
 
-def _follows_position(a: mujoco.MjsActuator) -> bool:
+def follows_position(a: mujoco.MjsActuator) -> bool:
+    """Whether an actuator on a joint feeds its position back by an affine law."""
     return a.trntype in ON_JOINT and a.biastype == _AFFINE_BIAS and a.biasprm[1] != 0
 
 

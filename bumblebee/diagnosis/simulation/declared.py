@@ -50,7 +50,8 @@ def _delay(plant: Plant, place: str) -> Sequence[float]:
 def _limit(plant: Plant, place: str) -> Sequence[float]:
     model, a = plant.model, plant.actuator[plant.joints.index(place)]
     limited = a >= 0 and model.actuator_forcelimited[a]
-    return (abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1] if limited else np.inf,)
+    given = abs(model.actuator_gear[a, 0]) * model.actuator_forcerange[a, 1] if limited else np.inf
+    return (given / plant.condition.supply,)
 
 
 def _spring(plant: Plant, place: str) -> Sequence[float]:

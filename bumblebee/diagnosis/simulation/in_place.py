@@ -82,7 +82,7 @@ def _offset(at: Target, value: float) -> None:
 
 def _limit(at: Target, value: float) -> None:
     model, a = at.model, at.actuator
-    force = value / abs(model.actuator_gear[a, 0])
+    force = value * at.plant.condition.supply / abs(model.actuator_gear[a, 0])
     model.actuator_forcelimited[a], model.actuator_forcerange[a] = 1, (-force, force)
 
 

@@ -6,13 +6,17 @@ The columns have one command a joint. What a tendon or a propeller was told is i
 actuator that integrates its command, from which a window would have to start.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import mujoco
 import numpy as np
+from mujoco.batch import MODEL_FIELDS
 
 from bumblebee.diagnosis.simulation.actuators import drive_law, take_target, take_torque
+from bumblebee.diagnosis.simulation.conditions import Condition, refuse_unmade, set_gains, set_supply, with_loads
 from bumblebee.diagnosis.simulation.failures import Failures
 from bumblebee.diagnosis.thresholds.simulation import DriveProbe, SimulationThresholds
 from bumblebee.errors import BadInput
@@ -70,6 +74,31 @@ class Plant:
     """Plants of the same robot with play, flexible shafts or yielding springs, by their places."""
     thresholds: SimulationThresholds = field(default_factory=SimulationThresholds, repr=False)
     """What it is simulated by."""
+    condition: Condition = field(default_factory=Condition)
+    """What its model has otherwise than the declared one."""
+    others: tuple["Plant", ...] = field(default=(), repr=False)
+    """The same robot under the other conditions that rollouts were recorded under."""
+    under: Mapping[str, int] = field(default_factory=dict, repr=False)
+    """Rollout -> number of its condition, 0 for this plant's own and where it is not listed."""
+
+    @property
+    def every(self) -> tuple["Plant", ...]:
+        """The robot under each condition, by number."""
+        return (self, *self.others)
+
+    def of(self, rollout: Rollout) -> "Plant":
+        """The robot under the condition of a rollout."""
+        return self.every[self.under.get(rollout.rollout_id, 0)]
+
+    @cached_property
+    def differing(self) -> tuple[str, ...]:
+        """Names of the model's arrays that are not the same under all conditions."""
+        models = [plant.model for plant in self.every]
+        names = [n for n in sorted(MODEL_FIELDS) if isinstance(getattr(self.model, n, None), np.ndarray)]
+        return tuple(
+            n for n in names if any(not np.array_equal(getattr(models[0], n), getattr(m, n)) for m in models[1:])
+        )
+
     failures: Failures = field(default_factory=Failures, repr=False)
     """Models of it that could not be made or simulated."""
 
@@ -95,16 +124,26 @@ def load_spec(path: Path) -> mujoco.MjSpec:
 
 
 def make_plant(
-    spec: mujoco.MjSpec, rollout: Rollout, where: object, thresholds: SimulationThresholds | None = None
+    spec: mujoco.MjSpec,
+    rollout: Rollout,
+    where: object,
+    thresholds: SimulationThresholds | None = None,
+    condition: Condition | None = None,
 ) -> Plant:
-    """Match the model's joints and actuators with the columns of `rollout`; `where` names the model in errors."""
-    rules = thresholds or SimulationThresholds()
-    declared, spec = spec, spec.copy()
+    """Match the model's joints and actuators with the columns of `rollout`; `where` names the model in errors.
+
+    The model is the declared one under a `condition`, if one is given.
+    """
+    rules, condition = thresholds or SimulationThresholds(), condition or Condition()
+    declared, spec = spec, with_loads(spec, condition.loads, where)
     delay = np.array([a.delay if a.nsample else 0.0 for a in spec.actuators])
     for actuator in spec.actuators:
         actuator.nsample, actuator.delay = 0, 0.0
     torque_input = _set_inputs(spec, rollout, where, rules.drive)
+    set_gains(spec, rollout.joints, condition)
     model = _with_movable_bodies(spec)
+    refuse_unmade(model, condition.loads, where)
+    set_supply(model, condition.supply)
     model.opt.iterations = max(rules.solver.iterations, model.opt.iterations)
     model.opt.ls_iterations = max(rules.solver.line_search, model.opt.ls_iterations)
     free, joints = _match_joints(model, rollout, where)
@@ -130,6 +169,7 @@ def make_plant(
         spec=declared,
         example=rollout,
         thresholds=rules,
+        condition=condition,
     )
 
 
@@ -153,7 +193,8 @@ def plant_by(plant: Plant, thresholds: SimulationThresholds) -> Plant:
     """The plant simulated by other thresholds, of which nothing has failed yet."""
     if thresholds == plant.thresholds:
         return replace(plant, failures=Failures())
-    return make_plant(plant.spec, plant.example, "declared model", thresholds)
+    own = make_plant(plant.spec, plant.example, "declared model", thresholds, plant.condition)
+    return replace(own, others=tuple(plant_by(other, thresholds) for other in plant.others), under=plant.under)
 
 
 def _match_joints(model: mujoco.MjModel, rollout: Rollout, where: object) -> tuple[int, np.ndarray]:

@@ -20,7 +20,8 @@ from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows, controls
 from bumblebee.errors import BadInput
 from bumblebee.quaternions import conjugate, from_rotation_vector, multiply, rotate_by_cross
-from bumblebee.sim.effects import Memory, StepHooks
+from bumblebee.sim.effects import Memory, StepHooks, hook_joints
+from bumblebee.sim.servo import servos_each, servos_of
 
 THREADS: int | None = None
 """Threads of every simulation; None: see `threads`."""
@@ -105,7 +106,8 @@ def _simulated(chunk: "_Chunk", layout: Layout, cache: dict[bytes, np.ndarray], 
     chosen, windows = chunk.chosen, chunk.windows
     count = int(np.ceil(windows.span / chunk.step - 1e-6))
     inputs = [inputs_of(windows, variation, chunk.step, count, cache) for variation in chosen]
-    models = [] if chosen[0].plant is not None else list({id(v.model): v.model for v in chosen}.values())
+    some = [] if chosen[0].plant is not None else [m for v in chosen for m in v.models]
+    models = list({id(m): m for m in some}.values())
     with without(models, far):
         return _run(chunk, layout, inputs)
 
@@ -174,11 +176,9 @@ class _Chunk:
 
     def batch(self) -> Batch:
         """A batch of all windows under all variations, in the chunk's step."""
-        models = {id(v.model): with_step(v.model, self.step) for v in self.chosen}
-        batch = Batch(self.lead.model, len(self.chosen) * len(self.windows), threads())
-        if self.lead.plain:
-            batch.set_models([models[id(v.model)] for v in self.chosen for _ in range(len(self.windows))])
-        return batch
+        for model in {id(m): m for v in self.chosen for m in v.models}.values():
+            with_step(model, self.step)
+        return batch_of(self.plant, self.windows, self.chosen)
 
     def begun(self, late: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Start states (V, W, nq), (V, W, nv) of the simulated model; encoders are `late` (J,) [s]."""
@@ -196,6 +196,25 @@ class _Chunk:
         if lead.plant is not None:
             qpos, qvel = restructured(plant, windows, lead, qpos, qvel, _led_in(plant, windows, lead, self.step))
         return qpos, qvel
+
+
+def batch_of(plant: Plant, windows: Windows, chosen: Sequence[Variation]) -> Batch:
+    """A batch of all windows under each of the `chosen`, each window in the model of its condition."""
+    lead = chosen[0]
+    if lead.hooks is not None or not (lead.plain or lead.others):
+        return own_batch(plant, windows, lead, len(chosen))
+    batch = Batch(lead.model, len(chosen) * len(windows), threads())
+    batch.set_models([v.models[c] for v in chosen for c in windows.condition])
+    return batch
+
+
+def own_batch(plant: Plant, windows: Windows, lead: Variation, copies: int) -> Batch:
+    """A batch of copies of all windows with models of its own, as they are now, whose fields may be written."""
+    batch = Batch(lead.model, copies * len(windows), threads())
+    for name in plant.differing if lead.others else ():
+        rows = np.stack([getattr(model, name) for model in lead.models])[np.tile(windows.condition, copies)]
+        batch.expand(name)[:] = rows
+    return batch
 
 
 def _run(chunk: _Chunk, layout: Layout, inputs: list[np.ndarray]) -> np.ndarray:
@@ -236,7 +255,7 @@ def _led_in(plant: Plant, windows: Windows, lead: Variation, step: float) -> Kno
     early, span, whole = earlier(plant, windows)
     early.qpos[:, plant.qpos] -= lead.offset
     qpos, qvel = restructured(plant, early, lead, early.qpos, early.qvel)
-    batch = Batch(lead.model, len(early), threads())
+    batch = batch_of(plant, early, [lead])
     batch.bind("qpos")[:], batch.bind("qvel")[:] = qpos, qvel
     set_plastic(batch, plant, early, lead, 1)
     control = inputs_of(early, lead, step, max(1, round(span / step)), {})
@@ -270,7 +289,11 @@ def _roll(
     """States (n, count, nq) and (n, count, nv) after every step."""
     hooks = lead.hooks
     if hooks is not None:
-        running = StepHooks(hooks, lead.model, batch)
+        condition = np.tile(windows.condition, copies)
+        servos = servos_each([servos_of(model, hook_joints(model)) for model in lead.models], condition)
+        if lead.others:
+            servos = replace(servos, supply=np.array([p.condition.supply for p in plant.every])[condition, None])
+        running = StepHooks(hooks, lead.model, batch, servos)
         running.reset(np.arange(len(control)), _repeated(remember(plant, windows, hooks, step), copies))
     if hooks is None or not hooks.each_step:
         out = batch.rollout(control.shape[1], control, record=("qpos", "qvel"))

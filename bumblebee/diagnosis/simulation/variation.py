@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -46,6 +46,18 @@ class Variation:
     """What the declared model was given."""
     impossible: bool = False
     """Whether the model with these effects could not be made: `model` is then the declared one, residuals are NaN."""
+    others: tuple[mujoco.MjModel, ...] = field(default=(), repr=False)
+    """The same under the plant's other conditions; `model` is that of its own."""
+
+    @property
+    def models(self) -> tuple[mujoco.MjModel, ...]:
+        """By number of the condition."""
+        return (self.model, *self.others)
+
+    @property
+    def bare(self) -> "Variation":
+        """Models, offsets and what becomes of single commands alone."""
+        return Variation(self.model, self.delay, self.offset, setpoints=self.setpoints, others=self.others)
 
     @property
     def plain(self) -> bool:
@@ -60,7 +72,9 @@ def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:
         return _made(plant, effects)
     except REFUSALS as error:
         plant.failures.add(_blamed(plant, effects), error)
-        return Variation(plant.model, plant.delay, plant.offset, effects=tuple(effects), impossible=True)
+        models = tuple(other.model for other in plant.others)
+        declared = Variation(plant.model, plant.delay, plant.offset, others=models)
+        return replace(declared, effects=tuple(effects), impossible=True)
 
 
 def _blamed(plant: Plant, effects: Sequence[Effect]) -> Sequence[Effect]:
@@ -83,7 +97,16 @@ def vary_or_refuse(plant: Plant, effects: Sequence[Effect]) -> Variation:
 
 
 def _made(plant: Plant, effects: Sequence[Effect]) -> Variation:
-    """The plant with `effects`; the same meaning as `sim.effects.spec.add_to_spec`, without compiling again."""
+    """The plant with `effects`; the same meaning as `sim.effects.spec.add_to_spec`, without compiling again.
+
+    Under several conditions it has a model for each: factors of gains multiply those of the condition.
+    """
+    own = _alone(plant, effects)
+    return replace(own, others=tuple(_alone(o, effects).model for o in plant.others)) if plant.others else own
+
+
+def _alone(plant: Plant, effects: Sequence[Effect]) -> Variation:
+    """The same under the plant's own condition alone."""
     if not effects:
         return Variation(plant.model, plant.delay, plant.offset)
     structural = [e for e in effects if _is_structural(e)]
@@ -164,7 +187,7 @@ def _structure(plant: Plant, effects: Sequence[Effect]) -> Plant:
     if key not in plant.compiled:
         spec = plant.spec.copy()
         add_to_spec(spec, effects)
-        plant.compiled[key] = make_plant(spec, plant.example, "declared model", plant.thresholds)
+        plant.compiled[key] = make_plant(spec, plant.example, "declared model", plant.thresholds, plant.condition)
     return plant.compiled[key]
 
 

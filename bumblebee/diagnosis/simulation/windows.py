@@ -38,6 +38,8 @@ class Windows:
     """(W, C, nu) logged commands around the window, in the actuators' own input."""
     command_time: np.ndarray
     """(W, C) times at which they were issued, after the start [s]."""
+    condition: np.ndarray
+    """(W,) number of the condition that it was recorded under, as the plant counts them."""
     source: Sequence[Rollout] = ()
     """The rollouts that `rollout` counts, for what drives remember from before the start."""
 
@@ -88,7 +90,7 @@ def _shares(lengths: Sequence[int], budget: int) -> list[int]:
 def _stretches(time: np.ndarray, horizon: float, rule: Windowing) -> list[tuple[int, int]]:
     """Consecutive stretches (first, last) of `horizon` s within the stamps `time` (T,)."""
     period = float(np.median(np.diff(time)))
-    gaps = np.concatenate(([0], np.cumsum(np.diff(time) > rule.gap * period)))
+    gaps = np.concatenate(([0], np.cumsum(np.diff(time) > max(rule.gap * period, rule.brief))))
     last = np.searchsorted(time, time + horizon + 0.5 * period - 1e-9) - 1
     last = np.maximum(last, np.minimum(np.arange(len(time)) + 1, len(time) - 1))
     off = np.abs(time[last] - time - horizon)
@@ -140,6 +142,7 @@ def cut(
         quat=None if quats[0] is None else np.stack(quats),
         command=np.stack([_pad(row["command"], size) for row in rows]),
         command_time=np.stack([_pad(row["command_time"], size) for row in rows]),
+        condition=np.array([plant.under.get(rollouts[s[0]].rollout_id, 0) for s in starts]),
         source=rollouts,
     )
 

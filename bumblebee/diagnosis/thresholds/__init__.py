@@ -12,6 +12,7 @@ from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds
 from bumblebee.diagnosis.thresholds.discrepancy import DiscrepancyThresholds
 from bumblebee.diagnosis.thresholds.estimation import EstimationThresholds
 from bumblebee.diagnosis.thresholds.gap import GapThresholds
+from bumblebee.diagnosis.thresholds.plan import PlanThresholds
 from bumblebee.diagnosis.thresholds.report import ReportThresholds
 from bumblebee.diagnosis.thresholds.residuals import ResidualThresholds
 from bumblebee.diagnosis.thresholds.selection import SelectionThresholds
@@ -36,3 +37,4 @@ class Thresholds:
     discrepancy: DiscrepancyThresholds = field(default_factory=DiscrepancyThresholds)
     gap: GapThresholds = field(default_factory=GapThresholds)
     report: ReportThresholds = field(default_factory=ReportThresholds)
+    plan: PlanThresholds = field(default_factory=PlanThresholds)

@@ -52,6 +52,16 @@ class Split:
 
 
 @dataclass(frozen=True)
+class Conditions:
+    """Of what was different when rollouts were recorded."""
+
+    relative: float = 1e-3
+    """Relative difference below which two numbers are one value of a condition: 0.205 says 0.204966."""
+    told: int = 6
+    """Conditions at most that a note lists one by one."""
+
+
+@dataclass(frozen=True)
 class InformativeSplit:
     """Of the exchange of rollouts that show what no fitted one does."""
 
@@ -117,6 +127,9 @@ class VelocityLatency:
     """Time around its ends from which the positions' velocities are taken [s]."""
     least: float = 5e-4
     """Age beyond which one must be, without doubt [s]: half a step of a millisecond is none."""
+    periods: float = 1.5
+    """Periods of the log that an age must exceed where position targets are logged: a servo that answers within a
+    period passes for half of one."""
     doubt: float = 4.0
     """Standard errors that make it beyond doubt."""
     most: float = 0.05
@@ -152,6 +165,7 @@ class DatasetThresholds:
     usable: Usable = field(default_factory=Usable)
     time_steps: TimeSteps = field(default_factory=TimeSteps)
     split: Split = field(default_factory=Split)
+    conditions: Conditions = field(default_factory=Conditions)
     informative: InformativeSplit = field(default_factory=InformativeSplit)
     noise: Noise = field(default_factory=Noise)
     smoothing: Smoothing = field(default_factory=Smoothing)

@@ -43,6 +43,32 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
+class Matters:
+    """Of the headline: what matters, and what is to be trusted."""
+
+    carries: float = 0.02
+    """Share of the excess chi-square that returns without an effect, from which on it carries the gain: below, one in
+    fifty of what was wrong, it is not told from what the other effects take over."""
+    wide: float = 3.0
+    """Upper end over lower end of an interval, from which on the size is not known alone: a third to a whole of a
+    torque or a gain is a different robot. So is an interval that holds the declared value."""
+    structure: float = 0.05
+    """Share of what is left, in chi-square above the noise, that a joint's missing torque must explain to be
+    proclaimed: with many data less is significant on every real robot, and changes no prediction."""
+    told: float = 0.8
+    """Share of what is left, or of what a joint's torque laws explain, after which a list is cut."""
+    quantities: int = 2
+    """Quantities at most that are told of a joint's missing torque where no law says how much each explains."""
+    places: int = 4
+    """Joints at most that the headline ranks."""
+    effectors: int = 3
+    """Ends of the chain at most that it ranks."""
+    noise: float = 1.05
+    """Times the noise floor below which an error leaves nothing to remove: closer, a share divides by the floor's own
+    error."""
+
+
+@dataclass(frozen=True)
 class ExampleWindows:
     """Of the windows to look at."""
 
@@ -100,6 +126,7 @@ class ReportThresholds:
     measured_curve: MeasuredCurve = field(default_factory=MeasuredCurve)
     effects: Effects = field(default_factory=Effects)
     unexplained: Unexplained = field(default_factory=Unexplained)
+    matters: Matters = field(default_factory=Matters)
     example_windows: ExampleWindows = field(default_factory=ExampleWindows)
     verdicts: Verdicts = field(default_factory=Verdicts)
     listing: Listing = field(default_factory=Listing)

@@ -15,6 +15,9 @@ class Windowing:
     """Nothing is compared sooner after a start [s]: at 500 Hz the next reading says only that the start was read."""
     gap: float = 1.8
     """Periods between two rows from which on a tick is missing between them."""
+    brief: float = 0.004
+    """A gap of up to that [s] is none: of a fast log a row is lost now and then, and a command held for so much longer
+    moves no joint by more than its neighbours' rows tell. Without it a log of 2 kHz that lost 1 % has no window."""
     outputs: int = 6
     """Compared ticks of a window, the last among them."""
 
@@ -88,6 +91,16 @@ class DriveProbe:
 
 
 @dataclass(frozen=True)
+class Conditions:
+    """Of rollouts that were recorded under conditions other than the declared ones."""
+
+    relative: float = 1e-3
+    """Relative difference of gains or voltages below which they are the same: rounding in a file is smaller."""
+    most: int = 24
+    """Conditions at most of which each has a model of its own in every simulation; it bounds memory."""
+
+
+@dataclass(frozen=True)
 class SimulationThresholds:
     """All of them."""
 
@@ -98,3 +111,4 @@ class SimulationThresholds:
     hidden: HiddenStates = field(default_factory=HiddenStates)
     solver: Solver = field(default_factory=Solver)
     drive: DriveProbe = field(default_factory=DriveProbe)
+    conditions: Conditions = field(default_factory=Conditions)

@@ -14,7 +14,7 @@ from bumblebee.measured.checks.units import servo_gains
 from bumblebee.measured.checks.view import View
 
 SPAN = 0.06  # s of a stretch: long enough to move beyond the sensors' noise, too short for neighbours to drift off
-STRETCHES = 240  # at most, spread over the file
+STRETCHES = 120  # at most, spread over the file
 STEP = 5e-4  # s of simulation at most
 MATTERS = 0.5  # share of the stretches, those in which the command's sign changes the prediction most
 AGREE = 0.75  # share of these in which the reversed command has to be nearer to what was measured

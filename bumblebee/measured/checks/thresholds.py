@@ -105,3 +105,6 @@ class Thresholds:
     """Mismatch of velocities [m/s, rms] below which frames are not told apart."""
     gains_relative: float = 0.02
     """Relative difference of gains: rounding in a file is smaller, a changed gain larger."""
+    gains_factor: float = 100.0
+    """Factor between stated and declared gains from which they are of another unit: people vary gains by ten or so,
+    a servo's own numbers (100 to 800 for 0.2 to 1.6 N m/rad) are 500 times as large."""

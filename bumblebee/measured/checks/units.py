@@ -68,14 +68,15 @@ def at_joint(model: mujoco.MjModel, actuator: int) -> bool:
 
 
 def servo_gains(model: mujoco.MjModel) -> dict[str, tuple[float, float]]:
-    """Joint name -> (kp, kd) of the position servos of a model; other actuators are left out."""
+    """Joint name -> (kp, kd) [N m a rad, a rad/s at the joint] of a model's position servos; others are left out."""
     gains = {}
     for actuator in range(model.nu):
         affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
         kp = float(model.actuator_gainprm[actuator, 0])
         if at_joint(model, actuator) and affine and kp > 0 and np.isclose(-model.actuator_biasprm[actuator, 1], kp):
             name = model.joint(int(model.actuator_trnid[actuator, 0])).name
-            gains[name] = (kp, float(-model.actuator_biasprm[actuator, 2]))
+            ratio = float(model.actuator_gear[actuator, 0]) ** 2
+            gains[name] = (kp * ratio, float(-model.actuator_biasprm[actuator, 2]) * ratio)
     return gains
 
 
@@ -88,9 +89,9 @@ def check_gains(view: View) -> None:
         values = view.rollout.meta.get(key)
         if values is None:
             continue
-        _compare(view, key, dict(zip(view.rollout.joints, values, strict=True)), wanted, "the declared model's")
+        _compare_declared(view, key, dict(zip(view.rollout.joints, values, strict=True)), wanted)
         theirs = _contract_gains(view.contract, key)
-        _compare(view, key, dict(zip(view.rollout.joints, values, strict=True)), theirs, "the policy contract's")
+        _compare(view, key, dict(zip(view.rollout.joints, values, strict=True)), theirs, "the policy contract's", True)
 
 
 def _contract_gains(contract: dict[str, Any] | None, key: str) -> dict[str, float]:
@@ -99,7 +100,21 @@ def _contract_gains(contract: dict[str, Any] | None, key: str) -> dict[str, floa
     return dict(zip(contract["joints"], contract[key], strict=True))
 
 
-def _compare(view: View, key: str, values: dict[str, float], wanted: dict[str, float], whose: str) -> None:
+def _compare_declared(view: View, key: str, values: dict[str, float], wanted: dict[str, float]) -> None:
+    """Gains other than the declared ones are a condition of the rollout; those of no drive of this kind are fatal."""
+    if negative := next((name for name, value in values.items() if value < 0), None):
+        view.add(f"{key}[{negative}]", None, "gains", "gains of at least 0", f"{values[negative]:g}", fatal=True)
+        return
+    most, known = view.limits.gains_factor, {name: (values[name], x) for name, x in wanted.items() if name in values}
+    far = [n for n, (value, x) in known.items() if value > 0 and x > 0 and not 1 / most <= value / x <= most]
+    if far:
+        expected = f"N m a rad (and a rad/s), within {most:g} times the declared model's {wanted[far[0]]:.6g}"
+        view.add(f"{key}[{far[0]}]", None, "gains", expected, f"{values[far[0]]:g}: another unit", fatal=True)
+    else:
+        _compare(view, key, values, wanted, "the declared model's", fatal=False)
+
+
+def _compare(view: View, key: str, values: dict[str, float], wanted: dict[str, float], whose: str, fatal: bool) -> None:
     wrong = [
         name
         for name, value in values.items()
@@ -108,4 +123,4 @@ def _compare(view: View, key: str, values: dict[str, float], wanted: dict[str, f
     if wrong:
         first = wrong[0]
         came = f"{values[first]:g} ({len(wrong)} joints differ)"
-        view.add(f"{key}[{first}]", None, "gains", f"{whose} {wanted[first]:.6g}", came, fatal=True)
+        view.add(f"{key}[{first}]", None, "gains", f"{whose} {wanted[first]:.6g}", came, fatal=fatal)

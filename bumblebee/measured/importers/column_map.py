@@ -59,6 +59,8 @@ class ColumnMap:
     """Topic of messages without names -> the joints in the order of its values."""
     episode: str = ""
     """Column that numbers the episodes of a file, or HDF5's groups of an episode each; every one becomes a rollout."""
+    valid: str = ""
+    """Column that is 0 in rows that do not count, as `torque_enable` is once a servo was switched off."""
     scale: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Column of the contract -> factors, one a joint, on its values (in rad where they are angles)."""
     offset: dict[str, tuple[float, ...]] = field(default_factory=dict)

@@ -21,12 +21,12 @@ from bumblebee.measured.rollout import Rollout
 from bumblebee.measured.tables import read_csv, read_parquet, separator
 
 
-def import_csv(place: Path, maps: Sequence[ColumnMap]) -> list[Rollout]:
-    """Every CSV and Parquet file of a folder or zip archive, or one file."""
+def import_csv(place: Path, maps: Sequence[ColumnMap], no_logs: Sequence[str] = ()) -> list[Rollout]:
+    """Every CSV and Parquet file of a folder or zip archive, or one file; but for those that are no logs."""
     source = open_source(place)
     rollouts = []
     for ending in (".csv", ".parquet"):
-        names = source.ending(ending)
+        names = [name for name in source.ending(ending) if name not in no_logs]
         ids = rollout_names(names, ending)
         rollouts += [rollout for name in names for rollout in read_table(source, name, ids[name], maps)]
     if not rollouts:
@@ -43,6 +43,8 @@ def read_table(source: Source, name: str, rollout_id: str, maps: Sequence[Column
         came = ", ".join(map(str, table.columns[:40])) or "none"
         raise BadInput(where, f"the columns {', '.join(_missing(maps[0], table))}", f"only {came}")
     table = table[table[_wanted(chosen)].notna().any(axis=1)]  # rows of nothing but separators
+    if chosen.valid:
+        table = table[table[chosen.valid].fillna(0).astype(bool)]
     if not len(table):
         raise BadInput(where, "rows under the header", "none")
     if not chosen.episode:
@@ -106,7 +108,12 @@ def _body(content: bytes) -> bytes:
 
 
 def _wanted(one: ColumnMap) -> list[str]:
-    names = [*(() if one.hz else one.time), *(name for names in one.columns.values() for name in names), one.episode]
+    names = [
+        *(() if one.hz else one.time),
+        *(name for names in one.columns.values() for name in names),
+        one.episode,
+        one.valid,
+    ]
     return list(dict.fromkeys(name for name in names if name))
 
 

@@ -12,12 +12,14 @@ from bumblebee.io.names import distinct_stems
 from bumblebee.io.write import new_folder, try_output
 from bumblebee.measured.importers.asap_npz import import_asap
 from bumblebee.measured.importers.column_map import DOUBLE_PENDULUM
+from bumblebee.measured.importers.conditions_table import read_conditions, with_conditions
 from bumblebee.measured.importers.csv_map import import_csv
 from bumblebee.measured.importers.hdf5_log import import_hdf5
 from bumblebee.measured.importers.lerobot import import_lerobot
 from bumblebee.measured.importers.map_file import read_map
 from bumblebee.measured.importers.ros import import_rosbag
 from bumblebee.measured.importers.so101 import import_so101
+from bumblebee.measured.importers.source import open_source
 from bumblebee.measured.importers.sysid_npz import import_sysid
 from bumblebee.measured.model_file import copy_model, load_model
 from bumblebee.measured.rollout import Rollout, write_rollout
@@ -28,7 +30,11 @@ MAPPED = ("csv", "rosbag", "lerobot", "hdf5")
 
 
 def read_rollouts(
-    source: Path, kind: str, model: mujoco.MjModel | None = None, column_map: Path | None = None
+    source: Path,
+    kind: str,
+    model: mujoco.MjModel | None = None,
+    column_map: Path | None = None,
+    conditions: Path | None = None,
 ) -> list[Rollout]:
     """The rollouts of a source in one of the layouts `KINDS`.
 
@@ -37,7 +43,10 @@ def read_rollouts(
         kind: one of `KINDS`; asap and sysid need `model`, those of `MAPPED` a `column_map`.
         model: the declared model.
         column_map: YAML file with the fields of `ColumnMap`.
+        conditions: table of what was different in each log, see `conditions_table`.
     """
+    table = read_conditions(conditions, open_source(source)) if conditions else None
+    no_log = (table.member,) if table else ()
     if kind in ("asap", "sysid") and model is None:
         raise BadInput(kind, "the declared model, by whose joints the file is read", "none", "Give a model.xml.")
     if kind in MAPPED and column_map is None:
@@ -45,7 +54,7 @@ def read_rollouts(
     mapped = read_map(column_map, kind) if kind in MAPPED and column_map else DOUBLE_PENDULUM[0]
     readers: dict[str, Callable[[], list[Rollout]]] = {
         "so101": lambda: import_so101(source),
-        "csv": lambda: import_csv(source, [mapped]),
+        "csv": lambda: import_csv(source, [mapped], no_log),
         "double_pendulum": lambda: import_csv(source, DOUBLE_PENDULUM),
         "asap": lambda: import_asap(source, model),
         "sysid": lambda: import_sysid(source, model),
@@ -55,11 +64,17 @@ def read_rollouts(
     }
     if kind not in readers:
         raise BadInput(kind, f"one of {', '.join(KINDS)}", repr(kind))
-    return _distinct(readers[kind]())
+    rollouts = _distinct(readers[kind]())
+    return with_conditions(rollouts, table) if table else rollouts
 
 
 def import_dataset(
-    source: Path, kind: str, out: Path, model_path: Path | None = None, column_map: Path | None = None
+    source: Path,
+    kind: str,
+    out: Path,
+    model_path: Path | None = None,
+    column_map: Path | None = None,
+    conditions: Path | None = None,
 ) -> list[str]:
     """Write `out`/rollouts/*.parquet and `out`/model.xml; `out` appears whole and must not exist. Returns the ids."""
     out = Path(out)
@@ -67,7 +82,7 @@ def import_dataset(
         raise BadInput(out, "a new folder", "one that exists", "Choose another name.")
     try_output(out)
     model = load_model(model_path) if model_path else None
-    rollouts = read_rollouts(Path(source), kind, model, column_map)
+    rollouts = read_rollouts(Path(source), kind, model, column_map, conditions)
     with new_folder(out) as folder:
         for rollout in rollouts:
             write_rollout(folder / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)

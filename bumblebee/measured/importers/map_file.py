@@ -12,6 +12,7 @@ from bumblebee.io.read import read_yaml
 from bumblebee.measured.importers.column_map import ANGLES, CLOCKS, LAYOUTS, LEFT_OUT, NAMED, SECONDS, ColumnMap
 from bumblebee.measured.importers.unitree import UNITREE
 
+_STATE = "It is not guessed: state it."
 _LARGEST = 1e9  # of a factor or offset: from ticks of an encoder to rad is 1e-3, from nanometres 1e-9
 _CHOICES = {
     "time_unit": tuple(SECONDS),
@@ -50,6 +51,7 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     for column, names in columns.items():
         same_order(f"{path}: columns: {column}", joints, names)
     given = {"joints": joints, "columns": columns, "time": ("time",), "episode": _one_name(path, table, "episode")}
+    given["valid"] = _one_name(path, table, "valid")
     given |= _clock(path, table, kind) | {"hz": _rate(f"{path}: hz", table.get("hz", 0.0))}
     given["angle_unit"] = _angle_unit(f"{path}: angle_unit", table.get("angle_unit", "rad"), len(joints))
     given["names"] = _renamed(f"{path}: names", table.get("names"), joints)
@@ -91,21 +93,23 @@ def _require_keys(path: Path, table: Any, kind: str) -> None:
     if not isinstance(table, dict) or not {"joints", "columns"} <= set(table) or set(table) - known:
         came = ", ".join(map(str, table)) if isinstance(table, dict) else type(table).__name__
         raise BadInput(path, f"joints, columns and no keys but {', '.join(sorted(known))}", came[:200])
+    columns = table["columns"] if isinstance(table["columns"], dict) else {}
+    if "base_ang_vel" in columns and table.get("angle_unit", "rad") not in ("rad", "deg") and "gyro_unit" not in table:
+        raise BadInput(f"{path}: gyro_unit", "rad or deg (a second)", "nothing", _STATE)
     if kind == "csv":
         return
+    if table.get("valid") and kind != "lerobot":
+        raise BadInput(f"{path}: valid", "no such key: a column of csv and lerobot says it", repr(table["valid"])[:60])
     stated = {"angle_unit": f"the unit of the joints, one of {', '.join(ANGLES)}, for all or one a joint"}
     if kind == "rosbag":
         stated["time"] = "the stamp that counts, header or log"
     if kind == "hdf5" and "hz" not in table:
         stated |= {"time": "the path of the time stamps, or hz", "time_unit": f"one of {', '.join(SECONDS)}"}
-    columns = table["columns"] if isinstance(table["columns"], dict) else {}
     if "base_quat" in columns:
         stated["quat_order"] = "wxyz or xyzw"
-    if "base_ang_vel" in columns and table.get("angle_unit") not in ("rad", "deg"):
-        stated["gyro_unit"] = "rad or deg"
     for key, what in stated.items():
         if key not in table:
-            raise BadInput(f"{path}: {key}", what, "nothing", "It is not guessed: state it.")
+            raise BadInput(f"{path}: {key}", what, "nothing", _STATE)
 
 
 def _clock(path: Path, table: dict[str, Any], kind: str) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from bumblebee.sim.effects import native
 from bumblebee.sim.effects.catalogue import CATALOGUE, STICTION_SOLIMP, STICTION_SOLREF, Effect, Kind, is_native, single
 from bumblebee.sim.effects.file import effects_yaml, read_effects, write_effects
 from bumblebee.sim.effects.forces import Memory, StepHooks, bent, history_length
-from bumblebee.sim.effects.hooks import RuntimeHooks, runtime_hooks
+from bumblebee.sim.effects.hooks import RuntimeHooks, hook_joints, runtime_hooks
 from bumblebee.sim.effects.native import SUFFIX, is_hidden, physical_inertia, sloped, spread_inertia
 from bumblebee.sim.effects.setpoints import NO_SPEED_LIMIT, SETPOINTS, advance
 from bumblebee.sim.effects.spec import ADDED, add_to_spec
@@ -36,6 +36,7 @@ __all__ = [
     "bent",
     "effects_yaml",
     "history_length",
+    "hook_joints",
     "is_hidden",
     "is_native",
     "native",

@@ -29,7 +29,7 @@ from mujoco.batch import Batch
 from bumblebee.sim.effects.hooks import RuntimeHooks, hook_joints
 from bumblebee.sim.effects.setpoints import advance
 from bumblebee.sim.effects.states import states_of
-from bumblebee.sim.servo import servos_of
+from bumblebee.sim.servo import Servos, servos_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +78,10 @@ def history_length(hooks: RuntimeHooks, step: float) -> int:
 class StepHooks:
     """Hooks that run beside one batch; call `reset` after its worlds were reset and `apply` before each step."""
 
-    def __init__(self, hooks: RuntimeHooks, model: mujoco.MjModel, batch: Batch) -> None:
+    def __init__(self, hooks: RuntimeHooks, model: mujoco.MjModel, batch: Batch, servos: Servos | None = None) -> None:
+        """`servos` are those of the worlds where they differ; by default `model`'s."""
         self._h, self._batch = hooks, batch
-        self.servos = servos_of(model, hook_joints(model))
+        self.servos = servos_of(model, hook_joints(model)) if servos is None else servos
         self._step = float(model.opt.timestep)
         count, joints = batch.nsim, len(hooks.joints)
         self._time, self._heat = np.zeros(count), np.zeros((count, joints))
@@ -261,10 +262,11 @@ class StepHooks:
     def _torque_limit(self, v: np.ndarray) -> np.ndarray:
         """Limits (n, J) of torques that drive the motion; those that brake keep the full one."""
         servos, speed = self.servos, self._h.speed_limit
-        some = np.isfinite(speed) & np.isfinite(servos.limit) & (servos.actuator >= 0)
-        left = np.clip(1.0 - np.abs(v) / speed, 0.0, 1.0)
+        finite = np.isfinite(servos.limit).all(axis=tuple(range(servos.limit.ndim - 1)))
+        some = np.isfinite(speed) & finite & (servos.actuator >= 0)
+        left = np.clip(1.0 - np.abs(v) / (speed * servos.supply), 0.0, 1.0)
         forward, backward = np.where(v > 0, left, 1.0), np.where(v < 0, left, 1.0)
-        a, force = servos.actuator[some], (servos.limit / np.maximum(np.abs(servos.gear), 1e-12))[some]
+        a, force = servos.actuator[some], (servos.limit / np.maximum(np.abs(servos.gear), 1e-12))[..., some]
         self._range[:, a, 0], self._range[:, a, 1] = -force * backward[:, some], force * forward[:, some]
         return np.where(some, servos.limit * left, servos.limit)
 

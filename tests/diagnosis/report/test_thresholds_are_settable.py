@@ -63,7 +63,7 @@ def test_the_document_goes_by_what_was_set(set_: Diagnosis, default: Diagnosis) 
 def test_page_and_terminal_go_by_what_was_set(set_: Diagnosis, default: Diagnosis) -> None:
     page, usual = (contents(made)["report.html"] for made in (set_, default))
     assert "WORSE" in page and "WORSE" not in usual
-    assert "and 1 more." in page and "more in diagnosis.json" in page
+    assert "and 1 more" in page and "more in diagnosis.json" in page
     assert page.count("<svg") == 3 and len(page) < len(usual)
     assert "WORSE" in summary(set_.document, RULES) and "WORSE" not in summary(default.document)
 

@@ -9,7 +9,7 @@ import pytest
 from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.dataset.undriven import commanded_undriven
 from bumblebee.diagnosis.gap.gap import gap
-from bumblebee.diagnosis.report.notes import beside_noise, unexplained_error, what_is_left
+from bumblebee.diagnosis.report.notes import unexplained_error, what_is_left
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.terminal import summary
 from bumblebee.diagnosis.thresholds.report import Verdicts
@@ -53,13 +53,6 @@ def test_an_error_at_the_noise_warns_of_nothing():
     assert unexplained_error(made, Verdicts()) == []
     assert what_is_left(made, Verdicts()) == "no significant structure in the residual"
     assert "No effect of the catalogue is missing" in render_report(made, [])
-
-
-def test_an_error_below_the_expected_noise_is_explained():
-    floor = {"value": 4.39e-3, "ci95": [2.5e-3, 6e-3]}
-    below = beside_noise({"value": 3.25e-3}, floor, "mrad", 1e3)
-    assert "at the noise floor" in below and "[2.5, 6]" in below
-    assert beside_noise({"value": 9e-3}, floor, "mrad", 1e3) == "noise floor 4.39 [2.5, 6] mrad"
 
 
 def test_one_rollout_says_what_could_not_be_tested(diagnosed):

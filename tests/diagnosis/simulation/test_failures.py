@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 
 import bumblebee.diagnosis.simulation.simulate as simulate
-from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.candidates import Candidate, all_candidates
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.replay import replay
 from bumblebee.diagnosis.residuals import make_problem
 from bumblebee.diagnosis.simulation import choose_starts, cut, residuals, vary
+from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.errors import BadInput
-from bumblebee.sim.effects import single
+from bumblebee.sim.effects import SUFFIX, single
 from tests.diagnosis import arm, cart
 
 BLOCK = """<mujoco><option timestep=".002"/><worldbody><body name="block"><joint name="rail" type="slide" axis="1 0 0"/>
@@ -120,3 +121,14 @@ def test_many_failures_are_few_lines() -> None:
         session.plant.failures.add([single("armature", f"j{k}", 0.1)], ValueError("no"))
     notes = session.plant.failures.notes(3)
     assert len(notes) == 4 and notes[-1].startswith("6 more")
+
+
+def test_play_and_shafts_are_offered_only_where_mjcf_has_room_for_a_second_hinge() -> None:
+    """Of two joints on one body the first has none."""
+    crossed = cart.xml().replace('<body name="pole">', "").replace("</body></body>", "</body>")
+    crossed = crossed.replace('<inertial pos="0 0 0" mass="2" diaginertia=".02 .02 .02"/>', "")
+    session = cart.session_of(cart.record(count=1, seconds=2.0), crossed)
+    rules = Thresholds().candidates
+    offered = [c for c in all_candidates(session.plant, session.rollouts, [], rules) if c.effect in SUFFIX]
+    assert {c.where for c in offered} == {"pole"}
+    assert not any(vary(session.plant, [c.at(c.start)]).impossible for c in offered)

@@ -59,6 +59,8 @@ def test_groups_of_an_hdf5_file_are_episodes_in_the_order_of_their_numbers(tmp_p
         (("obs/q,", "obs/qpos,"), "qpos.*only dq, q"),
         (("[shoulder, elbow, wrist]", "[shoulder, elbow]"), r"2 columns.*\(300, 3\)"),
         (("angle_unit: deg", "angle_unit: [deg, deg]"), "or 3 of them"),
+        (("angle_unit: deg", "angle_unit: [deg, deg, rad]\nvalid: on"), "valid.*no such key"),
+        (("deg\ncolumns: {", "turn\ncolumns: {base_ang_vel: gyro, "), "gyro_unit.*nothing"),
         (("angle_unit: deg", "angle_unit: normalised"), "scale.*factors of joint_pos to rad"),
     ],
 )

@@ -21,11 +21,11 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.profile import halved, profile
 from bumblebee.diagnosis.selection.proposals.joint_misfit import joint_chi_squares
 from bumblebee.diagnosis.selection.trial import Trial
-from bumblebee.diagnosis.simulation import Changes, Plant, Windows, command_inputs, vary
+from bumblebee.diagnosis.simulation import Changes, Plant, Windows, command_inputs, plant_servos, vary
 from bumblebee.diagnosis.thresholds.proposals import Saturation
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect
-from bumblebee.sim.servo import Servos, servos_of
+from bumblebee.sim.servo import Servos
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,9 +199,9 @@ def _demand(problem: Problem, effects: Sequence[Effect]) -> _Demand:
     """By the servos of the model with `effects`, at the logged states and commands."""
     windows, plant = problem.windows, problem.plant
     varied = vary(plant, effects)
-    own = varied.plant or plant
-    servos = servos_of(varied.model, [int(own.model.joint(name).id) for name in plant.joints])
-    tables = {i: _asked(plant, servos, windows.source[i]) for i in np.unique(windows.rollout)}
+    servos = [plant_servos(plant, model) for model in varied.models]
+    conditions = dict(zip(windows.rollout.tolist(), windows.condition.tolist(), strict=True))
+    tables = {i: _asked(plant, servos[c], windows.source[i]) for i, c in conditions.items()}
     peak = np.empty((len(windows), len(plant.joints)))
     slowest = np.empty_like(peak)
     for w, (i, first) in enumerate(zip(windows.rollout, windows.start, strict=True)):

@@ -1,0 +1,1 @@
+"""Planned runs on sealed robots, beside random motions of equal length."""

@@ -1,0 +1,208 @@
+"""The next experiment: safe runs, chosen to tell apart what a diagnosis could not and to narrow what it knows."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.plan.basis import Basis, basis_of
+from bumblebee.diagnosis.plan.choose import choose
+from bumblebee.diagnosis.plan.config import Gain, PlanConfig
+from bumblebee.diagnosis.plan.findings import Findings
+from bumblebee.diagnosis.plan.information import Lens, information_of, lens_of, logs_of
+from bumblebee.diagnosis.plan.limits import Limits
+from bumblebee.diagnosis.plan.machine import Machine
+from bumblebee.diagnosis.plan.motions import Motion
+from bumblebee.diagnosis.plan.objective import Objective, imitations, objective_of
+from bumblebee.diagnosis.plan.pool import refuse_none, resting, safe_pool, set_stage
+from bumblebee.diagnosis.plan.rehearsal import rehearse
+from bumblebee.diagnosis.plan.safety import Safe, made_safe
+from bumblebee.diagnosis.plan.stage import Stage
+from bumblebee.diagnosis.plan.unknowns import Case, cases_of
+from bumblebee.diagnosis.simulation import Plant
+from bumblebee.errors import BadInput
+from bumblebee.measured.rollout import Rollout
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Runs to be made, and what they are expected to tell."""
+
+    machine: Machine
+    limits: Limits
+    config: PlanConfig
+    findings: Findings | None
+    cases: list[Case]
+    """The robots that it is safe on."""
+    motions: list[Motion]
+    """The runs."""
+    reached: np.ndarray
+    """(R, 3, J) largest shares of travel, speed and torque that a run reaches in any case."""
+    objective: Objective
+    data: np.ndarray
+    """(N, N) information of what was measured already; zeros for nothing."""
+    runs: np.ndarray
+    """(R, N, N) information of the runs."""
+    refused: dict[str, int]
+    """Why other candidates were given up -> how many."""
+    checked: bool
+    """Whether the model has geometry by which self-collision could be looked for."""
+    left_out: tuple[str, ...]
+    """Robots that cannot even rest in the start pose, so that no run is safe on them."""
+
+    @property
+    def basis(self) -> Basis:
+        """The effects asked about."""
+        return self.objective.basis
+
+
+def make_plan(
+    spec: mujoco.MjSpec,
+    name: str,
+    config: PlanConfig | None = None,
+    session: Session | None = None,
+    findings: Findings | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Plan:
+    """Plan runs on the robot of `spec`; with the session of a dataset and what its diagnosis found, what it lacks."""
+    with threadpool_limits(1, user_api="blas"):  # as in a diagnosis: many small matrices
+        return _make_plan(spec, name, config or PlanConfig(), session, findings, say)
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """What the data say already, and how more of it is valued."""
+
+    lens: Lens
+    objective: Objective
+    data: np.ndarray
+    """(N, N) information; zeros for nothing."""
+
+
+def _make_plan(
+    spec: mujoco.MjSpec,
+    name: str,
+    config: PlanConfig,
+    session: Session | None,
+    findings: Findings | None,
+    say: Callable[[str], None],
+) -> Plan:
+    """The same on the threads that there are."""
+    stage = set_stage(spec, name, config, session, findings)
+    known = None if session is None else _measured(stage.machine, session, findings, config)
+    if known is not None:
+        stage = _with_rivals(stage, known, findings, config)
+    say(f"{len(stage.cases)} robots to be safe on; {config.pool} candidate motions")
+    safe = safe_pool(stage, config)
+    refuse_none(safe, say)
+    say(f"{len(safe.motions)} of them are safe; what they would tell")
+    effects = findings.effects if findings else ()
+    runs = rehearse(stage.machine, safe.motions, effects, stage.step, stage.rules.motions.settle)
+    logs = logs_of(stage.machine, runs, safe.motions)
+    if known is None:
+        known = _unmeasured(stage.machine, logs, config)
+    told = _told(stage.machine, safe.motions, logs, known.lens, _windows(stage.machine, config))
+    return _chosen(stage, safe, known, told, (config, findings), say)
+
+
+def _measured(machine: Machine, session: Session, findings: Findings | None, config: PlanConfig) -> _Known:
+    """What a dataset says."""
+    seen = session.plant  # which knows the conditions that its rollouts were recorded under
+    lens = _lens(machine, seen, session.rollouts, findings, config)
+    budget = 2 * _windows(machine, config)
+    data = information_of(seen, machine.seen_layout, session.rollouts, lens, budget).sum(axis=0)
+    return _Known(lens, _objective(machine, lens, data, config, len(data) - lens.basis.slices[-1].stop), data)
+
+
+def _unmeasured(machine: Machine, logs: Sequence[Rollout], config: PlanConfig) -> _Known:
+    """Nothing yet; the sizes of signals are those of the candidate runs."""
+    lens = _lens(machine, machine.seen[Gain()], logs, None, config)
+    one = information_of(machine.seen[Gain()], machine.seen_layout, logs[:1], lens, 1)[0]
+    objective = _objective(machine, lens, None, config, len(one) - lens.basis.slices[-1].stop)
+    return _Known(lens, objective, np.zeros_like(one))
+
+
+def _lens(
+    machine: Machine, seen: Plant, rollouts: Sequence[Rollout], findings: Findings | None, config: PlanConfig
+) -> Lens:
+    basis = basis_of(seen, rollouts, findings, config.thresholds)
+    return lens_of(machine, seen, rollouts, basis, DiagnosisConfig().horizon, config.thresholds)
+
+
+def _objective(machine: Machine, lens: Lens, data: np.ndarray | None, config: PlanConfig, first: int) -> Objective:
+    model = machine.plant.model
+    bodies = {
+        name: model.body(int(model.jnt_bodyid[model.joint(name).id])).name
+        for name, moved in zip(machine.joints, machine.moved, strict=True)
+        if moved
+    }
+    return objective_of(lens.basis, first, data, bodies, config.thresholds.plan)
+
+
+def _with_rivals(stage: Stage, known: _Known, findings: Findings | None, config: PlanConfig) -> Stage:
+    """The stage with the rivals' robots among its cases, at the size at which each imitates what was found."""
+    rule, basis = config.thresholds.plan.unknowns, known.lens.basis
+    rivals, count = [], dict.fromkeys(basis.found, 0)
+    for (k, other), steps in imitations(known.objective, known.data).items():
+        if count[k] < rule.rivals:
+            c = basis.candidates[other]
+            values = c.start
+            for f, step in zip(c.free, steps, strict=True):
+                values[f] = c.nominal[f] + step * c.step[f]
+            rivals.append((basis.found[k], c, c.clip(values)))
+            count[k] += 1
+    cases = cases_of(stage.machine, stage.limits, findings, rivals, rule)
+    return resting(stage, cases)
+
+
+def _windows(machine: Machine, config: PlanConfig) -> int:
+    """Windows that stand for a run."""
+    rule, small = config.thresholds.plan.information, config.thresholds.dataset.time_steps.small_model
+    return rule.windows if machine.plant.model.nv <= small else rule.few
+
+
+def _told(machine: Machine, motions: list[Motion], logs: list, lens: Lens, budget: int) -> np.ndarray:
+    """Information (R, N, N) of the motions, each by the robot at its gain."""
+    out: list[np.ndarray | None] = [None] * len(motions)
+    for gain in dict.fromkeys(m.gain for m in motions):
+        some = [i for i, m in enumerate(motions) if m.gain == gain]
+        told = information_of(machine.seen[gain], machine.seen_layout, [logs[i] for i in some], lens, budget)
+        for i, own in zip(some, told, strict=True):
+            out[i] = own
+    return np.stack([own for own in out if own is not None])
+
+
+def _chosen(
+    stage: Stage,
+    safe: Safe,
+    known: _Known,
+    told: np.ndarray,
+    asked: tuple[PlanConfig, Findings | None],
+    say: Callable[[str], None],
+) -> Plan:
+    """The best runs that are safe in fine steps, too; a run that is not is left out and the choice made again."""
+    config, findings = asked
+    shut: list[int] = []
+    while True:
+        picked = choose(known.objective, known.data, told, config.runs, shut)
+        if not picked:
+            raise BadInput("plan", "a motion that is safe in fine steps", "none", "Ask for less --travel or --speed.")
+        some, fine = [safe.motions[r] for r in picked], stage.machine.steps[0]
+        if fine == stage.step:
+            reached = safe.reached[picked]
+            break
+        say("the chosen runs again, in fine steps")
+        again = made_safe(stage, some, fine, shrinks=0)
+        if len(again.motions) == len(some):
+            reached = again.reached
+            break
+        kept = {m.number for m in again.motions}
+        shut += [r for r in picked if safe.motions[r].number not in kept]
+    return Plan(
+        stage.machine, stage.limits, config, findings, stage.cases, some, reached, known.objective, known.data,
+        told[picked], dict(safe.refused), stage.around.has_geometry, stage.left_out,
+    )  # fmt: skip

@@ -1,0 +1,26 @@
+"""Where motions are rehearsed: the robot at rest, its limits, and the robots that a plan must be safe on."""
+
+from dataclasses import dataclass
+
+from bumblebee.diagnosis.plan.contacts import Surroundings
+from bumblebee.diagnosis.plan.limits import Limits
+from bumblebee.diagnosis.plan.machine import Machine
+from bumblebee.diagnosis.plan.motions import Scope
+from bumblebee.diagnosis.plan.unknowns import Case
+from bumblebee.diagnosis.thresholds.plan import PlanThresholds
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A robot with its limits, the cases that it must be safe in, and what motions are drawn within."""
+
+    machine: Machine
+    limits: Limits
+    around: Surroundings
+    cases: list[Case]
+    scope: Scope
+    step: float
+    """Of rehearsals [s]."""
+    rules: PlanThresholds
+    left_out: tuple[str, ...] = ()
+    """Cases that are possible by the data and cannot even rest in the start pose."""

@@ -1,0 +1,153 @@
+"""A plan keeps its limits on every robot that it may be: by a simulation of the test's own, step by step."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.plan import PlanConfig, make_plan, set_stage
+from bumblebee.diagnosis.plan.contacts import Surroundings, inner_radius, inside_by
+from bumblebee.diagnosis.plan.motions import draw_motion, smooth_step
+from bumblebee.diagnosis.plan.safety import made_safe
+from bumblebee.errors import BadInput
+from tests.diagnosis.arm import XML
+from tests.diagnosis.plan.made import LIMITS, planned
+from tests.diagnosis.stander import XML as STANDER
+
+FRICTION = {"low": 0.3, "found": 0.4, "high": 0.5, "none": 0.0}
+
+
+def follow(model: mujoco.MjModel, home: np.ndarray, targets: np.ndarray, hz: float = 50.0) -> tuple[np.ndarray, ...]:
+    """Positions, velocities (T, J) and forces (T, nu) of a robot that first rests at `home` for 2 s."""
+    model.opt.timestep = 0.001
+    data, steps = mujoco.MjData(model), round(1000 / hz)
+    data.qpos[:], data.ctrl[:] = home, home
+    mujoco.mj_step(model, data, 2000)
+    rows = []
+    for target in targets:
+        data.ctrl[:] = target
+        rows.append((data.qpos.copy(), data.qvel.copy(), data.actuator_force.copy()))
+        mujoco.mj_step(model, data, steps)
+    return tuple(np.array(column) for column in zip(*rows, strict=True))
+
+
+@pytest.mark.parametrize("friction", FRICTION.values(), ids=FRICTION.keys())
+def test_a_plan_keeps_its_limits_on_the_declared_robot_and_at_both_ends_of_the_interval(friction: float) -> None:
+    plan = planned()
+    model = mujoco.MjModel.from_xml_string(XML)
+    model.dof_damping[1] = friction
+    for motion in plan.motions:
+        q, v, tau = follow(model, plan.machine.home, motion.targets)
+        assert (q > plan.limits.low - 1e-3).all() and (q < plan.limits.high + 1e-3).all()
+        assert (np.abs(v) <= 1.02 * plan.limits.speed).all()
+        assert (np.abs(tau) <= 1.02 * plan.limits.torque).all()
+
+
+def test_the_limits_are_the_told_ones_less_their_margins() -> None:
+    limits, rule = planned().limits, LIMITS.thresholds.plan.safety
+    np.testing.assert_allclose(limits.speed, 4.0 * rule.speed)
+    np.testing.assert_allclose(limits.torque, rule.torque * np.array([40.0, 40.0, 20.0]))
+    assert (limits.high - limits.low <= 2.0 + 1e-9).all()
+
+
+def test_runs_start_and_end_at_rest_in_the_start_pose() -> None:
+    plan = planned()
+    for motion in plan.motions:
+        np.testing.assert_allclose(motion.targets[[0, 1, -2, -1]], np.tile(plan.machine.home, (4, 1)), atol=1e-9)
+        speed = np.gradient(motion.targets, 0.02, axis=0)
+        assert np.abs(speed[[0, -1]]).max() < 1e-6
+        assert np.abs(np.gradient(speed, 0.02, axis=0)[[0, -1]]).max() < 1e-6
+        assert np.abs(motion.targets - plan.machine.home).max() > 0.02
+
+
+def test_a_ramp_has_no_speed_and_no_acceleration_at_its_ends() -> None:
+    share = np.linspace(-0.2, 1.2, 1401)
+    speed = np.gradient(smooth_step(share), share)
+    assert smooth_step(share)[0] == 0 and smooth_step(share)[-1] == 1
+    assert speed.min() > -1e-9 and np.abs(np.gradient(speed, share)).max() < 6.0
+
+
+def test_a_motion_that_breaks_a_limit_is_made_smaller_and_then_keeps_it() -> None:
+    stage = set_stage(mujoco.MjSpec.from_string(XML), "arm", LIMITS, None, None)
+    narrow = replace(stage.limits, speed=np.full(3, 0.3))
+    motions = [draw_motion(stage.scope, 0, k) for k in range(5)]
+    safe = made_safe(replace(stage, limits=narrow), motions)
+    assert safe.motions
+    assert all((new.amplitude < motions[new.number].amplitude).any() for new in safe.motions)
+    model = mujoco.MjModel.from_xml_string(XML)
+    for motion in safe.motions:
+        _, v, _ = follow(model, stage.machine.home, motion.targets)
+        assert np.abs(v).max() <= 0.31
+
+
+BLOCKED = XML.replace(
+    "<worldbody>", '<worldbody><geom name="post" type="box" size=".05 .3 .5" pos=".35 0 1.2"/>'
+).replace(
+    '<inertial pos="0.01 0.02 .12" mass=".7" diaginertia=".005 .005 .001"/>',
+    '<inertial pos="0.01 0.02 .12" mass=".7" diaginertia=".005 .005 .001"/>'
+    '<geom name="tip" type="sphere" size=".04" pos="0 0 .2" mass="0"/>',
+)  # fmt: skip
+
+
+def test_runs_keep_clear_of_a_post_beside_the_arm() -> None:
+    config = replace(LIMITS, pool=8, travel={"": 2.0})
+    stage = set_stage(mujoco.MjSpec.from_string(BLOCKED), "arm", config, None, None)
+    motions = [draw_motion(stage.scope, 0, k) for k in range(8)]
+    model = mujoco.MjModel.from_xml_string(BLOCKED)
+    home = stage.machine.home
+    safe = made_safe(replace(stage, cases=stage.cases[:1]), motions, 0.005)
+    assert any(near(model, follow(model, home, m.targets)[0]) <= 0 for m in motions)
+    assert safe.motions
+    assert all(near(model, follow(model, home, m.targets)[0]) > 0.0 for m in safe.motions)
+
+
+def near(model: mujoco.MjModel, path: np.ndarray) -> float:
+    """Least distance [m] of the tip from the post along a path (T, nq)."""
+    data, least = mujoco.MjData(model), np.inf
+    for qpos in path:
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        found = mujoco.mj_geomDistance(model, data, model.geom("tip").id, model.geom("post").id, 1.0, np.zeros(6))
+        least = min(least, found)
+    return least
+
+
+def test_a_stander_keeps_its_feet_down_and_its_base_upright() -> None:
+    config = PlanConfig(runs=1, seconds=4.0, pool=4, speed={"": 6.0}, travel={"": 2.5})
+    plan = make_plan(mujoco.MjSpec.from_string(STANDER), "stander", config)
+    assert plan.machine.plant.floating and len(plan.cases) > 3
+    model = mujoco.MjModel.from_xml_string(STANDER)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 400)
+    feet = data.ncon
+    for target in plan.motions[0].targets:
+        data.ctrl[:] = target
+        mujoco.mj_step(model, data, 4)
+        assert data.xmat[1].reshape(3, 3)[2, 2] > np.cos(0.1)
+        assert data.ncon == feet
+
+
+def test_a_robot_that_falls_over_is_refused_in_one_line() -> None:
+    falling = STANDER.replace('pos="-.12 .1 -.18"', 'pos=".11 .1 -.18"').replace(
+        'pos="-.12 -.1 -.18"', 'pos=".11 -.1 -.18"'
+    )
+    with pytest.raises(BadInput, match="stands on the floor") as caught:
+        make_plan(mujoco.MjSpec.from_string(falling), "stander", PlanConfig(speed={"": 2.0}, travel={"": 1.0}))
+    assert "\n" not in str(caught.value) and "--start" in str(caught.value)
+
+
+def test_surroundings_tell_a_far_arm_from_a_near_one() -> None:
+    stage = set_stage(mujoco.MjSpec.from_string(BLOCKED), "arm", LIMITS, None, None)
+    around = Surroundings(stage.machine.plant, stage.machine.qpos, LIMITS.thresholds.plan.safety)
+    away, into = np.zeros(3), np.array([0.0, 0.9, 0.0])
+    assert around.clash(away[None], away[None], away[None]) is None
+    assert "l3" in around.clash(into[None], away[None], away[None]).reason
+
+
+def test_the_margin_of_support_is_the_distance_from_the_edge() -> None:
+    square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [1.0, 1.0]])
+    assert inside_by(np.array([0.5, 1.0]), square) == pytest.approx(0.5)
+    assert inside_by(np.array([2.5, 1.0]), square) == pytest.approx(-0.5)
+    assert inner_radius(square) == pytest.approx(1.0)
+    assert inside_by(np.array([0.0, 0.0]), square[:2]) == -np.inf

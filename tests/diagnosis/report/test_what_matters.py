@@ -1,0 +1,186 @@
+"""The first sentences say what is gone, what is left in units of the task, what to trust; significance comes after."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.report.headline import effect_groups, headline, sized
+from bumblebee.diagnosis.report.page import render_report
+from bumblebee.diagnosis.report.removed_error import Ends, effectors, removed
+from bumblebee.diagnosis.report.terminal import summary
+from bumblebee.diagnosis.report.what_matters import left_over, quantities, structure, trust
+from bumblebee.diagnosis.thresholds.report import Matters, ReportThresholds
+from tests.measured.simulated import ARM_JOINTS, arm_model
+
+RULE = Matters()
+
+
+def effect(name: str, where: str, ends: list, explains: float, declared: float | None = 1.0) -> dict:
+    size = {"value": 0.5 * sum(ends), "ci95": ends, "nominal": declared, "unit": ""}
+    return {"effect": name, "where": [where], "parameters": {"factor": size}, "equivalent": [], "explains": explains,
+            "evidence": {"p": 0.0, "test": ""}, "native": True}  # fmt: skip
+
+
+def block(*values: float) -> dict:
+    joints = {name: {"value": v, "ci95": None} for name, v in zip("abc", values, strict=False)}
+    whole = float(np.sqrt(np.mean(np.square(values))))
+    return {"0.2": {"joint_pos_rmse": {"value": whole, "ci95": None, "unit": "rad", "per_joint": joints}}}
+
+
+def document() -> dict:
+    """Three joints; most is gone, most of what is left is in b, and the tests see structure in a and b."""
+    made = {
+        "effects": [
+            effect("kp", "a", [0.009, 0.011], 0.8), effect("kd", "a", [0.0, 0.2], 0.3),
+            effect("armature", "b", [0.9, 1.1], 0.0, 0.2), effect("kp", "c", [0.01, 0.23], 0.0),
+        ],
+        "error": {
+            "before": block(0.1, 0.1, 0.1), "after": block(0.01, 0.04, 0.0021), "floor": block(0.002, 0.002, 0.002),
+        },
+        "unexplained": {"significant": True, "p": 0.0, "where": ["a", "b"], "depends_on": ["time"], "description": "d"},
+        "structure": {
+            name: {"torque_rms": 0.3, "typical_torque": 3.0, "depends_on": ["time", "speed", "load"], "p": 0.0,
+                   "explains": share, "law_shares": [], "law_quantities": []}
+            for name, share in (("a", 0.01), ("b", 0.4))
+        },
+        "holdout": ["x", "y"],
+    }  # fmt: skip
+    share = {"what": "joints", "unit": "rad", "before": 0.1, "after": 0.0239, "floor": 0.002}
+    made["summary"] = {
+        "horizon": "0.2",
+        "rollouts": 2,
+        "removed": {"0.2": [share | {"share": 0.777, "ci95": [0.7, 0.81]}]},
+        "left": left_over(made["error"], "0.2", {}),
+        "ends": [{"what": "end", "where": "hand", "unit": "m", "before": 0.05, "value": 0.0123, "ci95": None}],
+        "structure": structure(made, RULE),
+        "trust": trust(made["effects"], RULE),
+    }
+    return made
+
+
+def test_the_first_sentence_is_the_share_that_is_gone_in_degrees_with_its_interval() -> None:
+    first, left, structured, trusted = headline(document(), ReportThresholds())
+    assert first.startswith("After 0.2 s on 2 held-out rollouts, 78 % [70, 81] of the removable error")
+    assert "5.7° to 1.4° RMS, noise 0.11°" in first
+    assert left == "What is left after 0.2 s: b 2.3° (94 %), hand 12.3 mm off (declared 50 mm)."
+    assert structured.startswith("Part of it has structure: 40 % of what is left, a missing torque at b (0.3 N m RMS")
+    assert structured.endswith("Significant, but below 5 % of what is left: a.")
+    assert "its gain comes from kp on a, kd on a; read as sizes by themselves kp on a; take the other 3 only" in trusted
+    assert "(2 have intervals wider than 3-fold" in trusted
+
+
+def test_page_and_terminal_begin_with_it_and_end_with_the_tests() -> None:
+    made = document()
+    page, text = render_report(made, []), summary(made)
+    for out, tested in ((page, "Unexplained residual"), (text, "unexplained:")):
+        order = [out.index(word) for word in ("of the removable error", "What is left", "only together", tested)]
+        assert order == sorted(order)
+    titles = [title for title, _ in effect_groups(made, RULE)]
+    assert [title.split(":")[0] for title in titles] == [
+        "Carry the gain", "Needed beside the others, no gain of their own shown", "Not to be trusted alone"
+    ]  # fmt: skip
+    assert all(title in page for title in titles) and "3-fold" in titles[-1]
+
+
+@pytest.mark.parametrize(
+    ("ends", "declared", "explains", "group", "wide"),
+    [
+        ([0.9, 1.1], 0.2, 0.5, "carry", False),
+        ([0.0, 0.2], 1.0, 0.5, "carry", True),
+        ([0.9, 1.1], 0.2, 0.0, "beside", False),
+        ([0.2, 1.1], 0.1, 0.0, "wide", True),
+        ([0.9, 1.1], 1.0, 0.0, "wide", True),
+        ([-1.1, -0.9], 0.0, 0.0, "beside", False),
+        ([0.9, None], None, 0.0, "wide", True),
+    ],
+)
+def test_an_effect_is_trusted_by_what_it_explains_and_how_wide_its_interval_is(
+    ends: list, declared: float | None, explains: float, group: str, wide: bool
+) -> None:
+    made = effect("kp", "a", [0.0, 0.0], explains, declared)
+    made["parameters"]["factor"]["ci95"] = ends
+    (told,) = trust([made], RULE)
+    assert (told["group"], told["wide"]) == (group, wide)
+
+
+def test_quantities_are_cut_to_what_explains_most_of_the_torque() -> None:
+    entry = {"law_shares": [0.02, 0.3, 0.05], "law_quantities": [["time"], ["position", "load"], ["speed"]],
+             "depends_on": ["time", "position", "load", "speed"]}  # fmt: skip
+    assert quantities(entry, RULE) == ["position", "load"]
+    assert quantities({"depends_on": ["time", "speed", "load"]}, RULE) == ["time", "speed"]
+
+
+def test_effects_of_like_size_on_several_joints_are_one_line() -> None:
+    made = document()
+    made["effects"] = [effect("encoder_quantisation", name, [1e-3, 1e-3], 0.0, 0.0) for name in "abc"]
+    made["summary"]["trust"] = trust(made["effects"], RULE)
+    ((_, listed),) = effect_groups(made, RULE)
+    assert [e["where"] for e in listed] == [["a", "b", "c"]] and len(made["effects"][0]["where"]) == 1
+
+
+def test_a_model_that_is_worse_is_not_called_better() -> None:
+    made = document()
+    made["summary"]["removed"]["0.2"][0] |= {"after": 0.15, "share": -0.5, "ci95": [-0.9, -0.1]}
+    first, *_, trusted = headline(made, ReportThresholds())
+    assert "the error of the joints is larger: 5.7° to 8.6° RMS" in first and trusted.startswith("Do not trust")
+
+
+def test_an_error_below_the_expected_noise_is_no_better_than_one_at_it() -> None:
+    made = document()
+    made["summary"]["removed"]["0.2"][0] |= {"after": 0.0019, "share": 1.001, "ci95": [0.99, 1.01]}
+    first = headline(made, ReportThresholds())[0]
+    assert (
+        "100 % [99, 101]" in first and "at the noise floor: the error of a complete model scatters about 0.11°" in first
+    )
+
+
+def test_thresholds_decide_what_is_proclaimed() -> None:
+    slack = ReportThresholds(matters=Matters(structure=0.005))
+    assert all(entry["proclaimed"] for entry in structure(document(), slack.matters))
+
+
+def cuts(rollouts: np.ndarray, measured: np.ndarray) -> SimpleNamespace:
+    """Windows of the arm as the error block cuts them."""
+    model = arm_model()
+    plant = SimpleNamespace(model=model, joints=ARM_JOINTS, qpos=np.arange(3))
+    part = SimpleNamespace(rollout=rollouts, measured=measured[:, None])
+    layout = SimpleNamespace(slices={"joint_pos": slice(0, 3)})
+    return SimpleNamespace(
+        plant=plant, layout=layout, windows={"0.2": part}, rule=ReportThresholds().prediction_error
+    )  # fmt: skip
+
+
+def test_the_share_that_is_gone_counts_from_the_floor_and_its_interval_holds_it() -> None:
+    rng, rollouts = np.random.default_rng(0), np.repeat(np.arange(8), 30)
+    before, after = (size * rng.standard_normal((240, 1, 3)) for size in (0.1, 0.04))
+    ends = Ends(cuts(rollouts, np.zeros((240, 3))), {"0.2": before}, {"0.2": after})
+    error = {"floor": block(0.02, 0.02, 0.02)}
+    (entry,) = removed(ends, error, RULE)["0.2"]
+    assert entry["share"] == pytest.approx(0.06 / 0.08, abs=0.03)
+    assert entry["ci95"][0] < 0.75 < entry["ci95"][1] and entry["ci95"][1] - entry["ci95"][0] < 0.15
+    (nothing,) = removed(Ends(ends.cuts, {"0.2": after / 2}, {"0.2": after / 2}), error, RULE)["0.2"]
+    assert nothing["share"] is None
+
+
+def test_windows_that_diverged_are_left_out_on_both_sides() -> None:
+    before = np.full((20, 1, 3), 0.1)
+    after = np.full((20, 1, 3), 0.05)
+    after[3] = np.nan
+    before[3] = 50.0
+    ends = Ends(cuts(np.arange(20) % 2, np.zeros((20, 3))), {"0.2": before}, {"0.2": after})
+    (entry,) = removed(ends, {"floor": block(0.0, 0.0, 0.0)}, RULE)["0.2"]
+    assert entry["share"] == pytest.approx(0.5)
+
+
+def test_the_end_of_the_chain_moves_by_the_lever_of_each_joint() -> None:
+    """The wrist's body hangs 0.6 m below the shoulder, its centre of mass 0.05 m below the wrist."""
+    off = np.zeros((4, 1, 3))
+    off[:, 0, 0] = 0.01
+    ends = Ends(cuts(np.array([0, 0, 1, 1]), np.zeros((4, 3))), {"0.2": 2 * off}, {"0.2": off})
+    (entry,) = effectors(ends, "0.2")
+    assert entry["value"] == pytest.approx(0.65 * 0.01, rel=1e-3) and entry["before"] == pytest.approx(0.013, rel=1e-3)
+
+
+def test_sizes_are_degrees_and_millimetres() -> None:
+    assert (sized(np.pi / 180, "rad"), sized(0.0123, "m"), sized(None, "m")) == ("1°", "12.3 mm", "-")
