@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bumblebee.measured.checks import Finding, Thresholds, check_rollout
-from bumblebee.measured.checks.reversed_command import reversed_fits_better
+from bumblebee.measured.checks.reversed_command import share_for_reversed
 from bumblebee.measured.checks.view import View
 from bumblebee.measured.rollout import Rollout
 
@@ -71,9 +71,9 @@ def test_the_model_tells_a_joint_that_is_truly_reversed(servo: bool, joint: int)
     """Asked of the model alone: the regression does not see every one of them."""
     for seed in range(3):
         rollout = record(seed, servo)
-        assert reversed_fits_better(View("r", rollout, model(servo), None, Thresholds()), joint, servo) is False
+        assert share_for_reversed(View("r", rollout, model(servo), None, Thresholds()), joint, servo) < 0.2
         turned = reversed_in(rollout, joint)
-        assert reversed_fits_better(View("r", turned, model(servo), None, Thresholds()), joint, servo) is True
+        assert share_for_reversed(View("r", turned, model(servo), None, Thresholds()), joint, servo) > 0.6
 
 
 def test_a_reversed_target_beside_a_tumbling_neighbour_is_refused() -> None:

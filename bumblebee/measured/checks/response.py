@@ -15,7 +15,7 @@ counts their products over 0.1 s (Newey and West 1987), and is never taken small
 
 import numpy as np
 
-from bumblebee.measured.checks.reversed_command import reversed_fits_better
+from bumblebee.measured.checks.reversed_command import share_for_reversed
 from bumblebee.measured.checks.sign import correlation
 from bumblebee.measured.checks.units import servo_gains
 from bumblebee.measured.checks.view import View
@@ -57,7 +57,8 @@ def check_response(view: View) -> None:
         against = strong and opposed and (not by_target or together < limits.response_correlation)
         mirrored = by_target and z < NOT_ALONG and together < MIRRORED and _follows_negative(view, place, given)
         if against or mirrored:
-            overruled = against and reversed_fits_better(view, joint, by_target) is False
+            share = share_for_reversed(view, joint, by_target) if against else None
+            overruled = share is not None and share < limits.response_model
             came = f"motion against it ({-z:.0f} standard errors, correlation of the changes {together:.2f})"
             column = view.label(name, joint)
             view.add(

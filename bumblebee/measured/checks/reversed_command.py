@@ -1,9 +1,9 @@
-"""Whether the declared model, told a joint's command the other way round, predicts that joint better.
+"""How often the declared model, told a joint's command the other way round, predicts that joint better.
 
 A joint that swings with its neighbours goes against its own torque for seconds, and no regression that is linear in the
 state takes all of that away. The declared equations of motion know what neighbours, gravity and gears do. So short
 stretches are simulated from the measured state twice, with the command as logged and with its sign changed; where the
-two differ most, the command matters most, and there the reversed one has to be nearer by far in nearly all stretches.
+two differ most, the command matters most, and there one of them is nearer to what was measured in nearly all stretches.
 What the model lacks besides (friction, strength, masses) is in both.
 """
 
@@ -17,13 +17,14 @@ SPAN = 0.06  # s of a stretch: long enough to move beyond the sensors' noise, to
 STRETCHES = 120  # at most, spread over the file
 STEP = 5e-4  # s of simulation at most
 MATTERS = 0.5  # share of the stretches, those in which the command's sign changes the prediction most
-AGREE = 0.75  # share of these in which the reversed command has to be nearer to what was measured
 
 
-def reversed_fits_better(view: View, joint: int, by_target: bool) -> bool | None:
-    """Whether most stretches speak for the command reversed; None where the model cannot tell.
+def share_for_reversed(view: View, joint: int, by_target: bool) -> float | None:
+    """Share of the stretches that the command reversed predicts better; None where the model cannot tell.
 
-    That is on a floating base, whose contacts no log has, for a servo of unknown gains, and where simulations diverge.
+    It is 0 or nearly so where the sign is right, whatever swings the joint; 0.7 and more where the command or the joint
+    is reversed. It cannot tell on a floating base, whose contacts no log has, for a servo of unknown gains, and where
+    simulations diverge.
     """
     model = view.model
     if view.floating or min(view.joint_ids(), default=-1) < 0 or model.nq != len(view.rollout.joints):
@@ -40,7 +41,7 @@ def reversed_fits_better(view: View, joint: int, by_target: bool) -> bool | None
     if good.mean() < MATTERS or not apart[good].any():
         return None
     matters = good & (apart >= np.quantile(apart[good], 1 - MATTERS)) & (apart > 0)
-    return bool((np.abs(moved - other) < np.abs(moved - plain))[matters].mean() >= AGREE)
+    return float((np.abs(moved - other) < np.abs(moved - plain))[matters].mean())
 
 
 class _Torque:
