@@ -82,6 +82,7 @@ CASES = {
     ),
     "viscous_friction, within kd": ([effect("viscous_friction", KNEE, 3.0)], 0.02),
     "viscous_friction, beyond kd": ([effect("viscous_friction", KNEE, 8.0)], 0.25),
+    "quadratic_friction": ([effect("quadratic_friction", KNEE, 1.5)], 0.7),
     "coulomb_friction": ([effect("coulomb_friction", KNEE, 8.0)], 0.3),
     "stribeck_friction": (
         [effect("stribeck_friction", KNEE, 6.0, 0.3), effect("coulomb_friction", KNEE, 2.0)],

@@ -277,7 +277,7 @@ LATER: tuple[Kind, ...] = (
          _plain_of(lambda p, s: p.peak_rate / (0.7 + s), setpoints.CommandRateLimit, "rate"), _fixed(0.2), _fixed(5.0)),
     Kind("command_profile", "joint",
          _plain_of(lambda p, s: max(p.peak_rate, 0.1) / s, setpoints.CommandProfile, "acceleration", speed=1e3),
-         _fixed(0.01), _fixed(0.3)),
+         _fixed(0.06), _fixed(0.3), least=_fixed(0.05)),  # below it is a delay of a few milliseconds
     Kind("quadratic_friction", "joint", _plain(lambda p, s: outside.Drag(p.name, s), "coefficient"),
          _KD(0.01), _KD(0.5)),
 )  # fmt: skip

@@ -7,6 +7,8 @@ import numpy as np
 from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.deploy.undeclared.law import Law, World
 
+PARTS = 5  # of a millisecond, in which a profile is followed
+
 
 @dataclass
 class CommandFilter(Law):
@@ -53,7 +55,7 @@ class CommandRateLimit(Law):
 class CommandProfile(Law):
     """What the servo follows speeds up and slows down by `acceleration` [rad/s^2], as a drive's firmware does it.
 
-    Every millisecond it takes the speed from which it can just stop at the target.
+    Every fifth of a millisecond it takes the speed from which it can just stop at the target.
     """
 
     joint: str
@@ -65,12 +67,16 @@ class CommandProfile(Law):
         self._speed = np.zeros(world.count)
 
     def command(self, world: World, command: ServoCommand) -> ServoCommand:
-        """One more millisecond of it."""
-        j, most = world.column(self.joint), self.acceleration * world.dt
-        target = command.target.copy()
-        away = target[:, j] - self._now
-        wanted = np.sign(away) * (np.sqrt(0.25 * most**2 + 2 * self.acceleration * np.abs(away)) - 0.5 * most)
-        self._speed = self._speed + np.clip(wanted - self._speed, -most, most)
-        self._now = self._now + self._speed * world.dt
-        target[:, j] = self._now
+        """One more millisecond of it, in parts of which the servo follows the mean."""
+        j, dt = world.column(self.joint), world.dt / PARTS
+        target, most = command.target.copy(), self.acceleration * dt
+        wish, mean = target[:, j].copy(), np.zeros(len(target))
+        for _ in range(PARTS):
+            away = wish - self._now
+            stops = np.sqrt(0.25 * most**2 + 2 * self.acceleration * np.abs(away)) - 0.5 * most
+            wanted = np.sign(away) * np.minimum(stops, np.abs(away) / dt)
+            self._speed = self._speed + np.clip(wanted - self._speed, -most, most)
+            mean += (self._now + 0.5 * self._speed * dt) / PARTS
+            self._now = self._now + self._speed * dt
+        target[:, j] = mean
         return replace(command, target=target)

@@ -57,12 +57,12 @@ def test_a_complete_model_leaves_nothing() -> None:
 
 
 def test_a_name_that_half_explains_a_strange_effect_is_withdrawn() -> None:
-    viscous = Candidate("viscous_friction", "pole", (0.02,), (0.02,))
-    found = discovered((viscous,), drag=0.05)
+    spring = Candidate("joint_spring", "pole", (0.0, 0.0), (0.02, 0.02), (0, 1))
+    found = discovered((spring,), cubic=0.6)
     (form,) = found.fit.chosen
-    assert form.texts == ("v*abs(v)",)
-    assert found.fit.of(form)[0] == pytest.approx(-0.05, rel=0.03)
-    assert found.withdrawn == ["viscous_friction on pole"]
+    assert form.texts[-1] == "q^3"
+    assert found.fit.of(form)[-1] == pytest.approx(-0.6, rel=0.03)
+    assert found.withdrawn == ["joint_spring on pole"]
 
 
 def test_a_true_name_is_neither_withdrawn_nor_joined_by_another() -> None:
