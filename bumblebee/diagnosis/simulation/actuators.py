@@ -82,7 +82,7 @@ def take_torque(actuator: mujoco.MjsActuator) -> None:
     A drive that is commanded in torque closes a current loop: its back-EMF and its position gains are not felt.
     """
     actuator.set_to_motor()
-    actuator.ctrllimited = int(mujoco.mjtLimited.mjLIMITED_FALSE)
+    _without_ranges(actuator)
 
 
 def take_target(actuator: mujoco.MjsActuator, kp: float, kd: float, gain: float) -> None:
@@ -92,7 +92,13 @@ def take_target(actuator: mujoco.MjsActuator, kp: float, kd: float, gain: float)
     if low < high and int(actuator.forcelimited) != int(mujoco.mjtLimited.mjLIMITED_TRUE):
         actuator.forcerange, actuator.forcelimited = [gain * low, gain * high], int(mujoco.mjtLimited.mjLIMITED_TRUE)
     actuator.set_to_position(kp=kp / gear**2, kv=kd / gear**2)
-    actuator.ctrllimited = int(mujoco.mjtLimited.mjLIMITED_FALSE)
+    _without_ranges(actuator)
+
+
+def _without_ranges(actuator: mujoco.MjsActuator) -> None:
+    """Take what was logged as it is: ranges of the input, and of an activation that is gone, are of the old drive."""
+    actuator.ctrllimited = actuator.actlimited = int(mujoco.mjtLimited.mjLIMITED_FALSE)
+    actuator.actrange = [0.0, 0.0]
 
 
 def fold_dampers(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, list[str]]:

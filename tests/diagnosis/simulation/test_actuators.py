@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.simulation.actuators import fold_dampers
+from bumblebee.diagnosis.simulation.actuators import fold_dampers, take_torque
 from bumblebee.sim.servo import servos_of
 
 _ARM = """<mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom size=".1" pos=".2 0 0"/></body></worldbody>
@@ -36,3 +36,17 @@ def test_a_lone_servo_and_a_lone_damper_stay_as_they_are() -> None:
     for alone in (_POSITION, _VELOCITY):
         spec = mujoco.MjSpec.from_string(_ARM.format(alone))
         assert fold_dampers(spec) == (spec, [])
+
+
+def test_a_drive_that_integrates_takes_the_logged_torque_without_the_range_of_its_activation() -> None:
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><worldbody><body><joint name="j"/><geom size=".1" mass="1"/></body></worldbody>'
+        '<actuator><intvelocity joint="j" kp="5" actrange="-1 1"/></actuator></mujoco>'
+    )
+    take_torque(spec.actuators[0])
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.ctrl[0] = 2.5
+    mujoco.mj_forward(model, data)
+    assert model.na == 0
+    assert data.qfrc_actuator[0] == 2.5
