@@ -17,7 +17,7 @@ from bumblebee.diagnosis.report.discrepancy_entries import discovered_entry, str
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.diagnosis.thresholds.discrepancy import CatalogueTerms
-from bumblebee.diagnosis.thresholds.report import MeasuredCurve, Unexplained
+from bumblebee.diagnosis.thresholds.report import MeasuredCurve, ReportThresholds
 from tests.diagnosis import arm, cart
 
 
@@ -47,12 +47,12 @@ def test_a_cubic_spring_is_found_with_its_form_and_size() -> None:
     (form,) = found.fit.chosen
     assert (form.where, form.texts) == ("pole", ("q^3",))
     assert found.fit.of(form)[0] == pytest.approx(-0.6, rel=0.02)
-    assert not unexplained(found, Unexplained())["significant"]
+    assert not unexplained(found, ReportThresholds())["significant"]
 
 
 def test_a_complete_model_leaves_nothing() -> None:
     found = discovered()
-    assert found.fit.chosen == () and not unexplained(found, Unexplained())["significant"]
+    assert found.fit.chosen == () and not unexplained(found, ReportThresholds())["significant"]
     assert not any(row["significant"] for row in structure_table(found, MeasuredCurve()).values())
 
 
