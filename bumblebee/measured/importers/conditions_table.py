@@ -13,6 +13,7 @@ YAML file that says which columns of such a CSV are what:
       added_mass: {column: load_kg, body: arm, position: [0, 0, -0.1]}
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
@@ -134,7 +135,7 @@ def _column(where: str, said: object) -> Column:
     scale, place = said.get("scale", 1.0), said.get("position", [])
     if not isinstance(scale, int | float) or isinstance(scale, bool) or not isinstance(place, list):
         raise BadInput(where, "a number for scale, a list for position", repr(said)[:80])
-    return Column(str(said["column"]), float(scale), str(said.get("body", "")), tuple(place))
+    return Column(str(said["column"]), _finite(where, scale), str(said.get("body", "")), tuple(place))
 
 
 def _frame(where: str, content: bytes) -> pd.DataFrame:
@@ -171,10 +172,21 @@ def _value(where: str, cell: Any, column: Column) -> Any:
     if isinstance(value, str) and (column.scale != 1.0 or column.body):
         raise BadInput(where, "a number", repr(value)[:80])
     if not isinstance(value, str):
-        value = float(value) * column.scale
+        value = _finite(where, value) * column.scale
     if column.body:
         return [{"body": column.body, "kg": value, "position": list(column.position)}] if value else None
     return value
+
+
+def _finite(where: str, value: Any) -> float:
+    """A number of a table or a map as a float."""
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise BadInput(where, "a finite number", repr(value)[:80])
+    return number
 
 
 def _stem(name: str) -> str:
