@@ -34,8 +34,8 @@ class IngestConfig(Ranged):
     model: Line = ""
     """The declared MJCF; empty: the model.xml beside the rollouts, or else this project's G1."""
     gains_tolerance: Annotated[float, Range(least=0, most=1000)] = Thresholds.gains_relative
-    """Largest relative difference between a file's kp or kd and the declared model's (and the deployed policy's);
-    a file beyond it is set aside. A lab that varies its gains on purpose allows more."""
+    """Largest relative difference between a file's kp or kd and the deployed policy's contract; a file beyond it is set
+    aside. Gains that are not the declared model's are a condition of the file: it is simulated by its own."""
 
     def __post_init__(self) -> None:
         """Refuse a folder's name that is none for every round."""
