@@ -29,6 +29,8 @@ class QuickConfig:
     """Leads at most."""
     joints: int = 3
     """Joints that are furthest off, listed with their error."""
+    notes: int = 3
+    """Failures told at most; how many more follows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,8 @@ class FirstLook:
     """z that a candidate had to reach."""
     units: dict[tuple[str, str, str], str]
     """(effect, place, parameter) -> unit."""
+    notes: list[str]
+    """Of the dataset (what was set aside), and models and steps of the search that failed."""
 
 
 def first_look(
@@ -64,7 +68,8 @@ def first_look(
         for c in (lead.candidate for lead in found)
         for p in CATALOGUE[c.effect].parameters
     }
-    return FirstLook(config.horizon, _errors(material, quick.joints), found, bound, units)
+    notes = [*material.session.notes, *plant.failures.notes(quick.notes)]
+    return FirstLook(config.horizon, _errors(material, quick.joints), found, bound, units, notes)
 
 
 def _errors(material: Material, most: int) -> list[tuple[str, float, str]]:
@@ -81,10 +86,11 @@ def told(look: FirstLook) -> str:
     """A first look as text."""
     lines = [f"declared model, after {look.horizon:g} s, the joints that are furthest off:"]
     lines += [f"  {joint:<28} {1e3 * error:.3g} m{unit}" for joint, error, unit in look.errors]
+    notes = [f"note: {note}" for note in look.notes]
     if not look.leads:
-        return "\n".join([*lines, f"no effect of the catalogue is sure alone (z of {look.bound:.2g} asked)"])
+        return "\n".join([*lines, f"no effect of the catalogue is sure alone (z of {look.bound:.2g} asked)", *notes])
     lines.append("leads, each fitted alone; effects that come together or pass for one another are not told apart:")
-    return "\n".join([*lines, *(_line(look, lead) for lead in look.leads)])
+    return "\n".join([*lines, *(_line(look, lead) for lead in look.leads), *notes])
 
 
 def _line(look: FirstLook, lead: Lead) -> str:

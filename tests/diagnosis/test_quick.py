@@ -1,5 +1,7 @@
 """A first look names what a diagnosis would, with its size; where nothing is, it says so."""
 
+from dataclasses import replace
+
 import pytest
 
 from bumblebee.diagnosis.quick import first_look, told
@@ -25,3 +27,5 @@ def test_a_model_that_lacks_nothing_gets_no_lead() -> None:
     look = first_look(arm.session_of(simulate({}, seed=3)), CONFIG)
     assert look.leads == []
     assert "no effect of the catalogue is sure alone" in told(look)
+    failed = replace(look, notes=["not tried: armature on j1"])
+    assert told(failed).endswith("note: not tried: armature on j1")
