@@ -1,0 +1,63 @@
+"""What is trained in the study: each policy as a job, from which parent, on which motions, for how many steps."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from benchmarks.study.motions import Motions
+from benchmarks.study.settings import Study
+
+
+@dataclass(frozen=True)
+class Job:
+    """One policy. Its folder in the run is its name."""
+
+    name: str
+    steps: float
+    """Control steps of its own, beside its parent's."""
+    seed: int
+    parent: str | None = None
+    """Name of the job whose policy it starts from."""
+    clips: tuple[str, ...] | None = None
+    """Names of the pieces that it learns from; None: all that are not held out."""
+
+
+def experts_jobs(study: Study, motions: Motions) -> list[Job]:
+    """For each seed a base policy and what is trained on from it; long jobs come first.
+
+    From a base policy: an expert of each cluster, one of each random cluster, and one policy trained on by the steps of
+    all experts together.
+    """
+    jobs: list[Job] = []
+    for seed in study.seeds:
+        jobs.append(Job(base_of(seed), study.base_steps, seed))
+    for seed in study.seeds:
+        jobs.append(Job(one_of(seed), study.expert_steps * len(motions.clusters), seed, base_of(seed)))
+    for seed in study.seeds:
+        for groups in (motions.labels.set_index("name")["cluster"], motions.random_clusters(seed)):
+            for cluster in sorted(groups.unique()):
+                own = tuple(groups.index[groups == cluster])
+                jobs.append(Job(expert_of(seed, cluster), study.expert_steps, seed, base_of(seed), own))
+    return jobs
+
+
+def base_of(seed: int) -> str:
+    """Name of a seed's base policy."""
+    return f"s{seed}-base"
+
+
+def one_of(seed: int) -> str:
+    """Name of the one policy that is trained on by all experts' steps."""
+    return f"s{seed}-one"
+
+
+def expert_of(seed: int, cluster: str) -> str:
+    """Name of a cluster's expert; random clusters are r0, r1 ..."""
+    return f"s{seed}-{cluster}"
+
+
+def ready(jobs: Sequence[Job], done: set[str], begun: set[str]) -> Job | None:
+    """The first job that is neither done nor begun and whose parent is done."""
+    for job in jobs:
+        if job.name not in done | begun and (job.parent is None or job.parent in done):
+            return job
+    return None
