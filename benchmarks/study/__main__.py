@@ -9,10 +9,10 @@ from pathlib import Path
 import torch
 
 import benchmarks.study
-from benchmarks.study.jobs import Job, experts_jobs
+from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, prepare, read_motions
+from benchmarks.study.parts import PARTS
 from benchmarks.study.settings import SMALL, Study, freeze
-from benchmarks.study.tables import experts_tables, read_arms
 from benchmarks.study.training import finished
 from benchmarks.study.trying import TRIALS, tried
 from benchmarks.study.workers import Places, Workers
@@ -28,8 +28,8 @@ def study_of(options: argparse.Namespace) -> Study:
     return SMALL if options.small else Study()
 
 
-def run_experts(options: argparse.Namespace) -> None:
-    """Train and try all policies of the first part, or as far as the time goes."""
+def run_part(options: argparse.Namespace) -> None:
+    """Train and try all policies of a part, or as far as the time goes."""
     study, motions = study_of(options), read_motions(options.motions)
     present = torch.cuda.device_count()
     if study.env.engine == "mujoco_warp" and not 1 <= options.gpus <= present:
@@ -37,13 +37,13 @@ def run_experts(options: argparse.Namespace) -> None:
             "--gpus", f"1 to {present} GPUs of this machine" if present else "a machine with a GPU", str(options.gpus)
         )
     freeze(options.out, study, motions=motions.hash)
-    jobs = experts_jobs(study, motions)
+    jobs = PARTS[options.part].jobs(study, motions)
     done = {job.name for job in jobs if finished(options.out, job)}
     shared = ["--motions", str(options.motions), "--out", str(options.out), *(["--small"] if options.small else [])]
 
     def train(job: Job, left: float | None) -> list[str]:
         seconds = [] if left is None else ["--seconds", f"{left:.1f}"]
-        return ["benchmarks.study.training", job.name, *shared, *seconds]
+        return ["benchmarks.study.training", options.part, job.name, *shared, *seconds]
 
     def trial(job: Job) -> list[str]:
         return ["benchmarks.study.trying", job.name, *shared[:4]]
@@ -82,7 +82,7 @@ def run_table(options: argparse.Namespace) -> None:
     """Write the tables of a finished run."""
     study, motions = study_of(options), read_motions(options.motions)
     stamp = freeze(options.run, study, motions=motions.hash)
-    text = experts_tables(read_arms(options.run, study, motions), study, motions)
+    text = PARTS[options.part].tables(options.run, study, motions)
     options.out.write_text(f"<!-- study {stamp}, motions {motions.hash} -->\n\n{text}")
     print(text, end="")
 
@@ -104,15 +104,17 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     own.add_argument("--clusters", type=int, default=0, help="0: as many as the elbow says")
     own.add_argument("--out", type=Path, required=True)
     own.set_defaults(work=run_prepare)
-    own = commands.add_parser("experts", help="experts against one policy: train and try")
+    own = commands.add_parser("run", help="train and try the policies of a part")
+    own.add_argument("part", choices=PARTS, help="; ".join(f"{name}: {part.what}" for name, part in PARTS.items()))
     own.add_argument("--gpus", type=int, default=1)
     own.add_argument("--each", type=int, default=2, help="trainings beside each other on a GPU")
     own.add_argument("--jobs", type=int, default=2, help="processor cores that try policies")
     own.add_argument("--minutes", type=float, help="end this call after so long")
     own.add_argument("--archive", type=Path, help="also pack what is finished into this .tgz")
     own.add_argument("--out", type=Path, required=True)
-    own.set_defaults(work=run_experts)
-    table = commands.add_parser("experts-table", help="the tables of a finished run")
+    own.set_defaults(work=run_part)
+    table = commands.add_parser("table", help="the tables of a finished run")
+    table.add_argument("part", choices=PARTS)
     table.add_argument("run", type=Path)
     table.add_argument("--out", type=Path, required=True, help="Markdown file")
     table.set_defaults(work=run_table)

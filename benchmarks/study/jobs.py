@@ -19,6 +19,8 @@ class Job:
     """Name of the job whose policy it starts from."""
     clips: tuple[str, ...] | None = None
     """Names of the pieces that it learns from; None: all that are not held out."""
+    settings: str = "ours"
+    """Name of its task and algorithm, see `settings.settings_of`."""
 
 
 def experts_jobs(study: Study, motions: Motions) -> list[Job]:
@@ -38,6 +40,32 @@ def experts_jobs(study: Study, motions: Motions) -> list[Job]:
                 own = tuple(groups.index[groups == cluster])
                 jobs.append(Job(expert_of(seed, cluster), study.expert_steps, seed, base_of(seed), own))
     return jobs
+
+
+PAPER_ARMS = {
+    "printed": "as printed",
+    "std": "printed, first deviation .2",
+    "ramp": "printed, penalties from .05 up over half of the training",
+    "adaptive": "printed, learning rate by KL",
+    "three": "all three",
+    "three-std": "all three but the deviation",
+    "three-ramp": "all three but the ramp",
+    "three-adaptive": "all three but the rate",
+    "reference": "all three, action around the reference",
+    "floor": "all three, a step earns at least 0",
+}
+"""Arms of the part `paper-task`, by name of their settings; `settings.PAPER_CHANGES` has what they change."""
+
+
+def paper_jobs(study: Study, motions: Motions) -> list[Job]:
+    """The paper's teacher from nothing, a policy for each arm, all of equal steps."""
+    seed = study.seeds[0]
+    return [Job(paper_of(seed, arm), study.paper_steps, seed, settings=f"paper-{arm}") for arm in PAPER_ARMS]
+
+
+def paper_of(seed: int, arm: str) -> str:
+    """Name of an arm's policy."""
+    return f"s{seed}-paper-{arm}"
 
 
 def base_of(seed: int) -> str:

@@ -10,9 +10,9 @@ import yaml
 
 from benchmarks.baselines.methods import OURS
 from bumblebee.errors import BadInput
-from bumblebee.learning.config import PpoConfig
+from bumblebee.learning.config import PAPER, PpoConfig
 from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.presets import PAPER_RANDOMISATION
+from bumblebee.tracking.presets import PAPER_RANDOMISATION, PAPER_TASK
 
 FROZEN = "study.json"
 
@@ -38,8 +38,14 @@ class Study:
     """Control steps of a base policy, which learns from all training motions."""
     expert_steps: float = 25e6
     """Control steps of each expert; the one policy gets as many as all experts of a seed together."""
+    paper_steps: float = 40e6
+    """Control steps of each arm of the part `paper-task`."""
     env: EnvConfig = field(default_factory=lambda: TASK)
     """The task of a base policy."""
+    paper_env: EnvConfig = field(default_factory=lambda: replace(PAPER_TASK, num_worlds=8192))
+    """The paper's task, for the part `paper-task`."""
+    paper_ppo: PpoConfig = PAPER
+    """The paper's algorithm."""
     child_threshold: float = 0.35
     """Distance that ends an episode of what is trained on from a base policy, from its first step on [m]."""
     ppo: PpoConfig = field(default_factory=lambda: replace(OURS, symmetry=True))
@@ -47,10 +53,52 @@ class Study:
     child_rate: float = 3e-4
     """First learning rate of what is trained on; the rate adapts afterwards."""
 
-    @property
-    def child_env(self) -> EnvConfig:
-        """The task of what is trained on from a base policy: the same, the curriculum being over."""
-        return replace(self.env, threshold_start=self.child_threshold, threshold_end=self.child_threshold)
+
+PAPER_CHANGES: dict[str, tuple[str, ...]] = {
+    "printed": (),
+    "std": ("std",),
+    "ramp": ("ramp",),
+    "adaptive": ("adaptive",),
+    "three": ("std", "ramp", "adaptive"),
+    "three-std": ("ramp", "adaptive"),
+    "three-ramp": ("std", "adaptive"),
+    "three-adaptive": ("std", "ramp"),
+    "reference": ("std", "ramp", "adaptive", "reference"),
+    "floor": ("std", "ramp", "adaptive", "floor"),
+}
+"""Deviations of each arm of the part `paper-task` from what the paper prints."""
+
+
+def settings_of(study: Study, name: str, child: bool) -> tuple[EnvConfig, PpoConfig]:
+    """Task and algorithm by name.
+
+    Args:
+        study: the study's settings.
+        name: "ours", or "paper-" and an arm of `PAPER_CHANGES`.
+        child: whether a base policy is trained on: the curriculum is over, the first rate is gentler.
+    """
+    if name == "ours":
+        if not child:
+            return study.env, study.ppo
+        limit = study.child_threshold
+        env = replace(study.env, threshold_start=limit, threshold_end=limit)
+        return env, replace(study.ppo, learning_rate=study.child_rate)
+    env, ppo = study.paper_env, study.paper_ppo
+    for change in PAPER_CHANGES[name.removeprefix("paper-")]:
+        env, ppo = _deviated(env, ppo, change)
+    return env, ppo
+
+
+def _deviated(env: EnvConfig, ppo: PpoConfig, change: str) -> tuple[EnvConfig, PpoConfig]:
+    if change == "std":
+        return env, replace(ppo, initial_std=0.2)
+    if change == "adaptive":
+        rates = {"learning_rate": 3e-4, "learning_rate_range": (1e-5, 1e-3)}
+        return env, replace(ppo, schedule="adaptive", desired_kl=0.015, desired_kl_end=0.01, **rates)
+    if change == "reference":
+        return replace(env, action="reference"), ppo
+    ramp = {"ramp_start": 0.05, "ramp_share": 0.5} if change == "ramp" else {"floor": 0.0}
+    return replace(env, reward=replace(env.reward, **ramp)), ppo
 
 
 SMALL = Study(
@@ -59,6 +107,9 @@ SMALL = Study(
     expert_steps=1024,
     env=replace(TASK, engine="mujoco", num_worlds=16, physics_hz=100.0, threads=1),
     ppo=replace(OURS, steps=16, epochs=2, hidden=(32, 32), symmetry=True),
+    paper_steps=512,
+    paper_env=replace(PAPER_TASK, engine="mujoco", num_worlds=16, physics_hz=100.0, threads=1),
+    paper_ppo=replace(PAPER, steps=16, epochs=1, hidden=(32, 32)),
 )
 """The same study in seconds on two cores: it shows that every part runs, and nothing else."""
 

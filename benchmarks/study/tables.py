@@ -12,7 +12,7 @@ from benchmarks.study.motions import Motions
 from benchmarks.study.settings import Study
 from benchmarks.study.trying import TRIALS
 from bumblebee.errors import BadInput
-from bumblebee.evaluation.intervals import Estimate, mean_by_motion, motion_means, sign_flip_test
+from bumblebee.evaluation.intervals import Estimate, mean_by_motion, motion_means, sign_flip_test, wilson
 
 ARMS = {
     "base": "base policy",
@@ -47,8 +47,8 @@ def read_arms(out: Path, study: Study, motions: Motions) -> Arms:
     for seed in study.seeds:
         clusters = {"experts": labels["cluster"], "random": motions.random_clusters(seed)}
         names = {name for groups in clusters.values() for name in groups.unique()}
-        tables = {name: _trials(out / expert_of(seed, name), motions) for name in names}
-        tables |= {"base": _trials(out / base_of(seed), motions), "one": _trials(out / one_of(seed), motions)}
+        tables = {name: read_trials(out / expert_of(seed, name), motions) for name in names}
+        tables |= {"base": read_trials(out / base_of(seed), motions), "one": read_trials(out / one_of(seed), motions)}
         every += [table.assign(policy=name, seed=seed) for name, table in tables.items()]
         own += [tables[arm].assign(arm=arm, seed=seed) for arm in ("base", "one")]
         for arm, groups in clusters.items():
@@ -57,12 +57,26 @@ def read_arms(out: Path, study: Study, motions: Motions) -> Arms:
     return Arms(pd.concat(own, ignore_index=True), pd.concat(every, ignore_index=True))
 
 
-def _trials(folder: Path, motions: Motions) -> pd.DataFrame:
+def read_trials(folder: Path, motions: Motions) -> pd.DataFrame:
+    """A policy's trials with the motion and cluster of each piece."""
     path = folder / TRIALS
     if not path.exists():
         raise BadInput(path, "the trials of every policy", "none", "Run `benchmarks.study experts` until it is done.")
     columns = motions.labels[["name", "motion", "cluster"]]
     return pd.read_csv(path).merge(columns, on="name", validate="many_to_one")
+
+
+def rate(rows: pd.DataFrame, column: str) -> Estimate:
+    """Mean over motions of a motion's share of successes, with Wilson's interval at the effective number of motions.
+
+    That number is what the shares' own variance between motions makes of the binomial one; where none or all succeed, the
+    number of motions.
+    """
+    shares = motion_means(rows[column].to_numpy(float), rows["motion"].to_numpy())
+    count, value = len(shares), float(shares.mean())
+    variance = float(shares.var(ddof=1)) / count if count > 1 else 0.0
+    effective = min(value * (1 - value) / variance, len(rows)) if variance > 0 else count
+    return Estimate(value, *wilson(value * effective, effective), len(rows), count)
 
 
 def estimate(rows: pd.DataFrame, column: str) -> Estimate:
@@ -79,9 +93,9 @@ def difference(rows: pd.DataFrame, first: str, second: str, column: str = "succe
     return mean_by_motion(away.to_numpy(), motion), sign_flip_test(motion_means(away.to_numpy(), motion))
 
 
-def experts_tables(arms: Arms, study: Study, motions: Motions) -> str:
-    """All tables of the first part as Markdown."""
-    parts = []
+def experts_tables(out: Path, study: Study, motions: Motions) -> str:
+    """All tables of the part `experts` as Markdown."""
+    arms, parts = read_arms(out, study, motions), []
     for robot in ("declared", "drawn"):
         rows = arms.own[arms.own["robot"] == robot]
         parts.append(f"### {robot} robot\n\n{_arms_table(rows)}\n{_pairs_table(rows, study)}")
@@ -91,20 +105,20 @@ def experts_tables(arms: Arms, study: Study, motions: Motions) -> str:
 
 
 def _arms_table(rows: pd.DataFrame) -> str:
-    head = ["arm", "motions", "n", *RATES.values(), "MPJPE [rad]", "MPKPE [mm]"]
-    lines = _head(head)
+    titles = ["arm", "motions", "n", *RATES.values(), "MPJPE [rad]", "MPKPE [mm]"]
+    lines = head(titles)
     for split, told in SPLITS.items():
         for arm, name in ARMS.items():
             own = rows[(rows["arm"] == arm) & (rows["split"] == split)]
             cells = [name, told, str(own["motion"].nunique())]
-            cells += [_cell(estimate(own, column), 2) for column in RATES]
-            cells += [_cell(estimate(own, "mpjpe_rad"), 3), _cell(estimate(own, "mpkpe_mm"), 0)]
-            lines.append(_line(cells))
+            cells += [cell(rate(own, column), 2) for column in RATES]
+            cells += [cell(estimate(own, "mpjpe_rad"), 3), cell(estimate(own, "mpkpe_mm"), 0)]
+            lines.append(line(cells))
     return "\n".join(lines) + "\n"
 
 
 def _pairs_table(rows: pd.DataFrame, study: Study) -> str:
-    head = [
+    titles = [
         "success, difference",
         "motions",
         "all seeds",
@@ -112,56 +126,60 @@ def _pairs_table(rows: pd.DataFrame, study: Study) -> str:
         *(f"seed {seed}" for seed in study.seeds),
         "pelvis rule",
     ]
-    lines = _head(head)
+    lines = head(titles)
     for split, told in SPLITS.items():
         own = rows[rows["split"] == split]
         for first, second in PAIRS:
             value, p = difference(own, first, second)
             each = [difference(own[own["seed"] == seed], first, second)[0].value for seed in study.seeds]
             other, _ = difference(own, first, second, "success_upright")
-            cells = [f"{ARMS[first]} less {ARMS[second]}", told, _signed(value), f"{p:.3g}"]
-            lines.append(_line([*cells, *(f"{one:+.2f}" for one in each), _signed(other)]))
+            cells = [f"{ARMS[first]} less {ARMS[second]}", told, signed(value), f"{p:.3g}"]
+            lines.append(line([*cells, *(f"{one:+.2f}" for one in each), signed(other)]))
     return "\n".join(lines) + "\n"
 
 
 def _cluster_table(rows: pd.DataFrame) -> str:
-    head = ["cluster", "motions", "n", *ARMS.values(), "experts less one"]
-    lines = _head(head)
+    titles = ["cluster", "motions", "n", *ARMS.values(), "experts less one"]
+    lines = head(titles)
     for cluster in sorted(rows["cluster"].unique()):
         for split, told in SPLITS.items():
             own = rows[(rows["cluster"] == cluster) & (rows["split"] == split)]
             if own.empty:
                 continue
             cells = [cluster, told, str(own["motion"].nunique())]
-            cells += [_cell(estimate(own[own["arm"] == arm], "success"), 2) for arm in ARMS]
-            lines.append(_line([*cells, _signed(difference(own, "experts", "one")[0])]))
+            cells += [cell(rate(own[own["arm"] == arm], "success"), 2) for arm in ARMS]
+            lines.append(line([*cells, signed(difference(own, "experts", "one")[0])]))
     return "\n".join(lines) + "\n"
 
 
 def _cross_table(arms: Arms, motions: Motions) -> str:
     rows = arms.every[(arms.every["robot"] == "declared") & (arms.every["split"] == "train")]
-    lines = _head(["policy", *motions.clusters])
+    lines = head(["policy", *motions.clusters])
     for policy in ["base", "one", *motions.clusters]:
         own = rows[rows["policy"] == policy]
-        cells = [_cell(estimate(own[own["cluster"] == cluster], "success"), 2) for cluster in motions.clusters]
-        lines.append(_line([policy, *cells]))
+        cells = [cell(rate(own[own["cluster"] == cluster], "success"), 2) for cluster in motions.clusters]
+        lines.append(line([policy, *cells]))
     return "\n".join(lines) + "\n"
 
 
-def _head(cells: Sequence[str]) -> list[str]:
-    return [_line(cells), "|" + "---|" * len(cells)]
+def head(cells: Sequence[str]) -> list[str]:
+    """The two first lines of a Markdown table."""
+    return [line(cells), "|" + "---|" * len(cells)]
 
 
-def _line(cells: Sequence[str]) -> str:
+def line(cells: Sequence[str]) -> str:
+    """A row of a Markdown table."""
     return "| " + " | ".join(cells) + " |"
 
 
-def _cell(value: Estimate, digits: int) -> str:
+def cell(value: Estimate, digits: int) -> str:
+    """A value with its interval."""
     if not np.isfinite(value.value):
         return "-"
     span = f" [{value.low:.{digits}f}, {value.high:.{digits}f}]" if np.isfinite(value.low) else ""
     return f"{value.value:.{digits}f}{span}"
 
 
-def _signed(value: Estimate) -> str:
+def signed(value: Estimate) -> str:
+    """A difference with its interval."""
     return f"{value.value:+.3f} [{value.low:+.3f}, {value.high:+.3f}]"

@@ -1,6 +1,6 @@
 """Trains one job of the study in this process, up to its steps or until the call is over; goes on exactly.
 
-    python -m benchmarks.study.training JOB --motions study/motions --out study/experts --seconds 500
+    python -m benchmarks.study.training PART JOB --motions study/motions --out study/experts --seconds 500
 
 is what the study starts for each job, on the GPU that CUDA_VISIBLE_DEVICES names.
 """
@@ -15,9 +15,10 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.study.jobs import Job, experts_jobs
+from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, read_motions
-from benchmarks.study.settings import SMALL, Study
+from benchmarks.study.parts import PARTS
+from benchmarks.study.settings import SMALL, Study, settings_of
 from benchmarks.study.workers import GOES_ON
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.learning.ppo import CHECKPOINT, Trainer
@@ -67,11 +68,9 @@ def train(
         return True
     folder = out / job.name
     folder.mkdir(parents=True, exist_ok=True)
-    task = study.env if job.parent is None else study.child_env
-    frames = task.num_worlds * study.ppo.steps
-    ppo = replace(study.ppo, iterations=math.ceil(job.steps / frames), checkpoint_every=CHECKPOINT_EVERY)
-    if job.parent is not None:
-        ppo = replace(ppo, learning_rate=study.child_rate)
+    task, ppo = settings_of(study, job.settings, job.parent is not None)
+    frames = task.num_worlds * ppo.steps
+    ppo = replace(ppo, iterations=math.ceil(job.steps / frames), checkpoint_every=CHECKPOINT_EVERY)
     torch.set_num_threads(task.threads)
     clips = [row.clip for row in motions.training(job.clips)]
     engine = make_engine(task.engine, task_model(task, model), task.num_worlds, task.threads, buffers=task.buffers)
@@ -101,6 +100,7 @@ def _plain(job: Job) -> dict:
 def main() -> None:
     """Train one job; exit code 3: not done when the time was over."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("part", choices=PARTS)
     parser.add_argument("job")
     parser.add_argument("--motions", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
@@ -111,7 +111,7 @@ def main() -> None:
     study = SMALL if options.small else Study()
     try:
         motions = read_motions(options.motions)
-        job = {job.name: job for job in experts_jobs(study, motions)}[options.job]
+        job = {job.name: job for job in PARTS[options.part].jobs(study, motions)}[options.job]
         done = train(job, motions, study, options.out, over=over)
     except BadInput as error:
         print(error)

@@ -1,6 +1,7 @@
 """The study: a run is held to its settings, goes on where it was ended, and its tables pair what belongs together."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +11,11 @@ import pytest
 
 from benchmarks.motion_pack import Packed, write_pack
 from benchmarks.study.__main__ import main
-from benchmarks.study.jobs import Job, base_of, experts_jobs, one_of, ready
+from benchmarks.study.jobs import PAPER_ARMS, Job, base_of, experts_jobs, one_of, paper_jobs, ready
 from benchmarks.study.motions import LABELS, MOTIONS, read_motions
-from benchmarks.study.settings import SMALL, freeze
-from benchmarks.study.tables import Arms, difference, experts_tables, read_arms
+from benchmarks.study.paper_tables import paper_tables
+from benchmarks.study.settings import PAPER_CHANGES, SMALL, Study, freeze, settings_of
+from benchmarks.study.tables import difference, experts_tables, rate
 from benchmarks.study.training import finished, train
 from benchmarks.study.trying import write_trials
 from benchmarks.study.workers import GOES_ON, Places, Workers
@@ -82,17 +84,17 @@ def test_a_run_is_trained_ended_gone_on_with_and_made_into_tables(folder: Path, 
         write_trials(out / job.name, motions)
     with pytest.raises(BadInput, match="another training"):
         finished(out, replace(jobs[0], steps=1.0))
-    text = experts_tables(read_arms(out, SMALL, motions), SMALL, motions)
+    text = experts_tables(out, SMALL, motions)
     assert "experts by cluster | held out | 2 |" in text
     assert text.count("experts by cluster less one policy, the experts' steps") == 4
-    main(["experts-table", str(out), "--motions", str(folder), "--small", "--out", str(tmp_path / "t.md")])
+    main(["table", "experts", str(out), "--motions", str(folder), "--small", "--out", str(tmp_path / "t.md")])
     assert text in (tmp_path / "t.md").read_text()
 
 
 def test_a_run_goes_on_with_its_own_settings_alone(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     freeze(tmp_path, replace(SMALL, expert_steps=7.0), motions=read_motions(folder).hash)
     with pytest.raises(SystemExit) as end:
-        main(["experts", "--small", "--motions", str(folder), "--out", str(tmp_path)])
+        main(["run", "experts", "--small", "--motions", str(folder), "--out", str(tmp_path)])
     assert end.value.code == 2
     assert "study.expert_steps" in capsys.readouterr().out
 
@@ -102,7 +104,7 @@ def test_a_gpu_that_is_not_there_is_said_before_anything_is_written(
 ) -> None:
     monkeypatch.setattr("torch.cuda.device_count", lambda: 0)
     with pytest.raises(SystemExit) as end:
-        main(["experts", "--motions", str(folder), "--out", str(tmp_path / "new"), "--gpus", "2"])
+        main(["run", "experts", "--motions", str(folder), "--out", str(tmp_path / "new"), "--gpus", "2"])
     assert end.value.code == 2
     assert "--gpus: expected a machine with a GPU, came 2" in capsys.readouterr().out
     assert not (tmp_path / "new").exists()
@@ -141,7 +143,17 @@ def test_a_difference_is_paired_by_piece_and_its_interval_is_over_motions() -> N
     assert value.motions == 20
     assert 0.6 < value.low < 0.75 < value.high < 0.9
     assert p < 0.001
-    assert Arms(table, table).own is table
+
+
+def test_a_rate_of_none_has_an_interval_and_pieces_and_seeds_of_a_motion_are_no_more_than_it() -> None:
+    names = [f"m{i}" for i in range(10)]
+    none = rate(pd.DataFrame({"motion": names, "success": False}), "success")
+    assert (none.value, none.low) == (0.0, 0.0)
+    assert 0.2 < none.high < 0.35
+    half = pd.DataFrame({"motion": names, "success": [True] * 5 + [False] * 5})
+    once, often = rate(half, "success"), rate(pd.concat([half] * 6), "success")
+    assert once.value == often.value == 0.5
+    assert (once.low, once.high) == pytest.approx((often.low, often.high))
 
 
 def _print(path: Path, code: int) -> str:
@@ -178,3 +190,27 @@ def test_the_frozen_file_is_plain(tmp_path: Path) -> None:
     assert stated["study"]["seeds"] == [0]
     assert np.isclose(stated["study"]["env"]["randomisation"]["delay"][1], 0.04)
     assert base_of(0) == "s0-base"
+
+
+def test_each_arm_of_the_papers_task_differs_by_what_it_says_and_is_tried(folder: Path, tmp_path: Path) -> None:
+    assert list(PAPER_ARMS) == list(PAPER_CHANGES)
+    settings = {arm: settings_of(Study(), f"paper-{arm}", False) for arm in PAPER_ARMS}
+    printed_env, printed_ppo = settings["printed"]
+    assert printed_ppo.initial_std == 1.0
+    assert settings["std"] == (printed_env, replace(printed_ppo, initial_std=0.2))
+    assert len({repr(own) for own in settings.values()}) == len(PAPER_ARMS)
+    motions = read_motions(folder)
+    jobs = paper_jobs(SMALL, motions)
+    for job in jobs:
+        if job.settings in ("paper-printed", "paper-floor"):
+            assert train(job, motions, SMALL, tmp_path)
+            write_trials(tmp_path / job.name, motions)
+    assert len({job.name for job in jobs if finished(tmp_path, job)}) == 2
+    with pytest.raises(BadInput, match="trials of every policy"):
+        paper_tables(tmp_path, SMALL, motions)
+    for job in jobs:
+        if not (tmp_path / job.name).exists():
+            shutil.copytree(tmp_path / jobs[0].name, tmp_path / job.name)
+    lines = paper_tables(tmp_path, SMALL, motions).splitlines()
+    assert len(lines) == 2 + 2 * len(PAPER_ARMS)
+    assert lines[2].startswith("| as printed | trained | 6 | ")
