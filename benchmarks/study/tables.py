@@ -69,8 +69,8 @@ def read_trials(folder: Path, motions: Motions) -> pd.DataFrame:
 def rate(rows: pd.DataFrame, column: str) -> Estimate:
     """Mean over motions of a motion's share of successes, with Wilson's interval at the effective number of motions.
 
-    That number is what the shares' own variance between motions makes of the binomial one; where none or all succeed, the
-    number of motions.
+    That number is what the shares' variance between motions makes of the binomial one; where none or all succeed, it is
+    the number of motions.
     """
     shares = motion_means(rows[column].to_numpy(float), rows["motion"].to_numpy())
     count, value = len(shares), float(shares.mean())
