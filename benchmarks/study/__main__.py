@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 
 import benchmarks.study
+from benchmarks.study.curves import draw
 from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, prepare, read_motions
 from benchmarks.study.parts import PARTS
@@ -85,6 +86,8 @@ def run_table(options: argparse.Namespace) -> None:
     text = PARTS[options.part].tables(options.run, study, motions)
     options.out.write_text(f"<!-- study {stamp}, motions {motions.hash} -->\n\n{text}")
     print(text, end="")
+    if options.curves:
+        draw(options.run, PARTS[options.part].jobs(study, motions), options.curves)
 
 
 def _counted(motions: Motions) -> str:
@@ -117,6 +120,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     table.add_argument("part", choices=PARTS)
     table.add_argument("run", type=Path)
     table.add_argument("--out", type=Path, required=True, help="Markdown file")
+    table.add_argument("--curves", type=Path, help="also draw the learning curves into this .svg")
     table.set_defaults(work=run_table)
     for part in (own, table):
         part.add_argument("--motions", type=Path, required=True)

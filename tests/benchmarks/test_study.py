@@ -87,8 +87,22 @@ def test_a_run_is_trained_ended_gone_on_with_and_made_into_tables(folder: Path, 
     text = experts_tables(out, SMALL, motions)
     assert "experts by cluster | held out | 2 |" in text
     assert text.count("experts by cluster less one policy, the experts' steps") == 4
-    main(["table", "experts", str(out), "--motions", str(folder), "--small", "--out", str(tmp_path / "t.md")])
+    main(
+        [
+            "table",
+            "experts",
+            str(out),
+            "--motions",
+            str(folder),
+            "--small",
+            "--out",
+            str(tmp_path / "t.md"),
+            "--curves",
+            str(tmp_path / "c.svg"),
+        ]
+    )
     assert text in (tmp_path / "t.md").read_text()
+    assert "</svg>" in (tmp_path / "c.svg").read_text()
 
 
 def test_a_run_goes_on_with_its_own_settings_alone(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
