@@ -1,9 +1,6 @@
 """The command line of the study; see the package."""
 
 import argparse
-import os
-import tarfile
-from collections.abc import Sequence
 from pathlib import Path
 
 import torch
@@ -15,11 +12,9 @@ from benchmarks.study.motions import Motions, prepare, read_motions
 from benchmarks.study.parts import PARTS
 from benchmarks.study.settings import SMALL, Study, freeze
 from benchmarks.study.training import finished
-from benchmarks.study.trying import TRIALS, tried
+from benchmarks.study.trying import tried
 from benchmarks.study.workers import Places, Workers
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
-from bumblebee.learning.policy import FILE
-from bumblebee.learning.ppo import CURVE
 
 LATER = "the call is over: the same command goes on"
 
@@ -53,23 +48,9 @@ def run_part(options: argparse.Namespace) -> None:
     gpus = options.gpus if study.env.engine == "mujoco_warp" else 0
     workers = Workers(jobs, Places(gpus, options.each, options.jobs), train, trial, options.out / "logs", seconds)
     whole = workers.run(done, {job.name for job in jobs if tried(options.out / job.name)})
-    if options.archive:
-        archive(options.out, options.archive, jobs)
     if workers.failed:
         raise SystemExit(f"failed: {', '.join(workers.failed)}; see {options.out / 'logs'}")
     print("done" if whole else LATER, flush=True)
-
-
-def archive(out: Path, path: Path, jobs: Sequence[Job]) -> None:
-    """Finished policies, curves and trials of a run in one file, to go on elsewhere."""
-    fresh = path.with_name(f".{path.name}.part")
-    with tarfile.open(fresh, "w:gz") as file:
-        for job in jobs:
-            for name in (FILE, "done.json", CURVE, TRIALS):
-                if (out / job.name / "done.json").exists() and (out / job.name / name).exists():
-                    file.add(out / job.name / name, f"{job.name}/{name}")
-        file.add(out / "study.json", "study.json")
-    os.replace(fresh, path)
 
 
 def run_prepare(options: argparse.Namespace) -> None:
@@ -113,7 +94,6 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     own.add_argument("--each", type=int, default=2, help="trainings beside each other on a GPU")
     own.add_argument("--jobs", type=int, default=2, help="processor cores that try policies")
     own.add_argument("--minutes", type=float, help="end this call after so long")
-    own.add_argument("--archive", type=Path, help="also pack what is finished into this .tgz")
     own.add_argument("--out", type=Path, required=True)
     own.set_defaults(work=run_part)
     table = commands.add_parser("table", help="the tables of a finished run")
