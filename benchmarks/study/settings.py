@@ -34,9 +34,9 @@ class Study:
 
     seeds: tuple[int, ...] = (0, 1, 2)
     """Of the base policy, of everything trained on from it, and of its random clusters."""
-    base_steps: float = 90e6
+    base_steps: float = 80e6
     """Control steps of a base policy, which learns from all training motions."""
-    expert_steps: float = 25e6
+    expert_steps: float = 16e6
     """Control steps of each expert; the one policy gets as many as all experts of a seed together."""
     paper_steps: float = 40e6
     """Control steps of each arm of the part `paper-task`."""
