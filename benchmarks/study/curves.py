@@ -10,10 +10,15 @@ from bumblebee.learning.ppo import CURVE
 
 COLUMNS = {"success": "success of training episodes", "key_error": "key body error [m]"}
 _SMOOTH = 15  # iterations
+_EVERY = 5  # of them drawn
 
 
 def draw(out: Path, jobs: Sequence[Job], path: Path) -> None:
-    """Each job's curve, behind its parent's; jobs of one kind (their names without the seed) have one colour."""
+    """Each job's curve, behind its parent's; jobs of one kind (their names without the seed) have one colour.
+
+    Jobs that have not begun are left out.
+    """
+    jobs = [job for job in jobs if (out / job.name / CURVE).exists()]
     import matplotlib
 
     matplotlib.use("svg")
@@ -29,7 +34,7 @@ def draw(out: Path, jobs: Sequence[Job], path: Path) -> None:
             first = next((parent.steps for parent in jobs if parent.name == job.parent), 0.0)
             smooth = curve[column].rolling(_SMOOTH, min_periods=1).mean()
             seen = (first + curve["frames"]) / 1e6
-            axis.plot(seen, smooth, color=colours[kind_of(job.name)], linewidth=0.8)
+            axis.plot(seen[::_EVERY], smooth[::_EVERY], color=colours[kind_of(job.name)], linewidth=0.8)
         axis.set(xlabel="million control steps", ylabel=label)
         axis.grid(alpha=0.3)
     handles = [pyplot.Line2D([], [], color=colours[kind], label=kind) for kind in kinds]

@@ -21,19 +21,23 @@ class Job:
     """Names of the pieces that it learns from; None: all that are not held out."""
     settings: str = "ours"
     """Name of its task and algorithm, see `settings.settings_of`."""
+    even: bool = False
+    """Whether each cluster gets an equal share of the draws, however long its motions are."""
 
 
 def experts_jobs(study: Study, motions: Motions) -> list[Job]:
     """For each seed a base policy and what is trained on from it; long jobs come first.
 
     From a base policy: an expert of each cluster, one of each random cluster, and one policy trained on by the steps of
-    all experts together.
+    all experts together, drawing motions by their length or each cluster as often.
     """
     jobs: list[Job] = []
     for seed in study.seeds:
         jobs.append(Job(base_of(seed), study.base_steps, seed))
     for seed in study.seeds:
-        jobs.append(Job(one_of(seed), study.expert_steps * len(motions.clusters), seed, base_of(seed)))
+        steps = study.expert_steps * len(motions.clusters)
+        jobs.append(Job(one_of(seed), steps, seed, base_of(seed)))
+        jobs.append(Job(even_of(seed), steps, seed, base_of(seed), even=True))
     for seed in study.seeds:
         for groups in (motions.labels.set_index("name")["cluster"], motions.random_clusters(seed)):
             for cluster in sorted(groups.unique()):
@@ -76,6 +80,11 @@ def base_of(seed: int) -> str:
 def one_of(seed: int) -> str:
     """Name of the one policy that is trained on by all experts' steps."""
     return f"s{seed}-one"
+
+
+def even_of(seed: int) -> str:
+    """Name of the one policy that draws each cluster as often."""
+    return f"s{seed}-even"
 
 
 def expert_of(seed: int, cluster: str) -> str:

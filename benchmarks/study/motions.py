@@ -11,6 +11,7 @@ from benchmarks.motion_pack import Packed, read_pack, write_pack
 from benchmarks.study.settings import sha256
 from bumblebee.clustering.config import ClusterConfig
 from bumblebee.errors import BadInput
+from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import DescribeConfig
 from bumblebee.motion.filter import filter_clips
 from bumblebee.motion.folder import ReadConfig, read_folder
@@ -40,6 +41,12 @@ class Motions:
         """Pieces to learn from; those among `names`, if given."""
         wanted = None if names is None else set(names)
         return [r for r in self.rows if r.clip.split == "train" and (wanted is None or r.clip.name in wanted)]
+
+    def cluster_indices(self, clips: Sequence[Clip]) -> list[int]:
+        """The index of each clip's cluster in `clusters`."""
+        index = {name: i for i, name in enumerate(self.clusters)}
+        named = self.labels.set_index("name")["cluster"]
+        return [index[named[clip.name]] for clip in clips]
 
     def random_clusters(self, seed: int) -> pd.Series:
         """As many clusters of equal sizes at random: name -> cluster, training and held-out pieces apart."""

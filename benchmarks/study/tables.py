@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.study.jobs import base_of, expert_of, one_of
+from benchmarks.study.jobs import base_of, even_of, expert_of, one_of
 from benchmarks.study.motions import Motions
 from benchmarks.study.settings import Study
 from benchmarks.study.trying import TRIALS
@@ -17,10 +17,18 @@ from bumblebee.evaluation.intervals import Estimate, mean_by_motion, motion_mean
 ARMS = {
     "base": "base policy",
     "one": "one policy, the experts' steps",
+    "even": "the same, each cluster drawn as often",
     "random": "experts of random clusters",
     "experts": "experts by cluster",
 }
-PAIRS = (("experts", "one"), ("experts", "random"), ("one", "base"), ("experts", "base"))
+PAIRS = (
+    ("experts", "one"),
+    ("experts", "even"),
+    ("experts", "random"),
+    ("one", "base"),
+    ("even", "one"),
+    ("experts", "base"),
+)
 RATES = {"success": "success", "success_local": "own place", "success_upright": "pelvis rule"}
 SPLITS = {"train": "trained", "test": "held out"}
 
@@ -48,9 +56,12 @@ def read_arms(out: Path, study: Study, motions: Motions) -> Arms:
         clusters = {"experts": labels["cluster"], "random": motions.random_clusters(seed)}
         names = {name for groups in clusters.values() for name in groups.unique()}
         tables = {name: read_trials(out / expert_of(seed, name), motions) for name in names}
-        tables |= {"base": read_trials(out / base_of(seed), motions), "one": read_trials(out / one_of(seed), motions)}
+        single = {"base": base_of(seed), "one": one_of(seed)}
+        if (out / even_of(seed) / TRIALS).exists():
+            single["even"] = even_of(seed)
+        tables |= {arm: read_trials(out / name, motions) for arm, name in single.items()}
         every += [table.assign(policy=name, seed=seed) for name, table in tables.items()]
-        own += [tables[arm].assign(arm=arm, seed=seed) for arm in ("base", "one")]
+        own += [tables[arm].assign(arm=arm, seed=seed) for arm in single]
         for arm, groups in clusters.items():
             parts = [tables[c][tables[c]["name"].map(groups) == c] for c in sorted(groups.unique())]
             own.append(pd.concat(parts).assign(arm=arm, seed=seed))
@@ -108,7 +119,7 @@ def _arms_table(rows: pd.DataFrame) -> str:
     titles = ["arm", "motions", "n", *RATES.values(), "MPJPE [rad]", "MPKPE [mm]"]
     lines = head(titles)
     for split, told in SPLITS.items():
-        for arm, name in ARMS.items():
+        for arm, name in _present(rows).items():
             own = rows[(rows["arm"] == arm) & (rows["split"] == split)]
             cells = [name, told, str(own["motion"].nunique())]
             cells += [cell(rate(own, column), 2) for column in RATES]
@@ -130,6 +141,8 @@ def _pairs_table(rows: pd.DataFrame, study: Study) -> str:
     for split, told in SPLITS.items():
         own = rows[rows["split"] == split]
         for first, second in PAIRS:
+            if not {first, second} <= set(_present(rows)):
+                continue
             value, p = difference(own, first, second)
             each = [difference(own[own["seed"] == seed], first, second)[0].value for seed in study.seeds]
             other, _ = difference(own, first, second, "success_upright")
@@ -139,7 +152,7 @@ def _pairs_table(rows: pd.DataFrame, study: Study) -> str:
 
 
 def _cluster_table(rows: pd.DataFrame) -> str:
-    titles = ["cluster", "motions", "n", *ARMS.values(), "experts less one"]
+    titles = ["cluster", "motions", "n", *_present(rows).values(), "experts less one"]
     lines = head(titles)
     for cluster in sorted(rows["cluster"].unique()):
         for split, told in SPLITS.items():
@@ -147,7 +160,7 @@ def _cluster_table(rows: pd.DataFrame) -> str:
             if own.empty:
                 continue
             cells = [cluster, told, str(own["motion"].nunique())]
-            cells += [cell(rate(own[own["arm"] == arm], "success"), 2) for arm in ARMS]
+            cells += [cell(rate(own[own["arm"] == arm], "success"), 2) for arm in _present(rows)]
             lines.append(line([*cells, signed(difference(own, "experts", "one")[0])]))
     return "\n".join(lines) + "\n"
 
@@ -160,6 +173,11 @@ def _cross_table(arms: Arms, motions: Motions) -> str:
         cells = [cell(rate(own[own["cluster"] == cluster], "success"), 2) for cluster in motions.clusters]
         lines.append(line([policy, *cells]))
     return "\n".join(lines) + "\n"
+
+
+def _present(rows: pd.DataFrame) -> dict[str, str]:
+    """The arms that were tried, with their names; a run of before an arm was thought of lacks it."""
+    return {arm: name for arm, name in ARMS.items() if (rows["arm"] == arm).any()}
 
 
 def head(cells: Sequence[str]) -> list[str]:

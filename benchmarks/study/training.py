@@ -10,7 +10,7 @@ import json
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import MISSING, asdict, fields, replace
 from pathlib import Path
 
 import torch
@@ -26,6 +26,7 @@ from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
+from bumblebee.tracking.sampler import ClipShares
 
 DONE = "done.json"
 CHECKPOINT_EVERY = 60
@@ -41,7 +42,8 @@ def finished(out: Path, job: Job) -> bool:
     path = out / job.name / DONE
     if not path.exists():
         return False
-    if json.loads(path.read_text())["job"] != _plain(job):
+    unsaid = {own.name: own.default for own in fields(Job) if own.default is not MISSING}
+    if unsaid | json.loads(path.read_text())["job"] != _plain(job):
         raise BadInput(path, f"a policy trained as {job.name} is now", "another training", "Use a new --out.")
     return True
 
@@ -74,7 +76,8 @@ def train(
     torch.set_num_threads(task.threads)
     clips = [row.clip for row in motions.training(job.clips)]
     engine = make_engine(task.engine, task_model(task, model), task.num_worlds, task.threads, buffers=task.buffers)
-    env = TrackingEnv(MotionLibrary(clips, task.ahead, device=engine.device), engine, task, job.seed)
+    shares = ClipShares.equal(motions.cluster_indices(clips)) if job.even else None
+    env = TrackingEnv(MotionLibrary(clips, task.ahead, device=engine.device), engine, task, job.seed, clip_share=shares)
     trainer = Trainer(env, ppo, folder, job.seed, None if job.parent is None else out / job.parent)
     trainer.train(job.name, over)
     if trainer.iteration < ppo.iterations:

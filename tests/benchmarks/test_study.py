@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.motion_pack import Packed, write_pack
 from benchmarks.study.__main__ import main
-from benchmarks.study.jobs import PAPER_ARMS, Job, base_of, experts_jobs, one_of, paper_jobs, ready
+from benchmarks.study.jobs import PAPER_ARMS, Job, base_of, even_of, experts_jobs, one_of, paper_jobs, ready
 from benchmarks.study.motions import LABELS, MOTIONS, read_motions
 from benchmarks.study.paper_tables import paper_tables
 from benchmarks.study.settings import PAPER_CHANGES, SMALL, Study, freeze, settings_of
@@ -51,7 +51,13 @@ def test_the_one_policy_gets_the_steps_of_all_experts_and_random_clusters_are_as
     experts = [job for name, job in jobs.items() if name.startswith("s0-c")]
     others = [job for name, job in jobs.items() if name.startswith("s0-r")]
     assert len(experts) == len(others) == 2
-    assert jobs[one_of(0)].steps == sum(job.steps for job in experts) == sum(job.steps for job in others)
+    assert jobs[even_of(0)].even
+    assert (
+        jobs[one_of(0)].steps
+        == jobs[even_of(0)].steps
+        == sum(job.steps for job in experts)
+        == sum(job.steps for job in others)
+    )
     for group in (experts, others):
         assert sorted(name for job in group for name in job.clips or ()) == sorted(motions.labels["name"])
 
@@ -87,6 +93,10 @@ def test_a_run_is_trained_ended_gone_on_with_and_made_into_tables(folder: Path, 
     text = experts_tables(out, SMALL, motions)
     assert "experts by cluster | held out | 2 |" in text
     assert text.count("experts by cluster less one policy, the experts' steps") == 4
+    assert text.count("the same, each cluster drawn as often less one policy") == 4
+    shutil.rmtree(out / even_of(0))
+    assert "drawn as often" not in experts_tables(out, SMALL, motions)
+    text = experts_tables(out, SMALL, motions)
     main(
         [
             "table",
