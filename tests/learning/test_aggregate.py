@@ -1,0 +1,73 @@
+"""What DAgger gathers: the newest samples, their past put together as the environment showed it, within bounds."""
+
+import pytest
+import torch
+
+from bumblebee.errors import BadInput
+from bumblebee.learning.aggregate import Aggregate
+from bumblebee.tracking.history import History
+from bumblebee.tracking.rows import Rows
+
+WORLDS, SIZE, ALONE, HISTORY, MEMORY = 3, 2, 1, 4, 3
+
+
+def filled(steps: int, capacity: int) -> tuple[Aggregate, dict[tuple[float, ...], torch.Tensor], torch.Tensor]:
+    """Random rows of three worlds with restarts; what each sample must give by its newest row, and the ages."""
+    torch.manual_seed(0)
+    data = Aggregate(capacity, WORLDS, (SIZE, ALONE, 1), HISTORY, MEMORY)
+    ring, shown, age = History(WORLDS, SIZE, HISTORY), [], torch.zeros(WORLDS, dtype=torch.long)
+    wanted, ages = {}, []
+    for step in range(steps):
+        row, alone = torch.randn(WORLDS, SIZE), torch.randn(WORLDS, ALONE)
+        ring.add(row, Rows(age == 0, by_mask=True))
+        shown.append(torch.cat((ring.stacked(), alone), dim=-1))
+        data.add(shown[-1], row[:, :1], torch.ones(WORLDS, 1), age)
+        ages.append(age.clone())
+        for world in range(WORLDS):
+            past = [shown[step - back][world] for back in range(min(MEMORY, int(age[world])), -1, -1)]
+            wanted[tuple(row[world].tolist())] = torch.stack(past)
+        age = torch.where(torch.rand(WORLDS) < 0.15, 0, age + 1)
+    return data, wanted, torch.stack(ages)
+
+
+@pytest.mark.parametrize(("steps", "kept"), [(30, 60), (30, 12), (3, 60)])
+def test_a_sample_has_the_past_that_its_world_saw(steps: int, kept: int) -> None:
+    """Not yet full, overwritten, and hardly begun: observations and marks are those of the steps themselves."""
+    data, wanted, _ = filled(steps, kept * WORLDS)
+    seen, known, mean, _ = data.draw(400, torch.Generator().manual_seed(1))
+    assert seen.shape == (400, MEMORY + 1, HISTORY * SIZE + ALONE) and known[:, -1].all()
+    for one, marks, answer in zip(seen, known, mean, strict=True):
+        newest = one[-1, (HISTORY - 1) * SIZE : HISTORY * SIZE]
+        past = wanted[tuple(newest.tolist())]
+        assert int(marks.sum()) == len(past) and marks[-len(past) :].all()
+        assert torch.equal(one[marks], past) and answer == newest[0]
+
+
+def test_the_ring_keeps_the_newest_whose_past_it_has() -> None:
+    data, _, _ = filled(30, 12 * WORLDS)
+    assert data.size == 12 * WORLDS
+    held = set(data._row[..., :SIZE].flatten(0, 1)[:, 0].tolist())
+    seen = data.draw(2000, torch.Generator().manual_seed(0))[0][:, -1, (HISTORY - 1) * SIZE]
+    assert set(seen.tolist()) <= held
+    assert len(set(seen.tolist())) == (12 - (HISTORY + MEMORY - 1)) * WORLDS
+
+
+def test_without_history_and_memory_every_sample_is_drawn() -> None:
+    data = Aggregate(5, 1, (1, 0, 1))
+    for value in range(8):
+        data.add(torch.full((1, 1), float(value)), torch.zeros(1, 1), torch.ones(1, 1), torch.full((1,), value))
+    assert data.size == 5
+    seen, known, _, _ = data.draw(100, torch.Generator().manual_seed(0))
+    assert set(seen.flatten().tolist()) == {3.0, 4.0, 5.0, 6.0, 7.0} and known.shape == (100, 1)
+
+
+def test_a_ring_shorter_than_what_the_student_looks_back_is_refused() -> None:
+    with pytest.raises(BadInput, match="capacity: expected at least 21: 7 steps of 3 worlds"):
+        Aggregate(18, WORLDS, (SIZE, ALONE, 1), HISTORY, MEMORY)
+
+
+def test_the_memory_that_is_told_is_the_memory_that_is_taken() -> None:
+    sizes = (107, 5, 23)
+    data = Aggregate(4000, 10, sizes)
+    taken = sum(tensor.nbytes for tensor in (data._row, data._mean, data._std, data._age))
+    assert Aggregate.gib(4000, sizes) == pytest.approx(taken / 2**30)
