@@ -191,7 +191,8 @@ def _check_sizes(policy: ExportedPolicy) -> None:
     stated, seen = policy.contract, policy.seen
     size = seen.history * sum(part["size"] for part in stated["observation"])
     size += sum(part["size"] for part in stated.get("observation_now", []))
-    wanted_in, wanted_out = {"obs": (size,)}, {"actions": (len(stated["joints"]),)}
+    wanted_in: dict[str, tuple[int, ...]] = {"obs": (size,)}
+    wanted_out: dict[str, tuple[int, ...]] = {"actions": (len(stated["joints"]),)}
     if policy.memory is not None:
         wanted_in["memory"] = wanted_out["memory_next"] = policy.memory
     session, where = policy.session, policy.folder / "policy.onnx"

@@ -84,6 +84,9 @@ class Distiller:
         self._generator = torch.Generator(env.device).manual_seed(config.seed)
         self.student, self.shape = _student(env, base, config)
         self._experts = {index: expert.to(env.device) for index, expert in experts.items()}
+        if base is None or config.init == "scratch" or _group(env) == "student":
+            sharp = [expert.actor.distribution.std_param.detach() for expert in self._experts.values()]
+            self.student.distribution.std_param.data.copy_(torch.stack(sharp).mean(0))
         self._of_clip = torch.as_tensor(cluster, device=env.device)
         self._optimiser = torch.optim.Adam(self.student.parameters(), lr=config.learning_rate)
         group, memory = env.groups[_group(env)], self.shape.memory
@@ -92,7 +95,9 @@ class Distiller:
         past = (self.shape.history, memory[0] if memory else 0)
         self._data = Aggregate(config.capacity, env.num_envs, self._sizes, *past, env.device)
         self._critic = base.critic_state if base is not None and _group(env) == "policy" else {}
-        self.iteration, self._rows = 0, []
+        self._samples = torch.zeros(max(cluster) + 1, device=env.device)  # of each cluster in this iteration
+        self.iteration = 0
+        self._rows: list[dict[str, float]] = []
         self._resume()
 
     @property
@@ -120,10 +125,12 @@ class Distiller:
             self._collect(config.expert_share * max(0.0, 1.0 - 2.0 * self.iteration / config.iterations))
             env.engine.check()
             kl, scalars = self._learn(), env.statistics.take()
+            least = float(self._samples[list(self._experts)].min() / self._samples.sum())
+            self._samples.zero_()
             self.iteration += 1
             kept = {name: scalars[name] for name in ("success", "key_error")}
             told = {"iteration": self.iteration, "frames": self.iteration * self.frames_each}
-            self._rows.append(told | {"kl": kl, **kept})
+            self._rows.append(told | {"kl": kl, **kept, "least_share": least})
             report(self.frames_each, f"KL {kl:.3f}, success {kept['success']:.2f}")
             done = enough()
             if self._folder is not None and (done or self.iteration % config.checkpoint_every == 0):
@@ -138,7 +145,7 @@ class Distiller:
         return Policy(actor, self._critic, self.shape)
 
     def curve(self) -> pd.DataFrame:
-        """A row an iteration: iteration, frames, kl, success, key_error."""
+        """A row an iteration: iteration, frames, kl, success, key_error, least_share (of the samples: a cluster's)."""
         return pd.DataFrame(self._rows)
 
     def save_checkpoint(self, folder: Path) -> None:
@@ -191,6 +198,7 @@ class Distiller:
         """What the expert of each world's cluster would do, mean and deviation (B, J), seeing `known` (B, D)."""
         wanted = torch.zeros(self.env.num_envs, self.env.num_actions, device=known.device)
         spread, now = torch.ones_like(wanted), self._of_clip[self.env.clip]
+        self._samples.index_add_(0, now, torch.ones_like(now, dtype=torch.float32))
         for index, expert in self._experts.items():
             own = Rows(now == index, self.env.engine.by_mask)
             if len(own):

@@ -53,6 +53,8 @@ class DistillConfig(Ranged):
         self.require(worlds * self.steps >= self.mini_batches, "mini_batches", f"at most {worlds * self.steps} samples")
 
 
-PAPER_DAGGER = DistillConfig(steps=1, learning_rate=1e-4, init="scratch", hidden=(1024, 1024, 512))
+PAPER_DAGGER = DistillConfig(
+    steps=1, learning_rate=1e-4, init="scratch", hidden=(1024, 1024, 512), checkpoint_every=1000
+)
 """Appendix B, "Hyperparameters for DAgger": Adam 1e-4, batch 4096 (a step of 4096 worlds), 2 epochs of 4 mini-batches,
 gradient norm 1; the paper's MLP."""

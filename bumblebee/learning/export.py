@@ -103,17 +103,18 @@ def onnx_of(policy: Policy) -> bytes:
 
     actor, shape, graph = policy.actor, policy.shape, Graph()
     value = normalised(graph, actor)
-    inputs, outputs = {"obs": ["N", shape.observation]}, {"actions": ["N", shape.actions]}
+    inputs: dict[str, list[str | int | None]] = {"obs": ["N", shape.observation]}
+    outputs: dict[str, list[str | int | None]] = {"actions": ["N", shape.actions]}
     if isinstance(actor, TransformerModel):
         value = behind_memory(graph, actor, value)
         inputs["memory"] = outputs["memory_next"] = ["N", *actor.settings.memory_shape]
     layers(graph, actor.mlp, value)
     graph.nodes[-1].output[0] = "actions"
-    ends = [
+    came, gone = (
         [helper.make_tensor_value_info(name, TensorProto.FLOAT, size) for name, size in side.items()]
         for side in (inputs, outputs)
-    ]
-    made = helper.make_graph(graph.nodes, "policy", *ends, graph.weights)
+    )
+    made = helper.make_graph(graph.nodes, "policy", came, gone, graph.weights)
     model = helper.make_model(made, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="bumblebee")
     model.ir_version = IR_VERSION
     checker.check_model(model)

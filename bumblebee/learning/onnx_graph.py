@@ -56,7 +56,7 @@ class Graph:
         """(N, ., .) with a 1 after the end of `axis`."""
         pads = np.zeros(6, dtype=np.int64)
         pads[3 + axis] = 1
-        names = [self.constant(f"{out}_pads", pads), self.constant(f"{out}_one", np.float32(1.0))]
+        names = [self.constant(f"{out}_pads", pads), self.constant(f"{out}_one", np.array(1.0, dtype=np.float32))]
         return self.add("Pad", [value, *names], out)
 
 
@@ -67,9 +67,9 @@ def normalised(graph: Graph, actor: MLPModel) -> str:
     return graph.add("Div", [centred, graph.constant("scale", own._std + own.eps)], "scaled")
 
 
-def layers(graph: Graph, modules: nn.Module, value: str, name: str = "layer") -> str:
+def layers(graph: Graph, modules: nn.Sequential, value: str, name: str = "layer") -> str:
     """Linear layers and ELUs, one after the other."""
-    for index, layer in enumerate(modules):  # type: ignore[arg-type]
+    for index, layer in enumerate(modules):
         out = f"{name}{index}"
         if isinstance(layer, nn.Linear):
             value = graph.linear(layer, value, out)
@@ -123,10 +123,12 @@ def _attention(graph: Graph, own: WindowAttention, normed: str, known: str) -> s
         table = own.place(own.distances).view(reach, heads, head).permute(1, 2, 0)
     places = graph.add("MatMul", [parts[1], graph.constant("places", table)], "place_score")
     score = graph.add("Add", [graph.add("MatMul", [parts[0], key], "content_score"), places], "score")
-    score = graph.add("Mul", [score, graph.constant("per_head", np.float32(head**-0.5))], "scaled_score")
+    score = graph.add(
+        "Mul", [score, graph.constant("per_head", np.array(head**-0.5, dtype=np.float32))], "scaled_score"
+    )
     held = graph.reshape(known, [0, 1, 1, reach], "known_by_head")
-    held = graph.add("Greater", [held, graph.constant("half", np.float32(0.5))], "held")
-    score = graph.add("Where", [held, score, graph.constant("never", np.float32(-np.inf))], "masked")
+    held = graph.add("Greater", [held, graph.constant("half", np.array(0.5, dtype=np.float32))], "held")
+    score = graph.add("Where", [held, score, graph.constant("never", np.array(-np.inf, dtype=np.float32))], "masked")
     weight = graph.add("Softmax", [score], "attended", axis=-1)
     merged = graph.add("Transpose", [graph.add("MatMul", [weight, value], "mixed")], "merged", perm=(0, 2, 1, 3))
     return graph.linear(own.out, graph.reshape(merged, [0, size], "all_heads"), "attention")

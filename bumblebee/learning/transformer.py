@@ -110,7 +110,7 @@ class TransformerModel(MLPModel):
 
     def empty_memory(self, robots: int) -> Tensor:
         """The memory (N, M, E + 1) of robots that have seen nothing."""
-        return torch.zeros(robots, *self.settings.memory_shape, device=self.block.attention.distances.device)
+        return torch.zeros(robots, *self.settings.memory_shape, device=self.block.attention.out.weight.device)
 
     def reset(self, dones: Tensor | None = None, hidden_state: HiddenState = None) -> None:
         """Forget everything or take over a state (M, N, E + 1); with `dones` (N,) forget what these robots saw."""

@@ -79,7 +79,7 @@ def test_two_experts_become_one_policy_with_a_memory() -> None:
     distiller.train()
     curve, after = distiller.curve(), apart(distiller.policy())
     assert curve["kl"].iloc[-3:].mean() < 0.2 * curve["kl"].iloc[0]
-    assert after < 0.3 * before
+    assert after < 0.5 * before
 
 
 def test_killed_it_goes_on_from_its_last_checkpoint(tmp_path: Path) -> None:
