@@ -10,13 +10,12 @@ the experts answer what they see in "policy", and who learns sees "student". Who
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import torch
-from rsl_rl.models import MLPModel
 from torch import Tensor
 
 from bumblebee.errors import BadInput
@@ -24,7 +23,9 @@ from bumblebee.learning.aggregate import Aggregate
 from bumblebee.learning.checkpoint import load_checkpoint, save_checkpoint
 from bumblebee.learning.distill_config import PAPER_DAGGER, DistillConfig
 from bumblebee.learning.gaussian import believed, gaussian, gaussian_kl
-from bumblebee.learning.policy import Policy, Shape, new_actor, shape_of
+from bumblebee.learning.policy import Policy, new_actor
+from bumblebee.learning.student import group_of, new_student
+from bumblebee.sim.warp_limits import within_memory
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.rows import Rows
 
@@ -82,19 +83,16 @@ class Distiller:
         torch.manual_seed(config.seed)
         self.env, self.config, self._folder = env, config, folder
         self._generator = torch.Generator(env.device).manual_seed(config.seed)
-        self.student, self.shape = _student(env, base, config)
-        self._experts = {index: expert.to(env.device) for index, expert in experts.items()}
-        if base is None or config.init == "scratch" or _group(env) == "student":
-            sharp = [expert.actor.distribution.std_param.detach() for expert in self._experts.values()]
-            self.student.distribution.std_param.data.copy_(torch.stack(sharp).mean(0))
+        self.student, self.shape = new_student(env, experts, config, base)
+        self._experts = {index: experts[index].to(env.device) for index in sorted(set(cluster))}
         self._of_clip = torch.as_tensor(cluster, device=env.device)
         self._optimiser = torch.optim.Adam(self.student.parameters(), lr=config.learning_rate)
-        group, memory = env.groups[_group(env)], self.shape.memory
+        group, memory = env.groups[group_of(env)], self.shape.memory
         sizes = [sum(size for _, size in parts) for parts in (group.parts, group.parts_now)]
         self._sizes = (*sizes, env.num_actions)
         past = (self.shape.history, memory[0] if memory else 0)
         self._data = Aggregate(config.capacity, env.num_envs, self._sizes, *past, env.device)
-        self._critic = base.critic_state if base is not None and _group(env) == "policy" else {}
+        self._critic = base.critic_state if base is not None and group_of(env) == "policy" else {}
         self._samples = torch.zeros(max(cluster) + 1, device=env.device)  # of each cluster in this iteration
         self.iteration = 0
         self._rows: list[dict[str, float]] = []
@@ -122,9 +120,10 @@ class Distiller:
         config, env = self.config, self.env
         while self.iteration < config.iterations:
             env.progress = 1.0  # the success threshold at its final value
-            self._collect(config.expert_share * max(0.0, 1.0 - 2.0 * self.iteration / config.iterations))
-            env.engine.check()
-            kl, scalars = self._learn(), env.statistics.take()
+            with within_memory(env.num_envs):
+                self._collect(config.expert_share * max(0.0, 1.0 - 2.0 * self.iteration / config.iterations))
+                env.engine.check()
+                kl, scalars = self._learn(), env.statistics.take()
             least = float(self._samples[list(self._experts)].min() / self._samples.sum())
             self._samples.zero_()
             self.iteration += 1
@@ -186,7 +185,7 @@ class Distiller:
         env, student = self.env, self.student
         for _ in range(self.config.steps):
             groups = env.get_observations()
-            seen = groups[_group(env)]
+            seen = groups[group_of(env)]
             student.update_normalization({"policy": seen})  # nothing where base's statistics stay
             wanted, spread = self._answers(groups["policy"])
             self._data.add(seen, wanted, spread, env.episode_length_buf)
@@ -235,27 +234,3 @@ def check_experts(experts: Mapping[int, Policy], cluster: Sequence[int]) -> None
     for index, expert in experts.items():
         if expert.shape.transformer is not None:
             raise BadInput(f"expert {index}", "a policy without a memory", "a transformer", "Distil MLPs.")
-
-
-def _student(env: TrackingEnv, base: Policy | None, config: DistillConfig) -> tuple[MLPModel, Shape]:
-    """Who learns, on the environment's device, and its shape."""
-    own = config.transformer if config.model == "transformer" else None
-    hidden = config.hidden if own is None else own.head
-    if base is None or _group(env) == "student":
-        shape = replace(shape_of(env, hidden, _group(env)), transformer=own)
-        return new_actor(shape).to(env.device).train(), shape
-    shape = base.shape
-    if config.init == "base":
-        student = new_actor(base.shape)
-        student.load_state_dict(base.actor.state_dict())
-    else:
-        shape = replace(base.shape, hidden=tuple(hidden), transformer=own)
-        student = new_actor(shape)
-        student.obs_normalizer.load_state_dict(base.actor.obs_normalizer.state_dict())
-    student.obs_normalizer.eval()  # the statistics stay those of base's training
-    return student.to(env.device), shape
-
-
-def _group(env: TrackingEnv) -> str:
-    """The observations of who learns."""
-    return "student" if "student" in env.groups else "policy"

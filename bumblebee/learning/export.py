@@ -65,13 +65,8 @@ def contract(
     parts "observation_now" of the newest step alone. A policy with a memory has "memory": zeros of that shape go in at
     a clip's start, then what the step before gave out.
     """
-    table = [gains(joint) for joint in joints()]
-
-    def listed(terms: Sequence[str]) -> list[dict[str, Any]]:
-        return [{"name": name, "size": size} for name, size in parts(terms, len(table), len(ahead))]
-
-    looks_ahead = any(part["name"].startswith("ahead") for part in listed((*seen.terms, *seen.now)))
-
+    table, counts = [gains(joint) for joint in joints()], (len(joints()), len(ahead))
+    looks_ahead = any(name.startswith("ahead") for name, _ in parts((*seen.terms, *seen.now), *counts))
     return {
         "schema": 1,
         "robot": "g1_23dof",
@@ -90,11 +85,15 @@ def contract(
         "terms": list(seen.terms),
         "history": seen.history,
         "now": list(seen.now),
-        "observation": listed(seen.terms),
-        "observation_now": listed(seen.now),
+        "observation": _listed(seen.terms, *counts),
+        "observation_now": _listed(seen.now, *counts),
         **({} if memory is None else {"memory": {"steps": memory[0], "size": memory[1]}}),
         "onnx_sha256": hashlib.sha256(onnx_bytes).hexdigest(),
     }
+
+
+def _listed(terms: Sequence[str], joint_count: int, ahead: int) -> list[dict[str, Any]]:
+    return [{"name": name, "size": size} for name, size in parts(terms, joint_count, ahead)]
 
 
 def onnx_of(policy: Policy) -> bytes:

@@ -197,3 +197,20 @@ def test_the_robots_closed_loop_is_that_of_the_trial(tmp_path: Path) -> None:
     assert torch.stack(student.taken[:30]).abs().max() > 0.1
     begun = [one.step(both, 0, robots.read())[0] for one in (runner, PolicyRunner(policy, library, names))]
     np.testing.assert_allclose(*begun, atol=1e-6)
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no NVIDIA GPU")
+def test_on_a_gpu_it_learns_and_goes_on(tmp_path: Path) -> None:
+    """Worlds, samples and memories on the device; the checkpoint of one Distiller is gone on from by another."""
+    pytest.importorskip("mujoco_warp", reason="the extra `gpu` is not installed")
+    config = replace(CONFIG, env=replace(TASK, engine="mujoco_warp", num_worlds=256), capacity=50_000)
+    experts = task()[1]
+    one = Distiller(env_of(config.env), experts, CLUSTER, config, folder=tmp_path)
+    one.train(enough=lambda: one.iteration == 20)
+    assert one._data._row.is_cuda and one.student._memory.is_cuda
+    other = Distiller(env_of(config.env), experts, CLUSTER, config, folder=tmp_path)
+    assert other.iteration == 20
+    other.train()
+    assert other.curve()["kl"].iloc[-3:].mean() < 0.3 * other.curve()["kl"].iloc[0]
+    assert next(other.policy().actor.parameters()).device.type == "cpu"
