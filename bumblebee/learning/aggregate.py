@@ -5,12 +5,30 @@ once, in the order of time, with the age of its world's episode; observations an
 together when they are drawn. A memory itself is not kept: it would be what weights of long ago made of those steps.
 """
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 
 from bumblebee.errors import BadInput
 
 _BYTES, _GIB = 4, 2**30
+
+
+@dataclass(frozen=True)
+class Samples:
+    """N samples that were drawn."""
+
+    observation: Tensor
+    """(N, M + 1, H * D + A) of the steps that are remembered and of the sample itself, the oldest first."""
+    known: Tensor
+    """(N, M + 1) bool, which of them belong to the sample's episode."""
+    mean: Tensor
+    """(N, J) what the expert would do."""
+    std: Tensor
+    """(N, J) how sharply."""
+    weight: Tensor
+    """(N,) what each counts, 1 on average: with it every cluster counts the same, however many samples it has."""
 
 
 class Aggregate:
@@ -20,8 +38,8 @@ class Aggregate:
         capacity: samples that are kept, rounded down to whole steps of all worlds.
         worlds: B.
         sizes: entries of one step of an observation, of what is seen of the newest step alone, and of an action.
-        history: H, control steps in an observation.
-        memory: M, control steps before it that a student remembers; 0 for one without memory.
+        past: H, control steps in an observation, and M, those before it that a student remembers.
+        clusters: K.
         device: where all lies.
     """
 
@@ -30,14 +48,14 @@ class Aggregate:
         capacity: int,
         worlds: int,
         sizes: tuple[int, int, int],
-        history: int = 1,
-        memory: int = 0,
+        past: tuple[int, int] = (1, 0),
+        clusters: int = 1,
         device: torch.device | str = "cpu",
     ) -> None:
         seen, alone, actions = sizes
-        self.history, self.memory, self._seen = history, memory, seen
+        (self.history, self.memory), self._seen = past, seen
         self.steps = max(capacity // worlds, 1)
-        context = history + memory - 1
+        context = self.history + self.memory - 1
         if self.steps <= context:
             wanted = f"at least {(context + 1) * worlds:,}: {context + 1} steps of {worlds} worlds"
             raise BadInput("capacity", wanted, f"{capacity:,}", "The student looks so far back.")
@@ -45,44 +63,45 @@ class Aggregate:
         try:
             self._row = torch.zeros(self.steps, worlds, seen + alone, device=device)
             self._mean, self._std = (torch.zeros(self.steps, worlds, actions, device=device) for _ in range(2))
-            self._age = torch.zeros(self.steps, worlds, dtype=torch.int32, device=device)
+            self._age, self._cluster = torch.zeros(2, self.steps, worlds, dtype=torch.int32, device=device)
         except torch.OutOfMemoryError:
             came = f"{self.gib(capacity, sizes):.1f} GiB on {device}"
             raise BadInput("capacity", "a memory of samples that the device holds", came, "Keep fewer.") from None
+        self.counts = torch.zeros(clusters, device=device)
+        """(K,) samples of each cluster."""
         self._added = 0
 
     @staticmethod
     def gib(capacity: int, sizes: tuple[int, int, int]) -> float:
-        """Memory of so many samples [GiB]: rows, means and deviations of the experts, ages."""
-        return capacity * _BYTES * (sizes[0] + sizes[1] + 2 * sizes[2] + 1) / _GIB
+        """Memory of so many samples [GiB]: rows, means and deviations of the experts, ages, clusters."""
+        return capacity * _BYTES * (sizes[0] + sizes[1] + 2 * sizes[2] + 2) / _GIB
 
     @property
     def size(self) -> int:
         """Samples that are kept."""
         return min(self._added, self.steps) * self.worlds
 
-    def add(self, observation: Tensor, mean: Tensor, std: Tensor, age: Tensor) -> None:
+    def add(self, observation: Tensor, answer: tuple[Tensor, Tensor], age: Tensor, cluster: Tensor) -> None:
         """Append a control step of all worlds; beyond the capacity the oldest is overwritten.
 
         Args:
-            observation: (B, H * D + N) as a group shows it; its end is the newest step.
-            mean: (B, J) what the experts would do there, `std` (B, J) how sharply.
-            std: see `mean`.
+            observation: (B, H * D + A) as a group shows it; its end is the newest step.
+            answer: (B, J) each, what the experts would do there and how sharply.
             age: (B,) control steps since the episode's first.
+            cluster: (B,) index of the cluster of each world's motion.
         """
         place = self._added % self.steps
         start = (self.history - 1) * self._seen
-        self._row[place], self._age[place] = observation[:, start:], age
-        self._mean[place], self._std[place] = mean, std
+        each = torch.ones(self.worlds, device=self._device)
+        if self._added >= self.steps:
+            self.counts.index_add_(0, self._cluster[place], -each)
+        self.counts.index_add_(0, cluster, each)
+        self._row[place], self._age[place], self._cluster[place] = observation[:, start:], age, cluster
+        self._mean[place], self._std[place] = answer
         self._added += 1
 
-    def draw(self, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Draw `count` samples, with replacement, among those whose past is kept.
-
-        Returns:
-            observations (n, M + 1, H * D + N) of the steps that are remembered and of the sample itself, the oldest
-            first; which of them belong to its episode (n, M + 1) bool; the experts' mean and deviation (n, J).
-        """
+    def draw(self, count: int, generator: torch.Generator) -> Samples:
+        """Draw `count` samples, with replacement, among those whose past is kept."""
         oldest = max(self._added - self.steps, 0)
         first = oldest + (self._context if oldest else 0)
         drawn = torch.randint((self._added - first) * self.worlds, (count,), generator=generator, device=self._device)
@@ -91,10 +110,13 @@ class Aggregate:
         age = torch.minimum(self._age[place, world], time)  # what was before the first sample is not known
         back = torch.arange(self.memory, -1, -1, device=self._device)
         known = back <= age[:, None]
-        return self._observed(time, world, age, back), known, self._mean[place, world], self._std[place, world]
+        own = self.counts[self._cluster[place, world]]
+        weight = self.counts.sum() / (own * (self.counts > 0).sum())
+        answer = self._mean[place, world], self._std[place, world]
+        return Samples(self._observed(time, world, age, back), known, *answer, weight)
 
     def _observed(self, time: Tensor, world: Tensor, age: Tensor, back: Tensor) -> Tensor:
-        """What `world` (n,) saw `back` (M + 1,) steps before `time` (n,), (n, M + 1, H * D + N).
+        """What `world` (n,) saw `back` (M + 1,) steps before `time` (n,), (n, M + 1, H * D + A).
 
         As the environment's history has it, what was before an episode's first step is that step.
         """

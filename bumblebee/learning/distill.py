@@ -1,8 +1,9 @@
 """DAgger from all experts into one generalist (paper, section 3.4 and the table "Hyperparameters for DAgger").
 
 The generalist acts, the expert of each motion's cluster says what it would have done there, and the generalist learns
-from everything gathered so far by KL(general || expert). Clusters are drawn with equal shares, whatever fails (appendix
-D: "each category is equally represented"): the environment's `clip_share` is `ClipShares.equal`.
+from everything gathered so far by KL(general || expert). Clusters have equal shares (appendix D: "each category is
+equally represented"): of the draws of episodes, whatever fails, by the environment's `clip_share`, `ClipShares.equal`,
+and of the loss, by weights, since episodes of short motions leave fewer samples.
 
 A teacher and its student are the same with one expert and two observations: in an environment with a group "student",
 the experts answer what they see in "policy", and who learns sees "student". Who learns may have a memory
@@ -91,9 +92,8 @@ class Distiller:
         sizes = [sum(size for _, size in parts) for parts in (group.parts, group.parts_now)]
         self._sizes = (*sizes, env.num_actions)
         past = (self.shape.history, memory[0] if memory else 0)
-        self._data = Aggregate(config.capacity, env.num_envs, self._sizes, *past, env.device)
+        self._data = Aggregate(config.capacity, env.num_envs, self._sizes, past, max(cluster) + 1, env.device)
         self._critic = base.critic_state if base is not None and group_of(env) == "policy" else {}
-        self._samples = torch.zeros(max(cluster) + 1, device=env.device)  # of each cluster in this iteration
         self.iteration = 0
         self._rows: list[dict[str, float]] = []
         self._resume()
@@ -124,12 +124,11 @@ class Distiller:
                 self._collect(config.expert_share * max(0.0, 1.0 - 2.0 * self.iteration / config.iterations))
                 env.engine.check()
                 kl, scalars = self._learn(), env.statistics.take()
-            least = float(self._samples[list(self._experts)].min() / self._samples.sum())
-            self._samples.zero_()
+            counts = self._data.counts[list(self._experts)]
             self.iteration += 1
             kept = {name: scalars[name] for name in ("success", "key_error")}
             told = {"iteration": self.iteration, "frames": self.iteration * self.frames_each}
-            self._rows.append(told | {"kl": kl, **kept, "least_share": least})
+            self._rows.append(told | {"kl": kl, **kept, "least_share": float(counts.min() / counts.sum())})
             report(self.frames_each, f"KL {kl:.3f}, success {kept['success']:.2f}")
             done = enough()
             if self._folder is not None and (done or self.iteration % config.checkpoint_every == 0):
@@ -187,17 +186,17 @@ class Distiller:
             groups = env.get_observations()
             seen = groups[group_of(env)]
             student.update_normalization({"policy": seen})  # nothing where base's statistics stay
-            wanted, spread = self._answers(groups["policy"])
-            self._data.add(seen, wanted, spread, env.episode_length_buf)
+            now = self._of_clip[env.clip]
+            wanted, spread = self._answers(groups["policy"], now)
+            self._data.add(seen, (wanted, spread), env.episode_length_buf, now)
             leads = torch.rand(env.num_envs, 1, generator=self._generator, device=seen.device) < expert_share
             _, _, dones, _ = env.step(torch.where(leads, wanted, student({"policy": seen})))
             student.reset(dones)
 
-    def _answers(self, known: Tensor) -> tuple[Tensor, Tensor]:
-        """What the expert of each world's cluster would do, mean and deviation (B, J), seeing `known` (B, D)."""
+    def _answers(self, known: Tensor, now: Tensor) -> tuple[Tensor, Tensor]:
+        """What the expert of each world's cluster `now` (B,) does with `known` (B, D): mean and deviation (B, J)."""
         wanted = torch.zeros(self.env.num_envs, self.env.num_actions, device=known.device)
-        spread, now = torch.ones_like(wanted), self._of_clip[self.env.clip]
-        self._samples.index_add_(0, now, torch.ones_like(now, dtype=torch.float32))
+        spread = torch.ones_like(wanted)
         for index, expert in self._experts.items():
             own = Rows(now == index, self.env.engine.by_mask)
             if len(own):
@@ -207,13 +206,14 @@ class Distiller:
         return wanted, spread
 
     def _learn(self) -> float:
-        """The mean KL over the gradient steps of an iteration."""
+        """The KL, a mean over clusters, and over the gradient steps of an iteration."""
         config = self.config
         batch, steps = max(self.frames_each // config.mini_batches, 1), config.epochs * config.mini_batches
         total = torch.zeros((), device=self.env.device)
         for _ in range(steps):
-            seen, known, mean, std = self._data.draw(batch, self._generator)
-            loss = gaussian_kl(*believed(self.student, seen, known), mean, std).mean()
+            drawn = self._data.draw(batch, self._generator)
+            own = believed(self.student, drawn.observation, drawn.known)
+            loss = (drawn.weight * gaussian_kl(*own, drawn.mean, drawn.std)).mean()
             self._optimiser.zero_grad()
             loss.backward()
             torch.nn.utils.clip_grad_norm_(self.student.parameters(), config.grad_norm)
