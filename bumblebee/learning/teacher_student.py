@@ -67,6 +67,7 @@ def generalist_of(
     experts: Mapping[int, Policy],
     config: DistillConfig = PAPER_GENERALIST,
     folder: Path | None = None,
+    base: Policy | None = None,
     model: Path | None = None,
 ) -> Distiller:
     """All experts into one policy, each cluster with the same share of the draws: train it, then ask for the policy.
@@ -77,11 +78,12 @@ def generalist_of(
         experts: cluster index -> its expert.
         config: model, algorithm and task; `config.env.student` is what the generalist sees.
         folder: for the checkpoint, which is gone on from.
+        base: see `Distiller`.
         model: MJCF of a corrected robot; the declared one if there is none.
     """
     check_experts(experts, cluster)
     env = make_env(clips, config.env, config.seed, ClipShares.equal(cluster), model)
-    return Distiller(env, experts, cluster, config, folder=folder)
+    return Distiller(env, experts, cluster, config, base, folder)
 
 
 def train_student(
