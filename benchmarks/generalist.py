@@ -1,9 +1,10 @@
 """The paper's transformer against MLPs: distilled from the same experts at equal steps, one line a case.
 
 `python -m benchmarks.generalist --out results.jsonl`: each arm learns by DAgger to do what the shipped policy does on
-the embedded motions, and is then tried on every one from its first frame. With `--run RUN --motions MOTIONS` the experts
-by cluster of a run of `benchmarks.study` are distilled, in its task and on its motions, into `RUN/s<seed>-<arm>`, where
-`benchmarks.study.trying` finds the policy. Cases that the file has are not run again; one that was cut off goes on.
+the embedded motions, and is then tried on every one from its first frame. With `--run RUN --motions MOTIONS` the
+experts by cluster of a run of `benchmarks.study` are distilled, in its task and on its motions, into
+`RUN/s<seed>-<arm>`, where `benchmarks.study.trying` finds the policy. Cases that the file has are not run again; one
+that was cut off goes on.
 """
 
 import argparse
