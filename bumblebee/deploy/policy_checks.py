@@ -113,7 +113,7 @@ def _tensors(proto: Any) -> Iterator[Any]:
 def _check_memory(where: str, memory: Any) -> None:
     if not isinstance(memory, dict) or set(memory) != {"steps", "size"}:
         raise BadInput(where, "a table with steps and size", repr(memory)[:60])
-    for key, most in (("steps", 1000), ("size", 10_000)):
+    for key, most in (("steps", 200), ("size", 4097)):  # a robot's memory then takes 3 MB at most
         if type(memory[key]) is not int or not 1 <= memory[key] <= most:
             raise BadInput(f"{where}.{key}", f"a whole number from 1 to {most}", repr(memory[key])[:60])
 

@@ -67,7 +67,7 @@ class Aggregate:
         except torch.OutOfMemoryError:
             came = f"{self.gib(capacity, sizes):.1f} GiB on {device}"
             raise BadInput("capacity", "a memory of samples that the device holds", came, "Keep fewer.") from None
-        self.counts = torch.zeros(clusters, device=device)
+        self.counts = torch.zeros(clusters, dtype=torch.long, device=device)
         """(K,) samples of each cluster."""
         self._added = 0
 
@@ -92,7 +92,7 @@ class Aggregate:
         """
         place = self._added % self.steps
         start = (self.history - 1) * self._seen
-        each = torch.ones(self.worlds, device=self._device)
+        each = torch.ones(self.worlds, dtype=torch.long, device=self._device)
         if self._added >= self.steps:
             self.counts.index_add_(0, self._cluster[place], -each)
         self.counts.index_add_(0, cluster, each)
