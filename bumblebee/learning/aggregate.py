@@ -123,4 +123,6 @@ class Aggregate:
         older = torch.arange(self.history - 1, -1, -1, device=self._device)
         ago = torch.minimum(back[:, None] + older, age[:, None, None])
         rows = self._row[(time[:, None, None] - ago) % self.steps, world[:, None, None]]
+        if rows.shape[-1] == self._seen:
+            return rows.flatten(2)
         return torch.cat((rows[..., : self._seen].flatten(2), rows[:, :, -1, self._seen :]), dim=-1)

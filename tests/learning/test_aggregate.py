@@ -8,34 +8,33 @@ from bumblebee.learning.aggregate import Aggregate
 from bumblebee.tracking.history import History
 from bumblebee.tracking.rows import Rows
 
-WORLDS, SIZE, ALONE, HISTORY, MEMORY = 3, 2, 1, 4, 3
+WORLDS, SIZE, HISTORY, MEMORY = 3, 2, 4, 3
 
 
-def filled(steps: int, capacity: int) -> tuple[Aggregate, dict[tuple[float, ...], torch.Tensor], torch.Tensor]:
-    """Random rows of three worlds with restarts; what each sample must give by its newest row, and the ages."""
+def filled(steps: int, capacity: int, alone: int = 1) -> tuple[Aggregate, dict[tuple[float, ...], torch.Tensor]]:
+    """Random rows of three worlds with restarts, and what each sample must give, by its newest row."""
     torch.manual_seed(0)
-    data = Aggregate(capacity, WORLDS, (SIZE, ALONE, 1), (HISTORY, MEMORY), clusters=2)
+    data = Aggregate(capacity, WORLDS, (SIZE, alone, 1), (HISTORY, MEMORY), clusters=2)
     ring, shown, age = History(WORLDS, SIZE, HISTORY), [], torch.zeros(WORLDS, dtype=torch.long)
-    wanted, ages = {}, []
+    wanted = {}
     for step in range(steps):
-        row, alone = torch.randn(WORLDS, SIZE), torch.randn(WORLDS, ALONE)
+        row, more = torch.randn(WORLDS, SIZE), torch.randn(WORLDS, alone)
         ring.add(row, Rows(age == 0, by_mask=True))
-        shown.append(torch.cat((ring.stacked(), alone), dim=-1))
+        shown.append(torch.cat((ring.stacked(), more), dim=-1))
         data.add(shown[-1], (row[:, :1], torch.ones(WORLDS, 1)), age, torch.tensor([0, 0, 1]))
-        ages.append(age.clone())
         for world in range(WORLDS):
             past = [shown[step - back][world] for back in range(min(MEMORY, int(age[world])), -1, -1)]
             wanted[tuple(row[world].tolist())] = torch.stack(past)
         age = torch.where(torch.rand(WORLDS) < 0.15, 0, age + 1)
-    return data, wanted, torch.stack(ages)
+    return data, wanted
 
 
-@pytest.mark.parametrize(("steps", "kept"), [(30, 60), (30, 12), (3, 60)])
-def test_a_sample_has_the_past_that_its_world_saw(steps: int, kept: int) -> None:
+@pytest.mark.parametrize(("steps", "kept", "alone"), [(30, 60, 1), (30, 12, 1), (30, 12, 0), (3, 60, 0)])
+def test_a_sample_has_the_past_that_its_world_saw(steps: int, kept: int, alone: int) -> None:
     """Not yet full, overwritten, and hardly begun: observations and marks are those of the steps themselves."""
-    data, wanted, _ = filled(steps, kept * WORLDS)
+    data, wanted = filled(steps, kept * WORLDS, alone)
     drawn = data.draw(400, torch.Generator().manual_seed(1))
-    assert drawn.observation.shape == (400, MEMORY + 1, HISTORY * SIZE + ALONE) and drawn.known[:, -1].all()
+    assert drawn.observation.shape == (400, MEMORY + 1, HISTORY * SIZE + alone) and drawn.known[:, -1].all()
     for one, marks, answer in zip(drawn.observation, drawn.known, drawn.mean, strict=True):
         newest = one[-1, (HISTORY - 1) * SIZE : HISTORY * SIZE]
         past = wanted[tuple(newest.tolist())]
@@ -44,7 +43,7 @@ def test_a_sample_has_the_past_that_its_world_saw(steps: int, kept: int) -> None
 
 
 def test_the_ring_keeps_the_newest_whose_past_it_has() -> None:
-    data, _, _ = filled(30, 12 * WORLDS)
+    data, _ = filled(30, 12 * WORLDS)
     assert data.size == 12 * WORLDS
     held = set(data._row[..., :SIZE].flatten(0, 1)[:, 0].tolist())
     seen = data.draw(2000, torch.Generator().manual_seed(0)).observation[:, -1, (HISTORY - 1) * SIZE]
@@ -80,7 +79,7 @@ def test_a_cluster_of_few_samples_counts_as_much_as_one_of_many() -> None:
 
 def test_a_ring_shorter_than_what_the_student_looks_back_is_refused() -> None:
     with pytest.raises(BadInput, match="capacity: expected at least 21: 7 steps of 3 worlds"):
-        Aggregate(18, WORLDS, (SIZE, ALONE, 1), (HISTORY, MEMORY))
+        Aggregate(18, WORLDS, (SIZE, 1, 1), (HISTORY, MEMORY))
 
 
 def test_the_memory_that_is_told_is_the_memory_that_is_taken() -> None:
