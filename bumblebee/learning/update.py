@@ -54,7 +54,8 @@ class DeviceUpdate:
         # Adam's fused kernel reads single precision; on a CPU it is given the rate as it is.
         self._adam_rate = self.rate.to(torch.float32 if on_gpu else torch.float64, copy=True)
         parameters, fused = chain(algorithm.actor.parameters(), algorithm.critic.parameters()), True if on_gpu else None
-        algorithm.optimizer = torch.optim.Adam(parameters, lr=self._adam_rate, capturable=on_gpu, fused=fused)
+        algorithm.optimizer = torch.optim.Adam(parameters, lr=algorithm.learning_rate, capturable=on_gpu, fused=fused)
+        self.attach_rate()
         self._target = torch.zeros((), device=device), torch.zeros((), device=device)
         self._kl = torch.zeros((), device=device)
         self._sums = torch.zeros(4 if algorithm.symmetry else 3, dtype=torch.float64, device=device)

@@ -35,7 +35,7 @@ def gathered(storage: RolloutStorage, advantages: Tensor, rows: Tensor) -> Rollo
     """
 
     def of(stored: Tensor) -> Tensor:
-        return stored.flatten(0, 1)[rows]
+        return stored.flatten(0, 1).index_select(0, rows)
 
     seen = {name: of(values) for name, values in storage.observations.items()}
     parameters = storage.distribution_params
@@ -44,7 +44,7 @@ def gathered(storage: RolloutStorage, advantages: Tensor, rows: Tensor) -> Rollo
         observations=TensorDict(seen, batch_size=[len(rows)]),
         actions=of(storage.actions),
         values=of(storage.values),
-        advantages=advantages[rows],
+        advantages=advantages.index_select(0, rows),
         returns=of(storage.returns),
         old_actions_log_prob=of(storage.actions_log_prob),
         old_distribution_params=tuple(of(values) for values in parameters),
