@@ -2,11 +2,12 @@
 
 A robot with friction and latency on every joint is found one effect at a time only by a long way round: each effect
 alone explains a twentieth, and what stands for the others' share has a strange name. Where residuals are large still
-after two effects (after one, where they are hundreds of times the noise), and the last explained little or they are very
-large, the usual ones of all joints are fitted together from the declared values on, or from those found. Of a small robot whose residuals stay large masses and
-centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows that took
-no part; these and the fitted ones are then whitened anew, and the search goes on from there. It never begins so: a load
-at the end of an arm weakens all drives as far as these can tell.
+after two effects (after one, where they are hundreds of times the noise), and the last explained little or they are
+very large, the usual ones of all joints are fitted together from the declared values on, or from those found. Of a
+small robot whose residuals stay large masses and centres of mass of all links follow. What is not sure is taken out
+again, and the rest has to pay on windows that took no part; these and the fitted ones are then whitened anew, and the
+search goes on from there. It never begins so: a load at the end of an arm weakens all drives as far as these can
+tell.
 """
 
 from collections.abc import Callable, Sequence
