@@ -50,7 +50,7 @@ class Problem:
     """Weight of the nuisances' prior; see `held_to`."""
 
     def held_to(self, power: float) -> "Problem":
-        """The problem with the nuisances' prior weighed for a model that leaves `power`, the median chi-square by value.
+        """The problem with the nuisances' prior weighed for a model that leaves `power` (median chi-square by value).
 
         Against residuals a thousand times the noise a prior of one weighs nothing, and nuisances take what effects
         should. What is left is then taken for the noise's measure: the prior weighs as much more.
