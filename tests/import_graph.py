@@ -2,11 +2,57 @@
 
 import ast
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
 PACKAGES = ("bumblebee", "tasks", "flows")
 Graph = dict[str, set[str]]
+
+
+@dataclass(frozen=True)
+class Import:
+    """An import statement: `import names` where `module` is None, else `from module import names`."""
+
+    line: int
+    module: str | None
+    names: tuple[str, ...]
+    late: bool
+    """Whether it runs later than the module's own import: inside a function, or for type checkers only."""
+
+    @property
+    def full(self) -> tuple[str, ...]:
+        """Full names of what is imported."""
+        return self.names if self.module is None else tuple(f"{self.module}.{name}" for name in self.names)
+
+
+@dataclass(frozen=True)
+class Source:
+    """What the tests ask of a file of code."""
+
+    imports: tuple[Import, ...]
+    started: tuple[str, ...]
+    """Texts that stand after "-m" in a list: modules that are a process of their own."""
+
+
+def source(path: Path, home: Path) -> Source:
+    """What a file below `home` imports and starts; each state of a file is parsed once."""
+    return _parsed(path, home, path.stat().st_mtime_ns)
+
+
+@cache
+def _parsed(path: Path, home: Path, changed: int) -> Source:
+    tree, package = ast.parse(path.read_text()), path.relative_to(home).with_suffix("").parts[:-1]
+    imports = []
+    for node, late in _statements(tree, False):
+        names = tuple(alias.name for alias in node.names)
+        module = None
+        if isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            module = ".".join([*base, *([node.module] if node.module else [])])
+        imports.append(Import(node.lineno, module, names, late))
+    return Source(tuple(imports), tuple(_started(tree)))
 
 
 def modules(home: Path) -> dict[str, Path]:
@@ -38,7 +84,7 @@ def call_graph(home: Path) -> Graph:
     found = {}
     for name, path in known.items():
         called = {faces.get(module, {}).get(item, module) for module, item in _imported(path, home, known, late=True)}
-        found[name] = (called | set(_started(path, known))) - {name}
+        found[name] = (called | {text for text in source(path, home).started if text in known}) - {name}
     return found
 
 
@@ -63,18 +109,14 @@ def reached(of: Graph, start: str) -> set[str]:
 
 def _imported(path: Path, home: Path, known: dict[str, Path], late: bool) -> Iterator[tuple[str, str]]:
     """(module of ours, the name that is taken from it or ""), for each import."""
-    package = path.relative_to(home).with_suffix("").parts[:-1]
-    for node in _statements(ast.parse(path.read_text()), late):
-        if isinstance(node, ast.Import):
-            yield from ((alias.name, "") for alias in node.names if alias.name in known)
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else ()
-            module = ".".join([*base, *([node.module] if node.module else [])])
-            for alias in node.names:
-                if f"{module}.{alias.name}" in known:
-                    yield f"{module}.{alias.name}", ""
-                elif module in known:
-                    yield module, alias.name
+    for one in source(path, home).imports:
+        if one.late and not late:
+            continue
+        for name, full in zip(one.names, one.full, strict=True):
+            if full in known:
+                yield full, ""
+            elif one.module in known:
+                yield one.module, name
 
 
 def _offered(path: Path, home: Path, known: dict[str, Path]) -> dict[str, str]:
@@ -82,18 +124,17 @@ def _offered(path: Path, home: Path, known: dict[str, Path]) -> dict[str, str]:
     return {name: module for module, name in _imported(path, home, known, late=False) if name}
 
 
-def _started(path: Path, known: dict[str, Path]) -> Iterator[str]:
-    """The modules that stand after "-m" in a list: a process of their own."""
-    for node in ast.walk(ast.parse(path.read_text())):
+def _started(tree: ast.AST) -> Iterator[str]:
+    for node in ast.walk(tree):
         texts = [getattr(item, "value", None) for item in node.elts] if isinstance(node, ast.List) else []
-        yield from (text for before, text in pairwise(texts) if before == "-m" and text in known)
+        yield from (text for before, text in pairwise(texts) if before == "-m" and isinstance(text, str))
 
 
-def _statements(node: ast.AST, late: bool) -> Iterator[ast.AST]:
-    """The statements that run when the module is imported; with `late` all."""
+def _statements(node: ast.AST, late: bool) -> Iterator[tuple[ast.Import | ast.ImportFrom, bool]]:
+    """The imports below a node, each with whether it runs later than the module's own import."""
     for child in ast.iter_child_nodes(node):
         function = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
         types_only = isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)
-        if late or not (function or types_only):
-            yield child
-            yield from _statements(child, late)
+        if isinstance(child, ast.Import | ast.ImportFrom):
+            yield child, late
+        yield from _statements(child, late or function or types_only)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.import_graph import circles, graph
+from tests.import_graph import circles, graph, source
 
 HOME = Path(__file__).parent.parent
 ORCHESTRATION = {"prefect", "dvc", "mlflow", "pydantic"}
@@ -26,14 +26,8 @@ FREE = {"errors", "files", "io", "last_line", "progress", "quaternions", "ranges
 
 def imports(path: Path) -> Iterator[tuple[int, str]]:
     """(line, full module name) of every import in a file, those inside functions too."""
-    package = path.relative_to(HOME).with_suffix("").parts[:-1]
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            yield from ((node.lineno, alias.name) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else ()
-            module = ".".join([*base, *([node.module] if node.module else [])])
-            yield from ((node.lineno, f"{module}.{alias.name}") for alias in node.names)
+    for one in source(path, HOME).imports:
+        yield from ((one.line, name) for name in one.full)
 
 
 def files(package: str) -> list[Path]:

@@ -20,6 +20,8 @@ from bumblebee.diagnosis.dataset import open_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import write_diagnosis
 from bumblebee.diagnosis.simulation import LEFT_OUT, NOT_TRIED
+from bumblebee.diagnosis.thresholds import Thresholds
+from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, TimeSteps
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout, write_rollout
 
@@ -37,17 +39,18 @@ FULL = Budgets(Size(), DiagnosisConfig(search_seconds=120.0, beyond_seconds=40.0
 QUICK = Budgets(
     SMALL,
     DiagnosisConfig(
-        max_windows=12,
-        max_holdout_windows=8,
-        max_long_windows=3,
-        report_windows=6,
+        max_windows=8,
+        max_holdout_windows=5,
+        max_long_windows=2,
+        report_windows=4,
         grow=False,
-        search_seconds=0.4,
+        search_seconds=0.3,
         beyond_seconds=0.1,
-        search=SearchConfig(screen_windows=8, patience=1, simulated=4, trials=2, most=3),
+        search=SearchConfig(screen_windows=6, patience=1, simulated=4, trials=2, most=3),
+        thresholds=Thresholds(dataset=DatasetThresholds(time_steps=TimeSteps(small_model=0))),
     ),
 )
-"""For cases of a second or two; model discrepancy is sought in every fifth of them."""
+"""For cases of a second or two, searched at steps of 2 ms; model discrepancy is sought in every fifth of them."""
 
 
 @dataclass(frozen=True)

@@ -77,13 +77,13 @@ def follow(
     group = Group(manner.seen, (n, library.num_joints, len(library.ahead)), 0.0, engine.device)
     generator = torch.Generator().manual_seed(0)
     limit = torch.tensor([success_threshold(clip.family) for clip in clips])
-    action = torch.zeros(n, library.num_joints)
+    act, action = policy.follower(), torch.zeros(n, library.num_joints)
     alive, alive_local, stands = torch.ones(3, n, dtype=torch.bool)
     sums = torch.zeros(4, n)  # frames before the loss, and the three errors over them
     for frame in range(int(library.length.max()) - 1):
         ref = library.frames(ids, torch.full((n,), (frame + 1) * dt))
         group.look(engine.state(), ref, action, Rows(torch.full((n,), frame == 0), by_mask=False), generator)
-        action = policy(group.exact)
+        action = act(group.exact)
         engine.step(joint_targets(ref, action, scale, middle))
         state = engine.state()
         running = frame + 1 < library.length

@@ -13,10 +13,15 @@ from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset import Session, make_session
 from bumblebee.diagnosis.residuals import Problem, make_problem
 from bumblebee.diagnosis.simulation import choose_starts, cut
+from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, TimeSteps
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Effect
 
-SMALL = DiagnosisConfig(max_windows=50, max_holdout_windows=25, report_windows=10)
+SMALL = DiagnosisConfig(
+    max_windows=22, max_holdout_windows=12, max_long_windows=6, report_windows=6, grow=False
+)  # fmt: skip
+SEARCHED_COARSELY = DatasetThresholds(time_steps=TimeSteps(small_model=0))
+"""The search at steps of 2 ms, as for larger robots, at half the cost; the last fit and the document at 1 ms."""
 JOINTS = ("j1", "j2", "j3")
 XML = """<mujoco model="arm"><compiler angle="radian"/><option timestep="0.005" integrator="implicitfast"/><worldbody>
 <body name="l1" pos="0 0 1"><joint name="j1" axis="0 0 1" armature="0.01"/>
@@ -30,9 +35,9 @@ XML = """<mujoco model="arm"><compiler angle="radian"/><option timestep="0.005" 
 <position name="j3" joint="j3" kp="30" kv="2" forcerange="-20 20"/></actuator></mujoco>"""
 
 
-def session_of(rollouts: list[Rollout], xml: str = XML) -> Session:
+def session_of(rollouts: list[Rollout], xml: str = XML, thresholds: DatasetThresholds = SEARCHED_COARSELY) -> Session:
     """The rollouts matched with the declared model `xml`, the arm's if none is given."""
-    return make_session(mujoco.MjSpec.from_string(xml), rollouts, "declared", "memory")
+    return make_session(mujoco.MjSpec.from_string(xml), rollouts, "declared", "memory", thresholds=thresholds)
 
 
 def problem_of(

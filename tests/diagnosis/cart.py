@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis.arm import session_of
 
@@ -33,8 +34,8 @@ def xml(actuators: str = "motor") -> str:
 
 
 def session(rollouts: list[Rollout], actuators: str = "motor") -> Session:
-    """The rollouts matched with the declared model."""
-    return session_of(rollouts, xml(actuators))
+    """The rollouts matched with the declared model; searched at 1 ms, as a small robot is."""
+    return session_of(rollouts, xml(actuators), DatasetThresholds())
 
 
 def stamps(hz: float, seconds: float, jitter: float, rng: np.random.Generator) -> np.ndarray:

@@ -7,6 +7,7 @@ import pytest
 
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.selection.proposals.encoder_resolution import grids
+from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds
 from bumblebee.sim.effects import CATALOGUE
 from tests.diagnosis import arm
 from tests.diagnosis.strange_arm import simulate
@@ -25,9 +26,9 @@ CASES = [
 def test_an_effect_is_named_up_to_its_class(
     kind: str, place: str, values: tuple[float, ...], parameter: str, tolerance: float
 ) -> None:
-    """The first in the list is the effect, or lists it as the same to these data."""
+    """The first in the list is the effect, or lists it as the same to these data; searched at 1 ms."""
     rollouts = simulate({(kind, place): values}, seed=5)
-    found = diagnose(arm.session_of(rollouts), CONFIG).document["effects"]
+    found = diagnose(arm.session_of(rollouts, thresholds=DatasetThresholds()), CONFIG).document["effects"]
     same = [(e["effect"], e["where"]) for e in (found[0], *found[0]["equivalent"])]
     assert (kind, [place] if place else []) in same
     if found[0]["effect"] == kind:

@@ -60,11 +60,13 @@ def test_viscous_friction_is_reported_as_the_class_it_shares_with_kd(diagnosed) 
     assert {"effect": "kd", "where": ["j1"]} in found["equivalent"]
 
 
-def test_one_rollout_says_that_nothing_was_held_out(diagnosed) -> None:
+def test_a_lone_rollout_is_diagnosed_and_said_to_be_one(diagnosed) -> None:
     """The effect is still found; the document says that its errors are not held out."""
     document = diagnosed({("motor_strength", "j3"): 0.85}, 5, count=1).document
+    assert [(e["effect"], e["where"]) for e in document["effects"]] == [("motor_strength", ["j3"])]
     assert document["holdout"] == []
     assert any("held out" in note for note in document["warnings"])
+    assert any("single rollout" in note for note in document["warnings"])
 
 
 def test_a_joint_that_never_moves_is_unidentifiable(diagnosed) -> None:

@@ -1,4 +1,4 @@
-"""Logs of every kind: torques, any actuator, slides, uneven and fast stamps, gaps, reported torque, a lone rollout."""
+"""Logs of every kind: torques, any actuator, slides, uneven and fast stamps, gaps, reported torque."""
 
 from dataclasses import replace
 
@@ -119,12 +119,6 @@ def test_friction_is_found_in_uneven_fast_torque_driven_logs(friction: tuple[flo
     assert [(e["effect"], e["where"]) for e in found["effects"]] == [("coulomb_friction", [where])]
     value = found["effects"][0]["parameters"]["frictionloss"]["value"]
     assert value == pytest.approx(max(friction), rel=0.1)
-
-
-def test_a_lone_rollout_is_diagnosed_and_said_to_be_one() -> None:
-    found = diagnose(session(cart.record(count=1, friction=(3.0, 0.0), seconds=5.0)), SMALL).document
-    assert found["holdout"] == [] and any("single rollout" in note for note in found["warnings"])
-    assert [e["where"] for e in found["effects"]] == [["cart"]]
 
 
 def test_a_drives_own_torque_says_its_gain_and_delay() -> None:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.import_graph import source
+
 HOME = Path(__file__).parents[2]
 ROOT = HOME / "bumblebee" / "diagnosis"
 # From the ground up; a room imports from rooms on lower floors.
@@ -50,13 +52,10 @@ def room_of(path: Path) -> str:
 
 def imported(path: Path) -> Iterator[tuple[int, list[str]]]:
     """(line, parts after bumblebee.diagnosis) of every import of the diagnosis in a file."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("bumblebee.diagnosis"):
-            yield node.lineno, node.module.split(".")[2:]
-        elif isinstance(node, ast.Import):
-            for alias in node.names:
-                if alias.name.startswith("bumblebee.diagnosis"):
-                    yield node.lineno, alias.name.split(".")[2:]
+    for one in source(path, HOME).imports:
+        for name in one.names if one.module is None else [one.module]:
+            if name.startswith("bumblebee.diagnosis"):
+                yield one.line, name.split(".")[2:]
 
 
 def test_every_folder_is_a_room_of_the_plan() -> None:
@@ -102,9 +101,9 @@ def test_a_face_offers_what_it_says_and_nothing_that_nobody_asks_for(room: str) 
         for path in (HOME / directory).rglob("*.py"):
             if path.is_relative_to(ROOT / room):
                 continue
-            for node in ast.walk(ast.parse(path.read_text())):
-                if isinstance(node, ast.ImportFrom) and node.module == f"bumblebee.diagnosis.{room}":
-                    used |= {alias.name for alias in node.names}
+            for one in source(path, HOME).imports:
+                if one.module == f"bumblebee.diagnosis.{room}":
+                    used |= set(one.names)
     assert set(face.__all__) - used == set()
 
 

@@ -29,6 +29,7 @@ from flows.stages import changed_stages, read_stages
 
 pytestmark = pytest.mark.e2e
 LIMIT = 600  # [s] for any one command
+ITERATIONS = 16  # of the base policy
 
 
 @dataclass(frozen=True)
@@ -92,8 +93,8 @@ def run_until_base_and_kill(folder: Path) -> tuple[str, list[str]]:
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Loop:
-    # Base trains long enough for the kill to come before its end.
-    over = {"gate": {"mode": "ask"}, "base": {"ppo": {"iterations": 24}}}
+    # Base trains long enough for the kill to come before its end; the search for effects need not come to its own.
+    over = {"gate": {"mode": "ask"}, "base": {"ppo": {"iterations": ITERATIONS}}, "diagnose": {"search_seconds": 2.0}}
     folder = workspaces.create(tmp_path_factory.mktemp("e2e") / "smoke", "smoke", **over)
     killed, left = run_until_base_and_kill(folder)
     waiting = call(folder, "flows.demo", "--workspace", str(folder))
@@ -142,7 +143,7 @@ def test_a_second_run_does_nothing(loop: Loop):
 
 
 def test_a_training_that_was_killed_and_resumed_ends_in_the_same_policy(loop: Loop):
-    assert re.search(r"base: goes on after iteration [1-9]\d* of 24", loop.waiting.stderr), "it began anew"
+    assert re.search(rf"base: goes on after iteration [1-9]\d* of {ITERATIONS}", loop.waiting.stderr), "it began anew"
     policy = loop.folder / "models" / "base" / "policy.onnx"
     resumed = hashlib.sha256(policy.read_bytes()).hexdigest()
     again = call(loop.folder, "dvc", "repro", "--force", "--single-item", "base")

@@ -17,6 +17,8 @@ from bumblebee.measured.importers.ros import import_rosbag
 from tests.fuzz.budget import rounds
 from tests.fuzz.test_measured import check, mutated
 from tests.measured.importers.recordings import (
+    HDF5_MAP,
+    LEROBOT_MAP,
     joint_messages,
     unitree_messages,
     write_db3,
@@ -34,15 +36,7 @@ order: {/command: [wrist, elbow, shoulder]}
 columns: {joint_pos: /joint_states:position, joint_vel: /joint_states:velocity, joint_target: /command:data}
 """
 MOTORS = "layout: unitree_hg\ntime: log\njoints: [a, b, c]\n"
-DATA_SETS = """
-joints: [shoulder, elbow, wrist]
-time: stamp
-time_unit: ms
-angle_unit: deg
-columns: {joint_pos: obs/q, joint_vel: obs/dq, joint_target: action}
-"""
-FEATURES = "joints: [shoulder, elbow, wrist, _]\nangle_unit: deg\n"
-MAPS = {"rosbag": JOINTS, "unitree": MOTORS, "hdf5": DATA_SETS, "lerobot": FEATURES}
+MAPS = {"rosbag": JOINTS, "unitree": MOTORS, "hdf5": HDF5_MAP, "lerobot": LEROBOT_MAP}
 
 
 def turned_often(tmp_path: Path, name: str, read: object, share: float = 0.08) -> None:
@@ -83,7 +77,7 @@ def test_turned_low_states_are_read_or_one_line(tmp_path: Path) -> None:
 
 def test_turned_hdf5_is_read_or_one_line(tmp_path: Path) -> None:
     pytest.importorskip("h5py")
-    (tmp_path / "map.yaml").write_text(DATA_SETS)
+    (tmp_path / "map.yaml").write_text(HDF5_MAP)
     write_hdf5(tmp_path / "log.h5", [few()], episodes=False)
     chosen = read_map(tmp_path / "map.yaml", "hdf5")
     turned_often(tmp_path, "log.h5", lambda: import_hdf5(tmp_path / "log.h5", chosen))
@@ -91,7 +85,7 @@ def test_turned_hdf5_is_read_or_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["meta/info.json", "data/chunk-000/file-000.parquet"])
 def test_turned_lerobot_datasets_are_read_or_one_line(tmp_path: Path, name: str) -> None:
-    (tmp_path / "map.yaml").write_text(FEATURES)
+    (tmp_path / "map.yaml").write_text(LEROBOT_MAP)
     write_lerobot(tmp_path / "set", [few()], ARM_JOINTS, 0.02, "v3.0")
     chosen = read_map(tmp_path / "map.yaml", "lerobot")
     turned_often(tmp_path, f"set/{name}", lambda: import_lerobot(tmp_path / "set", chosen))

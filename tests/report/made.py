@@ -74,24 +74,10 @@ def index(value: float) -> dict[str, Any]:
     return {"value": value, "ci95": [value - 0.1, value + 0.1], "n": 9, "chance95": [-0.1, 0.1]}
 
 
-def loop_results(
-    effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | None, name: str = "<b>walk</b>", note: str = ""
-) -> LoopResults:
-    """Results of a loop; `name` is a motion's and a family's, `note` what the gate's answer says."""
-    names = ["wave", name, "squat"]
-    library = pd.DataFrame({"name": names, "family": ["stand", name, "squat"], "split": ["train", "test", "train"]})
-    library = library.assign(source="made", licence="Apache-2.0", duration=4.0)
-    labels = pd.DataFrame({"name": names, "cluster": ["c0", "c1", "c0"], "x": [0.0, 1, 2], "y": [1.0, 0, 2]})
-    labels = labels.assign(split=library["split"], family=library["family"])
-    row = {
-        "label": "stand",
-        "clips": 1,
-        "held_out_clips": 1,
-        "speed": 0.1,
-        "displacement": 0.2,
-        "z_move": 0.001,
-        "keywords": "waves",
-    }
+def clusters() -> dict[str, Any]:
+    """data/clusters/summary.json of two clusters."""
+    row = {"label": "stand", "clips": 1, "held_out_clips": 1, "speed": 0.1, "displacement": 0.2, "z_move": 0.001,
+           "keywords": "waves"}  # fmt: skip
     audit = {
         "method": "autoencoder",
         "stability": {"seeds": index(1.0), "subsamples": index(0.8), "retrained": index(0.6)},
@@ -103,9 +89,13 @@ def loop_results(
         "separation": {"speed": 0.9},
         "separation_random_split": {"speed": 0.1},
     }
-    clusters = {"k": 2, "suggested_k": 3, "clusters": {"c0": row, "c1": row}, "audit": audit, "loss": {"infonce": 0.5}}
-    clusters["clips"] = {"train": 2, "held_out": 1, "with_captions": 3, "texts": {"made": 3}}
-    clusters["plane_variance"] = [0.5, 0.25]
+    texts = {"train": 2, "held_out": 1, "with_captions": 3, "texts": {"made": 3}}
+    return {"k": 2, "suggested_k": 3, "clusters": {"c0": row, "c1": row}, "audit": audit, "loss": {"infonce": 0.5},
+            "clips": texts, "plane_variance": [0.5, 0.25]}  # fmt: skip
+
+
+def evaluation() -> dict[str, Any]:
+    """data/evaluation/summary.json: the policies of `RATES` on the stand-in, and steps from one to the next."""
     entries = [
         entry(policy, "stand_in", split, by, group, rate)
         for policy, rate in RATES.items()
@@ -116,17 +106,30 @@ def loop_results(
     step = {"engine": "stand_in", "motions": 9, **measured, "mpkpe_mm": difference(3.0, 8.0, 0.5)}
     pairs = [*pairwise(list(RATES)[1:]), ("base", "experts-r1"), ("base", "generalist")]
     steps = [{"from": a, "to": b, "split": split, **step} for split in ("all", "train", "test") for a, b in pairs]
-    held = {
-        "rollouts": 6,
-        "change": {"1.0": {"without": 0.1, "with": 0.09, "relative": -0.1, "low": -0.2, "high": 0.1}},
-    }
-    turn = RoundResults(
+    return {"results": entries, "comparisons": steps, "contract_sha256": "abc" * 20}
+
+
+def round_results(effects: list[dict[str, Any]], note: str) -> RoundResults:
+    """A round whose diagnosis found `effects`."""
+    change = {"1.0": {"without": 0.1, "with": 0.09, "relative": -0.1, "low": -0.2, "high": 0.1}}
+    return RoundResults(
         n=1,
         intake={"accepted": 9, "quarantined": 1, "seconds": 45.0},
         gate={"status": "approved", "by": "Ada <script>", "at": "2026-01-01", "note": note},
         diagnosis=diagnosis(effects),
-        deltas={"c0": {"promoted": False, "held_out": held}},
+        deltas={"c0": {"promoted": False, "held_out": {"rollouts": 6, "change": change}}},
     )
+
+
+def loop_results(
+    effects: list[dict[str, Any]], sealed: list[dict[str, Any]] | None, name: str = "<b>walk</b>", note: str = ""
+) -> LoopResults:
+    """Results of a loop; `name` is a motion's and a family's, `note` what the gate's answer says."""
+    names = ["wave", name, "squat"]
+    library = pd.DataFrame({"name": names, "family": ["stand", name, "squat"], "split": ["train", "test", "train"]})
+    library = library.assign(source="made", licence="Apache-2.0", duration=4.0)
+    labels = pd.DataFrame({"name": names, "cluster": ["c0", "c1", "c0"], "x": [0.0, 1, 2], "y": [1.0, 0, 2]})
+    labels = labels.assign(split=library["split"], family=library["family"])
     curve = pd.DataFrame(
         {"frames": [1e5, 2e5, 3e5], "success": [0.1, 0.4, 0.8], "key_error": [0.3, 0.2, 0.1], "seconds": [9.0, 18, 27]}
     )
@@ -136,13 +139,13 @@ def loop_results(
         drops=pd.DataFrame({"motion": ["squat"], "rule": ["joint_speed"], "explanation": ["45 rad/s at 1.2 s"]}),
         labels=labels,
         elbow=pd.DataFrame({"k": [1, 2, 3], "within_ss": [9.0, 4.0, 2.0]}),
-        clusters=clusters,
+        clusters=clusters(),
         curves={"base": curve, "expert-c0 r0": curve},
-        evaluation={"results": entries, "comparisons": steps, "contract_sha256": "abc" * 20},
+        evaluation=evaluation(),
         contract={"motions": [{"name": n} for n in names], "seeds": [0]},
         published={"models": {name: published(name) for name in ("base", "expert-c0", "expert-c1", "generalist")}},
         sealed=None if sealed is None else {"effects": sealed},
-        rounds=(turn,),
+        rounds=(round_results(effects, note),),
     )
 
 

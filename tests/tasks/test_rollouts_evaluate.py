@@ -2,6 +2,8 @@
 
 import json
 import shutil
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,7 @@ from bumblebee.learning.export import write_export
 from bumblebee.measured.rollout import Rollout, read_dataset, read_rollout, write_rollout
 from bumblebee.motion.store import write_library
 from bumblebee.tracking.library import AHEAD
-from tasks import evaluate, rollouts, seal
+from tasks import evaluate, paths, rollouts, seal
 from tests.deploy.conftest import linear_onnx, nod
 
 PARAMS = """
@@ -52,8 +54,30 @@ def workspace(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
     return tmp_path / "work"
 
 
-def test_a_round_of_one_cluster_gives_a_dataset_of_the_contract(workspace: Path) -> None:
-    seal.main()
+@pytest.fixture(scope="module")
+def sealed(made: Path) -> Callable[..., None]:
+    """A function that puts what the stage seal made of a seed into the working folder; the stage runs once a seed."""
+
+    @cache
+    def robot(seed: int) -> bytes:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(made)
+            (made / "params.yaml").write_text(PARAMS.replace("seed: 3,", f"seed: {seed},"))
+            seal.main()
+        (made / "params.yaml").write_text(PARAMS)
+        found = (made / paths.SEALED_ROBOT).read_bytes()
+        shutil.rmtree((made / paths.SEALED_ROBOT).parent)
+        return found
+
+    def put(seed: int = 3) -> None:
+        paths.SEALED_ROBOT.parent.mkdir(parents=True, exist_ok=True)
+        paths.SEALED_ROBOT.write_bytes(robot(seed))
+
+    return put
+
+
+def test_a_round_of_one_cluster_gives_a_dataset_of_the_contract(workspace: Path, sealed: Callable[..., None]) -> None:
+    sealed()
     rollouts.main(round=1, cluster="c0")
     dataset = read_dataset(workspace / "data/rollouts/r1/c0")
     chosen = pd.read_csv(workspace / "data/rollouts/r1/c0/chosen.csv")
@@ -65,9 +89,11 @@ def test_a_round_of_one_cluster_gives_a_dataset_of_the_contract(workspace: Path)
 
 
 @pytest.mark.parametrize("base", ["odometry", "none"])
-def test_the_stand_in_logs_the_place_that_it_is_said_to_know(base: str, workspace: Path) -> None:
+def test_the_stand_in_logs_the_place_that_it_is_said_to_know(
+    base: str, workspace: Path, sealed: Callable[..., None]
+) -> None:
     (workspace / "params.yaml").write_text(PARAMS.replace("motions: 1,", f"motions: 1, base: {base},"))
-    seal.main()
+    sealed()
     rollouts.main(round=1, cluster="c0")
     for rollout in read_dataset(workspace / "data/rollouts/r1/c0").rollouts:
         assert (rollout.base_pos is None) == (base == "none")
@@ -139,8 +165,8 @@ def brief(name: str, meta: dict[str, object]) -> Rollout:
     return Rollout(name, ("knee",), 50.0, np.arange(3) / 50, still, still, joint_target=still, meta=meta)
 
 
-def test_evaluation_covers_policies_engines_and_splits(workspace: Path) -> None:
-    seal.main()
+def test_evaluation_covers_policies_engines_and_splits(workspace: Path, sealed: Callable[..., None]) -> None:
+    sealed()
     evaluate.main()
     summary = json.loads((workspace / "data/evaluation/summary.json").read_text())
     episodes = pd.read_parquet(workspace / "data/evaluation/episodes.parquet")
@@ -163,13 +189,12 @@ def test_evaluation_covers_policies_engines_and_splits(workspace: Path) -> None:
     assert contract["engines"]["nominal"]["timestep"] > contract["engines"]["stand_in"]["timestep"]
 
 
-def test_another_sealed_robot_is_another_contract(workspace: Path) -> None:
+def test_another_sealed_robot_is_another_contract(workspace: Path, sealed: Callable[..., None]) -> None:
     """Success on two different stand-ins is not comparable; on the declared model alone it is."""
     clips, hashes = [nod("a", 10)], {}
     for engines in (("nominal",), ("nominal", "stand_in")):
         for seed in (3, 4):
-            (workspace / "params.yaml").write_text(PARAMS.replace("seed: 3,", f"seed: {seed},"))
-            seal.main()
+            sealed(seed)
             hashes[engines, seed] = evaluate.frozen(clips, evaluate.EvaluateConfig(engines=engines)).sha256
     assert hashes[("nominal",), 3] == hashes[("nominal",), 4]
     assert hashes[("nominal", "stand_in"), 3] != hashes[("nominal", "stand_in"), 4]

@@ -44,7 +44,7 @@ def robots() -> dict[str, tuple[Problem, list[Candidate]]]:
     arms = arm.session_of(arm.simulate({}, count=2, seconds=3.0))
     standing = arm.session_of(stander.simulate(seconds=3.0)[0], stander.XML)
     for name, session in (("arm", arms), ("stander", standing)):
-        problem = arm.problem_of(session, [0, 1], 24)
+        problem = arm.problem_of(session, [0, 1], 12)
         found[name] = problem, all_candidates(session.plant, session.rollouts, [])
     return found
 
@@ -68,20 +68,21 @@ def test_every_effect_is_a_candidate_somewhere(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", SEARCHED)
 def test_no_candidate_changes_nothing(kind: str) -> None:
-    changes = [np.abs(problem.sensitivities([c])).max() for problem, c in candidates(kind)]
-    assert max(changes, default=0.0) > 0, f"{VARIATION}: {kind} changes no prediction"
+    seen = any(np.abs(problem.sensitivities([c])).max() > 0 for problem, c in candidates(kind))
+    assert seen, f"{VARIATION}: {kind} changes no prediction"
 
 
 @pytest.mark.parametrize("kind", SEARCHED)
 def test_what_is_screened_by_a_torque_has_one(kind: str) -> None:
     """A column from the torque's signature, not of zeros."""
-    largest = [np.inf]
-    for problem, c in candidates(kind):
-        joints = len(problem.plant.joints)
-        if not is_simulated(c, joints) and not shortlisted(c, joints):
-            columns, _ = screen(problem, [c], [], pulse_sizes(problem, np.ones(joints)))
-            largest = [x for x in largest if np.isfinite(x)] + [float(np.abs(columns.values).max())]
-    assert max(largest) > 0, f'{SIGNATURES}: the torque of {kind}, or column="simulated" in candidates/traits.py'
+    by_torque = [(p, c) for p, c in candidates(kind) if not (is_simulated(c, count(p)) or shortlisted(c, count(p)))]
+    columns = (screen(p, [c], [], pulse_sizes(p, np.ones(count(p))))[0].values for p, c in by_torque)
+    told = f'{SIGNATURES}: the torque of {kind}, or column="simulated" in candidates/traits.py'
+    assert not by_torque or any(np.abs(values).max() > 0 for values in columns), told
+
+
+def count(problem: Problem) -> int:
+    return len(problem.plant.joints)
 
 
 @pytest.mark.parametrize("kind", SEARCHED)

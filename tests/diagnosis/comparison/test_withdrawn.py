@@ -1,12 +1,10 @@
 """A correction that makes windows worse that took no part in the fit is withdrawn, one that helps stays."""
 
-import mujoco
 import numpy as np
 import pytest
 
 from bumblebee.diagnosis import diagnose as diagnosis
 from bumblebee.diagnosis.comparison.withdrawal import is_worse, standing
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.sim.effects import single
@@ -20,7 +18,7 @@ WRONG = single("coulomb_friction", "j3", 1.0)
 def rubbing() -> Problem:
     """Windows of an arm whose second joint has 1 N m of dry friction."""
     rollouts = arm.simulate({("coulomb_friction", "j2"): 1.0}, count=2)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, [0, 1], 0.2, 24))
     rng = np.random.default_rng(0)
     return make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
@@ -53,7 +51,7 @@ def test_structure_is_that_of_the_model_that_stands(monkeypatch) -> None:
     """A withdrawn fit is no longer what `structure` and `settings` describe: the joint that lacks friction is named."""
     monkeypatch.setattr(diagnosis, "standing", lambda problem, fitted, read: ([], [], ["withdrawn: all"]))
     rollouts = arm.simulate({("coulomb_friction", "j2"): 1.0}, count=3, seed=3)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     document = diagnosis.diagnose(session, arm.SMALL).document
     assert document["effects"] == []
     assert "withdrawn: all" in document["notes"]

@@ -3,10 +3,8 @@
 from dataclasses import replace
 from functools import cache
 
-import mujoco
-
 from bumblebee.diagnosis.dataset.informative_split import informative
-from bumblebee.diagnosis.dataset.session import Session, make_session
+from bumblebee.diagnosis.dataset.session import Session
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import arm
 from tests.diagnosis.strange_arm import simulate
@@ -15,7 +13,7 @@ LIMIT = 8.0
 
 
 def _session(rollouts: list[Rollout]) -> Session:
-    return make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    return arm.session_of(rollouts)
 
 
 @cache

@@ -113,7 +113,7 @@ def test_a_form_says_what_it_depends_on(texts: list[str], on: tuple[str, ...]) -
 def test_a_target_changed_on_its_way_cannot_push_harder_than_the_servo() -> None:
     """The servo has a kp of 60 on j2; terms without the target have no such bound."""
     rollouts = arm.simulate({}, count=1, seconds=1.0)
-    plant = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory").plant
+    plant = arm.session_of(rollouts).plant
     late = formula("j2", {"slewed(0.5, 0.02) - u": 60.0})
     assert not stiffer_than_the_drive(plant, late, np.array([60.0]), CatalogueTerms())
     assert stiffer_than_the_drive(plant, late, np.array([-600.0]), CatalogueTerms())

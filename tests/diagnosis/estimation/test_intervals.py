@@ -1,11 +1,9 @@
 """Intervals cover: fits of the true effect alone over several datasets, against their own standard errors."""
 
-import mujoco
 import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.estimation.covariance import interval
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
@@ -24,7 +22,7 @@ SEEDS = 5
 def _fitted(kind: str, place: str, value: float, seed: int) -> tuple[Problem, Fit, np.random.Generator]:
     """The true effect alone, fitted to 40 windows of three rollouts."""
     rollouts = arm.simulate({(kind, place): value} if value else {}, count=3, seconds=4.0, seed=seed)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     starts = choose_starts(session.rollouts, [0, 1, 2], 0.2, 40)
     windows = cut(session.plant, session.layout, session.rollouts, starts)
     rng = np.random.default_rng(0)

@@ -114,7 +114,7 @@ def near(model: mujoco.MjModel, path: np.ndarray) -> float:
 
 
 def test_a_stander_keeps_its_feet_down_and_its_base_upright() -> None:
-    config = PlanConfig(runs=1, seconds=4.0, pool=4, speed={"": 6.0}, travel={"": 2.5})
+    config = PlanConfig(runs=1, seconds=4.0, pool=2, speed={"": 6.0}, travel={"": 2.5})
     plan = make_plan(mujoco.MjSpec.from_string(STANDER), "stander", config)
     assert plan.machine.plant.floating and len(plan.cases) > 3
     model = mujoco.MjModel.from_xml_string(STANDER)

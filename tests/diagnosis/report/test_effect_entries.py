@@ -1,9 +1,7 @@
 """The list of effects in `diagnosis.json`: dry friction that changes is one entry with its level."""
 
-import mujoco
 import pytest
 
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import diagnose
 from tests.diagnosis import arm
 from tests.diagnosis.strange_arm import Truth, simulate
@@ -11,7 +9,7 @@ from tests.diagnosis.strange_arm import Truth, simulate
 
 def entries(truth: Truth) -> list[dict]:
     rollouts = simulate(truth, count=4, seconds=4.0, seed=3)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     return diagnose(session, arm.SMALL).document["effects"]
 
 

@@ -3,11 +3,11 @@
 from dataclasses import fields, replace
 from pathlib import Path
 
-import mujoco
 import pytest
 
 from bumblebee.diagnosis import report as room
-from bumblebee.diagnosis.dataset.session import Session, make_session
+from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.dataset.session import Session
 from bumblebee.diagnosis.diagnose import Diagnosis, diagnose
 from bumblebee.diagnosis.output import contents
 from bumblebee.diagnosis.replay import replay
@@ -21,6 +21,7 @@ from bumblebee.diagnosis.thresholds.report import (
     ReportThresholds,
     Verdicts,
 )
+from bumblebee.diagnosis.thresholds.selection import Forward, SelectionThresholds
 from tests.diagnosis import arm
 
 TRUTH = {("spring", "j2"): 1.5, ("command_delay", "j1"): 0.01}
@@ -33,20 +34,25 @@ RULES = ReportThresholds(
 )
 
 
+def config(**rooms: object) -> DiagnosisConfig:
+    """Two effects and no look at their rivals, which the report has no part in."""
+    forward = SelectionThresholds(forward=Forward(swaps=0))
+    return replace(arm.SMALL, beyond=False, thresholds=Thresholds(selection=forward, **rooms))
+
+
 @pytest.fixture(scope="module")
 def session() -> Session:
-    return make_session(mujoco.MjSpec.from_string(arm.XML), arm.simulate(TRUTH), "arm", "memory")
+    return arm.session_of(arm.simulate(TRUTH))
 
 
 @pytest.fixture(scope="module")
 def set_(session: Session) -> Diagnosis:
-    config = replace(arm.SMALL, beyond=False, thresholds=Thresholds(report=RULES))
-    return diagnose(session, config)
+    return diagnose(session, config(report=RULES))
 
 
 @pytest.fixture(scope="module")
 def default(session: Session) -> Diagnosis:
-    return diagnose(session, replace(arm.SMALL, beyond=False))
+    return diagnose(session, config())
 
 
 def test_the_document_goes_by_what_was_set(set_: Diagnosis, default: Diagnosis) -> None:

@@ -1,6 +1,5 @@
 """Parameters that are wrong on all joints at once are found together and by name."""
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -9,7 +8,7 @@ from bumblebee.diagnosis.comparison.backward_elimination import certainty
 from bumblebee.diagnosis.comparison.compare import compare
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.submodel import moved_without
-from bumblebee.diagnosis.dataset.session import Session, make_session
+from bumblebee.diagnosis.dataset.session import Session
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
@@ -26,7 +25,7 @@ TRUTH = {
 
 def _opened(effects: dict[tuple[str, str], float]) -> tuple[Session, Problem, Problem]:
     rollouts = arm.simulate(effects, count=3, seconds=5.0)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
 
     def of(ids: list[int], budget: int) -> Problem:
         windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, ids, 0.2, budget))

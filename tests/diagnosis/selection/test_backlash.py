@@ -1,22 +1,21 @@
 """Play is found by the few windows that feel it, and only where some window is further off than noise."""
 
-import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.prepare import Material, gather
 from bumblebee.diagnosis.residuals.problem import Problem, window_weights
 from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
 from bumblebee.diagnosis.selection.proposals.joint_misfit import joint_chi_squares, odd_joints
+from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds
 from tests.diagnosis import arm
 from tests.diagnosis.strange_arm import Truth, simulate
 
 
 def _material(truth: Truth) -> Material:
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), simulate(truth, seed=5), "arm", "memory")
+    session = arm.session_of(simulate(truth, seed=5))
     return gather(session, arm.SMALL, np.random.default_rng(0), lambda text: None)
 
 
@@ -63,8 +62,9 @@ def test_a_gap_is_tried_where_there_is_one(truth: Truth) -> None:
 
 
 def test_a_small_gap_is_named_with_an_interval_that_holds() -> None:
+    """So small that the search needs steps of 1 ms, as it usually takes them."""
     rollouts = simulate({("backlash", "j2"): (0.006,)}, seed=5)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts, thresholds=DatasetThresholds())
     found = diagnose(session, arm.SMALL).document["effects"]
     assert [(e["effect"], e["where"]) for e in found] == [("backlash", ["j2"])]
     low, high = found[0]["parameters"]["gap"]["ci95"]

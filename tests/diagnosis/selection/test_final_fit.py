@@ -1,11 +1,9 @@
 """The last fit is whitened anew as long as its model changes what a window shows, and not once more."""
 
-import mujoco
 import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection import final_fit as refining
@@ -20,7 +18,7 @@ LIMIT = 4.0
 def limited() -> tuple[Problem, list]:
     """The arm with a torque limit on one joint, which decides everything in the windows that reach it."""
     rollouts = arm.simulate({("torque_limit", "j2"): LIMIT}, count=2, seconds=4.0, seed=100)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     windows = cut(session.plant, session.layout, session.rollouts, choose_starts(session.rollouts, [0, 1], 0.2, 24))
     rng = np.random.default_rng(0)
     problem = make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)

@@ -2,12 +2,11 @@
 
 import re
 
-import mujoco
 import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
-from bumblebee.diagnosis.dataset.session import Session, make_session
+from bumblebee.diagnosis.dataset.session import Session
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem
 from bumblebee.diagnosis.selection.proposals.gain_grid import gains_by_grid
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
@@ -16,7 +15,7 @@ from tests.diagnosis import arm
 
 def _opened(xml: str) -> tuple[Session, Problem]:
     rollouts = arm.simulate({}, count=2, seconds=6.0)
-    session = make_session(mujoco.MjSpec.from_string(xml), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts, xml)
     windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, [0, 1], 0.2, 10))
     rng = np.random.default_rng(0)
     problem = make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)

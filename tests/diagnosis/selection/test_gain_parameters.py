@@ -1,11 +1,9 @@
 """Two effects on one servo's gains are written as one where one does."""
 
-import mujoco
 import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import make_problem, window_weights
 from bumblebee.diagnosis.selection.proposals.gain_parameters import plain_gains
@@ -23,7 +21,7 @@ from tests.diagnosis import arm
 )
 def test_a_pair_becomes_one(truth: tuple[str, float], start: dict[str, float], wanted: str, value: float) -> None:
     rollouts = arm.simulate({(truth[0], "j2"): truth[1]}, count=1)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, [0], 0.2, 14))
     rng = np.random.default_rng(0)
     problem = make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
@@ -40,7 +38,7 @@ def test_a_pair_becomes_one(truth: tuple[str, float], start: dict[str, float], w
 def test_a_weaker_drive_whose_damping_is_made_up_for_is_a_lower_kp(damping: float, wanted: list[str]) -> None:
     """A strength of 0.9 takes 0.4 of a kd of 4 away."""
     rollouts = arm.simulate({("motor_strength", "j2"): 0.9, ("viscous_friction", "j2"): damping}, count=1)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, [0], 0.2, 14))
     problem = make_problem(
         session.plant, session.layout, windows, session.sigma, session.steps, [], np.random.default_rng(0)
@@ -57,7 +55,7 @@ def test_a_weaker_drive_whose_damping_is_made_up_for_is_a_lower_kp(damping: floa
 
 def test_what_needs_both_keeps_both() -> None:
     rollouts = arm.simulate({("motor_strength", "j2"): 0.6, ("viscous_friction", "j2"): 2.0}, count=1)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, [0], 0.2, 14))
     rng = np.random.default_rng(0)
     problem = make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)

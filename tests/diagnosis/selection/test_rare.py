@@ -2,11 +2,9 @@
 
 import itertools
 
-import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.selection.proposals.packet_loss import LossLikelihoods
 from tests.diagnosis import arm
@@ -16,7 +14,7 @@ from tests.diagnosis.test_catalogue import CONFIG
 
 def test_lost_commands_are_found_with_a_share_that_covers() -> None:
     rollouts = simulate({("dropped_commands", ""): (0.03,)}, seed=3)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     (found,) = diagnose(session, CONFIG).document["effects"]
     assert (found["effect"], found["where"]) == ("dropped_commands", [])
     low, high = found["parameters"]["share"]["ci95"]
@@ -32,7 +30,7 @@ def test_lost_commands_are_found_with_a_share_that_covers() -> None:
 )
 def test_a_limit_that_few_windows_reach_is_found(kind: str, value: float, parameter: str) -> None:
     rollouts = simulate({(kind, "j2"): (value,)}, seed=3)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     (found,) = diagnose(session, CONFIG).document["effects"]
     assert (found["effect"], found["where"]) == (kind, ["j2"])
     assert found["parameters"][parameter]["value"] == pytest.approx(value, rel=0.03)

@@ -1,12 +1,10 @@
 """A second look on other windows: the same columns in the end, and less simulated where nothing is seen again."""
 
-import mujoco
 import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals import problem as problems
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, screening_windows, window_weights
@@ -22,7 +20,7 @@ SCREENED = 8
 def made() -> tuple[Problem, list[Candidate]]:
     """The arm with dry friction on one joint, three times as many windows of it as are screened, some candidates."""
     rollouts = arm.simulate({("coulomb_friction", "j2"): 0.25}, count=2, seconds=3.0)
-    session = make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    session = arm.session_of(rollouts)
     starts = choose_starts(session.rollouts, [0, 1], 0.2, 3 * SCREENED)
     windows = cut(session.plant, session.layout, session.rollouts, starts)
     rng = np.random.default_rng(0)

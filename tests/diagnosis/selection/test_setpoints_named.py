@@ -1,5 +1,6 @@
 """Drives that follow their targets late are told from delays and from lost commands; whole diagnoses of the arm."""
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -20,7 +21,8 @@ DRIVES = {
 
 @cache
 def diagnosis(drive: str) -> Diagnosis:
-    return diagnose(arm.session_of(simulate(DRIVES[drive])), arm.SMALL)
+    config = replace(arm.SMALL, max_windows=40, max_holdout_windows=20) if drive == "profile" else arm.SMALL
+    return diagnose(arm.session_of(simulate(DRIVES[drive])), config)
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,10 @@
 """A name gives way to one that fits better; friction that grows at rest is tried beside dry friction."""
 
-import mujoco
 import numpy as np
 import pytest
 
 from bumblebee.diagnosis.comparison.compare import compare
 from bumblebee.diagnosis.comparison.submodel import linearly_without
-from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.prepare import gather
 from bumblebee.diagnosis.residuals.problem import window_weights
@@ -25,7 +23,7 @@ from tests.diagnosis.test_catalogue import CONFIG
 
 def begun(xml: str, rollouts: list[Rollout], chosen: dict[tuple[str, str], float | tuple[float, ...]]) -> SearchState:
     """A search that has found some effects, fitted from some values."""
-    session = make_session(mujoco.MjSpec.from_string(xml), rollouts, "robot", "memory")
+    session = arm.session_of(rollouts, xml)
     material = gather(session, CONFIG, np.random.default_rng(0), lambda text: None)
     run = begin(material.problem, material.holdout, material.remade, CONFIG.search, lambda text: None)
     names = [next(c for c in run.candidates if (c.effect, c.where) == key) for key in chosen]

@@ -12,6 +12,15 @@ import pandas as pd
 from bumblebee.measured.importers.ros.types import TYPES
 from bumblebee.measured.rollout import Rollout
 
+HDF5_MAP = """
+joints: [shoulder, elbow, wrist]
+time: stamp
+time_unit: ms
+angle_unit: deg
+columns: {joint_pos: obs/q, joint_vel: obs/dq, joint_target: action}
+"""
+LEROBOT_MAP = "joints: [shoulder, elbow, wrist, _]\nangle_unit: deg\n"
+
 START = 1_700_000_000 * 10**9  # [ns] of the first row's header
 LOGGED = 3_000_000  # [ns] later the recorder writes it
 

@@ -9,17 +9,8 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.importers import import_dataset, read_rollouts
 from bumblebee.measured.importers.extras import library
 from bumblebee.measured.rollout import Rollout, read_dataset
-from tests.measured.importers.recordings import write_hdf5, write_lerobot
+from tests.measured.importers.recordings import HDF5_MAP, LEROBOT_MAP, write_hdf5, write_lerobot
 from tests.measured.simulated import ARM_JOINTS, arm_rollout
-
-HDF5_MAP = """
-joints: [shoulder, elbow, wrist]
-time: stamp
-time_unit: ms
-angle_unit: deg
-columns: {joint_pos: obs/q, joint_vel: obs/dq, joint_target: action}
-"""
-LEROBOT_MAP = "joints: [shoulder, elbow, wrist, _]\nangle_unit: deg\n"
 
 
 def imported(folder: Path, name: str, kind: str, text: str) -> list[Rollout]:
