@@ -62,12 +62,12 @@ def roll(policy: Policy, clips: Sequence[Clip], starts: Tensor, counts: Tensor, 
     first = library.frames(ids, starts * dt)
     engine.reset(ids, *start_state(first, 0.0, generator), first.hold_pos)
     engine.settle()
-    action, lost = torch.zeros(n, library.num_joints), torch.full((n,), -1)
+    act, action, lost = policy.follower(), torch.zeros(n, library.num_joints), torch.full((n,), -1)
     body, drift, height, wanted = [""] * n, [], [], []
     for t in range(int(counts.max())):
         ref = library.frames(ids, (starts + t + 1) * dt)
         group.look(engine.state(), ref, action, Rows(torch.full((n,), t == 0), by_mask=False), generator)
-        action = policy(group.exact)
+        action = act(group.exact)
         engine.step(joint_targets(ref, action, scale, middle))
         state = engine.state()
         distance = torch.nan_to_num((state.key_pos_w - ref.key_pos_w).norm(dim=-1), nan=torch.inf)

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.delta import action_adapter, load_delta
-from bumblebee.learning.distill import DistillConfig, distill
+from bumblebee.learning.distill import DistillConfig, Distiller
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import Policy, Shape, load_policy
 from bumblebee.learning.trial import World, success_by_family, try_policy
@@ -29,10 +29,11 @@ from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.observations import action_scale
+from bumblebee.tracking.rows import Rows
 from bumblebee.tracking.sampler import ClipShares
 from tasks import paths
 from tasks.sections import loop
-from tasks.stage import load, log_run, output_folder, run_stage
+from tasks.stage import load, log_run, output_folder, run_stage, scratch
 
 
 def main() -> None:
@@ -46,12 +47,19 @@ def main() -> None:
     model, hooks = simulator(shape.final_round, config.env.physics_hz)
     env = environment(clips, cluster, shape.final_round, hooks, config)
     env.action_adapter = deltas(env, cluster, shape.clusters, shape.final_round)
-    total = config.iterations * config.steps * config.env.num_worlds
-    with progress(total, "distil the generalist", "frames") as bar:
-        generalist, curve = distill(env, experts, cluster, config, base, bar.update)
+    kept = scratch("distill", paths.BASE, *folders, paths.FILTERED, paths.LABELS, config)
+    distiller = Distiller(env, experts, cluster, config, base, kept)
+    if distiller.iteration:
+        print(f"generalist: goes on after iteration {distiller.iteration} of {config.iterations}", flush=True)
+    total, begun = config.iterations * distiller.frames_each, distiller.iteration * distiller.frames_each
+    with progress(total, "distil the generalist", "frames", start=begun) as bar:
+        distiller.train(bar.update)
+    generalist, curve = distiller.policy(), distiller.curve()
     card: dict[str, Any] = {
         "from": [f"expert-{name}-r{shape.final_round}" for name in shape.clusters],
         "agreement": agreement(generalist, clips, model, hooks, config),
+        "parameters": sum(tensor.numel() for tensor in generalist.actor.parameters()),
+        "samples_gib": round(distiller.gib, 3),
         "config": asdict(config),
     }
     with output_folder(paths.GENERALIST) as folder:
@@ -135,8 +143,10 @@ def deltas(
     def adapt(state: RobotState, middle: Tensor, action: Tensor) -> Tensor:
         now, changed = of_clip[env.clip], action.clone()
         for index, adapter in adapters.items():
-            own = (now == index).nonzero()[:, 0]
-            changed[own] = adapter(state[own], middle[own], action[own])
+            own = Rows(now == index, env.engine.by_mask)
+            if len(own):
+                part = state if own.ids is None else state[own.ids]
+                own.put(changed, adapter(part, own.of(middle), own.of(action)))
         return changed
 
     return adapt

@@ -75,6 +75,9 @@ def _takes(contract: dict[str, Any]) -> Iterator[str]:
         + (", the oldest first" if history > 1 else "")
         + (f", then {sum(p['size'] for p in now)} entries of the newest step alone." if now else ".")
     )
+    if "memory" in contract:
+        steps, entries = contract["memory"]["steps"], contract["memory"]["size"]
+        yield f"`memory` (N, {steps}, {entries}): zeros at a clip's start, then `memory_next` of the step before."
     if history > 1:
         yield "Entries below are of the oldest step; the others follow in the same order."
     yield f"Normalisation is inside the file; joints in the order below; key bodies: {', '.join(KEY_BODIES)}."

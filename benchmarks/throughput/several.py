@@ -1,6 +1,6 @@
 """The PPO loop on several GPUs of one machine, beside the same loop on one.
 
-    python -m benchmarks.throughput.several WORLDS SECONDS STEPS COMPILE LAYER...      # one of the processes
+    python -m benchmarks.throughput.several WORLDS SECONDS STEPS COMPILE CAPTURED LAYER...      # one of the processes
 
 The first of the processes prints its result as a line of JSON, and how far the networks of the processes are apart at
 the end, which is nothing.
@@ -31,7 +31,8 @@ def measured(gpus: int, config: EnvConfig, ppo: PpoConfig, seconds: float) -> Lo
     Raises:
         BadInput: if it did not come to an end, with its last line.
     """
-    own = [str(value) for value in (config.num_worlds, seconds, ppo.steps, int(config.compile), *ppo.hidden)]
+    flags = int(config.compile), int(ppo.captured)
+    own = [str(value) for value in (config.num_worlds, seconds, ppo.steps, *flags, *ppo.hidden)]
     start = ["-m", TORCHRUN, "--nproc-per-node", str(gpus), "--master-addr", "127.0.0.1", "--master-port", free_port()]
     module = ["-m", "benchmarks.throughput.several", *own]
     done = subprocess.run([sys.executable, *start, *module], capture_output=True, text=True)
@@ -68,10 +69,11 @@ def print_several(counts: list[int], config: EnvConfig, ppo: PpoConfig, seconds:
 
 def main() -> None:
     """One process of several."""
-    worlds, seconds, steps, compiled, *hidden = sys.argv[1:]
+    worlds, seconds, steps, compiled, captured, *hidden = sys.argv[1:]
     ranks = join()
     config = EnvConfig(engine="mujoco_warp", physics_hz=200.0, num_worlds=int(worlds), compile=bool(int(compiled)))
-    ppo = PpoConfig(steps=int(steps), epochs=5, mini_batches=4, hidden=tuple(map(int, hidden)))
+    layers = tuple(map(int, hidden))
+    ppo = PpoConfig(steps=int(steps), epochs=5, mini_batches=4, hidden=layers, captured=bool(int(captured)))
     clips = make_library(EmbeddedConfig(limit=7))
     env = make_env(config, lambda device: MotionLibrary(clips, config.ahead, device=device), ranks)
     trainer = started(env, ppo, ranks)

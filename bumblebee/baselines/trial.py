@@ -19,6 +19,7 @@ from bumblebee.learning.policy import Policy
 from bumblebee.motion.clip import Clip
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.sim.engine_choice import make_engine
+from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.tracking.config import ObservationConfig, Randomisation
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import ReferenceFrame
@@ -30,6 +31,9 @@ from bumblebee.tracking.terminations import fallen, success_threshold
 
 ROBOTS_SEED = 11
 """Of robots that differ, the same for all policies."""
+UPRIGHT_HEIGHT, UPRIGHT_TILT = 0.25, 0.8
+"""The rule of BeyondMimic and what follows it: lost where the pelvis is so many metres too high or low, or gravity's
+part along the base's z is off by so much."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +65,8 @@ def follow(
 
     Returns:
         a row a clip: name, family, split, seconds; success and lost_at [s]; success_local, by distances after the
-        reference's root was moved over the robot's, which forgives drift; mpjpe_rad, mpkpe_mm and mpkpe_local_mm over
-        the frames before the loss.
+        reference's root was moved over the robot's, which forgives drift; success_upright, by `upright`; mpjpe_rad,
+        mpkpe_mm and mpkpe_local_mm over the frames before the loss.
     """
     n = len(clips)
     library = MovingLibrary(clips, policy.shape.ahead)
@@ -73,13 +77,13 @@ def follow(
     group = Group(manner.seen, (n, library.num_joints, len(library.ahead)), 0.0, engine.device)
     generator = torch.Generator().manual_seed(0)
     limit = torch.tensor([success_threshold(clip.family) for clip in clips])
-    action = torch.zeros(n, library.num_joints)
-    alive, alive_local = torch.ones(n, dtype=torch.bool), torch.ones(n, dtype=torch.bool)
+    act, action = policy.follower(), torch.zeros(n, library.num_joints)
+    alive, alive_local, stands = torch.ones(3, n, dtype=torch.bool)
     sums = torch.zeros(4, n)  # frames before the loss, and the three errors over them
     for frame in range(int(library.length.max()) - 1):
         ref = library.frames(ids, torch.full((n,), (frame + 1) * dt))
         group.look(engine.state(), ref, action, Rows(torch.full((n,), frame == 0), by_mask=False), generator)
-        action = policy(group.exact)
+        action = act(group.exact)
         engine.step(joint_targets(ref, action, scale, middle))
         state = engine.state()
         running = frame + 1 < library.length
@@ -87,13 +91,14 @@ def follow(
         down = fallen(state, ref) | engine.unstable()
         alive &= ((world.amax(-1) <= limit) & ~down) | ~running
         alive_local &= ((local.amax(-1) <= limit) & ~down) | ~running
+        stands &= (upright(state, ref) & ~engine.unstable()) | ~running
         joints = (state.joint_pos - ref.joint_pos).abs().mean(-1)
         counted = (alive & running).float()
         errors = torch.stack((torch.ones(n), joints, world.mean(-1), local.mean(-1)))
         sums += counted * torch.nan_to_num(errors)
-        if not bool(((alive | alive_local) & running).any()):
+        if not bool(((alive | alive_local | stands) & running).any()):
             break
-    return _table(clips, alive, alive_local, sums, dt)
+    return _table(clips, torch.stack((alive, alive_local, stands)), sums, dt)
 
 
 def _started(library: MovingLibrary, model: mujoco.MjModel, threads: int, robots: Randomisation | None) -> Engine:
@@ -108,12 +113,29 @@ def _started(library: MovingLibrary, model: mujoco.MjModel, threads: int, robots
     return engine
 
 
-def _table(clips: Sequence[Clip], alive: Tensor, alive_local: Tensor, sums: Tensor, dt: float) -> pd.DataFrame:
-    """The rows of `follow`: which were never lost (N,) bool, and `sums` (4, N) of frames and errors before the loss."""
+def upright(state: RobotState, ref: ReferenceFrame) -> Tensor:
+    """Robots (B,) bool whose pelvis is about as high and as tilted as the reference's."""
+    high = (state.root_pos_w[:, 2] - ref.root_pos_w[:, 2]).abs() <= UPRIGHT_HEIGHT
+    down = torch.tensor([0.0, 0.0, -1.0]).expand(len(high), 3)
+    tilt = rotate_inverse(state.root_quat_w, down)[:, 2] - rotate_inverse(ref.root_quat_w, down)[:, 2]
+    return high & (tilt.abs() <= UPRIGHT_TILT)
+
+
+def _table(clips: Sequence[Clip], kept: Tensor, sums: Tensor, dt: float) -> pd.DataFrame:
+    """The rows of `follow`.
+
+    Args:
+        clips: N of them.
+        kept: (3, N) bool, which were never lost in the world, over the robot's own place, and by `upright`.
+        sums: (4, N) frames and errors before the loss.
+        dt: of a frame [s].
+    """
+    alive, alive_local, stands = kept
     frames = sums[0].clamp(min=1)
     about = [(clip.name, clip.family, clip.split, clip.duration) for clip in clips]
     table = pd.DataFrame(about, columns=["name", "family", "split", "seconds"])
     table["success"], table["success_local"] = alive.numpy(), alive_local.numpy()
+    table["success_upright"] = stands.numpy()
     table["lost_at"] = torch.where(alive, torch.nan, sums[0] * dt).numpy()
     table["mpjpe_rad"] = (sums[1] / frames).numpy()
     table["mpkpe_mm"] = (1000 * sums[2] / frames).numpy()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bumblebee.deploy.policy_checks import check_fields, check_self_contained
+from bumblebee.deploy.policy_checks import check_fields, check_self_contained, check_tensors
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_bytes, read_json
 from bumblebee.robot.facts import joint_names, joints
@@ -33,7 +33,7 @@ class ExportedPolicy:
     contract: dict[str, Any]
     """contract.json."""
     session: "onnxruntime.InferenceSession"
-    """One thread; input "obs" (N, D), output "actions" (N, J)."""
+    """One thread; input "obs" (N, D), output "actions" (N, J); with a memory also "memory" and "memory_next"."""
 
     @classmethod
     def load(cls, folder: Path) -> "ExportedPolicy":
@@ -84,9 +84,27 @@ class ExportedPolicy:
         """Number of further reference frames in the observation."""
         return ahead_frames(self.contract)
 
+    @property
+    def memory(self) -> tuple[int, int] | None:
+        """(M, E) of what it remembers of one robot; None for a policy without a memory."""
+        return memory_shape(self.contract)
+
+    def empty_memory(self, robots: int) -> np.ndarray:
+        """The memory (N, M, E) of robots at the start of their clips; (N, 0, 0) for a policy without one."""
+        return np.zeros((robots, *(self.memory or (0, 0))), dtype=np.float32)
+
     def act(self, obs: np.ndarray) -> np.ndarray:
-        """Actions (N, J) for observations (N, D), float32."""
-        return self.session.run(["actions"], {"obs": np.ascontiguousarray(obs, dtype=np.float32)})[0]
+        """Actions (N, J) for observations (N, D), float32; with a memory, those at the start of a clip."""
+        return self.advance(obs, self.empty_memory(len(obs)))[0]
+
+    def advance(self, obs: np.ndarray, memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Actions (N, J) for observations (N, D) and the robots' memory (N, M, E); and their memory after it."""
+        fed = {"obs": np.ascontiguousarray(obs, dtype=np.float32)}
+        if self.memory is None:
+            return self.session.run(["actions"], fed)[0], memory
+        fed["memory"] = np.ascontiguousarray(memory, dtype=np.float32)
+        actions, after = self.session.run(["actions", "memory_next"], fed)
+        return actions, after
 
 
 def read_policy_contract(path: Path) -> dict[str, Any]:
@@ -134,6 +152,12 @@ def observed(contract: dict[str, Any]) -> ObservationConfig:
     return ObservationConfig(terms, history, now)
 
 
+def memory_shape(contract: dict[str, Any]) -> tuple[int, int] | None:
+    """(M, E) of one robot's memory; None where the contract has none."""
+    stated = contract.get("memory")
+    return None if stated is None else (stated["steps"], stated["size"])
+
+
 def ahead_frames(contract: dict[str, Any]) -> int:
     """Number of further reference frames that the contract's observation holds."""
     return sum(
@@ -167,30 +191,31 @@ def _check_sizes(policy: ExportedPolicy) -> None:
     stated, seen = policy.contract, policy.seen
     size = seen.history * sum(part["size"] for part in stated["observation"])
     size += sum(part["size"] for part in stated.get("observation_now", []))
-    inputs = {value.name: value.shape for value in policy.session.get_inputs()}
-    outputs = {value.name: value.shape for value in policy.session.get_outputs()}
-    where = policy.folder / "policy.onnx"
-    if set(inputs) != {"obs"} or len(inputs["obs"]) != 2 or inputs["obs"][-1] != size:
-        raise BadInput(f"{where}: inputs", f"obs (N, {size})", str(inputs)[:200])
-    joints_out = len(policy.contract["joints"])
-    if "actions" not in outputs or len(outputs["actions"]) != 2 or outputs["actions"][-1] != joints_out:
-        raise BadInput(f"{where}: outputs", f"actions (N, {joints_out})", str(outputs)[:200])
-    types = {value.name: value.type for value in (*policy.session.get_inputs(), *policy.session.get_outputs())}
-    for name in ("obs", "actions"):
-        if types[name] != "tensor(float)":
-            raise BadInput(f"{where}: {name}", "tensor(float)", types[name])
+    wanted_in: dict[str, tuple[int, ...]] = {"obs": (size,)}
+    wanted_out: dict[str, tuple[int, ...]] = {"actions": (len(stated["joints"]),)}
+    if policy.memory is not None:
+        wanted_in["memory"] = wanted_out["memory_next"] = policy.memory
+    session, where = policy.session, policy.folder / "policy.onnx"
+    check_tensors(f"{where}: inputs", session.get_inputs(), wanted_in, others=False)
+    check_tensors(f"{where}: outputs", session.get_outputs(), wanted_out, others=True)
 
 
 def _check_answer(policy: ExportedPolicy) -> None:
-    """Ask the policy once: whoever answers nothing, or no finite numbers, is not let near a robot."""
-    (obs,) = policy.session.get_inputs()
+    """Ask the policy once, with a memory twice: whoever answers no finite numbers is not let near a robot."""
+    (obs,) = (value for value in policy.session.get_inputs() if value.name == "obs")
     rows = 2  # the runner steps several robots at once
+    zeros, memory = np.zeros((rows, obs.shape[-1])), policy.empty_memory(rows)
     where = policy.folder / "policy.onnx"
     try:
-        actions = policy.act(np.zeros((rows, obs.shape[-1])))
+        actions, after = policy.advance(zeros, memory)
+        if policy.memory is not None:
+            actions, after = policy.advance(zeros, after)
     except Exception as error:  # onnxruntime raises its own types
         raise BadInput(where, f"actions for {rows} observations at once", str(error)[:200]) from None
     wanted = (rows, len(policy.contract["joints"]))
     if actions.shape != wanted or not np.isfinite(actions).all():
         came = f"shape {actions.shape}" if actions.shape != wanted else "NaN or infinity"
         raise BadInput(where, f"finite actions of shape {wanted} for an observation of zeros", came)
+    if after.shape != memory.shape or not np.isfinite(after).all():
+        came = f"shape {after.shape}" if after.shape != memory.shape else "NaN or infinity"
+        raise BadInput(f"{where}: memory_next", f"a finite memory of shape {memory.shape}", came)

@@ -1,6 +1,6 @@
 """Is a policy folder what it claims to be: types and ranges in contract.json, a model that reads no other file."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,34 @@ def check_fields(path: Path, contract: dict[str, Any]) -> None:
     history = contract.get("history", 1)
     if type(history) is not int or not 1 <= history <= 1000:
         raise BadInput(f"{path}: history", "a number of control steps from 1 to 1000", repr(history)[:60])
+    if "memory" in contract:
+        _check_memory(f"{path}: memory", contract["memory"])
+
+
+def check_tensors(where: str, values: Sequence[Any], wanted: Mapping[str, tuple[int, ...]], others: bool) -> None:
+    """Refuse a model whose inputs or outputs are not what its contract says.
+
+    Args:
+        where: file and side.
+        values: onnxruntime's inputs or outputs.
+        wanted: name -> shape of one robot's values, which stand behind the number of robots.
+        others: whether further ones may be there.
+
+    Raises:
+        BadInput: naming what was expected.
+    """
+    types = {value.name: value.type for value in values}
+    shapes = {value.name: list(value.shape) for value in values}
+    fits = others or set(shapes) == set(wanted)
+    for name, shape in wanted.items():
+        came = shapes.get(name, [])
+        fits = fits and len(came) == 1 + len(shape) and tuple(came[1:]) == shape
+    if not fits:
+        said = ", ".join(f"{name} (N, {', '.join(map(str, shape))})" for name, shape in wanted.items())
+        raise BadInput(where, said, str(shapes)[:200])
+    for name in wanted:
+        if types[name] != "tensor(float)":
+            raise BadInput(f"{where}: {name}", "tensor(float)", types[name])
 
 
 def check_self_contained(path: Path, model: bytes) -> None:
@@ -80,6 +108,14 @@ def _tensors(proto: Any) -> Iterator[Any]:
                 yield from (sparse.values, sparse.indices)
             waiting += [attribute.g] if attribute.HasField("g") else []
             waiting += attribute.graphs
+
+
+def _check_memory(where: str, memory: Any) -> None:
+    if not isinstance(memory, dict) or set(memory) != {"steps", "size"}:
+        raise BadInput(where, "a table with steps and size", repr(memory)[:60])
+    for key, most in (("steps", 200), ("size", 4097)):  # a robot's memory then takes 3 MB at most
+        if type(memory[key]) is not int or not 1 <= memory[key] <= most:
+            raise BadInput(f"{where}.{key}", f"a whole number from 1 to {most}", repr(memory[key])[:60])
 
 
 def _check_parts(where: str, parts: Any) -> None:

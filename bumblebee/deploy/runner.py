@@ -38,7 +38,7 @@ def robot_state(sensors: Sensors) -> RobotState:
 
 
 class PolicyRunner:
-    """One policy on B robots, each following its own clip from its first frame.
+    """One policy on B robots, each following its own clip from its first frame, and remembering it from there.
 
     Args:
         policy: what acts.
@@ -62,6 +62,7 @@ class PolicyRunner:
         self._last_action = torch.zeros(len(names), len(self._scale))
         self._seen, self._middle = policy.seen, action_middle(policy.contract["action"]["base"])
         self._past: Tensor | None = None  # (B, H, D) terms of the last control steps, the oldest first
+        self._memory = policy.empty_memory(len(names))
         self._begun = torch.zeros(len(names), dtype=torch.bool)
         self.compensation, self._undo = compensation, None
         if compensation is not None:
@@ -81,7 +82,9 @@ class PolicyRunner:
         """Actions (n, J) and the drives' command of `robots` (n,) at control tick `tick`."""
         rows, sensors = torch.as_tensor(robots), self._seen_by_policy(sensors)
         steps, now = self._look(robots, tick, sensors)
-        action = torch.as_tensor(self.policy.act(torch.cat((steps.flatten(1), now), dim=-1).numpy()))
+        memory = self._memory[robots] if tick else self.policy.empty_memory(len(rows))
+        answer, self._memory[robots] = self.policy.advance(torch.cat((steps.flatten(1), now), dim=-1).numpy(), memory)
+        action = torch.as_tensor(answer)
         self._last_action[rows] = action
         if self._past is None:
             self._past = torch.zeros(len(self._ids), *steps.shape[1:])
@@ -97,15 +100,15 @@ class PolicyRunner:
     def _look(self, robots: np.ndarray, tick: int, sensors: Sensors) -> tuple[Tensor, Tensor]:
         """What `robots` (n,) see over time (n, H, D) and of the newest step alone (n, N).
 
-        Before its first step a robot saw the same.
+        Before its first step a robot saw the same; tick 0 is a clip's first step, whatever was before it.
         """
-        rows, seen = torch.as_tensor(robots), self._seen
+        rows, seen, started = torch.as_tensor(robots), self._seen, tick > 0
         state, ref = robot_state(sensors), self._reference(robots, tick)
         terms, alone = (expanded(names) for names in (seen.terms, seen.now))
-        last = self._last_action[rows]
+        last = self._last_action[rows] * started
         row = see(terms, state, ref, last)[:, None]
         before = row.expand(-1, seen.history, -1) if self._past is None else self._past[rows]
-        steps = torch.where(self._begun[rows][:, None, None], torch.cat((before[:, 1:], row), dim=1), row)
+        steps = torch.where((self._begun[rows] & started)[:, None, None], torch.cat((before[:, 1:], row), dim=1), row)
         return steps, see(alone, state, ref, last) if alone else row[:, 0, :0]
 
     def _reference(self, robots: np.ndarray, tick: int) -> ReferenceFrame:

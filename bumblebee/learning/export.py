@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import torch
-from torch import nn
-
 from bumblebee.learning import pretrained
+from bumblebee.learning.onnx_graph import IR_VERSION, OPSET, Graph, behind_memory, layers, normalised
 from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.transformer import TransformerModel
 from bumblebee.robot.facts import joint_names, joints, stand_pose
 from bumblebee.robot.model import gains
 from bumblebee.tracking.config import ObservationConfig
@@ -19,13 +17,15 @@ from bumblebee.tracking.observations import action_scale
 from bumblebee.tracking.terms import parts
 
 ONNX, CONTRACT = "policy.onnx", "contract.json"
-OPSET, IR_VERSION = 17, 8  # read by every onnxruntime since 1.14
 
 
 def export_policy(folder: Path, policy: Policy, physics_hz: float = 200.0) -> None:
-    """Write `policy.onnx` (input "obs" (N, D), output "actions" (N, J), the mean) and `contract.json`."""
+    """Write `policy.onnx` (input "obs" (N, D), output "actions" (N, J), the mean) and `contract.json`.
+
+    With a memory "memory" (N, M, E + 1) goes in, too, and "memory_next" of the same shape out.
+    """
     shape = policy.shape
-    write_export(folder, onnx_of(policy), shape.ahead, physics_hz, shape.seen, shape.action)
+    write_export(folder, onnx_of(policy), shape.ahead, physics_hz, shape.seen, shape.action, shape.memory)
 
 
 def export_shipped(folder: Path) -> Path:
@@ -42,27 +42,31 @@ def write_export(
     physics_hz: float = 200.0,
     seen: ObservationConfig | None = None,
     action: str = "reference",
+    memory: tuple[int, int] | None = None,
 ) -> None:
-    """Write any ONNX policy over our observations with its contract."""
+    """Write any ONNX policy over our observations with its contract; `memory` (M, E + 1) is of one robot."""
     folder = Path(folder)
     (folder / ONNX).write_bytes(onnx_bytes)
-    stated = contract(onnx_bytes, ahead, physics_hz, seen or ObservationConfig(), action)
+    stated = contract(onnx_bytes, ahead, physics_hz, seen or ObservationConfig(), action, memory)
     (folder / CONTRACT).write_text(json.dumps(stated, indent=1) + "\n")
 
 
 def contract(
-    onnx_bytes: bytes, ahead: tuple[float, ...], physics_hz: float, seen: ObservationConfig, action: str
+    onnx_bytes: bytes,
+    ahead: tuple[float, ...],
+    physics_hz: float,
+    seen: ObservationConfig,
+    action: str,
+    memory: tuple[int, int] | None = None,
 ) -> dict[str, Any]:
     """What a runner must know to feed the policy and to use its output.
 
     "observation" lists the parts of one control step; the input has "history" of them, the oldest first, and then the
-    parts "observation_now" of the newest step alone.
+    parts "observation_now" of the newest step alone. A policy with a memory has "memory": zeros of that shape go in at
+    a clip's start, then what the step before gave out.
     """
-    table = [gains(joint) for joint in joints()]
-
-    def listed(terms: Sequence[str]) -> list[dict[str, Any]]:
-        return [{"name": name, "size": size} for name, size in parts(terms, len(table), len(ahead))]
-
+    table, counts = [gains(joint) for joint in joints()], (len(joints()), len(ahead))
+    looks_ahead = any(name.startswith("ahead") for name, _ in parts((*seen.terms, *seen.now), *counts))
     return {
         "schema": 1,
         "robot": "g1_23dof",
@@ -72,7 +76,7 @@ def contract(
         "control_hz": 50,
         "physics_hz": physics_hz,
         "default_pos": [round(float(q), 6) for q in stand_pose()],
-        "ahead": list(ahead),
+        "ahead": list(ahead) if looks_ahead else [],  # a student's task may have frames for its teacher alone
         "action": {
             "base": action,
             "scale": [round(float(s), 6) for s in action_scale()],
@@ -81,47 +85,36 @@ def contract(
         "terms": list(seen.terms),
         "history": seen.history,
         "now": list(seen.now),
-        "observation": listed(seen.terms),
-        "observation_now": listed(seen.now),
+        "observation": _listed(seen.terms, *counts),
+        "observation_now": _listed(seen.now, *counts),
+        **({} if memory is None else {"memory": {"steps": memory[0], "size": memory[1]}}),
         "onnx_sha256": hashlib.sha256(onnx_bytes).hexdigest(),
     }
 
 
+def _listed(terms: Sequence[str], joint_count: int, ahead: int) -> list[dict[str, Any]]:
+    return [{"name": name, "size": size} for name, size in parts(terms, joint_count, ahead)]
+
+
 def onnx_of(policy: Policy) -> bytes:
-    """The actor as an ONNX graph: (obs - mean) / (std + eps), then Gemm and ELU layer by layer."""
-    from onnx import TensorProto, checker, helper, numpy_helper
+    """The actor as an ONNX graph: (obs - mean) / (std + eps), perhaps a block with a memory, then layers."""
+    from onnx import TensorProto, checker, helper
 
-    actor, shape = policy.actor, policy.shape
-    normalizer = actor.obs_normalizer
-    weights: list[Any] = []
-    nodes: list[Any] = []
-
-    def constant(name: str, tensor: torch.Tensor) -> str:
-        weights.append(numpy_helper.from_array(tensor.detach().numpy().astype(np.float32), name))
-        return name
-
-    nodes.append(helper.make_node("Sub", ["obs", constant("mean", normalizer._mean)], ["centred"]))
-    nodes.append(helper.make_node("Div", ["centred", constant("scale", normalizer._std + normalizer.eps)], ["scaled"]))
-    value = "scaled"
-    for index, layer in enumerate(actor.mlp):
-        out = f"layer{index}"
-        if isinstance(layer, nn.Linear):
-            names = [constant(f"{out}_weight", layer.weight), constant(f"{out}_bias", layer.bias)]
-            nodes.append(helper.make_node("Gemm", [value, *names], [out], transB=1))
-        elif isinstance(layer, nn.ELU):
-            nodes.append(helper.make_node("Elu", [value], [out], alpha=layer.alpha))
-        else:
-            raise TypeError(f"no ONNX form for {type(layer).__name__} in the actor")
-        value = out
-    nodes[-1].output[0] = "actions"
-    graph = helper.make_graph(
-        nodes,
-        "policy",
-        [helper.make_tensor_value_info("obs", TensorProto.FLOAT, ["N", shape.observation])],
-        [helper.make_tensor_value_info("actions", TensorProto.FLOAT, ["N", shape.actions])],
-        weights,
+    actor, shape, graph = policy.actor, policy.shape, Graph()
+    value = normalised(graph, actor)
+    inputs: dict[str, list[str | int | None]] = {"obs": ["N", shape.observation]}
+    outputs: dict[str, list[str | int | None]] = {"actions": ["N", shape.actions]}
+    if isinstance(actor, TransformerModel):
+        value = behind_memory(graph, actor, value)
+        inputs["memory"] = outputs["memory_next"] = ["N", *actor.settings.memory_shape]
+    layers(graph, actor.mlp, value)
+    graph.nodes[-1].output[0] = "actions"
+    came, gone = (
+        [helper.make_tensor_value_info(name, TensorProto.FLOAT, size) for name, size in side.items()]
+        for side in (inputs, outputs)
     )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="bumblebee")
+    made = helper.make_graph(graph.nodes, "policy", came, gone, graph.weights)
+    model = helper.make_model(made, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="bumblebee")
     model.ir_version = IR_VERSION
     checker.check_model(model)
     return model.SerializeToString()

@@ -1,6 +1,6 @@
 """A trained policy in torch: building, saving and loading the network, apart from how it was trained."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,6 +13,7 @@ from torch import Tensor
 
 from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
+from bumblebee.learning.transformer import TransformerConfig, TransformerModel
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import TrackingEnv
 
@@ -38,6 +39,13 @@ class Shape:
     """Terms of which the newest step alone is seen, after the others."""
     action: Literal["reference", "default"] = "reference"
     """What an action of zero commands, see `EnvConfig.action`."""
+    transformer: TransformerConfig | None = None
+    """The transformer that `hidden` stands behind; None for an MLP."""
+
+    @property
+    def memory(self) -> tuple[int, int] | None:
+        """(M, E + 1) of what it remembers of one robot; None for a policy without a memory."""
+        return None if self.transformer is None else self.transformer.memory_shape
 
     @property
     def seen(self) -> ObservationConfig:
@@ -77,6 +85,8 @@ def model_config(hidden: tuple[int, ...], initial_std: float | None) -> dict[str
 class Policy:
     """The deterministic policy, observation (N, D) to mean action (N, J), with its critic's weights beside it.
 
+    One with a memory acts by `follower`; called as a function it acts as at an episode's first step.
+
     Args:
         actor: rsl_rl's network with group "policy".
         critic_state: weights of the critic, for whoever trains on.
@@ -90,7 +100,28 @@ class Policy:
     @torch.inference_mode()
     def __call__(self, observation: Tensor) -> Tensor:
         """Mean actions (N, J) of observations (N, D)."""
-        return self.actor({"policy": observation})
+        return self.advance(observation, None)[0]
+
+    @torch.inference_mode()
+    def advance(self, observation: Tensor, memory: Tensor | None) -> tuple[Tensor, Tensor | None]:
+        """Mean actions (N, J) of observations (N, D), and the memory (N, M, E + 1) after that step.
+
+        No memory is an empty one; a policy that has none gives None back.
+        """
+        if isinstance(self.actor, TransformerModel):
+            return self.actor.advance(observation, memory)
+        return self.actor({"policy": observation}), None
+
+    def follower(self) -> Callable[[Tensor], Tensor]:
+        """The policy from an episode's start on: to be called with each control step's observations (N, D)."""
+        memory: Tensor | None = None
+
+        def act(observation: Tensor) -> Tensor:
+            nonlocal memory
+            action, memory = self.advance(observation, memory)
+            return action
+
+        return act
 
     def to(self, device: torch.device | str) -> "Policy":
         """The policy on a device; a copy."""
@@ -105,8 +136,10 @@ class Policy:
 def new_actor(shape: Shape, initial_std: float = 1.0) -> MLPModel:
     """An untrained actor."""
     example = TensorDict({"policy": torch.zeros(1, shape.observation)}, batch_size=[1])
-    config = model_config(shape.hidden, initial_std)
-    return MLPModel(example, {"actor": ["policy"]}, "actor", shape.actions, **config)
+    config, groups = model_config(shape.hidden, initial_std), {"actor": ["policy"]}
+    if shape.transformer is not None:
+        return TransformerModel(example, groups, "actor", shape.actions, shape.transformer, **config)
+    return MLPModel(example, groups, "actor", shape.actions, **config)
 
 
 def load_policy(folder: Path) -> Policy:
@@ -118,11 +151,29 @@ def load_policy(folder: Path) -> Policy:
     path = Path(folder) / FILE
     try:
         content = torch.load(path, weights_only=True, map_location="cpu")
-        shape = Shape(**content["shape"])
+        shape, weights = _shape(content["shape"]), content["actor"]
+        _check_sizes(shape, weights)
         actor = new_actor(shape)
-        actor.load_state_dict(content["actor"])
+        actor.load_state_dict(weights)
     except FileNotFoundError:
         raise BadInput(path, "a trained policy", "no file", "Train it first.") from None
     except Exception as error:
         raise BadInput(path, "a checkpoint of a policy", str(error).splitlines()[0]) from None
     return Policy(actor, content["critic"], shape)
+
+
+def _shape(content: dict[str, Any]) -> Shape:
+    """The shape that a checkpoint states as plain values."""
+    own = content.get("transformer")
+    return Shape(**content | {"transformer": None if own is None else TransformerConfig(**own)})
+
+
+def _check_sizes(shape: Shape, weights: dict[str, Tensor]) -> None:
+    """Refuse a shape that is not that of the weights before a network of it takes any memory."""
+    with torch.device("meta"):
+        wanted = {name: tensor.shape for name, tensor in new_actor(shape).state_dict().items()}
+    came = {name: tensor.shape for name, tensor in weights.items()}
+    for name in sorted(wanted.keys() | came.keys()):
+        if wanted.get(name) != came.get(name):
+            said = [tuple(at[name]) if name in at else "none" for at in (wanted, came)]
+            raise ValueError(f"{name}: {said[0]} by its shape, {said[1]} in the file")

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import torch
-from rsl_rl.algorithms import PPO
 
 from bumblebee.errors import BadInput
+from bumblebee.learning.bounded_ppo import BoundedPpo
 from bumblebee.learning.checkpoint import load_checkpoint, save_checkpoint
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.curve import CurveWriter
@@ -30,29 +30,13 @@ from bumblebee.tracking.mirror import augmentation
 CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
 
 
-class BoundedPpo(PPO):
-    """rsl_rl's PPO with bounds on the adaptive learning rate, which are constants there (1e-5 and 1e-2)."""
-
-    def __init__(self, *args: Any, learning_rate_range: tuple[float, float], **kwargs: Any) -> None:
-        self._bounds = learning_rate_range
-        super().__init__(*args, **kwargs)
-
-    @property
-    def learning_rate(self) -> float:
-        """The rate of the next gradient step."""
-        return self._learning_rate
-
-    @learning_rate.setter
-    def learning_rate(self, value: float) -> None:
-        self._learning_rate = min(max(value, self._bounds[0]), self._bounds[1])
-
-
 def runner_config(config: PpoConfig) -> dict[str, Any]:
     """rsl_rl's configuration; it ignores keys that it does not know, so a test compares them with its signatures."""
     fixed = config.schedule == "fixed"
     algorithm = {
         "class_name": BoundedPpo,
         "learning_rate_range": (config.learning_rate,) * 2 if fixed else config.learning_rate_range,
+        "captured": config.captured,
         "num_learning_epochs": config.epochs,
         "num_mini_batches": config.mini_batches,
         "clip_param": config.clip,

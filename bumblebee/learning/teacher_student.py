@@ -4,13 +4,14 @@ Appendix A: the teacher sees 5 control steps with the targets in global coordina
 senses. Both learn in the same task, for instance `tracking.presets.PAPER_TASK`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 
 from bumblebee.learning.config import PAPER, PpoConfig
-from bumblebee.learning.distill import PAPER_DAGGER, DistillConfig, distill
+from bumblebee.learning.distill import PAPER_DAGGER, DistillConfig, Distiller, check_experts, distill
 from bumblebee.learning.policy import Policy
 from bumblebee.learning.ppo import Trainer
 from bumblebee.motion.clip import Clip
@@ -21,6 +22,11 @@ from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.presets import PAPER_TASK, STUDENT, distillation_task
 from bumblebee.tracking.sampler import ClipShares
+
+PAPER_GENERALIST = replace(
+    PAPER_DAGGER, model="transformer", capacity=10_000_000, env=distillation_task(PAPER_TASK, STUDENT)
+)
+"""Appendices B and C: a Gated Transformer-XL by DAgger. How many samples are kept the paper does not say: 5.8 GiB."""
 
 
 def make_env(
@@ -53,6 +59,31 @@ def train_teacher(
     trainer.train("teacher", enough)
     trainer.save_checkpoint()
     return trainer.policy()
+
+
+def generalist_of(
+    clips: Sequence[Clip],
+    cluster: Sequence[int],
+    experts: Mapping[int, Policy],
+    config: DistillConfig = PAPER_GENERALIST,
+    folder: Path | None = None,
+    base: Policy | None = None,
+    model: Path | None = None,
+) -> Distiller:
+    """All experts into one policy, each cluster with the same share of the draws: train it, then ask for the policy.
+
+    Args:
+        clips: N motions of all clusters.
+        cluster: (N,) cluster index of each.
+        experts: cluster index -> its expert.
+        config: model, algorithm and task; `config.env.student` is what the generalist sees.
+        folder: for the checkpoint, which is gone on from.
+        base: see `Distiller`.
+        model: MJCF of a corrected robot; the declared one if there is none.
+    """
+    check_experts(experts, cluster)
+    env = make_env(clips, config.env, config.seed, ClipShares.equal(cluster), model)
+    return Distiller(env, experts, cluster, config, base, folder)
 
 
 def train_student(

@@ -8,6 +8,7 @@ import pandas as pd
 import torch
 from torch import Tensor
 
+from bumblebee.learning.policy import Policy
 from bumblebee.motion.clip import Clip
 from bumblebee.ranges import Factor, Few, Ranged, Seed
 from bumblebee.sim.effects import RuntimeHooks
@@ -55,7 +56,8 @@ def try_policy(
 ) -> pd.DataFrame:
     """Roll out each clip, from its first frame.
 
-    A `Policy` is shown what its shape says that it sees; any other function gets the demo's observation (N, D).
+    A `Policy` is shown what its shape says that it sees, and remembers each rollout from its start if it has a memory;
+    any other function gets the demo's observation (N, D).
 
     Returns:
         a row a rollout: name, family, split, success, share (of the clip until it failed), key_error [m] and
@@ -83,6 +85,7 @@ def _try_some(
     engine = make_engine("mujoco", world.model, n, min(world.threads, n), world.hooks)
     ids, scale, dt = torch.arange(n), action_scale(), engine.control_dt
     shape = getattr(policy, "shape", None)
+    act = policy.follower() if isinstance(policy, Policy) else policy
     seen, middle = (shape.seen, action_middle(shape.action)) if shape else (ObservationConfig(), None)
     group = Group(seen, (n, library.num_joints, len(library.ahead)), trials.noise, engine.device)
     limit = torch.tensor([success_threshold(clip.family) for clip in clips])
@@ -97,7 +100,7 @@ def _try_some(
         ref = library.frames(ids, torch.full((n,), (frame + 1) * dt))
         state = engine.state()
         group.look(state, ref, action, Rows(torch.full((n,), frame == 0), by_mask=False), generator)
-        action = policy(group.noisy)
+        action = act(group.noisy)
         zero, adapter = middle_targets(ref, middle), world.action_adapter
         motor = action if adapter is None else adapter(state, zero, action)
         engine.step(zero + scale * motor)

@@ -113,6 +113,7 @@ class TrackingEnv(VecEnv):
     def progress(self, value: float) -> None:
         self._progress = value
         self._threshold.fill_(self.threshold)
+        self.reward.progress(value)
 
     @property
     def threshold(self) -> float:

@@ -11,11 +11,12 @@ from typing import Annotated, Literal
 import torch
 from torch import Tensor
 
-from bumblebee.ranges import Factor, Name, Range, Ranged, Weight
+from bumblebee.ranges import Factor, Name, Range, Ranged, Share, Weight
 from bumblebee.robot.facts import joints
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import angle_between, length3, rotate
 from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.terminations import threshold_at
 
 
 @dataclass(frozen=True)
@@ -232,6 +233,13 @@ class RewardConfig(Ranged):
     """Factors in exp(-factor * error) that replace the preset's, by term."""
     soft_limit: Annotated[float, Range(above=0, most=1)] = 0.95
     """Share of a torque, position or velocity limit beyond which it counts as exceeded."""
+    ramp_start: Share = 1.0
+    """Factor on all punishing terms at the training's start, from which it grows evenly to 1."""
+    ramp_share: Share = 0.0
+    """Share of the training over which it grows; with 0 it is 1 throughout."""
+    floor: Annotated[float, Range(least=-1000, most=0)] | None = None
+    """What a step earns at least, before the control period: with 0, to fall early is never worth more than to live.
+    None: no limit."""
 
     def __post_init__(self) -> None:
         """Refuse terms that there are not."""
@@ -257,8 +265,17 @@ class Reward:
         self._penalties = [name for name, weight in self.weights.items() if weight and name in PENALTIES]
         self._errors = [name for name, weight in self.weights.items() if weight and name in ERRORS]
         # Columns, so that one product serves all terms.
-        self._weights = _column([self.weights[name] for name in (*self._penalties, *self._errors)], device)
+        self._whole = _column([self.weights[name] for name in (*self._penalties, *self._errors)], device)
+        self._ramped, self._floor = self._whole < 0, config.floor
+        self._ramp = (config.ramp_start, 1.0, config.ramp_share)
+        self._weights = self._whole.clone()  # written in place, where a recorded graph reads it
+        self.progress(0.0)
         self._sharpness = _column([self.sharpness[name] for name in self._errors], device)
+
+    def progress(self, done: float) -> None:
+        """Weigh punishing terms as they are after this share of the training."""
+        factor = threshold_at(done, *self._ramp)
+        self._weights.copy_(torch.where(self._ramped, factor * self._whole, self._whole))
 
     def terms(self, step: Step) -> dict[str, Tensor]:
         """Each term with its weight, (B,)."""
@@ -273,7 +290,8 @@ class Reward:
 
     def __call__(self, step: Step) -> Tensor:
         """The reward of the step, (B,)."""
-        return self.dt * self._weighted(step).sum(0)
+        earned = self._weighted(step).sum(0)
+        return self.dt * (earned if self._floor is None else earned.clamp(min=self._floor))
 
 
 def _column(values: list[float], device: torch.device | str) -> Tensor:

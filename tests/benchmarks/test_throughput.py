@@ -94,7 +94,12 @@ def test_warp_alone_goes_where_the_environment_went(device: str) -> None:
         assert (ended["qpos"] - began["qpos"]).abs().max() > 1e-3
     rates = physics_and_environment(env, 0.05)
     assert min(rates.physics, rates.held, rates.environment) > 0 and math.isnan(rates.rollout)
-    assert loop_rate(started(env, PpoConfig(steps=2, epochs=1, mini_batches=1, hidden=(8,))), 0.05).frames > 0
+    for captured in (False, True):  # a rollout's recordings are made before, in inference mode
+        trainer = started(env, PpoConfig(steps=2, epochs=2, mini_batches=1, hidden=(8,), captured=captured))
+        assert loop_rate(trainer, 0.05).frames > 0
+        update = trainer.algorithm._device_update
+        assert (update is not None) == captured
+        assert update is None or (update._step._graph is not None) == (device == "cuda")
 
 
 def test_physics_alone_is_not_blamed_for_contacts_that_it_drops() -> None:

@@ -1,9 +1,9 @@
-"""Distillation: the KL against torch's, the ring, and a student that comes to agree with its experts."""
+"""Distillation: the KL against torch's, and a student that comes to agree with its experts."""
 
 import torch
 from torch.distributions import Independent, Normal, kl_divergence
 
-from bumblebee.learning.distill import Aggregate, gaussian, gaussian_kl
+from bumblebee.learning.gaussian import gaussian, gaussian_kl
 from bumblebee.learning.policy import Shape, new_actor
 
 
@@ -20,16 +20,6 @@ def test_kl_is_zero_only_between_equals() -> None:
     assert gaussian_kl(mean, std, mean, std).abs().max() < 1e-6
     assert (gaussian_kl(mean, std, mean + 0.1, std) > 0.1).all()
     assert (gaussian_kl(mean, std, mean, 2 * std) > 0.1).all()
-
-
-def test_the_ring_keeps_the_newest() -> None:
-    data = Aggregate(capacity=5, observation=1, actions=1)
-    for value in range(8):
-        data.add(torch.full((1, 1), float(value)), torch.zeros(1, 1), torch.ones(1, 1))
-    assert data.size == 5
-    assert sorted(data.observation[:, 0].tolist()) == [3, 4, 5, 6, 7]
-    seen, _, _ = data.draw(50, torch.Generator().manual_seed(0))
-    assert set(seen[:, 0].tolist()) <= {3.0, 4.0, 5.0, 6.0, 7.0}
 
 
 def test_learning_by_kl_recovers_the_experts_mean_and_spread() -> None:

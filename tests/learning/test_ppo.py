@@ -109,7 +109,7 @@ def test_it_learns_what_is_rewarded(model: mujoco.MjModel, tmp_path: Path) -> No
 def test_every_key_of_the_configuration_is_one_that_rsl_rl_reads() -> None:
     """Its top level ignores unknown keys in silence, so the names are compared with its signatures."""
     config = runner_config(PpoConfig())
-    known = set(inspect.signature(PPO.__init__).parameters) | {"class_name", "learning_rate_range"}
+    known = set(inspect.signature(PPO.__init__).parameters) | {"class_name", "learning_rate_range", "captured"}
     assert set(config["algorithm"]) <= known
     network = set(inspect.signature(MLPModel.__init__).parameters) | {"class_name"}
     assert set(config["actor"]) <= network and set(config["critic"]) <= network

@@ -47,6 +47,16 @@ def test_both_processes_learn_one_policy_from_worlds_of_their_own(whole: Path) -
     assert not np.allclose(first["mass"], second["mass"])
 
 
+def test_the_captured_update_learns_one_policy_too(whole: Path, tmp_path: Path) -> None:
+    """Equal to the bit on both; and not by chance what rsl_rl's update learns, which draws other noise."""
+    assert launch(2, [*PROCESS, str(tmp_path), "captured"]) == 0
+    first, second = learned(tmp_path)
+    for name, value in first["state"].items():
+        assert torch.equal(value, second["state"][name]), name
+    assert first["rate"] == second["rate"] != CONFIG.learning_rate
+    assert any(not torch.equal(value, learned(whole)[0]["state"][name]) for name, value in first["state"].items())
+
+
 def test_the_normalisation_has_seen_the_frames_of_all(whole: Path) -> None:
     """Its count is the number of control steps of both processes, as is the curve's."""
     state = learned(whole)[0]["state"]

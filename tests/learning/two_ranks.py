@@ -1,9 +1,10 @@
 """One of the processes of `test_ranks`: trains a little, then writes what it knows into a folder of the test.
 
-python -m tests.learning.two_ranks FOLDER [ITERATION AT WHICH THE SECOND RANK DIES]
+python -m tests.learning.two_ranks FOLDER [ITERATION AT WHICH THE SECOND RANK DIES | captured]
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -21,7 +22,7 @@ from tests.tracking.clips import waving
 CONFIG = PpoConfig(iterations=3, steps=4, epochs=2, mini_batches=2, hidden=(16, 16), checkpoint_every=2)
 
 
-def main(folder: Path, dies_at: int | None) -> None:
+def main(folder: Path, dies_at: int | None, captured: bool) -> None:
     """Train to the end, or die."""
     torch.set_num_threads(1)
     ranks = join(on_gpu=False)
@@ -29,7 +30,7 @@ def main(folder: Path, dies_at: int | None) -> None:
     library = MotionLibrary([waving("a", 50), waving("b", 70)], config.ahead)
     engine = MujocoCpu(load_model(physics_hz=100), config.num_worlds, threads=1)
     env = TrackingEnv(library, engine, config, seed=ranks.seed(3))
-    trainer = Trainer(env, CONFIG, folder, seed=3, ranks=ranks)
+    trainer = Trainer(env, replace(CONFIG, captured=captured), folder, seed=3, ranks=ranks)
     began, iterate = trainer.iteration, trainer._iterate
 
     def fragile() -> dict[str, float]:
@@ -49,4 +50,5 @@ def main(folder: Path, dies_at: int | None) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else None)
+    also = sys.argv[2] if len(sys.argv) > 2 else ""
+    main(Path(sys.argv[1]), int(also) if also.isdigit() else None, also == "captured")

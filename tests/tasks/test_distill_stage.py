@@ -1,5 +1,6 @@
 """The stage distill: the engine asked for, the clusters' shares, and experts of another task."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,13 +11,16 @@ import pytest
 import torch
 import yaml
 
+from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
 from bumblebee.learning.distill import DistillConfig
-from bumblebee.learning.policy import Policy, Shape, new_actor
+from bumblebee.learning.policy import Policy, Shape, load_policy, new_actor
 from bumblebee.motion.store import write_library
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.warp_limits import Buffers
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.library import AHEAD
+from bumblebee.tracking.observations import layout
 from tasks import distill
 from tests.tracking.clips import waving
 
@@ -69,9 +73,9 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., 
     labels = {"name": list("abc"), "cluster": ["c0", "c1", "c1"]}
     pd.DataFrame(labels).to_parquet("data/clusters/labels.parquet")
 
-    def make(env: dict[str, object], **other: object) -> None:
+    def make(env: dict[str, object], distill: dict[str, object] | None = None, **other: object) -> None:
         loop = {"clusters": ["c0", "c1"], "rounds": [], "final_round": 0}
-        Path("params.yaml").write_text(yaml.safe_dump({**loop, "distill": {"env": TINY | env}}))
+        Path("params.yaml").write_text(yaml.safe_dump({**loop, "distill": {"env": TINY | env, **(distill or {})}}))
         shapes = {"base": shape(), "experts/r0/c0": shape(), "experts/r0/c1": shape(**other)}
         for folder, own in shapes.items():
             Path("models", folder).mkdir(parents=True)
@@ -101,3 +105,37 @@ def test_a_task_that_is_not_the_experts_is_refused(
     workspace(env)
     with pytest.raises(BadInput, match=words):
         distill.main()
+
+
+def test_a_missing_expert_is_refused_in_a_line_that_names_it(workspace: Callable[..., None]) -> None:
+    """Before anything is made."""
+    workspace({})
+    Path("models/experts/r0/c1/policy.pt").unlink()
+    with pytest.raises(BadInput) as refused:
+        distill.main()
+    said = "models/experts/r0/c1/policy.pt: expected a trained policy, came no file. Train it first."
+    assert str(refused.value) == said and not Path("models/generalist").exists()
+
+
+def test_the_stage_makes_a_transformer_that_the_runner_takes(
+    workspace: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From params.yaml to models/generalist: policy, contract with its memory, curve, card."""
+    monkeypatch.setattr(distill, "make_engine", make_engine)
+    monkeypatch.setattr(distill, "log_run", lambda *_, **__: None)
+    student = {"student": {"terms": ["student"], "history": 10}}
+    own = {"embedding": 12, "heads": 3, "memory": 4, "feed_forward": 8, "head": [16]}
+    settings = {"model": "transformer", "init": "scratch", "transformer": own, "iterations": 2, "mini_batches": 2}
+    size = sum(size for _, size in layout(23, len(AHEAD)))
+    workspace(student, settings, observation=size)
+    for folder in ("base", "experts/r0/c0"):
+        seen = shape(observation=size)
+        Policy(new_actor(seen), {}, seen).save(Path("models", folder))
+    distill.main()
+    made = Path("models/generalist")
+    policy, trained = ExportedPolicy.load(made), load_policy(made)
+    assert policy.memory == trained.shape.memory == (4, 13) and policy.seen.history == 10
+    assert len(pd.read_csv(made / "curve.csv")) == 2
+    card = json.loads((made / "card.json").read_text())
+    assert card["config"]["transformer"]["embedding"] == 12 and set(card["agreement"]) >= {"all"}
+    assert card["parameters"] == sum(tensor.numel() for tensor in trained.actor.parameters())

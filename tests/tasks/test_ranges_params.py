@@ -105,9 +105,11 @@ def test_presets_and_methods_of_the_benchmarks_are_within_the_ranges():
     from benchmarks.baselines.methods import RANDOMISATIONS
     from bumblebee.learning.config import PAPER
     from bumblebee.learning.distill import PAPER_DAGGER
+    from bumblebee.learning.teacher_student import PAPER_GENERALIST
     from bumblebee.tracking.presets import PAPER_TASK, distillation_task
 
-    assert all(isinstance(one, Ranged) for one in (*RANDOMISATIONS.values(), PAPER, PAPER_DAGGER, PAPER_TASK))
+    presets = (PAPER, PAPER_DAGGER, PAPER_GENERALIST, PAPER_TASK)
+    assert all(isinstance(one, Ranged) for one in (*RANDOMISATIONS.values(), *presets))
     assert distillation_task(PAPER_TASK).student.history == 10
 
 

@@ -131,3 +131,25 @@ def test_an_unknown_term_is_refused() -> None:
         Reward(RewardConfig(weights={"action_rat": -1.0}), 0.02)
     with pytest.raises(BadInput, match=r"came 'torque'$"):
         Reward(RewardConfig(sharpness={"torque": 1.0}), 0.02)
+
+
+def _punished() -> Step:
+    """A robot on its reference whose action jumped by one unit on one joint."""
+    return replace(perfect(), actions=(one(3, 1.0), Z23, Z23))
+
+
+def test_punishing_terms_grow_with_the_training_and_the_others_do_not() -> None:
+    config = RewardConfig(preset="paper", ramp_start=0.1, ramp_share=0.5)
+    own = Reward(config, 1.0)
+    earned = []
+    for done in (0.0, 0.25, 0.5, 1.0):
+        own.progress(done)
+        earned.append(own(_punished()).item())
+    assert earned == pytest.approx([3.5 - 4 * factor for factor in (0.1, 0.55, 1.0, 1.0)])
+
+
+def test_a_step_earns_at_least_the_floor() -> None:
+    config = RewardConfig(preset="paper", floor=0.0)
+    assert Reward(config, 0.02)(_punished()).item() == 0.0
+    assert Reward(config, 0.02)(perfect()).item() == pytest.approx(3.5 * 0.02)
+    assert Reward(RewardConfig(preset="paper"), 0.02)(_punished()).item() == pytest.approx(-0.5 * 0.02)

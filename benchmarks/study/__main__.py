@@ -1,0 +1,122 @@
+"""The command line of the study; see the package."""
+
+import argparse
+from pathlib import Path
+
+import torch
+
+import benchmarks.study
+from benchmarks.study.curves import draw
+from benchmarks.study.jobs import Job
+from benchmarks.study.motions import Motions, prepare, read_motions
+from benchmarks.study.parts import PARTS
+from benchmarks.study.settings import SMALL, Study, freeze
+from benchmarks.study.training import finished
+from benchmarks.study.trying import tried
+from benchmarks.study.workers import Places, Workers
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+
+LATER = "the call is over: the same command goes on"
+
+
+def study_of(options: argparse.Namespace) -> Study:
+    """The study's settings."""
+    return SMALL if options.small else Study()
+
+
+def run_part(options: argparse.Namespace) -> None:
+    """Train and try all policies of a part, or as far as the time goes."""
+    study, motions = study_of(options), read_motions(options.motions)
+    present = torch.cuda.device_count()
+    if study.env.engine == "mujoco_warp" and not 1 <= options.gpus <= present:
+        raise BadInput(
+            "--gpus", f"1 to {present} GPUs of this machine" if present else "a machine with a GPU", str(options.gpus)
+        )
+    freeze(options.out, study, motions=motions.hash)
+    jobs = PARTS[options.part].jobs(study, motions)
+    done = {job.name for job in jobs if finished(options.out, job)}
+    shared = ["--motions", str(options.motions), "--out", str(options.out), *(["--small"] if options.small else [])]
+
+    def train(job: Job, left: float | None) -> list[str]:
+        seconds = [] if left is None else ["--seconds", f"{left:.1f}"]
+        return ["benchmarks.study.training", options.part, job.name, *shared, *seconds]
+
+    def trial(job: Job) -> list[str]:
+        return ["benchmarks.study.trying", job.name, *shared[:4]]
+
+    seconds = None if options.minutes is None else 60 * options.minutes
+    gpus = options.gpus if study.env.engine == "mujoco_warp" else 0
+    workers = Workers(jobs, Places(gpus, options.each, options.jobs), train, trial, options.out / "logs", seconds)
+    whole = workers.run(done, {job.name for job in jobs if tried(options.out / job.name)})
+    if workers.failed:
+        raise SystemExit(f"failed: {', '.join(workers.failed)}; see {options.out / 'logs'}")
+    print("done" if whole else LATER, flush=True)
+
+
+def run_prepare(options: argparse.Namespace) -> None:
+    """Read the sources and write the study's motions."""
+    motions = prepare(options.sources, options.out, options.texts, options.clusters)
+    print(_counted(motions))
+    print((options.out / "clusters.txt").read_text(), end="")
+
+
+def run_table(options: argparse.Namespace) -> None:
+    """Write the tables of a finished run."""
+    study, motions = study_of(options), read_motions(options.motions)
+    stamp = freeze(options.run, study, motions=motions.hash)
+    text = PARTS[options.part].tables(options.run, study, motions)
+    options.out.write_text(f"<!-- study {stamp}, motions {motions.hash} -->\n\n{text}")
+    print(text, end="")
+    if options.curves:
+        draw(options.run, PARTS[options.part].jobs(study, motions), options.curves)
+
+
+def _counted(motions: Motions) -> str:
+    table = motions.labels.groupby("split").agg(
+        pieces=("name", "size"), motions=("motion", "nunique"), seconds=("seconds", "sum")
+    )
+    return table.to_string()
+
+
+def parse(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=benchmarks.study.__doc__.splitlines()[0])
+    commands = parser.add_subparsers(required=True)
+    own = commands.add_parser("prepare", help="read, hold out, filter and cluster the motions")
+    own.add_argument("sources", nargs="+", type=Path)
+    own.add_argument("--texts", type=Path, help="HumanML3D's folder")
+    own.add_argument("--clusters", type=int, default=0, help="0: as many as the elbow says")
+    own.add_argument("--out", type=Path, required=True)
+    own.set_defaults(work=run_prepare)
+    own = commands.add_parser("run", help="train and try the policies of a part")
+    own.add_argument("part", choices=PARTS, help="; ".join(f"{name}: {part.what}" for name, part in PARTS.items()))
+    own.add_argument("--gpus", type=int, default=1)
+    own.add_argument("--each", type=int, default=2, help="trainings beside each other on a GPU")
+    own.add_argument("--jobs", type=int, default=2, help="processor cores that try policies")
+    own.add_argument("--minutes", type=float, help="end this call after so long")
+    own.add_argument("--out", type=Path, required=True)
+    own.set_defaults(work=run_part)
+    table = commands.add_parser("table", help="the tables of a finished run")
+    table.add_argument("part", choices=PARTS)
+    table.add_argument("run", type=Path)
+    table.add_argument("--out", type=Path, required=True, help="Markdown file")
+    table.add_argument("--curves", type=Path, help="also draw the learning curves into this .svg")
+    table.set_defaults(work=run_table)
+    for part in (own, table):
+        part.add_argument("--motions", type=Path, required=True)
+        part.add_argument("--small", action="store_true", help="the same in seconds on two cores: shows that it runs")
+    return parser.parse_args(arguments)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run a command; bad input is one line and status 2."""
+    options = parse(arguments)
+    try:
+        options.work(options)
+    except BadInput as error:
+        print(error)
+        raise SystemExit(EXIT_BAD_INPUT) from None
+
+
+if __name__ == "__main__":
+    main()

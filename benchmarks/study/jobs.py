@@ -1,0 +1,100 @@
+"""What is trained in the study: each policy as a job, from which parent, on which motions, for how many steps."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from benchmarks.study.motions import Motions
+from benchmarks.study.settings import Study
+
+
+@dataclass(frozen=True)
+class Job:
+    """One policy. Its folder in the run is its name."""
+
+    name: str
+    steps: float
+    """Control steps of its own, beside its parent's."""
+    seed: int
+    parent: str | None = None
+    """Name of the job whose policy it starts from."""
+    clips: tuple[str, ...] | None = None
+    """Names of the pieces that it learns from; None: all that are not held out."""
+    settings: str = "ours"
+    """Name of its task and algorithm, see `settings.settings_of`."""
+    even: bool = False
+    """Whether each cluster gets an equal share of the draws, however long its motions are."""
+
+
+def experts_jobs(study: Study, motions: Motions) -> list[Job]:
+    """For each seed a base policy and what is trained on from it; long jobs come first.
+
+    From a base policy: an expert of each cluster, one of each random cluster, and one policy trained on by the steps of
+    all experts together, drawing motions by their length or each cluster as often.
+    """
+    jobs: list[Job] = []
+    for seed in study.seeds:
+        jobs.append(Job(base_of(seed), study.base_steps, seed))
+    for seed in study.seeds:
+        steps = study.expert_steps * len(motions.clusters)
+        jobs.append(Job(one_of(seed), steps, seed, base_of(seed)))
+        jobs.append(Job(even_of(seed), steps, seed, base_of(seed), even=True))
+    for seed in study.seeds:
+        for groups in (motions.labels.set_index("name")["cluster"], motions.random_clusters(seed)):
+            for cluster in sorted(groups.unique()):
+                own = tuple(groups.index[groups == cluster])
+                jobs.append(Job(expert_of(seed, cluster), study.expert_steps, seed, base_of(seed), own))
+    return jobs
+
+
+PAPER_ARMS = {
+    "printed": "as printed",
+    "std": "printed, first deviation .2",
+    "ramp": "printed, penalties from .05 up over half of the training",
+    "adaptive": "printed, learning rate by KL",
+    "three": "all three",
+    "three-std": "all three but the deviation",
+    "three-ramp": "all three but the ramp",
+    "three-adaptive": "all three but the rate",
+    "reference": "all three, action around the reference",
+    "floor": "all three, a step earns at least 0",
+}
+"""Arms of the part `paper-task`, by name of their settings; `settings.PAPER_CHANGES` has what they change."""
+
+
+def paper_jobs(study: Study, motions: Motions) -> list[Job]:
+    """The paper's teacher from nothing, a policy for each arm, all of equal steps."""
+    seed = study.seeds[0]
+    return [Job(paper_of(seed, arm), study.paper_steps, seed, settings=f"paper-{arm}") for arm in PAPER_ARMS]
+
+
+def paper_of(seed: int, arm: str) -> str:
+    """Name of an arm's policy."""
+    return f"s{seed}-paper-{arm}"
+
+
+def base_of(seed: int) -> str:
+    """Name of a seed's base policy."""
+    return f"s{seed}-base"
+
+
+def one_of(seed: int) -> str:
+    """Name of the one policy that is trained on by all experts' steps."""
+    return f"s{seed}-one"
+
+
+def even_of(seed: int) -> str:
+    """Name of the one policy that draws each cluster as often."""
+    return f"s{seed}-even"
+
+
+def expert_of(seed: int, cluster: str) -> str:
+    """Name of a cluster's expert; random clusters are r0, r1 ..."""
+    return f"s{seed}-{cluster}"
+
+
+def ready(jobs: Sequence[Job], done: set[str], begun: set[str]) -> Job | None:
+    """The first job that is neither done nor begun and whose parent is done."""
+    for job in jobs:
+        if job.name not in done | begun and (job.parent is None or job.parent in done):
+            return job
+    return None

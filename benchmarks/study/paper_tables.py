@@ -1,0 +1,28 @@
+"""The paper's task: what each deviation from its text gives, one policy each."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from benchmarks.study.jobs import PAPER_ARMS, paper_of
+from benchmarks.study.motions import Motions
+from benchmarks.study.settings import Study
+from benchmarks.study.tables import SPLITS, cell, estimate, head, line, rate, read_trials
+from bumblebee.learning.ppo import CURVE
+
+
+def paper_tables(out: Path, study: Study, motions: Motions) -> str:
+    """Success of each arm with intervals over motions, and the reward and deviation at the end of its curve."""
+    lines = head(["arm", "motions", "n", "success", "pelvis rule", "MPKPE [mm]", "reward", "deviation", "episode [s]"])
+    for arm, told in PAPER_ARMS.items():
+        name = paper_of(study.seeds[0], arm)
+        rows = read_trials(out / name, motions)
+        rows = rows[rows["robot"] == "declared"]
+        last = pd.read_csv(out / name / CURVE).tail(10).mean()
+        for split, which in SPLITS.items():
+            own = rows[rows["split"] == split]
+            cells = [told, which, str(own["motion"].nunique())]
+            cells += [cell(rate(own, "success"), 2), cell(rate(own, "success_upright"), 2)]
+            cells += [cell(estimate(own, "mpkpe_mm"), 0), f"{last['reward']:.3f}", f"{last['action_std']:.2f}"]
+            lines.append(line([*cells, f"{0.02 * last['episode_length']:.1f}"]))
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,26 @@
+"""The parts of the study that are trainings and trials: the jobs of each, and its tables."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.study.jobs import Job, experts_jobs, paper_jobs
+from benchmarks.study.motions import Motions
+from benchmarks.study.paper_tables import paper_tables
+from benchmarks.study.settings import Study
+from benchmarks.study.tables import experts_tables
+
+
+@dataclass(frozen=True)
+class Part:
+    """One command of the study."""
+
+    what: str
+    jobs: Callable[[Study, Motions], list[Job]]
+    tables: Callable[[Path, Study, Motions], str]
+
+
+PARTS = {
+    "experts": Part("experts by cluster, at random, and one policy at equal steps", experts_jobs, experts_tables),
+    "paper-task": Part("the task as the paper prints it, and what makes it learn", paper_jobs, paper_tables),
+}

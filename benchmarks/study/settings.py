@@ -1,0 +1,161 @@
+"""What the study fixes beforehand, and the file that holds a run to it."""
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from benchmarks.baselines.methods import OURS
+from bumblebee.errors import BadInput
+from bumblebee.learning.config import PAPER, PpoConfig
+from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.presets import PAPER_RANDOMISATION, PAPER_TASK
+
+FROZEN = "study.json"
+
+TASK = EnvConfig(
+    engine="mujoco_warp",
+    num_worlds=8192,
+    physics_hz=200.0,
+    randomisation=PAPER_RANDOMISATION,
+    threshold_start=0.8,
+    threshold_end=0.35,
+    threshold_share=0.4,
+)
+"""Our own task with the paper's randomisation: its printed rewards teach nothing (docs/decisions/paper-task.md)."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """Seeds, budgets and settings, the same for every arm."""
+
+    seeds: tuple[int, ...] = (0, 1, 2)
+    """Of the base policy, of everything trained on from it, and of its random clusters."""
+    base_steps: float = 80e6
+    """Control steps of a base policy, which learns from all training motions."""
+    expert_steps: float = 16e6
+    """Control steps of each expert; the one policy gets as many as all experts of a seed together."""
+    paper_steps: float = 40e6
+    """Control steps of each arm of the part `paper-task`."""
+    env: EnvConfig = field(default_factory=lambda: TASK)
+    """The task of a base policy."""
+    paper_env: EnvConfig = field(default_factory=lambda: replace(PAPER_TASK, num_worlds=8192))
+    """The paper's task, for the part `paper-task`."""
+    paper_ppo: PpoConfig = PAPER
+    """The paper's algorithm."""
+    child_threshold: float = 0.35
+    """Distance that ends an episode of what is trained on from a base policy, from its first step on [m]."""
+    ppo: PpoConfig = field(default_factory=lambda: replace(OURS, symmetry=True))
+    """The algorithm; its iterations follow from the steps."""
+    child_rate: float = 3e-4
+    """First learning rate of what is trained on; the rate adapts afterwards."""
+
+
+PAPER_CHANGES: dict[str, tuple[str, ...]] = {
+    "printed": (),
+    "std": ("std",),
+    "ramp": ("ramp",),
+    "adaptive": ("adaptive",),
+    "three": ("std", "ramp", "adaptive"),
+    "three-std": ("ramp", "adaptive"),
+    "three-ramp": ("std", "adaptive"),
+    "three-adaptive": ("std", "ramp"),
+    "reference": ("std", "ramp", "adaptive", "reference"),
+    "floor": ("std", "ramp", "adaptive", "floor"),
+}
+"""Deviations of each arm of the part `paper-task` from what the paper prints."""
+
+
+def settings_of(study: Study, name: str, child: bool) -> tuple[EnvConfig, PpoConfig]:
+    """Task and algorithm by name.
+
+    Args:
+        study: the study's settings.
+        name: "ours", or "paper-" and an arm of `PAPER_CHANGES`.
+        child: whether a base policy is trained on: the curriculum is over, the first rate is gentler.
+    """
+    if name == "ours":
+        if not child:
+            return study.env, study.ppo
+        limit = study.child_threshold
+        env = replace(study.env, threshold_start=limit, threshold_end=limit)
+        return env, replace(study.ppo, learning_rate=study.child_rate)
+    env, ppo = study.paper_env, study.paper_ppo
+    for change in PAPER_CHANGES[name.removeprefix("paper-")]:
+        env, ppo = _deviated(env, ppo, change)
+    return env, ppo
+
+
+def _deviated(env: EnvConfig, ppo: PpoConfig, change: str) -> tuple[EnvConfig, PpoConfig]:
+    if change == "std":
+        return env, replace(ppo, initial_std=0.2)
+    if change == "adaptive":
+        rates = {"learning_rate": 3e-4, "learning_rate_range": (1e-5, 1e-3)}
+        return env, replace(ppo, schedule="adaptive", desired_kl=0.015, desired_kl_end=0.01, **rates)
+    if change == "reference":
+        return replace(env, action="reference"), ppo
+    ramp = {"ramp_start": 0.05, "ramp_share": 0.5} if change == "ramp" else {"floor": 0.0}
+    return replace(env, reward=replace(env.reward, **ramp)), ppo
+
+
+SMALL = Study(
+    seeds=(0,),
+    base_steps=2048,
+    expert_steps=1024,
+    env=replace(TASK, engine="mujoco", num_worlds=16, physics_hz=100.0, threads=1),
+    ppo=replace(OURS, steps=16, epochs=2, hidden=(32, 32), symmetry=True),
+    paper_steps=512,
+    paper_env=replace(PAPER_TASK, engine="mujoco", num_worlds=16, physics_hz=100.0, threads=1),
+    paper_ppo=replace(PAPER, steps=16, epochs=1, hidden=(32, 32)),
+)
+"""The same study in seconds on two cores: it shows that every part runs, and nothing else."""
+
+
+def freeze(out: Path, study: Study, **inputs: Any) -> str:
+    """Write what the run in `out` is held to, or compare with what it began with; returns the hash of it.
+
+    Args:
+        out: the run's folder, made where there is none.
+        study: its settings.
+        inputs: plain values that results depend on beside them, such as the hash of the motions.
+
+    Raises:
+        BadInput: if the run began with others.
+    """
+    stated = json.loads(json.dumps({"study": asdict(study), **inputs}))
+    path = Path(out) / FROZEN
+    if path.exists():
+        began = _read(path)
+        different = sorted(_differences(began, stated))
+        if different:
+            came = ", ".join(different[:4]) + (f" and {len(different) - 4} more" if len(different) > 4 else "")
+            raise BadInput(
+                path, "the settings and motions that the run began with", f"others: {came}", "Use a new --out."
+            )
+    else:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(stated, indent=1) + "\n")
+    return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def sha256(path: Path) -> str:
+    """Hash of a file's bytes."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return dict(json.loads(path.read_text()))
+    except (ValueError, TypeError) as error:
+        raise BadInput(path, "the settings of a study", f"{type(error).__name__}: {error}") from None
+
+
+def _differences(began: Any, now: Any, place: str = "") -> list[str]:
+    """Dotted places at which two nested mappings differ."""
+    if isinstance(began, dict) and isinstance(now, dict):
+        keys = sorted({*began, *now})
+        return [d for key in keys for d in _differences(began.get(key), now.get(key), f"{place}{key}.")]
+    return [] if began == now else [f"{place.rstrip('.')} {yaml.safe_dump(began, default_flow_style=True).split()[0]}"]

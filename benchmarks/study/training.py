@@ -1,0 +1,126 @@
+"""Trains one job of the study in this process, up to its steps or until the call is over; goes on exactly.
+
+    python -m benchmarks.study.training PART JOB --motions study/motions --out study/experts --seconds 500
+
+is what the study starts for each job, on the GPU that CUDA_VISIBLE_DEVICES names.
+"""
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Callable
+from dataclasses import MISSING, asdict, fields, replace
+from pathlib import Path
+
+import torch
+
+from benchmarks.study.jobs import Job
+from benchmarks.study.motions import Motions, read_motions
+from benchmarks.study.parts import PARTS
+from benchmarks.study.settings import SMALL, Study, settings_of
+from benchmarks.study.workers import GOES_ON
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.learning.ppo import CHECKPOINT, Trainer
+from bumblebee.sim.engine_choice import make_engine
+from bumblebee.tracking.env import TrackingEnv
+from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.model import task_model
+from bumblebee.tracking.sampler import ClipShares
+
+DONE = "done.json"
+CHECKPOINT_EVERY = 60
+"""Iterations: some 15 s of a GPU."""
+
+
+def finished(out: Path, job: Job) -> bool:
+    """Whether the job's policy is there, trained as the job says.
+
+    Raises:
+        BadInput: if the one that is there was trained otherwise.
+    """
+    path = out / job.name / DONE
+    if not path.exists():
+        return False
+    unsaid = {own.name: own.default for own in fields(Job) if own.default is not MISSING}
+    if unsaid | json.loads(path.read_text())["job"] != _plain(job):
+        raise BadInput(path, f"a policy trained as {job.name} is now", "another training", "Use a new --out.")
+    return True
+
+
+def train(
+    job: Job,
+    motions: Motions,
+    study: Study,
+    out: Path,
+    model: Path | None = None,
+    over: Callable[[], bool] = lambda: False,
+) -> bool:
+    """Train the job's policy into `out / job.name`; whether it is done.
+
+    Args:
+        job: what to train.
+        motions: the study's.
+        study: its settings.
+        out: the run's folder, with the parent's policy in it.
+        model: MJCF of a corrected robot; the declared one without.
+        over: says when to stop and keep a checkpoint.
+    """
+    if finished(out, job):
+        return True
+    folder = out / job.name
+    folder.mkdir(parents=True, exist_ok=True)
+    task, ppo = settings_of(study, job.settings, job.parent is not None)
+    frames = task.num_worlds * ppo.steps
+    ppo = replace(ppo, iterations=math.ceil(job.steps / frames), checkpoint_every=CHECKPOINT_EVERY)
+    torch.set_num_threads(task.threads)
+    clips = [row.clip for row in motions.training(job.clips)]
+    engine = make_engine(task.engine, task_model(task, model), task.num_worlds, task.threads, buffers=task.buffers)
+    shares = ClipShares.equal(motions.cluster_indices(clips)) if job.even else None
+    env = TrackingEnv(MotionLibrary(clips, task.ahead, device=engine.device), engine, task, job.seed, clip_share=shares)
+    trainer = Trainer(env, ppo, folder, job.seed, None if job.parent is None else out / job.parent)
+    trainer.train(job.name, over)
+    if trainer.iteration < ppo.iterations:
+        trainer.save_checkpoint()
+        return False
+    trainer.policy().save(folder)
+    told = {"job": _plain(job), "frames": trainer.frames, "seconds": round(trainer._seconds, 1), "clips": len(clips)}
+    (folder / DONE).write_text(json.dumps(told) + "\n")
+    (folder / CHECKPOINT).unlink(missing_ok=True)
+    return True
+
+
+def deadline(seconds: float | None) -> Callable[[], bool]:
+    """Says when so many seconds are over; never without."""
+    end = math.inf if seconds is None else time.monotonic() + seconds
+    return lambda: time.monotonic() > end
+
+
+def _plain(job: Job) -> dict:
+    return json.loads(json.dumps(asdict(job)))
+
+
+def main() -> None:
+    """Train one job; exit code 3: not done when the time was over."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("part", choices=PARTS)
+    parser.add_argument("job")
+    parser.add_argument("--motions", type=Path, required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--seconds", type=float)
+    parser.add_argument("--small", action="store_true")
+    options = parser.parse_args()
+    over = deadline(options.seconds)
+    study = SMALL if options.small else Study()
+    try:
+        motions = read_motions(options.motions)
+        job = {job.name: job for job in PARTS[options.part].jobs(study, motions)}[options.job]
+        done = train(job, motions, study, options.out, over=over)
+    except BadInput as error:
+        print(error)
+        raise SystemExit(EXIT_BAD_INPUT) from None
+    raise SystemExit(0 if done else GOES_ON)
+
+
+if __name__ == "__main__":
+    main()
