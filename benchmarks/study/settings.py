@@ -130,6 +130,7 @@ def freeze(out: Path, study: Study, **inputs: Any) -> str:
     if path.exists():
         began = _read(path)
         different = sorted(_differences(began, stated))
+        stated = began
         if different:
             came = ", ".join(different[:4]) + (f" and {len(different) - 4} more" if len(different) > 4 else "")
             raise BadInput(
@@ -156,6 +157,7 @@ def _read(path: Path) -> dict[str, Any]:
 def _differences(began: Any, now: Any, place: str = "") -> list[str]:
     """Dotted places at which two nested mappings differ."""
     if isinstance(began, dict) and isinstance(now, dict):
-        keys = sorted({*began, *now})
+        # What the run's beginning does not say is a setting of later code, at its default.
+        keys = sorted(began)
         return [d for key in keys for d in _differences(began.get(key), now.get(key), f"{place}{key}.")]
     return [] if began == now else [f"{place.rstrip('.')} {yaml.safe_dump(began, default_flow_style=True).split()[0]}"]

@@ -55,7 +55,8 @@ class BoundedPpo(PPO):
 
     def load(self, loaded_dict: dict[str, Any], load_cfg: dict[str, Any] | None, strict: bool) -> bool:
         """Go on from what `save` gave, whichever update was used then."""
-        own = {name: self.optimizer.param_groups[0][name] for name in _OPTIONS}
+        group = self.optimizer.param_groups[0]
+        own = {name: group[name] for name in _OPTIONS if name in group}
         loaded = loaded_dict | {"optimizer_state_dict": _with_groups(loaded_dict["optimizer_state_dict"], own)}
         whole = super().load(loaded, load_cfg, strict)
         if self._device_update is not None:

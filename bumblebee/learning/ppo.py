@@ -1,7 +1,7 @@
 """PPO of rsl_rl around the tracking environment: our loop, curve, curriculum and checkpoints (paper, section 3.2).
 
 rsl_rl's own `learn` prints a screen an iteration and forgets the environment in its checkpoints; the steps between are
-its, unchanged.
+its, unchanged, or its update is recorded (`update`).
 """
 
 import contextlib

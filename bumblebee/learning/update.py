@@ -33,6 +33,7 @@ def cannot(algorithm: PPO) -> str | None:
         "a value loss without clipping": not algorithm.use_clipped_value_loss,
         "another symmetry than augmentation": symmetry is not None
         and (symmetry.use_mirror_loss or not symmetry.use_data_augmentation),
+        "an adaptive rate without a target": algorithm.schedule == "adaptive" and algorithm.desired_kl is None,
         "another optimiser than Adam": type(algorithm.optimizer) is not torch.optim.Adam,
     }
     return next((name for name, true in lacking.items() if true), None)

@@ -238,3 +238,14 @@ def test_each_arm_of_the_papers_task_differs_by_what_it_says_and_is_tried(folder
     lines = paper_tables(tmp_path, SMALL, motions).splitlines()
     assert len(lines) == 2 + 2 * len(PAPER_ARMS)
     assert lines[2].startswith("| as printed | trained | 6 | ")
+
+
+def test_a_run_goes_on_with_settings_that_later_code_added(tmp_path: Path) -> None:
+    stamp = freeze(tmp_path, SMALL, motions="x")
+    began = json.loads((tmp_path / "study.json").read_text())
+    del began["study"]["ppo"]["captured"]
+    (tmp_path / "study.json").write_text(json.dumps(began))
+    later = freeze(tmp_path, SMALL, motions="x")
+    assert later != stamp
+    with pytest.raises(BadInput, match="motions"):
+        freeze(tmp_path, SMALL, motions="y")

@@ -126,7 +126,7 @@ def test_readings_on_a_grid_show_it_where_the_noise_is_finer():
 
 def test_a_turn_of_the_imu_of_a_micrometre_in_the_feet_is_not_seen():
     robot = declared("stand")
-    plan = make_plan(robot, 1, 2.0, np.random.default_rng(0))
+    plan = make_plan(robot, 1, 1.0, np.random.default_rng(0))
     eye, run = (
         make_eye(robot, fly(robot, [], plan, np.random.default_rng(1)), 1.0, np.random.default_rng(2)),
         lambda angle: fly(robot, [ImuOffset(0, angle)], plan, np.random.default_rng(1)),

@@ -1,12 +1,14 @@
 """The throughput benchmark: copies of motions are what they are copies of, and its rows are rates."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
+from benchmarks.throughput.__main__ import print_rows
 from benchmarks.throughput.alone import Rolled, command, listening, physics_step, without_overflow
 from benchmarks.throughput.growth import FRAMES, copies
 from benchmarks.throughput.measure import environment_rate, loop_rate, make_env, physics_and_environment, started
@@ -21,6 +23,7 @@ from bumblebee.tracking.library import MotionLibrary
 from tests.tracking.clips import waving
 
 CLIPS = [waving("a", 60), waving("b", 90)]
+ROWS = ("physics", "environment", "loop, eager", "loop, captured")
 QUIET = Randomisation(friction=(1.0, 1.0), gains=0.0, mass=0.0, push=0.0)
 GPU = pytest.param(
     "cuda", marks=[pytest.mark.gpu, pytest.mark.skipif(not torch.cuda.is_available(), reason="no NVIDIA GPU")]
@@ -50,6 +53,20 @@ def test_the_rows_are_rates() -> None:
         assert environment_rate(env, 0.05) > 0
         assert 0 < loop.update < loop.iteration
         np.testing.assert_allclose(loop.frames * loop.iteration, 2 * 4, rtol=1e-6)
+
+
+def test_both_updates_stand_beside_physics(capsys: pytest.CaptureFixture[str]) -> None:
+    """A row each with its share of physics, and how long an iteration and its update take."""
+    config = EnvConfig(num_worlds=4, threads=1, physics_hz=100.0)
+    ppo = PpoConfig(steps=2, epochs=1, mini_batches=1, hidden=(8,))
+    print_rows(config, CLIPS, {"eager": ppo, "captured": replace(ppo, captured=True)}, 0.05, [])
+    lines = capsys.readouterr().out.splitlines()
+    rates = {name: float(line.split(name)[1].split()[0]) for name in ROWS for line in lines if f"Hz   {name}" in line}
+    shares = {name: float(line.split(name)[1].split()[1]) for name in ROWS for line in lines if f"Hz   {name}" in line}
+    assert set(rates) == set(ROWS) and all(rate > 0 for rate in rates.values())
+    for name in ROWS:
+        assert shares[name] == pytest.approx(rates[name] / rates["physics"], abs=0.01)
+    assert sum("an iteration of 2 steps" in line for line in lines) == 2
 
 
 def test_physics_alone_goes_where_the_environment_went() -> None:

@@ -19,6 +19,7 @@ from torch.utils._python_dispatch import TorchDispatchMode
 from bumblebee.learning.bounded_ppo import BoundedPpo
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.ppo import runner_config
+from bumblebee.learning.ranks import Ranks
 from bumblebee.learning.update_graph import Recorded
 from bumblebee.learning.update_step import next_rate
 from tests.learning.test_ppo import PPO_CONFIG, model, trainer, weights  # noqa: F401
@@ -35,9 +36,11 @@ def mirror(env: object, obs: TensorDict | None, actions: Tensor | None) -> tuple
     return obs, None if actions is None else torch.cat((actions, -actions))
 
 
-def algorithm(config: PpoConfig, device: str = "cpu", symmetry: bool = False, **more: Any) -> BoundedPpo:
+def algorithm(
+    config: PpoConfig, device: str = "cpu", symmetry: bool = False, ranks: int = 1, **more: Any
+) -> BoundedPpo:
     """With networks that a seed gives."""
-    settings = runner_config(config) | {"multi_gpu": None}
+    settings = runner_config(config) | {"multi_gpu": Ranks(0, ranks).settings}
     settings["algorithm"] |= more
     if symmetry:
         augmentation = {"use_data_augmentation": True, "data_augmentation_func": mirror}
@@ -124,6 +127,24 @@ def test_the_rate_follows_the_divergence_as_in_rsl_rl() -> None:
     for rate, divergence, bounds, expected in cases:
         came = next_rate(torch.tensor(rate, dtype=torch.float64), torch.tensor(divergence), target, bounds)
         assert float(came) == expected, (rate, divergence)
+
+
+def test_processes_that_saw_the_same_learn_what_one_would(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two of them: gradients and divergence are exchanged between the passes, to the bit."""
+    config = replace(CONFIG, captured=True, desired_kl=5e-4)  # a twice as large divergence would be beyond it
+    alone, together = algorithm(config), algorithm(config, ranks=2)
+    exchanged = []
+
+    def doubled(values: Tensor, op: object = None) -> None:
+        exchanged.append(values.numel())
+        values.mul_(2)
+
+    monkeypatch.setattr(torch.distributed, "all_reduce", doubled)
+    assert learned(together, 3) == learned(alone, 3)
+    for name, value in networks(alone).items():
+        assert torch.equal(networks(together)[name], value), name
+    weights = sum(parameter.numel() for one in (alone.actor, alone.critic) for parameter in one.parameters())
+    assert exchanged == [weights, 1] * (3 * CONFIG.epochs * CONFIG.mini_batches)
 
 
 class NoLooking(TorchDispatchMode):

@@ -1,5 +1,7 @@
 """Beyond the catalogue from end to end: what no effect names is found, refitted and kept; nothing else is."""
 
+from functools import cache
+
 import mujoco
 import numpy as np
 import pytest
@@ -21,7 +23,9 @@ from bumblebee.diagnosis.thresholds.report import MeasuredCurve, ReportThreshold
 from tests.diagnosis import arm, cart
 
 
-def prepared(**truth: float) -> tuple[Session, Problem, Problem]:
+@cache
+def prepared(**truth: float | tuple[float, float]) -> tuple[Session, Problem, Problem]:
+    """Windows to fit and to judge by of four rollouts of the cart, made once for each truth."""
     rollouts = cart.record(count=4, seconds=8.0, **truth)
     session = make_session(mujoco.MjSpec.from_string(cart.xml()), rollouts, "cart", "memory")
     problems = []

@@ -20,10 +20,10 @@ SEEDS = 5
 
 
 def _fitted(kind: str, place: str, value: float, seed: int) -> tuple[Problem, Fit, np.random.Generator]:
-    """The true effect alone, fitted to 40 windows of three rollouts."""
+    """The true effect alone, fitted to 24 windows of three rollouts."""
     rollouts = arm.simulate({(kind, place): value} if value else {}, count=3, seconds=4.0, seed=seed)
     session = arm.session_of(rollouts)
-    starts = choose_starts(session.rollouts, [0, 1, 2], 0.2, 40)
+    starts = choose_starts(session.rollouts, [0, 1, 2], 0.2, 24)
     windows = cut(session.plant, session.layout, session.rollouts, starts)
     rng = np.random.default_rng(0)
     problem = make_problem(session.plant, session.layout, windows, session.sigma, session.steps, [], rng)
