@@ -1,0 +1,65 @@
+"""The torque that the declared model lacks, joint by joint: the tests of what a diagnosis leaves, nothing fitted.
+
+The windows, their whitening and the tests are those of `diagnose`, so that both say the same of the same logs.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.discrepancy import JointActivity, LackOfFit, lack_of_fit
+from bumblebee.diagnosis.estimation import gauss_newton
+from bumblebee.diagnosis.prepare import gather
+from bumblebee.diagnosis.residuals import window_weights
+
+
+@dataclass(frozen=True, eq=False)
+class MissingTorque:
+    """What the tests say of the declared model, on J joints."""
+
+    left: LackOfFit
+    still: tuple[str, ...]
+    """Joints that never move; nothing is said of them."""
+
+    def cloud(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Position, velocity and missing torque [N m], (N,) each, of a joint in every segment of the fitted windows."""
+        data, evidence = self.left.scene.data, self.left.scene.evidence
+        q, v = (data.path.mean(values[..., joint]).ravel() for values in (data.q, data.v))
+        return q, v, evidence.lacking(joint).ravel()
+
+    def entries(self, units: dict[str, dict[str, str]]) -> dict[str, dict[str, Any]]:
+        """Joint -> its torque, and what that goes with; the largest share of what its servo gives first."""
+        evidence = self.left.scene.evidence
+        rows = {j.joint: (k, j) for k, j in enumerate(self.left.joints) if j.joint not in self.still}
+        order = sorted(rows, key=lambda name: -(rows[name][1].rms / rows[name][1].typical * rows[name][1].significant))
+        return {
+            name: {
+                "unit": units[name]["torque"],
+                "mean": _constant(evidence, rows[name][0]),
+                "structured_rms": rows[name][1].rms,
+                "drive_rms": rows[name][1].typical,
+                "significant": rows[name][1].significant,
+                "p": rows[name][1].p,
+                "depends_on": list(rows[name][1].depends_on),
+            }
+            for name in order
+        }
+
+
+def _constant(evidence: Any, joint: int) -> float:
+    """The constant torque [N m] that explains most of what a joint lacks."""
+    return float(evidence.test(joint, np.ones((1, *evidence.score[joint].shape))).size[0])
+
+
+def missing_torque(session: Session, config: DiagnosisConfig) -> MissingTorque:
+    """Test the declared model; `BadInput` where no rollout has a stretch as long as a window."""
+    with threadpool_limits(1, user_api="blas"):
+        material = gather(session, config, np.random.default_rng(config.seed), lambda text: None)
+        problem = material.problem
+        fit = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
+        left = lack_of_fit(problem, material.holdout.problem, fit, JointActivity(material.typical, material.still))
+    return MissingTorque(left, tuple(material.still))
