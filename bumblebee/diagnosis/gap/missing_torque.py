@@ -33,26 +33,24 @@ class MissingTorque:
 
     def entries(self, units: dict[str, dict[str, str]]) -> dict[str, dict[str, Any]]:
         """Joint -> its torque, and what that goes with; the largest share of what its servo gives first."""
-        evidence = self.left.scene.evidence
-        rows = {j.joint: (k, j) for k, j in enumerate(self.left.joints) if j.joint not in self.still}
-        order = sorted(rows, key=lambda name: -(rows[name][1].rms / rows[name][1].typical * rows[name][1].significant))
+        rows = [(k, j) for k, j in enumerate(self.left.joints) if j.joint not in self.still]
         return {
-            name: {
-                "unit": units[name]["torque"],
-                "mean": _constant(evidence, rows[name][0]),
-                "structured_rms": rows[name][1].rms,
-                "drive_rms": rows[name][1].typical,
-                "significant": rows[name][1].significant,
-                "p": rows[name][1].p,
-                "depends_on": list(rows[name][1].depends_on),
+            j.joint: {
+                "unit": units[j.joint]["torque"],
+                "mean": self.constant(k),
+                "structured_rms": j.rms,
+                "drive_rms": j.typical,
+                "significant": j.significant,
+                "p": j.p,
+                "depends_on": list(j.depends_on),
             }
-            for name in order
+            for k, j in sorted(rows, key=lambda row: -row[1].significant * row[1].rms / row[1].typical)
         }
 
-
-def _constant(evidence: Any, joint: int) -> float:
-    """The constant torque [N m] that explains most of what a joint lacks."""
-    return float(evidence.test(joint, np.ones((1, *evidence.score[joint].shape))).size[0])
+    def constant(self, joint: int) -> float:
+        """The constant torque [N m] that explains most of what a joint lacks."""
+        evidence = self.left.scene.evidence
+        return float(evidence.test(joint, np.ones((1, *evidence.score[joint].shape))).size[0])
 
 
 def missing_torque(session: Session, config: DiagnosisConfig) -> MissingTorque:

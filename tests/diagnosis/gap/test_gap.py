@@ -77,6 +77,15 @@ def test_logs_without_a_stretch_of_a_windows_length_get_a_report_without_missing
     assert "Too few windows" in gap_page(made)
 
 
+def test_a_trace_is_not_called_nothing(session: Session) -> None:
+    report = gap(session, 20, SMALL)
+    entry = report.document["missing_torque"]["j3"]
+    entry |= {"significant": False, "p": 1e-9}
+    assert "too small or not confirmed" in gap_page(report)
+    entry["p"] = 0.5
+    assert "too small or not confirmed" not in gap_page(report)
+
+
 def test_its_thresholds_are_settable(session: Session) -> None:
     before, rules = gap(session, 20, SMALL), Thresholds()
     assert before.document["missing_torque"]["j2"]["significant"]
