@@ -54,7 +54,7 @@ def gap(session: Session, budget: int = 120, config: DiagnosisConfig | None = No
     document = {
         **_heading(session, units),
         **_errors(session, cuts, config.seed),
-        "missing_torque": torque.entries(units) if torque else {},
+        "missing_torque": torque.entries(units, rules.gap.naming) if torque else {},
         "reported_torque": reported_torque(session.plant, session.rollouts, rules.gap.reported_torque),
         "motions": _by_motion(session, cuts.windows),
         "unidentifiable": [

@@ -15,6 +15,7 @@ from bumblebee.diagnosis.discrepancy import JointActivity, LackOfFit, lack_of_fi
 from bumblebee.diagnosis.estimation import gauss_newton
 from bumblebee.diagnosis.prepare import gather
 from bumblebee.diagnosis.residuals import window_weights
+from bumblebee.diagnosis.thresholds.gap import Naming
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,21 +32,38 @@ class MissingTorque:
         q, v = (data.path.mean(values[..., joint]).ravel() for values in (data.q, data.v))
         return q, v, evidence.lacking(joint).ravel()
 
-    def entries(self, units: dict[str, dict[str, str]]) -> dict[str, dict[str, Any]]:
-        """Joint -> its torque, and what that goes with; the largest share of what its servo gives first."""
-        rows = [(k, j) for k, j in enumerate(self.left.joints) if j.joint not in self.still]
+    def entries(self, units: dict[str, dict[str, str]], rule: Naming | None = None) -> dict[str, dict[str, Any]]:
+        """Joint -> its torque, and what that goes with; the largest share of what its servo gives first.
+
+        The size is that of the torques which a joint lacks by itself, whatever their form: far from a fit the basis
+        functions' sizes are no more than first guesses.
+        """
+        implied = self.left.scene.evidence.implied
+        rows = [(k, j, implied(k)) for k, j in enumerate(self.left.joints) if j.joint not in self.still]
         return {
             j.joint: {
                 "unit": units[j.joint]["torque"],
                 "mean": self.constant(k),
-                "structured_rms": j.rms,
+                "structured_rms": rms,
                 "drive_rms": j.typical,
                 "significant": j.significant,
                 "p": j.p,
-                "depends_on": list(j.depends_on),
+                "depends_on": self.quantities(k, rule or Naming()) if j.significant else [],
             }
-            for k, j in sorted(rows, key=lambda row: -row[1].significant * row[1].rms / row[1].typical)
+            for k, j, rms in sorted(rows, key=lambda row: -row[1].significant * row[2] / row[1].typical)
         }
+
+    def quantities(self, joint: int, rule: Naming) -> list[str]:
+        """What the torque of a joint that lacks one depends on, the most important first.
+
+        By the basis functions that were found beyond doubt on the fitted windows. That their sizes are the same on
+        others, as a diagnosis asks, is too much where nothing was fitted and sensitivities are the declared model's.
+        """
+        found = [f for f in self.left.sought.found if f.joint == joint]
+        sizes = [float(np.sqrt((np.einsum("fws,f->ws", f.torque, f.verdict.size) ** 2).mean())) for f in found]
+        some = [f for f, size in zip(found, sizes, strict=True) if size > rule.part_of_largest * max(sizes)]
+        named = dict.fromkeys(quantity for f in some for quantity in f.function.on)
+        return list(named or self.left.joints[joint].depends_on)
 
     def constant(self, joint: int) -> float:
         """The constant torque [N m] that explains most of what a joint lacks."""

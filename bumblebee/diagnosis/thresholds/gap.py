@@ -4,6 +4,14 @@ from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
+class Naming:
+    """Of what a joint's missing torque is said to depend on."""
+
+    part_of_largest: float = 0.1
+    """Share of the largest basis function's torque below which another one's quantities are not named."""
+
+
+@dataclass(frozen=True)
 class ReportedTorque:
     """Of the comparison with the drive's own torque."""
 
@@ -27,5 +35,6 @@ class GapPage:
 class GapThresholds:
     """All of them."""
 
+    naming: Naming = field(default_factory=Naming)
     reported_torque: ReportedTorque = field(default_factory=ReportedTorque)
     page: GapPage = field(default_factory=GapPage)
