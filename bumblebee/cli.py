@@ -121,7 +121,7 @@ def gap(
     if out:
         claim_folder(out, GAP, overwrite, inputs_of(model, dataset))
     report = compare(open_session(model, dataset))
-    print(gap_summary(report.document, report.examples, report.report), flush=True)
+    print(gap_summary(report.document, report.examples, report.thresholds.report), flush=True)
     if out:
         write_gap(report, out, overwrite)
         print(f"written: {out / 'gap.html'}, gap.json")

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from bumblebee.diagnosis.candidates import still_joints
+from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset import JUDGED_TWICE, Session
-from bumblebee.diagnosis.gap.dependence_test import JointStructure
+from bumblebee.diagnosis.gap.missing_torque import MissingTorque, missing_torque
 from bumblebee.diagnosis.gap.reported_torque import reported_torque
-from bumblebee.diagnosis.gap.sparse_regression import examine
-from bumblebee.diagnosis.gap.torque_residual import TorqueResidual, missing_torques
 from bumblebee.diagnosis.report import (
     ALONE,
     HorizonWindows,
@@ -22,8 +21,8 @@ from bumblebee.diagnosis.report import (
     horizon_windows,
 )
 from bumblebee.diagnosis.simulation import Windows, joint_units, members, mixed_notes, residuals, vary
-from bumblebee.diagnosis.thresholds.gap import GapThresholds
-from bumblebee.diagnosis.thresholds.report import ReportThresholds
+from bumblebee.diagnosis.thresholds import Thresholds
+from bumblebee.errors import BadInput
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,46 +31,50 @@ class Gap:
 
     document: dict[str, Any]
     examples: list[dict[str, Any]]
-    torque: TorqueResidual | None
-    thresholds: GapThresholds = field(default_factory=GapThresholds)
+    torque: MissingTorque | None
+    """None where no stretch of the logs was long enough to test."""
+    thresholds: Thresholds = field(default_factory=Thresholds)
     """What it was made with."""
-    report: ReportThresholds = field(default_factory=ReportThresholds)
-    """The same of what it shares with a diagnosis: errors, examples and verdicts."""
 
 
-def gap(
-    session: Session,
-    budget: int = 120,
-    seed: int = 0,
-    thresholds: GapThresholds | None = None,
-    report: ReportThresholds | None = None,
-) -> Gap:
-    """Compare the declared model of `session` with all its rollouts; nothing is fitted."""
-    rules, shared = thresholds or GapThresholds(), report or ReportThresholds()
-    ids = list(range(len(session.rollouts)))
-    cuts = horizon_windows(session, ids, budget, shared.prediction_error)
+def gap(session: Session, budget: int = 120, config: DiagnosisConfig | None = None) -> Gap:
+    """Compare the declared model of `session` with all its rollouts; nothing is fitted.
+
+    Args:
+        session: the declared model and all rollouts.
+        budget: windows for each horizon of the errors.
+        config: of the diagnosis whose tests say what the model lacks.
+    """
+    config = config or DiagnosisConfig()
+    rules = config.thresholds
+    cuts = horizon_windows(session, list(range(len(session.rollouts))), budget, rules.report.prediction_error)
     still = still_joints(session.plant, session.rollouts, session.sigma)
-    train, held = missing_torques(session, [], np.zeros(1), rules.missing_torque)
-    found = []
-    if train is not None and held is not None:
-        found = [examine(train, held, j, rules)[0] for j, n in enumerate(train.joints) if n not in still]
+    torque, untested = _tested(session, config)
     units = joint_units(session.plant)
     document = {
         **_heading(session, units),
-        **_errors(session, cuts, seed),
-        "missing_torque": _torques(found, train, held, units),
-        "reported_torque": reported_torque(session.plant, session.rollouts, rules.reported_torque),
+        **_errors(session, cuts, config.seed),
+        "missing_torque": torque.entries(units, rules.gap.naming) if torque else {},
+        "reported_torque": reported_torque(session.plant, session.rollouts, rules.gap.reported_torque),
         "motions": _by_motion(session, cuts.windows),
         "unidentifiable": [
             {"where": [name], "why": "the joint is not excited: it moves no more than its sensor's noise"}
             for name in still
         ],
         "warnings": [*session.warnings, *([] if session.accept else [ALONE])],
-        "notes": [*(n for n in session.notes if n != JUDGED_TWICE), *mixed_notes(session.plant)],
+        "notes": [*(n for n in session.notes if n != JUDGED_TWICE), *mixed_notes(session.plant), *untested],
         "set_aside": session.set_aside,
         "noise": dict(zip(session.layout.labels(session.plant.joints), session.sigma.tolist(), strict=True)),
     }
-    return Gap(document, examples(session, rule=shared.example_windows), train, rules, shared)
+    return Gap(document, examples(session, rule=rules.report.example_windows), torque, rules)
+
+
+def _tested(session: Session, config: DiagnosisConfig) -> tuple[MissingTorque | None, list[str]]:
+    """What the declared model lacks; where no window can be cut, None and a note why."""
+    try:
+        return missing_torque(session, config), []
+    except BadInput as error:
+        return None, [f"missing torques could not be tested: {error}"]
 
 
 def _heading(session: Session, units: dict[str, dict[str, str]]) -> dict[str, Any]:
@@ -93,31 +96,6 @@ def _errors(session: Session, cuts: HorizonWindows, seed: int) -> dict[str, Any]
         "error": error_block(cuts, whiteners, model, session.steps[0], seed),
         "floor": floor_block(cuts, whiteners, session.sigma, seed),
     }
-
-
-def _torques(
-    found: Sequence[JointStructure],
-    train: TorqueResidual | None,
-    held: TorqueResidual | None,
-    units: dict[str, dict[str, str]],
-) -> dict[str, Any]:
-    """Joint -> mean and structured part of the torque that it lacks, and what that goes with; largest share first."""
-    if train is None or held is None:
-        return {}
-    out = {}
-    for s in sorted(found, key=lambda s: -(s.rms / s.typical if s.significant else 0.0)):
-        j = train.joints.index(s.joint)
-        lacks = np.concatenate((train.missing[:, j], held.missing[:, j]))
-        out[s.joint] = {
-            "unit": units[s.joint]["torque"],
-            "mean": float(np.mean(lacks)),
-            "structured_rms": s.rms,
-            "drive_rms": s.typical,
-            "significant": s.significant,
-            "p": s.p,
-            "depends_on": list(s.depends_on),
-        }
-    return out
 
 
 def _by_motion(session: Session, windows: dict[str, Windows]) -> list[dict[str, Any]]:

@@ -39,7 +39,7 @@ def gap_page(report: Gap) -> str:
         *_clouds(report),
         *_reported(document),
         "<h2>Error by motion</h2>",
-        _motions(document["motions"], report.thresholds.page.motions),
+        _motions(document["motions"], report.thresholds.gap.page.motions),
         "<h2>Notes</h2>" if document["notes"] or document["unidentifiable"] else "",
         items(document["notes"] + [f"{', '.join(u['where'])}: {u['why']}" for u in document["unidentifiable"]]),
     ]
@@ -115,7 +115,7 @@ def _joints(document: dict[str, Any]) -> str:
 
 
 def _torque(report: Gap) -> str:
-    document, span = report.document, report.thresholds.missing_torque.span
+    document = report.document
     lacking = document["missing_torque"]
     if not lacking:
         return "<p>Too few windows to say.</p>"
@@ -123,7 +123,7 @@ def _torque(report: Gap) -> str:
     for joint, entry in lacking.items():
         on = escape(", ".join(entry["depends_on"])) or "no single quantity"
         share = f"{100 * entry['structured_rms'] / entry['drive_rms']:.0f} %" if entry["drive_rms"] else "-"
-        quiet = f"<span class='note'>{escape(nothing_seen(document, joint, report.report.verdicts))}</span>"
+        quiet = f"<span class='note'>{escape(nothing_seen(document, joint, report.thresholds.report.verdicts))}</span>"
         rows.append(
             [
                 f"{escape(joint)} [{entry['unit']}]",
@@ -134,31 +134,32 @@ def _torque(report: Gap) -> str:
                 probability(entry["p"]),
             ]
         )
-    head = ["joint", "mean", "predictable RMS", "share of drive torque", "depends on", "p"]
+    head = ["joint", "constant", "RMS", "share of drive torque", "depends on", "p"]
     text = (
-        f"<p class='note'>Mean torque that would cancel the velocity error over {span:g} s or a tick. The predictable "
-        "part is what gradient-boosted trees, trained on some rollouts, predict on others; p is Bonferroni-corrected "
-        "for the number of joints.</p>"
+        "<p class='note'>Torque that the declared model lacks, by the tests that a diagnosis applies to its own rest: "
+        "basis functions of the motion, confirmed on rollouts that took no part, and whether a free torque in every "
+        "fifth of a window explains more than sensor noise does. p is corrected for the number of functions or joints."
+        "</p>"
     )
     return text + table(head, rows, (1, 2, 3, 5))
 
 
 def _clouds(report: Gap) -> list[str]:
     """Missing torque over velocity and position of the joints with most structure."""
-    data = report.torque
-    if data is None:
+    if report.torque is None:
         return []
+    names = [j.joint for j in report.torque.left.joints]
     worst = [j for j, e in report.document["missing_torque"].items() if e["significant"]]
     parts = []
-    for joint in worst[: report.thresholds.page.pictures]:
-        j, lacks = data.joints.index(joint), f"residual [{of_joint(report.document, joint, 'torque')}]"
+    for joint in worst[: report.thresholds.gap.page.pictures]:
+        position, velocity, torque = report.torque.cloud(names.index(joint))
+        lacks = f"missing torque [{of_joint(report.document, joint, 'torque')}]"
         pair = [
             cloud_picture(
-                values[:, j], data.missing[:, j], f"{name} [{of_joint(report.document, joint, name)}]", lacks,
-                f"{joint} over {name}",
+                values, torque, f"{name} [{of_joint(report.document, joint, name)}]", lacks, f"{joint} over {name}"
             )
-            for name, values in (("velocity", data.v), ("position", data.q))
-        ]  # fmt: skip
+            for name, values in (("velocity", velocity), ("position", position))
+        ]
         shown = "".join(figure(p, escape(f"{joint}: mean in equally filled bins, 95 % interval")) for p in pair)
         parts.append(f"<div class='row'>{shown}</div>")
     return parts

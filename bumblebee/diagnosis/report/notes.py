@@ -158,16 +158,17 @@ def what_is_left(document: Mapping[str, Any], rule: Verdicts) -> str:
 
 
 def nothing_seen(document: Mapping[str, Any], joint: str, rule: Verdicts) -> str:
-    """What to say of a joint whose missing torque has no structure: no comfort where it errs by much."""
+    """What to say of a joint whose missing torque is not significant: no comfort where it errs by much."""
+    quiet = "no significant structure"
+    if document["missing_torque"][joint]["p"] < rule.trace:
+        quiet = "significant structure, but too small or not confirmed on other rollouts"
     horizon = told_horizon(document["error"])
     if horizon is None:
-        return "no significant structure"
+        return quiet
     value, noise = (
         document[part].get(horizon, {}).get("joint_pos_rmse", {}).get("per_joint", {}).get(joint, {}).get("value")
         for part in ("error", "floor")
     )
     if value is None or not noise or value <= rule.large * noise:
-        return "no significant structure"
-    return (
-        f"no significant structure, yet the error after {horizon} s is {number(value / noise, 2)} times the noise floor"
-    )
+        return quiet
+    return f"{quiet}, yet the error after {horizon} s is {number(value / noise, 2)} times the noise floor"

@@ -1,54 +1,118 @@
-"""The gap report: what could not be tested stands in it, and its thresholds are settable."""
+"""The gap report: a complete model lacks nothing, a lacking one what it lacks; what could not be tested is said."""
 
 from dataclasses import fields, replace
 from pathlib import Path
 
-import mujoco
 import pytest
 
 from bumblebee.diagnosis import gap as room
-from bumblebee.diagnosis.dataset.session import Session, make_session
+from bumblebee.diagnosis.config import DiagnosisConfig
+from bumblebee.diagnosis.dataset.session import Session
 from bumblebee.diagnosis.gap import gap, gap_page
 from bumblebee.diagnosis.report import gap_summary
-from bumblebee.diagnosis.thresholds.gap import GapThresholds
+from bumblebee.diagnosis.thresholds import Thresholds
+from bumblebee.diagnosis.thresholds.gap import GapPage, GapThresholds
 from bumblebee.diagnosis.thresholds.report import ExampleWindows, ReportThresholds, Verdicts
 from tests.diagnosis import arm, cart
+from tests.diagnosis.arm import SMALL, session_of
+
+COUNT = 4
+"""Rollouts of a case: two to fit at least, and some that take no part."""
+
+
+def of(effects: dict[tuple[str, str], float], seed: int = 0, **given) -> Session:
+    return session_of(arm.simulate(effects, count=COUNT, seed=seed, **given))
+
+
+def by(thresholds: Thresholds) -> DiagnosisConfig:
+    return replace(SMALL, thresholds=thresholds)
+
+
+def named(session: Session) -> dict[str, list[str]]:
+    """Joint that lacks a torque -> what that depends on."""
+    entries = gap(session, 20, SMALL).document["missing_torque"]
+    return {joint: e["depends_on"] for joint, e in entries.items() if e["significant"]}
 
 
 @pytest.fixture(scope="module")
 def session() -> Session:
-    rollouts = arm.simulate({("spring", "j2"): 1.5})
-    return make_session(mujoco.MjSpec.from_string(arm.XML), rollouts, "arm", "memory")
+    return of({("spring", "j2"): 1.5})
 
 
-def test_a_gap_report_of_one_rollout_says_what_could_not_be_tested():
-    report = gap(make_session(mujoco.MjSpec.from_string(cart.xml()), cart.record(count=1), "cart", "memory"))
+@pytest.mark.parametrize("seed", range(6))
+def test_nothing_depends_on_anything_where_the_model_is_complete(seed: int) -> None:
+    assert named(of({}, seed)) == {}
+
+
+@pytest.mark.parametrize(
+    "effect, joint, quantity",
+    [
+        (("coulomb_friction", "j2", 0.5), "j2", "velocity"),
+        (("viscous_friction", "j3", 0.3), "j3", "velocity"),
+        (("spring", "j2", 1.5), "j2", "position"),
+        (("motor_strength", "j2", 0.8), "j2", "torque"),
+    ],
+)
+def test_what_a_joint_lacks_is_named_with_what_it_depends_on(effect, joint: str, quantity: str) -> None:
+    kind, place, value = effect
+    found = named(of({(kind, place): value}))
+    assert quantity in found[joint]
+
+
+def test_the_missing_torque_is_as_large_as_the_friction_that_the_model_lacks() -> None:
+    entry = gap(of({("coulomb_friction", "j2"): 0.5}), 20, SMALL).document["missing_torque"]["j2"]
+    assert 0.3 < entry["structured_rms"] < 0.6
+
+
+def test_a_gap_report_of_one_rollout_says_what_could_not_be_tested() -> None:
+    report = gap(session_of(cart.record(count=1), cart.xml()), 20, SMALL)
     assert any("could not be tested" in text for text in report.document["warnings"])
     assert "WARNING: a single rollout" in gap_summary(report.document, report.examples)
 
 
+def test_logs_without_a_stretch_of_a_windows_length_get_a_report_without_missing_torques(session: Session) -> None:
+    made = gap(session, 20, replace(SMALL, horizon=60.0))
+    assert made.document["missing_torque"] == {} and made.torque is None
+    assert any("missing torques could not be tested" in note for note in made.document["notes"])
+    assert "Too few windows" in gap_page(made)
+
+
+def test_a_trace_is_not_called_nothing(session: Session) -> None:
+    report = gap(session, 20, SMALL)
+    entry = report.document["missing_torque"]["j3"]
+    entry |= {"significant": False, "p": 1e-9}
+    assert "too small or not confirmed" in gap_page(report)
+    entry["p"] = 0.5
+    assert "too small or not confirmed" not in gap_page(report)
+
+
 def test_its_thresholds_are_settable(session: Session) -> None:
-    before, rules = gap(session), GapThresholds()
-    assert any(e["significant"] for e in before.document["missing_torque"].values())
-    strict = replace(rules, dependence=replace(rules.dependence, least=1e9))
-    assert not any(e["significant"] for e in gap(session, thresholds=strict).document["missing_torque"].values())
-    long = replace(
-        rules, missing_torque=replace(rules.missing_torque, span=0.08, fewest=20), page=replace(rules.page, motions=1)
-    )
-    made = gap(session, thresholds=long)
-    assert len(made.torque) < len(before.torque)
-    assert "0.08 s" in gap_page(made) and "and 2 more" in gap_page(made)
-    none = replace(rules, missing_torque=replace(rules.missing_torque, fewest=10**9))
-    assert gap(session, thresholds=none).document["missing_torque"] == {}
+    before, rules = gap(session, 20, SMALL), Thresholds()
+    assert before.document["missing_torque"]["j2"]["significant"]
+    tests = replace(rules.discrepancy.residual_tests, least_torque=1e9, excess_fitted=1e9, excess_alone=1e9)
+    strict = replace(rules, discrepancy=replace(rules.discrepancy, residual_tests=tests))
+    assert not any(e["significant"] for e in gap(session, 20, by(strict)).document["missing_torque"].values())
+    short = replace(before, thresholds=replace(rules, gap=GapThresholds(page=GapPage(motions=1, pictures=0))))
+    assert "and 3 more" in gap_page(short) and len(gap_page(short)) < len(gap_page(before))
 
 
 def test_what_it_shares_with_a_diagnosis_is_settable(session: Session) -> None:
-    rules = ReportThresholds(example_windows=ExampleWindows(lengths=(0.2,)), verdicts=Verdicts(large=0.0))
-    strict = replace(GapThresholds().dependence, least=1e9)
-    made = gap(session, thresholds=GapThresholds(dependence=strict), report=rules)
+    rules = Thresholds()
+    tests = replace(rules.discrepancy.residual_tests, least_torque=1e9, excess_fitted=1e9, excess_alone=1e9)
+    made = gap(
+        session,
+        20,
+        by(
+            replace(
+                rules,
+                discrepancy=replace(rules.discrepancy, residual_tests=tests),
+                report=ReportThresholds(example_windows=ExampleWindows(lengths=(0.2,)), verdicts=Verdicts(large=0.0)),
+            )
+        ),
+    )
     assert all(e["time"][-1] == pytest.approx(0.2) for e in made.examples)
     assert "times the noise" in gap_page(made)
-    assert "times the noise" in gap_summary(made.document, made.examples, made.report)
+    assert "times the noise" in gap_summary(made.document, made.examples, made.thresholds.report)
 
 
 def test_no_threshold_is_without_a_reader() -> None:
