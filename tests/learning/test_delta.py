@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from bumblebee.errors import BadInput
-from bumblebee.learning.delta import DeltaEnv, Recordings, compare, replay_error, rewards, stack
+from bumblebee.learning.delta import DeltaEnv, Recordings, compare, replay_error, rewards, stack, train_delta
 from bumblebee.learning.delta.action import (
     DeltaAction,
     DeltaConfig,
@@ -20,6 +20,7 @@ from bumblebee.learning.delta.action import (
 from bumblebee.measured.rollout import Rollout
 from bumblebee.robot.facts import ANKLE_JOINTS, joint_names, stand_pose
 from bumblebee.sim.engine import RobotState
+from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
 
@@ -190,3 +191,14 @@ def test_promotion_needs_an_interval_below_zero() -> None:
     judged = compare(few, {h: 0.5 * v for h, v in few.items()})
     assert not judged.promoted
     assert "too few held-out rollouts to judge (3, 4 are needed)" in judged.reason
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_on_a_gpu_a_delta_is_trained_where_the_engine_is(recordings: Recordings) -> None:
+    config = DeltaConfig(num_envs=64, iterations=1, steps_per_iteration=4, episode_seconds=0.4)
+    env = DeltaEnv(make_engine("mujoco_warp", load_model(), 64), recordings, config, NO_OFFSET)
+    assert {seen.device.type for seen in env.get_observations().values()} == {"cuda"}
+    delta, curve = train_delta(env, config)
+    assert np.isfinite(curve["reward"]).all()
+    assert next(delta.network.parameters()).device.type == "cpu"

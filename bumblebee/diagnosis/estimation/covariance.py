@@ -52,7 +52,7 @@ def _clustered(
     normals = np.matmul(rows * weights[:, None, None], rows.transpose(0, 2, 1))
     groups = np.unique(clusters)
     prior = np.zeros(len(basis))
-    prior[: len(problem.nuisance)] = 1.0
+    prior[: len(problem.nuisance)] = problem.prior
     summed = np.stack([normals[clusters == g].sum(axis=0) for g in groups])
     full = summed.sum(axis=0) + np.diag(prior)
     full[np.diag_indices(len(full))] *= 1 + 1e-9

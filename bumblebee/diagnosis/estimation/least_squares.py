@@ -17,7 +17,7 @@ def project(
     flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
     normal = flat @ flat.T
     count = len(problem.nuisance)
-    normal[np.arange(count), np.arange(count)] += 1.0  # the nuisances' prior
+    normal[np.arange(count), np.arange(count)] += problem.prior
     normal[np.arange(count, len(normal)), np.arange(count, len(normal))] *= 1 + damping
     return basis, np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
 
@@ -33,7 +33,7 @@ def cost_of(problem: Problem, residual: np.ndarray, weights: np.ndarray) -> tupl
     basis, inverse = project(problem, np.empty((0, *residual.shape)), weights)
     nuisance = solve(basis, inverse, residual, weights)
     left = residual - np.tensordot(nuisance, basis, axes=1)
-    return float((weights[:, None] * left**2).sum() + nuisance @ nuisance), nuisance
+    return float((weights[:, None] * left**2).sum() + problem.prior * nuisance @ nuisance), nuisance
 
 
 class LeftOver:

@@ -46,6 +46,16 @@ class Problem:
     recall: Recall = field(default_factory=Recall, repr=False)
     thresholds: Thresholds = field(default_factory=Thresholds, repr=False)
     """What all that is asked of the problem is decided by."""
+    prior: float = 1.0
+    """Weight of the nuisances' prior; see `held_to`."""
+
+    def held_to(self, power: float) -> "Problem":
+        """The problem with the nuisances' prior weighed for a model that leaves `power` (median chi-square by value).
+
+        Against residuals a thousand times the noise a prior of one weighs nothing, and nuisances take what effects
+        should. What is left is then taken for the noise's measure: the prior weighs as much more.
+        """
+        return replace(self, prior=max(1.0, power / self.thresholds.residuals.nuisances.held_from))
 
     def residual(self, effects: Sequence[Sequence[Effect]], coarse: bool = False) -> np.ndarray:
         """Whitened residuals of several models, (V, W, M)."""

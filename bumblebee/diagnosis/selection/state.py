@@ -39,7 +39,9 @@ class SearchState:
         self.problem, self.holdout, self.remake, self.config, self.say = problem, holdout, remake, config, say
         start = problem.residual([[]])[0]
         self.weights = window_weights(start)
-        self.fit = gauss_newton(problem, (), (), self.weights)
+        found = gauss_newton(problem, (), (), self.weights)
+        self.problem = problem.held_to(found.power(problem))
+        self.fit = resolved(self.problem, found, self.weights)
         self.keep = screening_windows(problem, config.screen_windows)
         self.closed: set[Candidate] = set()
         self.hopeless: set[tuple[str, str]] = set()  # limits, plays, shafts (effect, joint) that were tried in vain
@@ -195,6 +197,7 @@ class SearchState:
             self.problem = self.problem.relinearised(fit.effects)
             self.holdout = self.holdout.relinearised(fit.effects)
         self.weights = window_weights(fit.clean(self.problem))
+        self.problem = self.problem.held_to(fit.power(self.problem))
         self.fit = resolved(self.problem, fit, self.weights)
         self.small = self.problem.part(self.keep)
         if self.fit.cost < self.rule.anew * self.screened_cost:

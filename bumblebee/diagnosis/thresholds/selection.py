@@ -21,6 +21,8 @@ class Forward:
     """Times the bound's chi-square from which on a screened gain is sure enough to make others wait."""
     many_after: int = 2
     """Effects after which a model that is still far off is taken to lack many."""
+    many_at_once: float = 300.0
+    """Median chi-square by value, from which on one effect is enough for that."""
     many_little: float = 0.5
     """Share of the reduced chi-square that the last of them took at most."""
     many_patience: int = 2

@@ -30,23 +30,24 @@ class DeltaEnv(VecEnv):
     """
 
     def __init__(self, engine: Engine, recordings: Recordings, config: DeltaConfig, encoder_offset: Tensor) -> None:
-        self.engine, self.recordings, self.config = engine, recordings, config
-        self.num_envs, self.num_actions, self.device = engine.num_worlds, len(config.joints), "cpu"
+        device = engine.device
+        self.engine, self.recordings, self.config = engine, recordings.to(device), config
+        self.num_envs, self.num_actions, self.device = engine.num_worlds, len(config.joints), str(device)
         self.max_episode_length = round(config.episode_seconds / engine.control_dt)
         self.cfg = config
-        self._offset = encoder_offset
-        self._starts = recordings.windows(self.max_episode_length, stride=1)
-        self._placement = placement(config.joints)
+        self._offset = encoder_offset.to(device)
+        self._starts = self.recordings.windows(self.max_episode_length, stride=1)
+        self._placement = placement(config.joints).to(device)
         facts = joints()
-        self._effort = torch.tensor([j.effort_limit for j in facts])
-        self._range = torch.tensor([j.range for j in facts]).T
-        self._speed = torch.tensor([j.velocity_limit for j in facts])
-        self._generator = torch.Generator().manual_seed(config.seed)
-        self.episode_length_buf = torch.zeros(self.num_envs, dtype=torch.long)
-        self._row = torch.zeros(self.num_envs, dtype=torch.long)
-        self._last = torch.zeros(self.num_envs, self.num_actions)
-        self._joint_vel = torch.zeros(self.num_envs, len(facts))
-        self._restart(torch.arange(self.num_envs))
+        self._effort = torch.tensor([j.effort_limit for j in facts], device=device)
+        self._range = torch.tensor([j.range for j in facts], device=device).T
+        self._speed = torch.tensor([j.velocity_limit for j in facts], device=device)
+        self._generator = torch.Generator(device).manual_seed(config.seed)
+        self.episode_length_buf = torch.zeros(self.num_envs, dtype=torch.long, device=device)
+        self._row = torch.zeros(self.num_envs, dtype=torch.long, device=device)
+        self._last = torch.zeros(self.num_envs, self.num_actions, device=device)
+        self._joint_vel = torch.zeros(self.num_envs, len(facts), device=device)
+        self._restart(torch.arange(self.num_envs, device=device))
 
     def get_observations(self) -> TensorDict:
         """What the policy and the critic see now."""
@@ -62,7 +63,7 @@ class DeltaEnv(VecEnv):
         state, unstable = self.engine.state(), self.engine.unstable()
         distance = (state.root_pos_w - self.recordings.qpos[self._row, :3]).norm(dim=-1)
         lost = (distance > self.config.divergence) | unstable
-        reward = torch.where(unstable, torch.zeros(()), self._reward(state, delta)).nan_to_num()
+        reward = torch.where(unstable, 0.0, self._reward(state, delta)).nan_to_num()
         reward = reward + self.config.rewards.termination * lost * self.engine.control_dt
         timeout = self.episode_length_buf >= self.max_episode_length
         done = lost | timeout
@@ -97,7 +98,7 @@ class DeltaEnv(VecEnv):
     def _restart(self, ids: Tensor) -> None:
         if len(ids) == 0:
             return
-        drawn = torch.randint(len(self._starts), (len(ids),), generator=self._generator)
+        drawn = torch.randint(len(self._starts), (len(ids),), generator=self._generator, device=ids.device)
         rows = self._starts[drawn]
         restart(self.engine, self.recordings, ids, rows, self._offset)
         self._row[ids] = rows

@@ -35,13 +35,19 @@ class Recordings:
     length: Tensor
     ids: tuple[str, ...]
 
+    def to(self, device: torch.device | str) -> "Recordings":
+        """The same on a device."""
+        moved = {name: getattr(self, name).to(device) for name in ("qpos", "qvel", "targets", "start", "length")}
+        return Recordings(**moved, ids=self.ids)
+
     def windows(self, frames: int, stride: int) -> Tensor:
         """First rows of all windows of `frames` steps, every `stride` rows of each longer rollout, (W,)."""
+        device = self.start.device
         rows = [
-            torch.arange(int(first), int(first) + max(int(length) - frames, 0), stride)
+            torch.arange(int(first), int(first) + max(int(length) - frames, 0), stride, device=device)
             for first, length in zip(self.start, self.length, strict=True)
         ]
-        return torch.cat(rows) if rows else torch.zeros(0, dtype=torch.long)
+        return torch.cat(rows) if rows else torch.zeros(0, dtype=torch.long, device=device)
 
     def owner(self, rows: Tensor) -> Tensor:
         """Index of the rollout that each row belongs to."""

@@ -30,7 +30,7 @@ def train_delta(
     """
     torch.manual_seed(config.seed)
     with contextlib.redirect_stdout(io.StringIO()):  # rsl_rl prints both networks
-        runner = OnPolicyRunner(env, runner_config(_ppo(config)), log_dir=None, device="cpu")
+        runner = OnPolicyRunner(env, runner_config(_ppo(config)), log_dir=None, device=env.device)
     algorithm: BoundedPpo = runner.alg  # type: ignore[assignment]
     _start_at_zero(algorithm.actor.mlp)
     algorithm.train_mode()

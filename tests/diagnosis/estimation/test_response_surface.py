@@ -24,7 +24,7 @@ class Rough:
         rng = np.random.default_rng(1)
         self.plant = SimpleNamespace(floating=floating, joints=("j",), bodies=())
         self.windows = SimpleNamespace(rollout=np.arange(W) % 5)
-        self.nuisance = np.zeros((1, W, M))
+        self.nuisance, self.prior = np.zeros((1, W, M)), 1.0
         self.thresholds = Thresholds()
         self.column = 4.5 * rng.standard_normal((W, M))  # for a change of 0.18 N m
         self.noise = rng.standard_normal((W, M))

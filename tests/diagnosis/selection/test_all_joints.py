@@ -1,5 +1,7 @@
 """Parameters that are wrong on all joints at once are found together and by name."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,12 +10,15 @@ from bumblebee.diagnosis.comparison.backward_elimination import certainty
 from bumblebee.diagnosis.comparison.compare import compare
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.submodel import moved_without
+from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.dataset.session import Session
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
+from bumblebee.diagnosis.selection.proposals import all_joints
 from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.diagnosis.thresholds import Thresholds
 from tests.diagnosis import arm
 
 TRUTH = {
@@ -91,3 +96,26 @@ def test_an_effect_taken_out_by_slopes_leaves_what_a_refit_in_the_simulator_leav
     assert less.cost == pytest.approx(again.cost, rel=0.01)
     declared = gauss_newton(problem, (), (), weights)
     assert moved_without(problem, full, weights, three).cost == pytest.approx(declared.cost, rel=0.05)
+
+
+@pytest.mark.parametrize(("power", "begins"), [(100.0, False), (400.0, True)])
+def test_one_effect_is_enough_to_begin_where_residuals_are_hundreds_of_times_the_noise(
+    monkeypatch: pytest.MonkeyPatch, power: float, begins: bool
+) -> None:
+    tried: list[float] = []
+    monkeypatch.setattr(all_joints, "fit_all_joints", lambda *_: tried.append(power))
+    thresholds = Thresholds()
+    run = SimpleNamespace(
+        tried_many=False,
+        given=0,
+        fall=0.9,
+        fit=SimpleNamespace(chosen=("one",)),
+        rule=thresholds.selection.forward,
+        config=SearchConfig(),
+        problem=SimpleNamespace(thresholds=thresholds),
+        candidates=[],
+        say=None,
+        power=lambda: power,
+    )
+    assert not all_joints.start_with_all_joints(run)  # nothing came of it
+    assert bool(tried) is begins

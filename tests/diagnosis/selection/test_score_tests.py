@@ -18,7 +18,7 @@ def _z(sizes: np.ndarray, there: float, seed: int, factor: float = 1.0) -> float
     column = rng.standard_normal((1, _WINDOWS, _VALUES)) * sizes[None, :, None] / np.sqrt(_VALUES)
     residual = there * column[0] + factor * rng.standard_normal((_WINDOWS, _VALUES))
     nuisance = rng.standard_normal((2, _WINDOWS, _VALUES))
-    problem = SimpleNamespace(nuisance=nuisance, thresholds=Thresholds())
+    problem = SimpleNamespace(nuisance=nuisance, thresholds=Thresholds(), prior=1.0)
     fit = SimpleNamespace(residual=residual, columns=np.empty((0, _WINDOWS, _VALUES)))
     candidate = Candidate("coulomb_friction", "j", (0.0,), (1.0,))
     columns = Columns([candidate], column.astype(np.float32))

@@ -2,11 +2,12 @@
 
 A robot with friction and latency on every joint is found one effect at a time only by a long way round: each effect
 alone explains a twentieth, and what stands for the others' share has a strange name. Where residuals are large still
-after two effects, and the second explained little or they are very large, the usual ones of all joints are fitted
-together from the declared values on, or from those found. Of a small robot whose residuals stay large masses and
-centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows that took
-no part; these and the fitted ones are then whitened anew, and the search goes on from there. It never begins so: a load
-at the end of an arm weakens all drives as far as these can tell.
+after two effects (after one, where they are hundreds of times the noise), and the last explained little or they are
+very large, the usual ones of all joints are fitted together from the declared values on, or from those found. Of a
+small robot whose residuals stay large masses and centres of mass of all links follow. What is not sure is taken out
+again, and the rest has to pay on windows that took no part; these and the fitted ones are then whitened anew, and the
+search goes on from there. It never begins so: a load at the end of an arm weakens all drives as far as these can
+tell.
 """
 
 from collections.abc import Callable, Sequence
@@ -123,7 +124,7 @@ def _moved(problem: Problem, fit: Fit, weights: np.ndarray, damping: float) -> n
     normal, count = flat @ flat.T, len(problem.nuisance)
     own = np.arange(len(normal))
     power = max(float((weights[:, None] * fit.clean(problem) ** 2).mean()), 1.0)
-    normal[own[:count], own[:count]] += 1.0
+    normal[own[:count], own[:count]] += problem.prior
     normal[own[count:], own[count:]] += damping * normal[own[count:], own[count:]] + power / rule.free**2
     move = np.linalg.solve(normal, flat @ (fit.residual * np.sqrt(weights)[:, None]).ravel())[count:]
     values = fit.values.copy()
@@ -169,6 +170,8 @@ def whitened_anew(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Problem
     if holdout.problem is not None:
         holdout = replace(holdout, problem=_whitened_around(holdout.problem, fit.effects))
     weights = window_weights(problem.residual([fit.effects])[0])
+    fit = gauss_newton(problem, fit.chosen, fit.values, weights, iterations=2, coarse=True)
+    problem = problem.held_to(fit.power(problem))
     return problem, holdout, gauss_newton(problem, fit.chosen, fit.values, weights, iterations=2, coarse=True)
 
 
@@ -191,9 +194,11 @@ def start_with_all_joints(run: SearchState) -> bool:
 
     Only if the last of these explained little, or they are very large: else the next may explain the rest.
     """
-    if run.tried_many or run.given or len(run.fit.chosen) < run.rule.many_after or run.power() < run.config.many:
+    power = run.power()
+    enough = 1 if power >= run.rule.many_at_once else run.rule.many_after
+    if run.tried_many or run.given or len(run.fit.chosen) < enough or power < run.config.many:
         return False
-    if run.fall >= run.rule.many_little and run.power() < run.config.far:
+    if run.fall >= run.rule.many_little and power < run.config.far:
         return False
     run.tried_many = True
     fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
