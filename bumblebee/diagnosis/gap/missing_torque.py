@@ -33,7 +33,7 @@ class MissingTorque:
         return q, v, evidence.lacking(joint).ravel()
 
     def entries(self, units: dict[str, dict[str, str]], rule: Naming | None = None) -> dict[str, dict[str, Any]]:
-        """Joint -> its torque, and what that goes with; the largest share of what its servo gives first.
+        """Joint -> its torque, and what that goes with; first where it explains most of what the windows show.
 
         The size is that of the torques which a joint lacks by itself, whatever their form: far from a fit the basis
         functions' sizes are no more than first guesses.
@@ -48,9 +48,10 @@ class MissingTorque:
                 "drive_rms": j.typical,
                 "significant": j.significant,
                 "p": j.p,
+                "excess": j.excess,
                 "depends_on": self.quantities(k, rule or Naming()) if j.significant else [],
             }
-            for k, j, rms in sorted(rows, key=lambda row: -row[1].significant * row[2] / row[1].typical)
+            for k, j, rms in sorted(rows, key=lambda row: -row[1].significant * row[1].excess)
         }
 
     def quantities(self, joint: int, rule: Naming) -> list[str]:

@@ -59,6 +59,12 @@ def test_what_a_joint_lacks_is_named_with_what_it_depends_on(effect, joint: str,
     assert quantity in found[joint]
 
 
+@pytest.mark.parametrize("effect", [("torque_limit", "j2", 6.0), ("motor_strength", "j2", 0.8)])
+def test_the_joint_that_is_wrong_stands_first_however_wrong_it_is(effect) -> None:
+    kind, place, value = effect
+    assert next(iter(named(of({(kind, place): value}, 3)))) == "j2"
+
+
 def test_the_missing_torque_is_as_large_as_the_friction_that_the_model_lacks() -> None:
     entry = gap(of({("coulomb_friction", "j2"): 0.5}), 20, SMALL).document["missing_torque"]["j2"]
     assert 0.3 < entry["structured_rms"] < 0.6
