@@ -93,10 +93,13 @@ def run_until_base_and_kill(folder: Path) -> tuple[str, list[str]]:
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Loop:
-    # Base trains long enough for the kill to come before its end. The search for effects has time for the first of
-    # them: without a limit it takes half a minute or several, by what the tiny policies make of the sealed robot.
-    diagnosed = {"search_seconds": 5.0, "beyond_seconds": 1.0}
-    over = {"gate": {"mode": "ask"}, "base": {"ppo": {"iterations": ITERATIONS}}, "diagnose": diagnosed}
+    over = {
+        "gate": {"mode": "ask"},
+        "base": {"ppo": {"iterations": ITERATIONS}},  # long enough for the kill to come before its end
+        # Time for the first effect: the whole search takes half a minute or several, by what was sealed and measured.
+        "diagnose": {"search_seconds": 5.0, "beyond_seconds": 1.0},
+        "control": {"kinds": ["delta"]},  # all that the other kind does, and more
+    }
     folder = workspaces.create(tmp_path_factory.mktemp("e2e") / "smoke", "smoke", **over)
     killed, left = run_until_base_and_kill(folder)
     waiting = call(folder, "flows.demo", "--workspace", str(folder))
