@@ -11,9 +11,9 @@ from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, prepare, read_motions
 from benchmarks.study.parts import PARTS
 from benchmarks.study.settings import SMALL, Study, freeze
-from benchmarks.study.training import finished
-from benchmarks.study.trying import tried
-from benchmarks.study.workers import Places, Workers
+from benchmarks.study.steps import Places, Runner, Step
+from benchmarks.study.training import DONE, finished
+from benchmarks.study.trying import TRIALS
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 
 LATER = "the call is over: the same command goes on"
@@ -34,23 +34,30 @@ def run_part(options: argparse.Namespace) -> None:
         )
     freeze(options.out, study, motions=motions.hash)
     jobs = PARTS[options.part].jobs(study, motions)
-    done = {job.name for job in jobs if finished(options.out, job)}
-    shared = ["--motions", str(options.motions), "--out", str(options.out), *(["--small"] if options.small else [])]
-
-    def train(job: Job, left: float | None) -> list[str]:
-        seconds = [] if left is None else ["--seconds", f"{left:.1f}"]
-        return ["benchmarks.study.training", options.part, job.name, *shared, *seconds]
-
-    def trial(job: Job) -> list[str]:
-        return ["benchmarks.study.trying", job.name, *shared[:4]]
-
+    for job in jobs:
+        finished(options.out, job)  # refuses what was trained otherwise
     seconds = None if options.minutes is None else 60 * options.minutes
     gpus = options.gpus if study.env.engine == "mujoco_warp" else 0
-    workers = Workers(jobs, Places(gpus, options.each, options.jobs), train, trial, options.out / "logs", seconds)
-    whole = workers.run(done, {job.name for job in jobs if tried(options.out / job.name)})
-    if workers.failed:
-        raise SystemExit(f"failed: {', '.join(workers.failed)}; see {options.out / 'logs'}")
+    steps = [step for job in jobs for step in steps_of(job, options)]
+    runner = Runner(steps, Places(gpus, options.each, options.jobs), options.out / "logs", seconds)
+    whole = runner.run()
+    if runner.failed:
+        raise SystemExit(f"failed: {', '.join(runner.failed)}; see {options.out / 'logs'}")
     print("done" if whole else LATER, flush=True)
+
+
+def steps_of(job: Job, options: argparse.Namespace) -> tuple[Step, Step]:
+    """A job's training and its trials."""
+    shared = ("--motions", str(options.motions), "--out", str(options.out))
+    small = ("--small",) if options.small else ()
+    train = ("benchmarks.study.training", options.part, job.name, *shared, *small)
+    trial = ("benchmarks.study.trying", job.name, *shared)
+    folder, name = options.out / job.name, f"{job.name}.train"
+    parents = (f"{job.parent}.train",) if job.parent else ()
+    return (
+        Step(name, train, folder / DONE, parents, gpu=True),
+        Step(f"{job.name}.trial", trial, folder / TRIALS, (name,)),
+    )
 
 
 def run_prepare(options: argparse.Namespace) -> None:

@@ -1,6 +1,5 @@
 """What is trained in the study: each policy as a job, from which parent, on which motions, for how many steps."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from benchmarks.study.motions import Motions
@@ -90,11 +89,3 @@ def even_of(seed: int) -> str:
 def expert_of(seed: int, cluster: str) -> str:
     """Name of a cluster's expert; random clusters are r0, r1 ..."""
     return f"s{seed}-{cluster}"
-
-
-def ready(jobs: Sequence[Job], done: set[str], begun: set[str]) -> Job | None:
-    """The first job that is neither done nor begun and whose parent is done."""
-    for job in jobs:
-        if job.name not in done | begun and (job.parent is None or job.parent in done):
-            return job
-    return None

@@ -27,24 +27,21 @@ from typing import Any
 import numpy as np
 
 from benchmarks.study.motions import Motions, read_motions
+from benchmarks.study.on_robot import KEY, exported, run_on_robot
 from benchmarks.study.settings import SMALL, Study, freeze, sha256
+from bumblebee.deploy.episodes import Episode
 from bumblebee.deploy.stand_in import BASES
 from bumblebee.deploy.stand_in_effects import SCHEMA, entry, read_sealed, seal
 from bumblebee.deploy.undeclared.kinds import Kind, Place
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.thinning import thin
-from bumblebee.learning.export import export_policy
-from bumblebee.learning.policy import load_policy
-from bumblebee.measured.rollout import read_rollout
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.store import write_library
 from tasks.seal import OF_G1, SealConfig, drawn_place, size, somewhere
 from tasks.seal_trial import episodes, to_the_end
-from tasks.stand_in import cut, start_stand_in
+from tasks.stand_in import cut
 
 DECLARED = "declared.json"
 GROUND = ("ground_compliance", "ground_friction")
-_KEY = "policy"
 
 
 @dataclass(frozen=True)
@@ -151,17 +148,11 @@ def trial(
     policy: Path, effects: list[dict[str, Any]], clips: Sequence[Clip], config: RobotsConfig, threads: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Whether an exported policy follows each clip to its end on the robot, (N,) bool, and for how long, (N,) [s]."""
-    planned = [
-        {"rollout_id": f"t{i}", "policy": _KEY, "motion": e.motion, "seed": e.seed}
-        for i, e in enumerate(episodes(clips, config.trial_seed))
-    ]
-    plan = {"policies": {_KEY: str(policy.resolve())}, "episodes": planned, "base": config.base, "judged": True}
+    planned = [Episode(f"t{i}", KEY, e.motion, e.seed) for i, e in enumerate(episodes(clips, config.trial_seed))]
     with tempfile.TemporaryDirectory() as scratch:
-        work = Path(scratch)
-        write_library(work / "clips", list(clips))
-        (work / "robot.json").write_text(json.dumps(_content(effects)))
-        start_stand_in(plan, work / "clips", work / "rollouts", work, threads, work / "robot.json")
-        rollouts = [read_rollout(work / "rollouts" / f"{episode['rollout_id']}.parquet") for episode in planned]
+        robot = Path(scratch) / "robot.json"
+        robot.write_text(json.dumps(_content(effects)))
+        rollouts = run_on_robot(policy, robot, clips, planned, config.base, True, threads)
     ends = [to_the_end(clip, rollout) for clip, rollout in zip(clips, rollouts, strict=True)]
     return np.array(ends), np.array([rollout.duration for rollout in rollouts])
 
@@ -184,13 +175,11 @@ def seal_robots(
             read_sealed(path)
         return paths
     with tempfile.TemporaryDirectory() as scratch:
-        exported = Path(scratch) / "exported"
-        exported.mkdir()
-        export_policy(exported, load_policy(policy))
-        clips = _followed(exported, motions, config, out, threads)
+        own = exported(policy, Path(scratch) / "exported")
+        clips = _followed(own, motions, config, out, threads)
         for path, seed in zip(paths[1:], config.seeds, strict=True):
             if not path.exists():
-                _seal_one(path, exported, clips, config, seed, threads)
+                _seal_one(path, own, clips, config, seed, threads)
             read_sealed(path)
     return paths
 

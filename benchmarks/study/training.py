@@ -15,11 +15,12 @@ from pathlib import Path
 
 import torch
 
+from benchmarks.study.correction import DECLARED, Correction
 from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.parts import PARTS
 from benchmarks.study.settings import SMALL, Study, settings_of
-from benchmarks.study.workers import GOES_ON
+from benchmarks.study.steps import GOES_ON
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.learning.ppo import CHECKPOINT, Trainer
 from bumblebee.sim.engine_choice import make_engine
@@ -53,7 +54,7 @@ def train(
     motions: Motions,
     study: Study,
     out: Path,
-    model: Path | None = None,
+    correction: Correction = DECLARED,
     over: Callable[[], bool] = lambda: False,
 ) -> bool:
     """Train the job's policy into `out / job.name`; whether it is done.
@@ -63,7 +64,7 @@ def train(
         motions: the study's.
         study: its settings.
         out: the run's folder, with the parent's policy in it.
-        model: MJCF of a corrected robot; the declared one without.
+        correction: what the robot is taken to be, beside what is declared.
         over: says when to stop and keep a checkpoint.
     """
     if finished(out, job):
@@ -75,9 +76,13 @@ def train(
     ppo = replace(ppo, iterations=math.ceil(job.steps / frames), checkpoint_every=CHECKPOINT_EVERY)
     torch.set_num_threads(task.threads)
     clips = [row.clip for row in motions.training(job.clips)]
-    engine = make_engine(task.engine, task_model(task, model), task.num_worlds, task.threads, buffers=task.buffers)
+    model = task_model(task, correction.model)
+    engine = make_engine(
+        task.engine, model, task.num_worlds, task.threads, hooks=correction.hooks(model), buffers=task.buffers
+    )
     shares = ClipShares.equal(motions.cluster_indices(clips)) if job.even else None
-    env = TrackingEnv(MotionLibrary(clips, task.ahead, device=engine.device), engine, task, job.seed, clip_share=shares)
+    library = MotionLibrary(clips, task.ahead, device=engine.device)
+    env = TrackingEnv(library, engine, task, job.seed, correction.adapter(), shares)
     trainer = Trainer(env, ppo, folder, job.seed, None if job.parent is None else out / job.parent)
     trainer.train(job.name, over)
     if trainer.iteration < ppo.iterations:

@@ -40,11 +40,6 @@ def try_policy(folder: Path, motions: Motions) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def tried(folder: Path) -> bool:
-    """Whether the policy's trials are there."""
-    return (folder / TRIALS).exists()
-
-
 def write_trials(folder: Path, motions: Motions) -> None:
     """Try the policy and write its trials, whole or not at all."""
     fresh = folder / f".{TRIALS}.part"

@@ -11,14 +11,14 @@ import pytest
 
 from benchmarks.motion_pack import Packed, write_pack
 from benchmarks.study.__main__ import main
-from benchmarks.study.jobs import PAPER_ARMS, Job, base_of, even_of, experts_jobs, one_of, paper_jobs, ready
+from benchmarks.study.jobs import PAPER_ARMS, base_of, even_of, experts_jobs, one_of, paper_jobs
 from benchmarks.study.motions import LABELS, MOTIONS, read_motions
 from benchmarks.study.paper_tables import paper_tables
 from benchmarks.study.settings import PAPER_CHANGES, SMALL, Study, freeze, settings_of
+from benchmarks.study.steps import GOES_ON, Places, Runner, Step, ready
 from benchmarks.study.tables import difference, experts_tables, rate
 from benchmarks.study.training import finished, train
 from benchmarks.study.trying import write_trials
-from benchmarks.study.workers import GOES_ON, Places, Workers
 from bumblebee.errors import BadInput
 from bumblebee.motion.embedded import make_library
 
@@ -71,11 +71,13 @@ def test_nothing_held_out_is_learned_from(folder: Path) -> None:
         assert not learned & held
 
 
-def test_a_child_waits_for_its_parent() -> None:
-    jobs = [Job("b", 1, 0), Job("c", 1, 0, "b")]
-    assert ready(jobs, set(), {"b"}) is None
-    assert ready(jobs, {"b"}, {"b"}) == jobs[1]
-    assert ready(jobs, {"b", "c"}, set()) is None
+def test_a_step_waits_for_what_it_needs_for_its_kind_of_place_and_for_its_time() -> None:
+    steps = [Step("b", (), Path("b"), gpu=True), Step("c", (), Path("c"), ("b",), gpu=True, seconds=60.0)]
+    assert ready(steps, set(), {"b"}, True, None) is None
+    assert ready(steps, {"b"}, {"b"}, False, None) is None
+    assert ready(steps, {"b"}, {"b"}, True, 59.0) is None
+    assert ready(steps, {"b"}, {"b"}, True, 60.0) == ready(steps, {"b"}, {"b"}, True, None) == steps[1]
+    assert ready(steps, {"b", "c"}, set(), True, None) is None
 
 
 def test_a_run_is_trained_ended_gone_on_with_and_made_into_tables(folder: Path, tmp_path: Path) -> None:
@@ -181,30 +183,34 @@ def test_a_rate_of_none_has_an_interval_and_pieces_and_seeds_of_a_motion_are_no_
 
 
 def _print(path: Path, code: int) -> str:
-    """A module that writes its place and leaves with this exit code."""
-    path.write_text(f"import os, sys\nprint(repr(os.environ['CUDA_VISIBLE_DEVICES']))\nsys.exit({code})\n")
+    """A module that writes its place and arguments and leaves with this exit code."""
+    path.write_text(
+        f"import os, sys\nprint(repr(os.environ['CUDA_VISIBLE_DEVICES']), *sys.argv[1:2])\nsys.exit({code})\n"
+    )
     return path.stem
 
 
 @pytest.mark.parametrize("code", [0, 1, GOES_ON])
-def test_workers_do_all_stop_at_a_failure_and_leave_the_rest_when_the_time_is_over(
+def test_steps_are_all_done_stop_at_a_failure_and_wait_for_another_call_when_the_time_is_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     good, other = _print(tmp_path / "study_good.py", 0), _print(tmp_path / "study_other.py", code)
-    jobs = [Job("base", 1, 0), Job("a", 1, 0, "base"), Job("b", 1, 0, "base")]
-    workers = Workers(
-        jobs,
-        Places(2, 1, 1),
-        lambda job, _: [other if job.name == "a" else good],
-        lambda _: [good],
-        tmp_path / "l",
-        60.0,
-    )
-    assert workers.run(set(), set()) is (code == 0)
-    assert workers.failed == (["a"] if code == 1 else [])
-    assert (tmp_path / "l" / "base.train.log").read_text().strip() in ("'0'", "'1'")
-    assert (tmp_path / "l" / "base.trial.log").exists() or code == 1
+    done = tmp_path / "done"
+    done.write_text("")
+    steps = [
+        Step("known", ("no_such_module",), done),
+        Step("base", (good,), tmp_path / "b", ("known",), gpu=True),
+        Step("trial", (good,), tmp_path / "t", ("base",)),
+        Step("other", (other,), tmp_path / "o", ("trial",), gpu=True),
+        Step("after", (good,), tmp_path / "a", ("other",)),
+    ]
+    runner = Runner(steps, Places(2, 1, 1), tmp_path / "l", 60.0)
+    assert runner.run() is (code == 0)
+    assert runner.failed == (["other"] if code == 1 else [])
+    assert (tmp_path / "l" / "base.log").read_text().strip() in ("'0' --seconds", "'1' --seconds")
+    assert (tmp_path / "l" / "trial.log").read_text().strip() == "''"
+    assert (tmp_path / "l" / "after.log").exists() is (code == 0)
 
 
 def test_the_frozen_file_is_plain(tmp_path: Path) -> None:

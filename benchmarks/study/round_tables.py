@@ -1,0 +1,152 @@
+"""What rounds did: success on each robot, error on held-out recordings, what was found; intervals are over motions."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.study.rounds import ARMS, BASE, Place, RoundsConfig
+from benchmarks.study.tables import cell, head, line, rate, signed
+from bumblebee.deploy.stand_in_effects import read_sealed
+from bumblebee.errors import BadInput
+from bumblebee.evaluation.intervals import Estimate, mean_by_motion, motion_means, sign_flip_test
+from bumblebee.learning.delta import compare
+
+SETS = ("recorded", "held out")
+
+
+def rounds_tables(out: Path, robots: Path, config: RoundsConfig) -> str:
+    """All tables as Markdown.
+
+    Raises:
+        BadInput: if a step of a robot has not been done.
+    """
+    names = sorted(path.name for path in out.iterdir() if (path / BASE).is_dir())
+    trials = pd.concat([_of_robot(out, robot, config) for robot in names], ignore_index=True)
+    parts = [f"### {robot}\n\n{_success(trials[trials['robot'] == robot], config)}" for robot in names]
+    parts.append(f"### Recordings of round 1 that took no part, error after 0.2 and 1 s\n\n{_errors(out, names)}")
+    parts.append(f"### What the delta actions do, mean absolute correction [rad]\n\n{_magnitudes(out, names, config)}")
+    parts.append(f"### What diagnoses found, and what was sealed\n\n{_found(out, robots, names, config)}")
+    return "\n".join(parts)
+
+
+def read_tried(out: Path, place: Place, config: RoundsConfig) -> pd.DataFrame:
+    """A place's trials, a row an episode."""
+    files = [out / place.name / f"tried-{shard}.csv" for shard in range(config.shards)]
+    for file in files:
+        if not file.exists():
+            raise BadInput(file, "the trials of every round", "none", "Run `benchmarks.study.rounds run` to its end.")
+    return pd.concat([pd.read_csv(file) for file in files], ignore_index=True)
+
+
+def paired(rows: pd.DataFrame, first: pd.Series, second: pd.Series) -> tuple[Estimate, float]:
+    """Success of some rows less that of others, paired by motion and seed, and the p-value of sign flips."""
+    one, other = (rows[which].set_index(["motion", "seed"])["success"].astype(float) for which in (first, second))
+    away = (one - other).dropna()
+    motions = away.index.get_level_values("motion").to_numpy()
+    return mean_by_motion(away.to_numpy(), motions), sign_flip_test(motion_means(away.to_numpy(), motions))
+
+
+def _of_robot(out: Path, robot: str, config: RoundsConfig) -> pd.DataFrame:
+    tables = [read_tried(out, Place(robot, BASE, 0), config).assign(arm=BASE, round=0)]
+    for arm in ARMS:
+        for round_ in range(1, config.rounds + 1):
+            tables.append(read_tried(out, Place(robot, arm, round_), config).assign(arm=arm, round=round_))
+    return pd.concat(tables, ignore_index=True).rename(columns={"name": "motion"}).assign(robot=robot)
+
+
+def _success(rows: pd.DataFrame, config: RoundsConfig) -> str:
+    lines = head(["motions", "arm", "round", "n", "success", "less round 0", "less no correction", "p", "MPKPE [mm]"])
+    for which in SETS:
+        own = rows[rows["set"] == which]
+        for arm in (BASE, *ARMS):
+            for round_ in (0,) if arm == BASE else range(1, config.rounds + 1):
+                lines.append(_line(own, which, arm, round_))
+    return "\n".join(lines) + "\n"
+
+
+def _line(rows: pd.DataFrame, which: str, arm: str, round_: int) -> str:
+    here = (rows["arm"] == arm) & (rows["round"] == round_)
+    cells = [which, arm, str(round_), str(int(here.sum())), cell(rate(rows[here], "success"), 2)]
+    if arm == BASE:
+        cells += ["", "", ""]
+    else:
+        cells.append(signed(paired(rows, here, rows["arm"] == BASE)[0]))
+        value, p = paired(rows, here, (rows["arm"] == "none") & (rows["round"] == round_))
+        cells += ["", ""] if arm == "none" else [signed(value), f"{p:.3g}"]
+    return line([*cells, f"{rows[here]['mpkpe_mm'].mean():.0f}"])
+
+
+def _errors(out: Path, names: Sequence[str]) -> str:
+    titles = [
+        "robot",
+        "simulator",
+        "rollouts",
+        "after 0.2 s",
+        "to declared",
+        "after 1 s",
+        "to declared",
+        "both to delta",
+    ]
+    lines = head([*titles, "the gate"])
+    for robot in names:
+        table = pd.read_csv(out / Place(robot, BASE, 1).name / "errors.csv")
+        errors = {
+            (name, str(horizon)): own.sort_values("rollout")["error"].to_numpy()
+            for (name, horizon), own in table.groupby(["correction", "horizon"])
+        }
+        for name in table["correction"].unique():
+            lines.append(line([robot, *_replayed(errors, name)]))
+    return "\n".join(lines) + "\n"
+
+
+def _replayed(errors: dict[tuple[str, str], np.ndarray], name: str) -> list[str]:
+    """The cells of one simulator."""
+    horizons = sorted({horizon for _, horizon in errors}, key=float)
+
+    def change(first: str, second: str) -> dict[str, dict[str, float]]:
+        return compare({h: errors[first, h] for h in horizons}, {h: errors[second, h] for h in horizons}).change
+
+    own, cells = change("declared", name), [name, str(int(np.isfinite(errors[name, horizons[-1]]).sum()))]
+    for horizon in horizons:
+        cells += [f"{own[horizon]['with']:.4f}", "" if name == "declared" else _relative(own[horizon])]
+    cells.append(_relative(change("delta", "both")[horizons[-1]]) if name == "both" else "")
+    before = {"delta": "declared", "both": "physics"}.get(name)
+    if before is None:
+        return [*cells, ""]
+    gain = compare({h: errors[before, h] for h in horizons}, {h: errors[name, h] for h in horizons})
+    return [*cells, "kept" if gain.promoted else "not kept"]
+
+
+def _relative(change: dict[str, float]) -> str:
+    return f"{change['relative']:+.0%} [{change['low']:+.0%}, {change['high']:+.0%}]"
+
+
+def _magnitudes(out: Path, names: Sequence[str], config: RoundsConfig) -> str:
+    rows = {}
+    for robot in names:
+        for arm in ("delta", "both"):
+            for round_ in range(1, config.rounds + 1):
+                card = json.loads((out / Place(robot, arm, round_).name / "delta" / "card.json").read_text())
+                rows[robot, arm, str(round_)] = card["magnitude_rad"]
+    joints = list(next(iter(rows.values())))
+    lines = head(["robot", "arm", "round", *joints])
+    lines += [line([*key, *(f"{own[joint]:.3f}" for joint in joints)]) for key, own in rows.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _found(out: Path, robots: Path, names: Sequence[str], config: RoundsConfig) -> str:
+    lines = head(["robot", "sealed", "arm", "round", "found"])
+    for robot in names:
+        sealed = ", ".join(sorted(str(row["effect"]) for row in read_sealed(robots / f"{robot}.json"))) or "nothing"
+        places = [Place(robot, BASE, 1)]
+        places += [
+            Place(robot, arm, r) for r in range(2, config.rounds + 1) for arm in ARMS if "diagnosis" in ARMS[arm]
+        ]
+        for place in places:
+            document = json.loads((out / place.name / "diagnosis" / "diagnosis.json").read_text())
+            found = "; ".join(" ".join([row["effect"], *row["where"]]) for row in document["effects"]) or "nothing"
+            lines.append(line([robot, sealed, place.arm, str(place.round), found]))
+    return "\n".join(lines) + "\n"
