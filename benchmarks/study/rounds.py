@@ -66,7 +66,7 @@ class RoundsConfig:
         default_factory=lambda: DeltaConfig(iterations=300, num_envs=1024, steps_per_iteration=16)
     )
     diagnosis: DiagnosisConfig = field(
-        default_factory=lambda: DiagnosisConfig(search_seconds=150.0, beyond_seconds=25.0)
+        default_factory=lambda: DiagnosisConfig(search_seconds=200.0, beyond_seconds=30.0)
     )
     judge_worlds: int = 64
     """Robots that replay held-out recordings at once."""
