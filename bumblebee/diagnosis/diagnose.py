@@ -23,7 +23,7 @@ from bumblebee.diagnosis.estimation import gauss_newton
 from bumblebee.diagnosis.prepare import Material, gather
 from bumblebee.diagnosis.report import Findings, document, effect_entries, loss_entries, unseen_notes
 from bumblebee.diagnosis.residuals import Problem, window_weights
-from bumblebee.diagnosis.selection import Refined, Search, grids, half_widths, refine, search
+from bumblebee.diagnosis.selection import Refined, Search, grids, half_widths, least_simulation_error, refine, search
 from bumblebee.diagnosis.selection import entries as rounding_entries
 from bumblebee.sim.effects import Effect
 
@@ -111,7 +111,7 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
     if last.fit.chosen:
         holdout = holdout.relinearised(last.fit.effects)
     if not config.beyond:
-        return _Found(found, last, holdout, None, (time,))
+        return _Found(found, least_simulation_error(last, holdout), holdout, None, (time,))
     say("what is left")
     offers, budget = offers_of(found, material.candidates), Budget(larger * config.beyond_seconds)
     activity = JointActivity(material.typical, material.still)
@@ -125,7 +125,7 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
         lambda: discover(last.problem, holdout, last.fit, activity, say, offers, budget),
         tested,
     )
-    last = _with(beyond, last)
+    last = least_simulation_error(_with(beyond, last), beyond.holdout)
     return _Found(with_catalogue_effects(found, last.fit), last, beyond.holdout, beyond, (time, budget))
 
 

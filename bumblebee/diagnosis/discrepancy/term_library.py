@@ -194,7 +194,11 @@ def _others(data: Quantities, j: int) -> Iterator[BasisFunction]:
 
 
 def _tables(data: Quantities, j: int) -> Iterator[BasisFunction]:
-    """Heights over one quantity, straight between knots."""
+    """Heights over one quantity, straight between knots; none over what stands still."""
+    return (table for table in _every_table(data, j) if table is not None)
+
+
+def _every_table(data: Quantities, j: int) -> Iterator[BasisFunction | None]:
     rule = data.thresholds.term_library
     u, tau, own = data.u[..., j], data.tau[..., j], {"q": _POSITION, "v": _VELOCITY}
     if np.ptp(tau) > 0:
@@ -214,14 +218,21 @@ def _tables(data: Quantities, j: int) -> Iterator[BasisFunction]:
 
 def _table(
     data: Quantities, j: int, name: str, frame: str, count: int, on: tuple[str, ...], cost: int
-) -> BasisFunction:
+) -> BasisFunction | None:
+    """None where the quantity stands still, to the digits that a term is written with."""
     rule, x = data.thresholds.term_library, read_term(name)(data.values(j))
-    knots = [float(f"{k:.5g}") for k in np.unique(np.quantile(x, np.linspace(*rule.table_quantiles, count)))]
-    knots = sorted(set(knots))
+    knots = _written(np.quantile(x, np.linspace(*rule.table_quantiles, count)))
     if len(knots) < rule.fewest_knots:
-        knots = [float(x.min()), float(x.mean()), float(x.max()) + 1e-6]
+        knots = _written(np.array([x.min(), x.mean(), x.max()]))
+    if len(knots) < 2:
+        return None
     rows = [[float(k == i) for k in range(len(knots))] for i in range(len(knots))]
     return BasisFunction(tuple(frame.format(_curve(name, knots, row)) for row in rows), on, cost)
+
+
+def _written(values: np.ndarray) -> list[float]:
+    """The values in order, each once, as `_curve` writes them."""
+    return sorted({float(f"{value:.5g}") for value in values})
 
 
 def _curve(name: str, knots: list[float], heights: list[float]) -> str:

@@ -6,6 +6,7 @@ from bumblebee.diagnosis.selection.forward import Search, search
 from bumblebee.diagnosis.selection.leads import Lead, leads
 from bumblebee.diagnosis.selection.proposals.encoder_resolution import entries, grids
 from bumblebee.diagnosis.selection.score_tests import score_tests
+from bumblebee.diagnosis.selection.simulation_error import least_simulation_error
 from bumblebee.diagnosis.selection.state import Loss
 from bumblebee.diagnosis.selection.trial import try_one
 
@@ -20,6 +21,7 @@ __all__ = [
     "grids",
     "half_widths",
     "leads",
+    "least_simulation_error",
     "refine",
     "rivals",
     "score_tests",

@@ -112,6 +112,16 @@ class FinalFit:
 
 
 @dataclass(frozen=True)
+class SimulationError:
+    """Of values that are moved to where the model predicts best."""
+
+    far: float = 25.0
+    """Median chi-square by value of what is left, from which on noise is no measure: readings five times as far off."""
+    iterations: int = 8
+    """Gauss-Newton's steps at most."""
+
+
+@dataclass(frozen=True)
 class Confounding:
     """Of effects that these data cannot tell apart."""
 
@@ -141,5 +151,6 @@ class SelectionThresholds:
     trials: Trials = field(default_factory=Trials)
     swap: Swap = field(default_factory=Swap)
     final_fit: FinalFit = field(default_factory=FinalFit)
+    simulation_error: SimulationError = field(default_factory=SimulationError)
     confounding: Confounding = field(default_factory=Confounding)
     proposals: ProposalThresholds = field(default_factory=ProposalThresholds)

@@ -154,3 +154,16 @@ def test_a_basis_function_of_two_inner_numbers_has_neighbours_and_others_have_no
     texts = {function.texts[0] for function in neighbours(rest, TermLibrary())}
     assert texts == {f"friction(rested({a}))" for a in ("0.9, 0.02", "0.1, 0.02", "0.3, 0.08", "0.3, 0.005")}
     assert neighbours(BasisFunction(("q^3",), ("position",), 2), TermLibrary()) == []
+
+
+@pytest.mark.parametrize("span", [0.0, 1e-8, 1e-6])
+def test_a_joint_that_stands_still_has_no_table_and_every_function_can_be_read(span: float) -> None:
+    _, scene = null()
+    q = scene.data.q.copy()
+    q[..., 0] = 0.0416989 + span * np.linspace(0.0, 1.0, q[..., 0].size).reshape(q.shape[:-1])
+    still = replace(scene.data, q=q)
+    for j in range(len(still.joints)):
+        functions = basis_functions(still, j)
+        assert functions
+        for function in functions:
+            assert np.isfinite([still.torque(read_term(text), j) for text in function.texts]).all()
