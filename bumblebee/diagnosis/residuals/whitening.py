@@ -155,15 +155,21 @@ def sample(noisy: NoisyWindows, rng: np.random.Generator) -> Sampled:
     return Sampled(np.nan_to_num(moved).reshape(len(moved), len(windows), -1), signs, valid)
 
 
-def fit_whitener(noisy: NoisyWindows, rng: np.random.Generator, move: np.ndarray | None = None) -> Whitener:
-    """The whitener of the windows for their model and their sensors' noise.
+def fit_whitener(
+    noisy: NoisyWindows, rng: np.random.Generator, move: np.ndarray | None = None, stepped: np.ndarray | None = None
+) -> Whitener:
+    """The whitener of the windows for their model, their sensors' noise and, if given, the simulation's own error.
 
-    `move` (W, C) is by how much their starts have been displaced from the measured ones, if they have.
+    Args:
+        noisy: windows, model and noise.
+        rng: of the perturbed starts' signs.
+        move: (W, C) by how much the starts have been displaced from the measured ones, if they have.
+        stepped: (W, N, D) change of the prediction from steps twice as long; NaN where these diverge.
     """
     found = sample(noisy, rng)
     mean = found.moved.mean(axis=0)
     away = found.moved - mean
-    factor = factors_of(found, noisy.sigma, noisy.rule)
+    factor = factors_of(found, noisy.sigma, noisy.rule, stepped)
     white = np.matmul(factor, away.transpose(1, 2, 0)).transpose(2, 0, 1).astype(np.float32)
     offset, slopes = np.zeros_like(mean), found.slopes
     if move is not None:
@@ -184,9 +190,17 @@ def null_draws(whitener: Whitener, sigma: np.ndarray, rng: np.random.Generator) 
     return starts + np.matmul(whitener.factor, reading.transpose(1, 2, 0)).transpose(2, 0, 1)
 
 
-def factors_of(found: Sampled, sigma: np.ndarray, rule: Whitening) -> np.ndarray:
-    """Inverse Cholesky factors (W, M, M) of the covariance of what noise in the starts makes plus that of readings."""
+def factors_of(found: Sampled, sigma: np.ndarray, rule: Whitening, stepped: np.ndarray | None = None) -> np.ndarray:
+    """Inverse Cholesky factors (W, M, M) of the covariance of what noise in the starts makes plus that of readings.
+
+    And of what steps of a finite length make of a prediction: `stepped` (W, N, D) is what steps of twice the length
+    change. What all windows have of it together is a nuisance (`nuisances`); of a share of it that is each window's
+    own, what exceeds the noise in a signal counts along it and, by its root mean square, in every reading.
+    """
     samples, windows, size = found.moved.shape
+    numeric = _own_numerical_error(np.zeros((windows, size)) if stepped is None else stepped, sigma, rule)
+    each = np.sqrt((numeric**2).mean(axis=1))
+    numeric, each = numeric.reshape(windows, -1), np.tile(each, (1, size // len(sigma)))
     reading = np.tile(sigma**2, size // len(sigma))
     away = found.moved - found.moved.mean(axis=0)
     # The slopes have bent to all but these of the samples.
@@ -195,12 +209,20 @@ def factors_of(found: Sampled, sigma: np.ndarray, rule: Whitening) -> np.ndarray
     for w in range(windows):
         # Scale first: signals of different units would spoil the factor's condition.
         scale = np.sqrt(reading + away[:, w].var(axis=0))
-        x = away[:, w] / scale
-        covariance = (x.T @ x) / samples
-        diagonal = reading / scale**2
+        x, own = away[:, w] / scale, numeric[w] / scale
+        covariance = (x.T @ x) / samples + np.outer(own, own)
+        diagonal = (reading + each[w] ** 2) / scale**2
         if free > 0:
             curved = ((x - found.signs[:, w] @ (slopes[w] / scale)) ** 2).sum(axis=0) / free
             diagonal += rule.curved * curved
         covariance[np.diag_indices(size)] += diagonal
         out[w] = dtrtri(np.linalg.cholesky(covariance), lower=1)[0] / scale
     return out
+
+
+def _own_numerical_error(stepped: np.ndarray, sigma: np.ndarray, rule: Whitening) -> np.ndarray:
+    """A window's own numerical error (W, N, D) as far as it exceeds the noise `sigma` (D,) of a signal."""
+    own = rule.stepped * np.nan_to_num(stepped).reshape(len(stepped), -1, len(sigma))
+    power = (own**2).mean(axis=1, keepdims=True)
+    beyond = np.maximum(power - sigma**2, 0.0)
+    return own * np.sqrt(beyond / np.where(power > 0, power, 1.0))

@@ -12,6 +12,8 @@ class Whitening:
 
     It grows with their variance squared, and what the next readings leave of that is 0.6 to 0.7 on a standing G1.
     """
+    stepped: float = 0.3
+    """Share of what steps of twice the length change that is a window's own numerical error."""
     height_noise: float = 0.002
     """Noise of a base height that is not measured but taken from stance [m]."""
 

@@ -1,5 +1,7 @@
 """What the truth's integrator makes of it is no effect, whatever integrator the model declares."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -7,6 +9,8 @@ import pytest
 from bumblebee.diagnosis.estimation import gauss_newton
 from bumblebee.diagnosis.residuals import make_problem
 from bumblebee.diagnosis.simulation import choose_starts, cut
+from bumblebee.diagnosis.thresholds import Thresholds
+from bumblebee.diagnosis.thresholds.residuals import ResidualThresholds, Whitening
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis.arm import session_of
 
@@ -43,7 +47,12 @@ def test_another_integrator_leaves_little_that_the_nuisances_do_not_take(declare
     starts = choose_starts(session.rollouts, [0, 1], 0.2, 20)
     windows = cut(session.plant, session.layout, session.rollouts, starts)
     steps = (session.search_step, session.steps[1])
-    problem = make_problem(session.plant, session.layout, windows, session.sigma, steps, [], np.random.default_rng(0))
+    # As large as the noise alone makes it: without each window's own numerical error in its covariance.
+    residuals = replace(ResidualThresholds(), whitening=Whitening(stepped=0.0))
+    problem = make_problem(
+        session.plant, session.layout, windows, session.sigma, steps, [], np.random.default_rng(0),
+        thresholds=replace(Thresholds(), residuals=residuals),
+    )  # fmt: skip
     fit = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     raw, left = (float(np.mean(r**2)) for r in (problem.residual([[]])[0], fit.clean(problem)))
     assert raw > 100 and left < 0.02 * raw

@@ -1,0 +1,44 @@
+"""What steps of a finite length make of a window is weighed as the readings' noise is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bumblebee.diagnosis.residuals.whitening import Sampled, factors_of
+from bumblebee.diagnosis.thresholds.residuals import Whitening
+
+WINDOWS, READINGS = 6, 12
+SIGMA = np.array([1e-6, 1e-4])
+
+
+@pytest.fixture
+def sampled() -> Sampled:
+    """Starts without noise: what is left is the readings'."""
+    size = READINGS * len(SIGMA)
+    return Sampled(np.zeros((8, WINDOWS, size)), np.ones((8, WINDOWS, 4)), np.ones(WINDOWS, bool))
+
+
+def test_without_an_error_of_the_steps_a_reading_counts_by_its_noise(sampled: Sampled) -> None:
+    rule = replace(Whitening(), curved=0.0)
+    factors = factors_of(sampled, SIGMA, rule, np.zeros((WINDOWS, READINGS, 2)))
+    assert np.allclose(factors, np.diag(1 / np.tile(SIGMA, READINGS)))
+    assert np.array_equal(factors, factors_of(sampled, SIGMA, rule))
+
+
+def test_a_numerical_error_far_above_the_noise_is_no_evidence(sampled: Sampled) -> None:
+    """An error like that of the steps comes out near 1, where the noise alone would make thousands of it."""
+    rule, rng = Whitening(), np.random.default_rng(0)
+    stepped = rng.standard_normal((WINDOWS, READINGS, 2)) * [1e-3, 1e-3]
+    error = (rule.stepped * stepped).reshape(WINDOWS, -1)
+
+    def power(factors: np.ndarray) -> float:
+        return float((np.einsum("wij,wj->wi", factors, error) ** 2).mean())
+
+    assert power(factors_of(sampled, SIGMA, rule)) > 1e4
+    assert power(factors_of(sampled, SIGMA, rule, stepped)) < 1.0
+
+
+def test_windows_that_diverge_in_longer_steps_keep_their_noise(sampled: Sampled) -> None:
+    nothing = np.full((WINDOWS, READINGS, 2), np.nan)
+    assert np.array_equal(factors_of(sampled, SIGMA, Whitening(), nothing), factors_of(sampled, SIGMA, Whitening()))
