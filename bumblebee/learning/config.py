@@ -46,8 +46,8 @@ class PpoConfig(Ranged):
     """First standard deviation of the action; 0.3 was a dead end."""
     symmetry: bool = False
     """Learn from every sample's reflection too, left and right exchanged; doubles the batch."""
-    captured: bool = False
-    """Update without waiting for the GPU, each gradient step one CUDA graph; off until it was measured on a GPU."""
+    captured: bool | None = None
+    """Update without waiting for the GPU, each gradient step one CUDA graph; if not stated, where the task is on a GPU."""
     checkpoint_every: Annotated[int, Range(least=1, most=1_000_000_000)] = 25
     """Iterations between checkpoints, from which a killed training goes on."""
 

@@ -36,7 +36,7 @@ def runner_config(config: PpoConfig) -> dict[str, Any]:
     algorithm = {
         "class_name": BoundedPpo,
         "learning_rate_range": (config.learning_rate,) * 2 if fixed else config.learning_rate_range,
-        "captured": config.captured,
+        "captured": bool(config.captured),
         "num_learning_epochs": config.epochs,
         "num_mini_batches": config.mini_batches,
         "clip_param": config.clip,
@@ -86,7 +86,10 @@ class Trainer:
             config = replace(config, hidden=origin.shape.hidden)
         self.env, self.config, self.folder, self.ranks = env, config, Path(folder), ranks or Ranks()
         torch.manual_seed(seed)
-        if torch.device(env.device).type == "cuda":
+        on_gpu = torch.device(env.device).type == "cuda"
+        if config.captured is None:
+            config = self.config = replace(config, captured=on_gpu)
+        if on_gpu:
             torch.set_float32_matmul_precision("high")
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks
             settings = runner_config(config) | {"multi_gpu": self.ranks.settings}
