@@ -125,7 +125,7 @@ def diagnosis(work: Work) -> None:
         for rollout in work.rollouts(learned=True):
             write_rollout(dataset / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)
         write_xml(dataset / "model.xml")
-        config = work.config.diagnosis
+        config = work.config.diagnosis if work.place.round == 1 else work.config.later
         session = open_session(dataset / "model.xml", dataset, config.thresholds.dataset)
         result = diagnose(session, config, say=lambda text: print(text, flush=True))
         with new_folder(work.folder / "diagnosis") as folder:

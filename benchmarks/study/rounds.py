@@ -33,7 +33,7 @@ from bumblebee.learning.policy import FILE
 BASE = "base"
 """The arm of what all arms share: the base policy, the recordings of round 1 and their diagnosis."""
 ARMS = {"none": (), "physics": ("diagnosis",), "delta": ("delta",), "both": ("diagnosis", "delta")}
-"""What each arm corrects the simulator by."""
+"""What each arm corrects the simulator by. The longest way is the last and goes first."""
 KINDS = ("tried", "record", "diagnosis", "delta", "errors", "policy")
 WORK = "benchmarks.study.round_work"
 
@@ -65,13 +65,17 @@ class RoundsConfig:
     delta: DeltaConfig = field(
         default_factory=lambda: DeltaConfig(iterations=300, num_envs=1024, steps_per_iteration=16)
     )
-    diagnosis: DiagnosisConfig = field(
-        default_factory=lambda: DiagnosisConfig(search_seconds=200.0, beyond_seconds=30.0)
-    )
+    diagnosis: DiagnosisConfig = field(default_factory=DiagnosisConfig)
+    """Of the first round, before a GPU is there."""
+    later: DiagnosisConfig = field(default_factory=lambda: DiagnosisConfig(search_seconds=150.0, beyond_seconds=30.0))
+    """Of later rounds, which GPUs wait for: less time, on all cores."""
     judge_worlds: int = 64
     """Robots that replay held-out recordings at once."""
 
 
+_HASTY = DiagnosisConfig(
+    max_windows=12, max_holdout_windows=8, report_windows=8, search_seconds=1.0, beyond_seconds=1.0
+)
 SMALL_CONFIG = RoundsConfig(
     motions=4,
     repeats=1,
@@ -80,9 +84,8 @@ SMALL_CONFIG = RoundsConfig(
     shards=1,
     steps=512,
     delta=DeltaConfig(iterations=1, num_envs=8, steps_per_iteration=4, episode_seconds=0.4),
-    diagnosis=DiagnosisConfig(
-        max_windows=12, max_holdout_windows=8, report_windows=8, search_seconds=1.0, beyond_seconds=1.0
-    ),
+    diagnosis=_HASTY,
+    later=_HASTY,
 )
 """For tests: it shows that every step runs, and nothing else."""
 
@@ -179,7 +182,7 @@ def plan(out: Path, robots: Sequence[str], config: RoundsConfig, shared: tuple[s
         place = Place(robot, BASE, 1)
         diagnosed[place] = add(place, "diagnosis", recorded[place])
     for round_ in range(1, config.rounds + 1):
-        places = [Place(robot, arm, round_) for robot in robots for arm in ARMS]
+        places = [Place(robot, arm, round_) for arm in reversed(ARMS) for robot in reversed(robots)]
         for place in places if round_ > 1 else []:
             if ARMS[place.arm]:
                 needs = [trained[Place(place.robot, place.arm, round_ - 1)]]
