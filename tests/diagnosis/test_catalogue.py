@@ -15,7 +15,7 @@ from tests.diagnosis.strange_arm import simulate
 CONFIG = replace(arm.SMALL, beyond=False)
 CASES = [
     ("command_delay", "", (0.012,), "delay", 0.06),
-    ("strength_drift", "j2", (0.04,), "rate", 0.1),
+    pytest.param("strength_drift", "j2", (0.04,), "rate", 0.1, marks=pytest.mark.slow),
     ("cogging", "j1", (0.3, 0.2, 12.0), "periods", 0.01),
     pytest.param("hysteresis", "j2", (0.5, 0.05), "amplitude", 0.1, marks=pytest.mark.slow),
     pytest.param("backlash", "j2", (0.03,), "gap", 0.25, marks=pytest.mark.slow),
@@ -39,6 +39,7 @@ def test_an_effect_is_named_up_to_its_class(
         assert found[0]["parameters"][parameter]["value"] == pytest.approx(truth, rel=tolerance)
 
 
+@pytest.mark.slow
 def test_hysteresis_is_found_on_a_joint_with_a_declared_spring() -> None:
     """MJCF has one spring a joint, so only Dahl's law can be named there; the truth yields at a width."""
     declared = arm.XML.replace('<joint name="j2"', '<joint name="j2" stiffness="5"')

@@ -7,7 +7,7 @@ from bumblebee.diagnosis.diagnose import diagnose
 from tests.diagnosis.arm import SMALL
 
 SINGLES = [
-    ("coulomb_friction", "j2", 0.3, 0.05),
+    pytest.param("coulomb_friction", "j2", 0.3, 0.05, marks=pytest.mark.slow),
     ("viscous_friction", "j1", 0.3, 0.05),
     ("motor_strength", "j3", 0.85, 0.01),
     pytest.param("command_delay", "j2", 0.013, 0.05, marks=pytest.mark.slow),

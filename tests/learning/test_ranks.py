@@ -47,6 +47,7 @@ def test_both_processes_learn_one_policy_from_worlds_of_their_own(whole: Path) -
     assert not np.allclose(first["mass"], second["mass"])
 
 
+@pytest.mark.slow
 def test_the_captured_update_learns_one_policy_too(whole: Path, tmp_path: Path) -> None:
     """Equal to the bit on both; and not by chance what rsl_rl's update learns, which draws other noise."""
     assert launch(2, [*PROCESS, str(tmp_path), "captured"]) == 0

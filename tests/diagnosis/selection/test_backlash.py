@@ -61,6 +61,7 @@ def test_a_gap_is_tried_where_there_is_one(truth: Truth) -> None:
     assert found[0].values[0] == pytest.approx(0.006, rel=0.4)
 
 
+@pytest.mark.slow
 def test_a_small_gap_is_named_with_an_interval_that_holds() -> None:
     """So small that the search needs steps of 1 ms, as it usually takes them."""
     rollouts = simulate({("backlash", "j2"): (0.006,)}, seed=5)

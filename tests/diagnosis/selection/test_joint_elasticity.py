@@ -34,6 +34,7 @@ def test_stiffnesses_get_finer_where_a_servo_on_the_joint_would_shake() -> None:
     assert (soft[:-1] / soft[1:]).max() < (on_motor[:-1] / on_motor[1:]).min()
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_off_and_has_no_name_is_tried() -> None:
     run = begun(arm.XML, simulate({("series_elasticity", "j2"): (600.0,)}, seed=3), {})
     found = joint_elasticity_trials(run.problem, run.fit, run.candidates, run.weights, run.hopeless)
@@ -48,6 +49,7 @@ def test_no_shaft_explains_noise() -> None:
     assert best_elasticity(run.problem, run.fit, run.candidates, run.weights, "j2") is None
 
 
+@pytest.mark.slow
 def test_a_rotor_is_no_shaft() -> None:
     run = begun(arm.XML, arm.simulate({("armature", "j2"): 0.015}, seed=3), {("armature", "j2"): 0.013})
     assert not swap(run)

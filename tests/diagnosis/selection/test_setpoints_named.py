@@ -28,7 +28,7 @@ def diagnosis(drive: str) -> Diagnosis:
 @pytest.mark.parametrize(
     ("drive", "effect", "where", "parameter", "truth"),
     [
-        ("filter", "command_filter", ["j2"], "time", 0.03),
+        pytest.param("filter", "command_filter", ["j2"], "time", 0.03, marks=pytest.mark.slow),
         pytest.param("rate", "command_rate_limit", ["j2"], "rate", 1.0, marks=pytest.mark.slow),
         pytest.param("profile", "command_profile", ["j2"], "acceleration", 30.0, marks=pytest.mark.slow),
         ("loss", "dropped_commands", ["j2"], "share", 0.3),
