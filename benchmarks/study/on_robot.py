@@ -1,13 +1,18 @@
 """Runs a policy on a sealed robot, which is a process of its own."""
 
+import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+import pandas as pd
+
 from bumblebee.deploy.episodes import Episode
+from bumblebee.evaluation.episodes import rollout_metrics
+from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import load_policy
-from bumblebee.measured.rollout import Rollout, read_rollout
+from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import write_library
 from tasks.stand_in import start_stand_in
@@ -46,3 +51,34 @@ def run_on_robot(
         write_library(work / "clips", list(clips))
         start_stand_in(plan, work / "clips", work / "rollouts", work, threads, robot)
         return [read_rollout(work / "rollouts" / f"{e.rollout_id}.parquet") for e in episodes]
+
+
+def read_recordings(folder: Path) -> list[Rollout]:
+    """All rollouts in a folder's `record-*`."""
+    return [read_rollout(file) for part in sorted(folder.glob("record-*")) for file in rollout_files(part)]
+
+
+def judged_rows(rollouts: Sequence[Rollout], clips: Sequence[Clip], held_out: Sequence[str]) -> pd.DataFrame:
+    """A row a judged rollout: name, set, seed, success, seconds, mpkpe_mm.
+
+    Args:
+        rollouts: `<motion>-<seed>` each, of the true state.
+        clips: the motions that were followed.
+        held_out: names of those that no training has seen.
+    """
+    by_name, rows = {clip.name: clip for clip in clips}, []
+    for rollout in rollouts:
+        clip = by_name[rollout.meta["motion"]]
+        found = rollout_metrics(rollout, clip, success_threshold(clip.family))
+        which = "held out" if clip.name in held_out else "recorded"
+        row = {"name": clip.name, "set": which, "seed": int(rollout.rollout_id.rsplit("-", 1)[1])}
+        rows.append(row | {"success": found.success, "seconds": rollout.duration, "mpkpe_mm": found.mpkpe_mm})
+    return pd.DataFrame(rows)
+
+
+def write_csv(path: Path, table: pd.DataFrame) -> None:
+    """Write a table whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = path.with_name(f".{path.name}.part")
+    table.to_csv(fresh, index=False)
+    os.replace(fresh, path)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.study.rounds import ARMS, BASE, Place, RoundsConfig
-from benchmarks.study.tables import cell, head, line, rate, signed
+from benchmarks.study.tables import cell, head, line, rate, relative, signed
 from bumblebee.deploy.stand_in_effects import read_sealed
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.intervals import Estimate, mean_by_motion, motion_means, sign_flip_test
@@ -111,17 +111,13 @@ def _replayed(errors: dict[tuple[str, str], np.ndarray], name: str) -> list[str]
 
     own, cells = change("declared", name), [name, str(int(np.isfinite(errors[name, horizons[-1]]).sum()))]
     for horizon in horizons:
-        cells += [f"{own[horizon]['with']:.4f}", "" if name == "declared" else _relative(own[horizon])]
-    cells.append(_relative(change("delta", "both")[horizons[-1]]) if name == "both" else "")
+        cells += [f"{own[horizon]['with']:.4f}", "" if name == "declared" else relative(own[horizon])]
+    cells.append(relative(change("delta", "both")[horizons[-1]]) if name == "both" else "")
     before = {"delta": "declared", "both": "physics"}.get(name)
     if before is None:
         return [*cells, ""]
     gain = compare({h: errors[before, h] for h in horizons}, {h: errors[name, h] for h in horizons})
     return [*cells, "kept" if gain.promoted else "not kept"]
-
-
-def _relative(change: dict[str, float]) -> str:
-    return f"{change['relative']:+.0%} [{change['low']:+.0%}, {change['high']:+.0%}]"
 
 
 def _magnitudes(out: Path, names: Sequence[str], config: RoundsConfig) -> str:

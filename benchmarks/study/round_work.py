@@ -5,21 +5,19 @@ python -m benchmarks.study.round_work record robot-0/base/r1 --shard 0 --motions
 
 import argparse
 import json
-import os
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from pathlib import Path
 
 import mujoco
-import numpy as np
 import pandas as pd
 import torch
 
 from benchmarks.study.correction import DECLARED, Correction
+from benchmarks.study.delta_training import learn_delta, replayed
 from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, read_motions
-from benchmarks.study.on_robot import KEY, exported, run_on_robot
+from benchmarks.study.on_robot import KEY, exported, judged_rows, read_recordings, run_on_robot, write_csv
 from benchmarks.study.rounds import ARMS, SMALL_CONFIG, Place, RoundsConfig, learned_from
 from benchmarks.study.settings import FROZEN, SMALL, Study
 from benchmarks.study.steps import GOES_ON
@@ -29,25 +27,12 @@ from bumblebee.diagnosis.dataset import open_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import fill
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
-from bumblebee.evaluation.episodes import rollout_metrics
-from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.io.write import new_folder
-from bumblebee.learning.delta import (
-    DeltaEnv,
-    Recordings,
-    load_delta,
-    magnitudes,
-    replay_error,
-    save_delta,
-    stack,
-    train_delta,
-)
-from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files, write_rollout
+from bumblebee.learning.delta import stack
+from bumblebee.measured.rollout import Rollout, write_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.robot.model import write_xml
-from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
-from tasks.delta import recorded_state
 from tasks.stand_in import cut
 
 CORRECTIONS = {"declared": (), "physics": ("diagnosis",), "delta": ("delta",), "both": ("diagnosis", "delta")}
@@ -89,8 +74,7 @@ class Work:
         """This round's recordings: to learn a correction from, or to judge it by."""
         names = learned_from(self.recorded)
         folder = self.out / self.place.recorded.name
-        every = [read_rollout(file) for part in sorted(folder.glob("record-*")) for file in rollout_files(part)]
-        return [rollout for rollout in every if (rollout.meta["motion"] in names) == learned]
+        return [rollout for rollout in read_recordings(folder) if (rollout.meta["motion"] in names) == learned]
 
     def on_robot(self, names: Sequence[str], seed: int, repeats: int, base: str, judged: bool) -> list[Rollout]:
         """The shard's part of the motions on the robot; the first tick's seeds differ by repeat."""
@@ -134,19 +118,9 @@ def diagnosis(work: Work) -> None:
 
 def delta(work: Work) -> None:
     """A delta action on what the arm's diagnosis leaves, if it has one; on a GPU in one go."""
-    config, parts = work.config.delta, [part for part in ARMS[work.place.arm] if part != "delta"]
-    correction = work.correction(parts, work.place.arm)
-    model = load_model(correction.model)
-    hooks = correction.hooks(model)
-    learned = stack(work.rollouts(learned=True), load_model())
-    engine = make_engine(work.study.env.engine, model, config.num_envs, 1, hooks)
-    env = DeltaEnv(engine, learned, config, _offset(correction, model))
-    trained, curve = train_delta(env, config)
-    sizes = magnitudes(trained, recorded_state(learned), learned.targets)
-    card = {"promoted": False, "magnitude_rad": sizes, "rollouts": len(learned.ids), "config": asdict(config)}
-    with new_folder(work.folder / "delta") as folder:
-        save_delta(folder, trained, config.hidden, card)
-        curve.to_csv(folder / "curve.csv", index=False)
+    parts = [part for part in ARMS[work.place.arm] if part != "delta"]
+    correction, engine = work.correction(parts, work.place.arm), work.study.env.engine
+    learn_delta(work.rollouts(learned=True), engine, work.config.delta, correction, work.folder / "delta")
 
 
 def errors(work: Work) -> None:
@@ -155,19 +129,11 @@ def errors(work: Work) -> None:
     held_out = stack(work.rollouts(learned=False), load_model())
     tables = []
     for name, parts in CORRECTIONS.items():
-        found = replayed(work, work.correction(parts, name), held_out)
+        found = replayed(work.correction(parts, name), held_out, work.config.judge_worlds)
         for horizon, values in found.items():
             rows = {"rollout": held_out.ids, "correction": name, "horizon": float(horizon), "error": values}
             tables.append(pd.DataFrame(rows))
-    _write(work.folder / "errors.csv", pd.concat(tables, ignore_index=True))
-
-
-def replayed(work: Work, correction: Correction, recordings: Recordings) -> dict[str, np.ndarray]:
-    """Horizon -> error of each rollout in a corrected simulator, on the processor."""
-    model = load_model(correction.model)
-    engine = make_engine("mujoco", model, work.config.judge_worlds, 1, correction.hooks(model))
-    adapter = load_delta(correction.delta, promoted_only=False) if correction.delta else None
-    return replay_error(engine, recordings, _offset(correction, model), adapter)
+    write_csv(work.folder / "errors.csv", pd.concat(tables, ignore_index=True))
 
 
 def policy(work: Work) -> None:
@@ -185,33 +151,10 @@ def tried(work: Work) -> None:
     held_out = labels[labels["split"] == "test"].drop_duplicates("motion")["name"].tolist()
     names = [*work.recorded, *held_out]
     rollouts = work.on_robot(names, config.try_seed, config.tries, config.tried_base, True)
-    clips = {clip.name: clip for clip in work.clips(names)}
-    rows = []
-    for rollout in rollouts:
-        clip = clips[rollout.meta["motion"]]
-        found = rollout_metrics(rollout, clip, success_threshold(clip.family))
-        which = "held out" if clip.name in held_out else "recorded"
-        row = {"name": clip.name, "set": which, "seed": int(rollout.rollout_id.rsplit("-", 1)[1])}
-        rows.append(row | {"success": found.success, "seconds": rollout.duration, "mpkpe_mm": found.mpkpe_mm})
-    _write(work.folder / f"tried-{work.shard}.csv", pd.DataFrame(rows))
+    write_csv(work.folder / f"tried-{work.shard}.csv", judged_rows(rollouts, work.clips(names), held_out))
 
 
 DO: dict[str, Callable[[Work], None]] = {own.__name__: own for own in (record, diagnosis, delta, errors, policy, tried)}
-
-
-def _offset(correction: Correction, model: mujoco.MjModel) -> torch.Tensor:
-    hooks = correction.hooks(model)
-    if hooks is None:
-        return torch.zeros(model.nu)
-    return torch.as_tensor(hooks.encoder_offset, dtype=torch.float32)
-
-
-def _write(path: Path, table: pd.DataFrame) -> None:
-    """Whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    fresh = path.with_name(f".{path.name}.part")
-    table.to_csv(fresh, index=False)
-    os.replace(fresh, path)
 
 
 def main() -> None:

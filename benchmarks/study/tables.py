@@ -201,3 +201,8 @@ def cell(value: Estimate, digits: int) -> str:
 def signed(value: Estimate) -> str:
     """A difference with its interval."""
     return f"{value.value:+.3f} [{value.low:+.3f}, {value.high:+.3f}]"
+
+
+def relative(change: dict[str, float]) -> str:
+    """A relative change, an entry of `learning.delta.Gain.change`, with its interval."""
+    return f"{change['relative']:+.3f} [{change['low']:+.3f}, {change['high']:+.3f}]"
