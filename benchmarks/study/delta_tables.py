@@ -1,6 +1,7 @@
 """One delta action for each cluster against one for all: replay error, success after training on, magnitudes."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +24,12 @@ def deltas_tables(run: Path, motions: Motions) -> str:
     Raises:
         BadInput: if a step has not been done.
     """
-    errors = {cluster: _read(run / f"errors-{cluster}.csv") for cluster in motions.clusters}
-    tried = pd.concat([_trials(run, cluster) for cluster in motions.clusters], ignore_index=True)
+    clusters = [cluster for cluster in motions.clusters if (run / f"delta-{cluster}").exists()]
+    errors = {cluster: _read(run / f"errors-{cluster}.csv") for cluster in clusters}
+    tried = pd.concat([_trials(run, cluster) for cluster in clusters], ignore_index=True)
     parts = [f"### Held-out recordings, error after 0.2 and 1 s [rad]\n\n{_errors(errors)}"]
-    parts.append(f"### Success on the robot after training on\n\n{_success(tried, motions)}")
-    parts.append(f"### Mean absolute correction [rad]\n\n{_magnitudes(run, motions)}")
+    parts.append(f"### Success on the robot after training on\n\n{_success(tried, clusters)}")
+    parts.append(f"### Mean absolute correction [rad]\n\n{_magnitudes(run, clusters)}")
     return "\n".join(parts)
 
 
@@ -69,9 +71,9 @@ def _arm_errors(errors: dict[tuple[str, str], np.ndarray], arm: str) -> list[str
     return [*cells, relative(change(GENERAL, OWN)[horizons[-1]]) if arm == OWN else ""]
 
 
-def _success(tried: pd.DataFrame, motions: Motions) -> str:
+def _success(tried: pd.DataFrame, clusters: Sequence[str]) -> str:
     lines = head(["cluster", "motions", "arm", "n", "success", "less none", "own less general", "p"])
-    for cluster in (*motions.clusters, ALL):
+    for cluster in (*clusters, ALL):
         for which in ("recorded", "held out"):
             rows = tried[(tried["set"] == which) & ((tried["cluster"] == cluster) | (cluster == ALL))]
             if len(rows):
@@ -89,8 +91,8 @@ def _arm_success(rows: pd.DataFrame, arm: str) -> list[str]:
     return [*cells, signed(value), f"{p:.3g}"]
 
 
-def _magnitudes(run: Path, motions: Motions) -> str:
-    folders = {what: run / f"delta-{what}" for what in (GENERAL, *motions.clusters)}
+def _magnitudes(run: Path, clusters: Sequence[str]) -> str:
+    folders = {what: run / f"delta-{what}" for what in (GENERAL, *clusters)}
     cards = {what: json.loads((folder / CARD).read_text()) for what, folder in folders.items()}
     joints = list(cards[GENERAL]["magnitude_rad"])
     lines = head(["delta action", "rollouts", *joints])

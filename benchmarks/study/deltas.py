@@ -10,13 +10,15 @@ judged by the rest of these recordings, and by what a policy is worth on the rob
 import argparse
 import json
 import shutil
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import torch
 
-from benchmarks.study.motions import read_motions
-from benchmarks.study.rounds import BASE, SMALL_CONFIG, Place
+from benchmarks.study.motions import Motions, read_motions
+from benchmarks.study.on_robot import read_recordings
+from benchmarks.study.rounds import BASE, SMALL_CONFIG, Place, learned_from
 from benchmarks.study.rounds import RoundsConfig as Rounds
 from benchmarks.study.settings import FROZEN, SMALL, Study, freeze, sha256
 from benchmarks.study.steps import Places, Runner, Step
@@ -24,6 +26,7 @@ from bumblebee.deploy.stand_in import BASES
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.learning.delta import DeltaConfig
 from bumblebee.learning.policy import FILE
+from bumblebee.measured.rollout import Rollout
 
 NONE, GENERAL, OWN = ARMS = ("none", "general", "own")
 """Without a delta action, with the one for all clusters, with the cluster's own."""
@@ -84,10 +87,10 @@ def run(options: argparse.Namespace) -> None:
     if gpus > torch.cuda.device_count():
         raise BadInput("--gpus", f"at most {torch.cuda.device_count()} GPUs of this machine", str(gpus))
     motions = read_motions(options.motions)
-    begin(options, study, config, motions.hash)
+    clusters = begin(options, study, config, motions)
     inputs = {"--rounds": options.rounds, "--motions": options.motions, "--robots": options.robots}
     shared = [word for name, path in (inputs | {"--out": options.out}).items() for word in (name, str(path))]
-    steps = plan(options.out, motions.clusters, (*shared, *(("--small",) if options.small else ())))
+    steps = plan(options.out, clusters, (*shared, *(("--small",) if options.small else ())))
     seconds = None if options.minutes is None else 60 * options.minutes
     runner = Runner(steps, Places(gpus, options.each, options.jobs), options.out / "logs", seconds)
     whole = runner.run()
@@ -96,8 +99,8 @@ def run(options: argparse.Namespace) -> None:
     print("done" if whole else "the call is over: the same command goes on", flush=True)
 
 
-def begin(options: argparse.Namespace, study: Study, config: DeltasConfig, motions: str) -> None:
-    """Hold the run to its settings, take the base policy in.
+def begin(options: argparse.Namespace, study: Study, config: DeltasConfig, motions: Motions) -> list[str]:
+    """Hold the run to its settings, take the base policy in; the clusters that can have a delta action of their own.
 
     Raises:
         BadInput: if the rounds have no recordings of the robot, or the run began with others.
@@ -105,12 +108,24 @@ def begin(options: argparse.Namespace, study: Study, config: DeltasConfig, motio
     folder = options.rounds / Place(options.robot, BASE, 1).name
     if not list(folder.glob("record-*")):
         raise BadInput(folder, "recordings of the robot", "none", "Run `benchmarks.study.rounds run` first.")
-    rounds = json.loads((options.rounds / FROZEN).read_text())
-    inputs = {"motions": motions, "robot": options.robot}
-    inputs |= {"recorded": rounds["recorded"], "base": sha256(options.rounds / BASE / FILE)}
-    freeze(options.out, study, deltas=asdict(config), **inputs)
+    recorded = json.loads((options.rounds / FROZEN).read_text())["recorded"]
+    clusters = clusters_with_episodes(read_recordings(folder), recorded, motions, config.delta.episode_seconds)
+    inputs = {"motions": motions.hash, "robot": options.robot, "recorded": recorded}
+    freeze(options.out, study, deltas=asdict(config), **inputs, base=sha256(options.rounds / BASE / FILE))
     if not (options.out / BASE).exists():
         shutil.copytree(options.rounds / BASE, options.out / BASE)
+    for cluster in sorted(set(motions.clusters) - set(clusters)):
+        print(f"{cluster}: left out, none of its recordings is longer than an episode", flush=True)
+    return clusters
+
+
+def clusters_with_episodes(
+    rollouts: Sequence[Rollout], recorded: Sequence[str], motions: Motions, seconds: float
+) -> list[str]:
+    """Clusters of which a recording to learn from is longer than `seconds`."""
+    cluster_of, learned = motions.labels.set_index("name")["cluster"], learned_from(recorded)
+    names = {own.meta["motion"] for own in rollouts if own.duration > seconds}
+    return sorted({cluster_of[name] for name in names & set(learned)})
 
 
 def write_table(options: argparse.Namespace) -> None:

@@ -15,6 +15,8 @@ from bumblebee.evaluation.intervals import Estimate, mean_by_motion, motion_mean
 from bumblebee.learning.delta import compare
 
 SETS = ("recorded", "held out")
+NONE = next(iter(ARMS))
+"""The arm that corrects nothing."""
 
 
 def rounds_tables(out: Path, robots: Path, config: RoundsConfig) -> str:
@@ -58,25 +60,29 @@ def _of_robot(out: Path, robot: str, config: RoundsConfig) -> pd.DataFrame:
 
 
 def _success(rows: pd.DataFrame, config: RoundsConfig) -> str:
-    lines = head(["motions", "arm", "round", "n", "success", "less round 0", "less no correction", "p", "MPKPE [mm]"])
+    """A row a set of motions and arm: success after each round, and what the last is beside others."""
+    last, rounds = config.rounds, range(1, config.rounds + 1)
+    after = [f"round {round_}" for round_ in rounds]
+    titles = ["motions", "correction", "n", "round 0", *after, f"{last} less 0", f"{last} less none", "p"]
+    lines = head([*titles, f"MPKPE 0, {last} [mm]"])
     for which in SETS:
         own = rows[rows["set"] == which]
-        for arm in (BASE, *ARMS):
-            for round_ in (0,) if arm == BASE else range(1, config.rounds + 1):
-                lines.append(_line(own, which, arm, round_))
+        for arm in ARMS:
+            lines.append(line([which, arm, *_cells(own, arm, last)]))
     return "\n".join(lines) + "\n"
 
 
-def _line(rows: pd.DataFrame, which: str, arm: str, round_: int) -> str:
-    here = (rows["arm"] == arm) & (rows["round"] == round_)
-    cells = [which, arm, str(round_), str(int(here.sum())), cell(rate(rows[here], "success"), 2)]
-    if arm == BASE:
-        cells += ["", "", ""]
-    else:
-        cells.append(signed(paired(rows, here, rows["arm"] == BASE)[0]))
-        value, p = paired(rows, here, (rows["arm"] == "none") & (rows["round"] == round_))
-        cells += ["", ""] if arm == "none" else [signed(value), f"{p:.3g}"]
-    return line([*cells, f"{rows[here]['mpkpe_mm'].mean():.0f}"])
+def _cells(rows: pd.DataFrame, arm: str, last: int) -> list[str]:
+    def of(name: str, round_: int) -> pd.Series:
+        return (rows["arm"] == name) & (rows["round"] == round_)
+
+    before, here = of(BASE, 0), of(arm, last)
+    cells = [str(int(here.sum())), cell(rate(rows[before], "success"), 2)]
+    cells += [cell(rate(rows[of(arm, round_)], "success"), 2) for round_ in range(1, last + 1)]
+    cells.append(signed(paired(rows, here, before)[0]))
+    value, p = paired(rows, here, of(NONE, last))
+    cells += ["", ""] if arm == NONE else [signed(value), f"{p:.2g}"]
+    return [*cells, f"{rows[before]['mpkpe_mm'].mean():.0f}, {rows[here]['mpkpe_mm'].mean():.0f}"]
 
 
 def _errors(out: Path, names: Sequence[str]) -> str:

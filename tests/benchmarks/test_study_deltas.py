@@ -4,6 +4,7 @@ import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -43,7 +44,15 @@ def test_each_arm_has_its_delta_action() -> None:
 def test_a_robot_that_nobody_recorded_is_one_line(tmp_path: Path) -> None:
     options = argparse.Namespace(rounds=tmp_path, robot="robot-9", out=tmp_path / "out")
     with pytest.raises(BadInput, match=r"robot-9/base/r1: expected recordings of the robot, came none"):
-        deltas.begin(options, SMALL, SMALL_DELTAS, "")
+        deltas.begin(options, SMALL, SMALL_DELTAS, None)
+
+
+def test_a_cluster_of_motions_shorter_than_an_episode_is_left_out() -> None:
+    labels = pd.DataFrame({"name": ["a", "b", "c", "d"], "cluster": ["c0", "c0", "c1", "c1"]})
+    seconds = {"a": 2.0, "b": 2.0, "c": 0.9, "d": 2.0}
+    rollouts = [SimpleNamespace(meta={"motion": name}, duration=own) for name, own in seconds.items()]
+    found = deltas.clusters_with_episodes(rollouts, ["a", "b", "c", "d"], SimpleNamespace(labels=labels), 1.0)
+    assert found == ["c0"]  # c is what c1 would learn from, d judges
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +88,7 @@ def test_every_step_runs_and_is_made_into_tables(folder: Path) -> None:
     out, motions = folder / "out", read_motions(folder)
     shared = ["--motions", str(folder), "--robots", str(folder / "robots"), "--small", "--out", str(out)]
     options = deltas.parse(["run", str(folder / "rounds"), "--robot", "declared", *shared])
-    deltas.begin(options, SMALL, SMALL_DELTAS, motions.hash)
+    assert deltas.begin(options, SMALL, SMALL_DELTAS, motions) == ["c0", "c1"]
     for step in plan(out, motions.clusters, ()):
         kind, what = step.command[1:3]
         own = argparse.Namespace(

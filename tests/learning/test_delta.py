@@ -69,6 +69,21 @@ def test_rewards_by_hand() -> None:
     assert rewards.rotation_closeness(turn, still).item() == pytest.approx(np.exp(-4 * 0.2**2), rel=1e-4)
 
 
+def test_a_limit_that_the_robot_was_at_too_costs_nothing() -> None:
+    low, high = -torch.ones(23), torch.ones(23)
+    values, recorded = torch.zeros(4, 23), torch.zeros(4, 23)
+    values[1:, 2] = 1.2
+    recorded[2:, 2] = 1.1
+    values[3, 5] = -2.0
+    assert rewards.beyond_alone(values, recorded, low, high).tolist() == [0.0, 1.0, 0.0, 1.0]
+
+
+def test_recordings_shorter_than_an_episode_are_one_line(recordings: Recordings) -> None:
+    engine = MujocoCpu(load_model(), 2, threads=1)
+    with pytest.raises(BadInput, match=r"expected one of more than 3 s, came 3 of at most 1\.4 s"):
+        DeltaEnv(engine, recordings, DeltaConfig(num_envs=2, episode_seconds=3.0), NO_OFFSET)
+
+
 @pytest.mark.parametrize(("beyond", "penalty"), [(0, 0.0), (1, 1.0), (5, 1.0), (23, 1.0)])
 def test_the_limit_rows_say_whether_any_joint_is_beyond_however_many(beyond: int, penalty: float) -> None:
     """The table's 1(x not in [x_min, x_max]), as the tracking task has it; not a share of the 23 joints."""

@@ -11,6 +11,7 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 from torch import Tensor
 
+from bumblebee.errors import BadInput
 from bumblebee.learning.delta import rewards
 from bumblebee.learning.delta.action import DeltaConfig, correction, observe, placement
 from bumblebee.learning.delta.recordings import Recordings
@@ -27,6 +28,9 @@ class DeltaEnv(VecEnv):
         recordings: training rollouts only.
         config: see `DeltaConfig`.
         encoder_offset: (J,) [rad] what the encoders add, taken off a recording before it becomes a state.
+
+    Raises:
+        BadInput: if no recording is as long as an episode.
     """
 
     def __init__(self, engine: Engine, recordings: Recordings, config: DeltaConfig, encoder_offset: Tensor) -> None:
@@ -37,6 +41,10 @@ class DeltaEnv(VecEnv):
         self.cfg = config
         self._offset = encoder_offset.to(device)
         self._starts = self.recordings.windows(self.max_episode_length, stride=1)
+        if not len(self._starts):
+            came = f"{len(recordings.ids)} of at most {float(recordings.length.max()) * engine.control_dt:.1f} s"
+            do = "Record longer, or shorten delta.episode_seconds."
+            raise BadInput("delta: recordings", f"one of more than {config.episode_seconds:g} s", came, do)
         self._placement = placement(config.joints).to(device)
         facts = joints()
         self._effort = torch.tensor([j.effort_limit for j in facts], device=device)
@@ -80,8 +88,8 @@ class DeltaEnv(VecEnv):
         small = self.config.action_penalty
         total = (
             weight.torque_limits * rewards.beyond(torque, -0.999 * self._effort, 0.999 * self._effort)
-            + weight.dof_pos_limits * rewards.beyond(state.joint_pos, *self._range)
-            + weight.dof_vel_limits * rewards.beyond(state.joint_vel, -self._speed, self._speed)
+            + weight.dof_pos_limits * rewards.beyond_alone(state.joint_pos, qpos[:, 7:], *self._range)
+            + weight.dof_vel_limits * rewards.beyond_alone(state.joint_vel, qvel[:, 6:], -self._speed, self._speed)
             + weight.dof_acc * rewards.squared_norm(acceleration)
             + weight.action_rate * small * rewards.squared_norm(delta - self._last)
             + weight.action_norm * small * rewards.norm(delta)

@@ -53,6 +53,16 @@ def beyond(values: Tensor, low: Tensor, high: Tensor) -> Tensor:
     return ((values < low) | (values > high)).any(dim=-1).float()
 
 
+def beyond_alone(values: Tensor, recorded: Tensor, low: Tensor, high: Tensor) -> Tensor:
+    """The same for any value whose recording (B, J) is inside: what the robot itself did costs nothing, (B,).
+
+    With the row as printed a delta action earns more by keeping the simulator's joints off limits at which the robot's
+    were than by following the robot (docs/decisions/delta-action.md).
+    """
+    outside = ((values < low) | (values > high)) & (recorded >= low) & (recorded <= high)
+    return outside.any(dim=-1).float()
+
+
 def squared_norm(values: Tensor) -> Tensor:
     """Rows "DoF acceleration" and "Action rate": ||x||^2 of (B, N), (B,)."""
     return values.square().sum(dim=-1)
