@@ -19,6 +19,9 @@ from bumblebee.robot.facts import joints
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.sim.rotations import rotate_inverse
 
+_SLACK = 0.02
+"""How far a joint of the simulator goes beyond a limit that it only leans on [rad]."""
+
 
 class DeltaEnv(VecEnv):
     """rsl_rl's environment interface over an engine and recordings.
@@ -88,7 +91,7 @@ class DeltaEnv(VecEnv):
         small = self.config.action_penalty
         total = (
             weight.torque_limits * rewards.beyond(torque, -0.999 * self._effort, 0.999 * self._effort)
-            + weight.dof_pos_limits * rewards.beyond_alone(state.joint_pos, qpos[:, 7:], *self._range)
+            + weight.dof_pos_limits * rewards.beyond_alone(state.joint_pos, qpos[:, 7:], *self._range, _SLACK)
             + weight.dof_vel_limits * rewards.beyond_alone(state.joint_vel, qvel[:, 6:], -self._speed, self._speed)
             + weight.dof_acc * rewards.squared_norm(acceleration)
             + weight.action_rate * small * rewards.squared_norm(delta - self._last)

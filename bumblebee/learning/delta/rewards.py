@@ -53,13 +53,13 @@ def beyond(values: Tensor, low: Tensor, high: Tensor) -> Tensor:
     return ((values < low) | (values > high)).any(dim=-1).float()
 
 
-def beyond_alone(values: Tensor, recorded: Tensor, low: Tensor, high: Tensor) -> Tensor:
-    """The same for any value whose recording (B, J) is inside: what the robot itself did costs nothing, (B,).
+def beyond_alone(values: Tensor, recorded: Tensor, low: Tensor, high: Tensor, slack: float = 0.0) -> Tensor:
+    """The same for any value more than `slack` outside whose recording (B, J) is inside, (B,).
 
-    With the row as printed a delta action earns more by keeping the simulator's joints off limits at which the robot's
-    were than by following the robot (docs/decisions/delta-action.md).
+    What the robot itself did costs nothing. With the row as printed a delta action earns more by keeping the
+    simulator's joints off limits at which the robot's were than by following it (docs/decisions/delta-action.md).
     """
-    outside = ((values < low) | (values > high)) & (recorded >= low) & (recorded <= high)
+    outside = ((values < low - slack) | (values > high + slack)) & (recorded >= low) & (recorded <= high)
     return outside.any(dim=-1).float()
 
 

@@ -53,7 +53,7 @@ def _ppo(config: DeltaConfig) -> PpoConfig:
         desired_kl_end=config.desired_kl,
         entropy=0.0,
         hidden=config.hidden,
-        initial_std=max(config.init_std * config.limit, 0.05),
+        initial_std=config.init_std * config.limit,
     )
 
 
