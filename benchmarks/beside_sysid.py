@@ -23,8 +23,7 @@ import mujoco.sysid
 import numpy as np
 
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.dataset import open_session
-from bumblebee.diagnosis.dataset.session import Session
+from bumblebee.diagnosis.dataset import Session, open_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.replay import replay
 from bumblebee.diagnosis.simulation import choose_starts, cut, residuals, vary

@@ -12,8 +12,7 @@ from benchmarks.study.motions import Motions
 from benchmarks.study.round_tables import paired
 from benchmarks.study.tables import cell, head, line, rate, relative, signed
 from bumblebee.errors import BadInput
-from bumblebee.learning.delta import compare
-from bumblebee.learning.delta.action import CARD
+from bumblebee.learning.delta import CARD, compare
 
 ALL = "all"
 

@@ -1,6 +1,7 @@
 """The delta action: a small policy that corrects the simulator where it still errs; its task, training and worth."""
 
 from bumblebee.learning.delta.action import (
+    CARD,
     DeltaAction,
     DeltaConfig,
     action_adapter,
@@ -15,6 +16,7 @@ from bumblebee.learning.delta.recordings import Recordings, stack
 from bumblebee.learning.delta.train import train_delta
 
 __all__ = [
+    "CARD",
     "DeltaAction",
     "DeltaConfig",
     "DeltaEnv",
