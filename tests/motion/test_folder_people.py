@@ -142,6 +142,7 @@ def test_a_changed_setting_makes_all_anew(mixed, tmp_path, made):
     assert sorted(made) == before and len(made) == 5
 
 
+@pytest.mark.slow
 def test_the_result_does_not_depend_on_the_number_of_processes(mixed, tmp_path):
     one = read_folder(mixed, CONFIG)
     assert_same(one, read_folder(mixed, replace(CONFIG, processes=2)))

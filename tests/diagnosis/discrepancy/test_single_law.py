@@ -30,6 +30,7 @@ def at_rest(problem: Problem, *chosen: Candidate) -> Fit:
     return gauss_newton(problem, chosen, values, np.ones(len(problem.windows)), iterations=0)
 
 
+@pytest.mark.slow
 def test_a_cubic_spring_that_stands_as_a_spring_and_cogging_gets_its_basis_function() -> None:
     found = discovered((SPRING, COGGING), cubic=0.6)
     (form,) = found.fit.chosen

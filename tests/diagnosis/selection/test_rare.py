@@ -12,6 +12,7 @@ from tests.diagnosis.strange_arm import simulate
 from tests.diagnosis.test_catalogue import CONFIG
 
 
+@pytest.mark.slow
 def test_lost_commands_are_found_with_a_share_that_covers() -> None:
     rollouts = simulate({("dropped_commands", ""): (0.03,)}, seed=3)
     session = arm.session_of(rollouts)
