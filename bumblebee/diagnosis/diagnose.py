@@ -111,7 +111,7 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
     if last.fit.chosen:
         holdout = holdout.relinearised(last.fit.effects)
     if not config.beyond:
-        return _Found(found, least_simulation_error(last, holdout), holdout, None, (time,))
+        return _Found(found, _moved(last, holdout), holdout, None, (time,))
     say("what is left")
     offers, budget = offers_of(found, material.candidates), Budget(larger * config.beyond_seconds)
     activity = JointActivity(material.typical, material.still)
@@ -125,8 +125,14 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
         lambda: discover(last.problem, holdout, last.fit, activity, say, offers, budget),
         tested,
     )
-    last = least_simulation_error(_with(beyond, last), beyond.holdout)
+    last = _moved(_with(beyond, last), beyond.holdout)
     return _Found(with_catalogue_effects(found, last.fit), last, beyond.holdout, beyond, (time, budget))
+
+
+def _moved(last: Refined, holdout: Holdout) -> Refined:
+    """The last fit at the values of least simulation error; where they cannot be computed it stays as it is."""
+    failures = last.problem.plant.failures
+    return failures.attempt("least simulation error", lambda: least_simulation_error(last, holdout), lambda: last)
 
 
 def _steps_of_encoders(session: Session, found: _Found) -> tuple[list[dict[str, Any]], list[Effect]]:

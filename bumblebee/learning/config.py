@@ -47,7 +47,7 @@ class PpoConfig(Ranged):
     symmetry: bool = False
     """Learn from every sample's reflection too, left and right exchanged; doubles the batch."""
     captured: bool | None = None
-    """Update without waiting for the GPU, each gradient step one CUDA graph; None: where the task is on a GPU."""
+    """Update without waiting for the GPU, each gradient step one CUDA graph; None: on one GPU."""
     checkpoint_every: Annotated[int, Range(least=1, most=1_000_000_000)] = 25
     """Iterations between checkpoints, from which a killed training goes on."""
 

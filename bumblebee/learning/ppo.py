@@ -88,7 +88,7 @@ class Trainer:
         torch.manual_seed(seed)
         on_gpu = torch.device(env.device).type == "cuda"
         if config.captured is None:
-            config = self.config = replace(config, captured=on_gpu)
+            config = self.config = replace(config, captured=on_gpu and self.ranks.count == 1)
         if on_gpu:
             torch.set_float32_matmul_precision("high")
         with contextlib.redirect_stdout(io.StringIO()):  # it prints both networks

@@ -9,7 +9,6 @@ in units of what is left of it, without the nuisances, which no corrected model 
 system identification (Ljung, System Identification, 2nd ed., ch. 7, output error).
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,35 +19,26 @@ from bumblebee.diagnosis.estimation import Fit, gauss_newton, interval
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.final_fit import Refined
 from bumblebee.diagnosis.simulation import Recall
-from bumblebee.sim.effects import Effect
 
 
 def least_simulation_error(last: Refined, holdout: Holdout) -> Refined:
     """The last fit at the values that predict best; as it is where noise is its measure, or they predict no better.
 
-    They must be no worse on the validation windows, nor after 1 s.
+    They must be no worse on the validation windows, nor after 1 s; without such windows nothing is moved.
     """
     problem, fit = last.problem, last.fit
     rule = problem.thresholds.selection.simulation_error
-    if not fit.chosen or fit.power(problem) < rule.far:
+    if not fit.chosen or holdout.problem is None or fit.power(problem) < rule.far:
         return last
     size = signal_errors(problem, fit)
     plain, same = in_signal_units(problem, size), np.ones(len(problem.windows))
-    judging = None if holdout.problem is None else in_signal_units(holdout.problem, size)
-
-    def error(effects: Sequence[Effect]) -> float:
-        """Mean square on the validation windows, of signals in units of `size`."""
-        return 0.0 if judging is None else float((judging.residual([effects])[0] ** 2).mean())
-
     moved = gauss_newton(plain, fit.chosen, fit.values, same, rule.iterations)
-    if error(moved.effects) > error(fit.effects) or holdout.worse_later(fit, _in(problem, moved, last.weights)):
+    judged = in_signal_units(holdout.problem, size).residual([fit.effects, moved.effects])
+    before, after = (judged**2).mean(axis=(1, 2))
+    there = gauss_newton(problem, fit.chosen, moved.values, last.weights, iterations=0)
+    if after > before or holdout.worse_later(fit, there):
         return last
-    return Refined(problem, _in(problem, moved, last.weights), last.weights, interval(plain, moved, same))
-
-
-def _in(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
-    """A fit's values on the whitened windows."""
-    return gauss_newton(problem, fit.chosen, fit.values, weights, iterations=0)
+    return Refined(problem, there, last.weights, interval(plain, moved, same))
 
 
 def signal_errors(problem: Problem, fit: Fit) -> np.ndarray:

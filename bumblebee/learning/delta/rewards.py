@@ -2,7 +2,8 @@
 
 The table prints its regularisation rows with dots on quantities that have none; the reading here: the action rate is
 the difference of two successive delta actions, the action norm is the norm of the delta action itself. Its limit rows
-are indicators, 1(x not in [x_min, x_max]), of any joint, as in `tracking.rewards`.
+are indicators, 1(x not in [x_min, x_max]), of any joint, as in `tracking.rewards`; those of joints leave out what the
+recording did too.
 """
 
 from dataclasses import dataclass

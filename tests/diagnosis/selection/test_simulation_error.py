@@ -60,3 +60,9 @@ def test_readings_in_signal_units_are_the_simulations_own_errors() -> None:
     raw = plain.residual([last.fit.effects])[0]
     white = np.matmul(problem.whitener.factor, (raw - problem.whitener.offset)[..., None])[..., 0]
     assert white == pytest.approx(problem.residual([last.fit.effects])[0], abs=1e-6)
+
+
+def test_without_windows_to_judge_by_nothing_is_moved() -> None:
+    problem, _, candidates = _problems(0.1, 0.6)
+    last = _fit(problem, [candidates[FRICTION]], [0.3])
+    assert least_simulation_error(last, Holdout(None)) is last
