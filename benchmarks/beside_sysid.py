@@ -94,7 +94,7 @@ def identified(session: Session, kinds: Sequence[str], windows: int, horizon: fl
     starts = choose_starts(session.rollouts, list(range(len(session.rollouts))), horizon, windows)
     cuts = cut(plant, layout, session.rollouts, starts)
     declared = residuals(plant, layout, cuts, [vary(plant, [])], step)[0]
-    size = np.sqrt(np.nanmean(declared**2, axis=(0, 1)))
+    size = np.maximum(np.sqrt(np.nanmean(declared**2, axis=(0, 1))), session.sigma)
     worst = 10.0 * np.abs(np.nan_to_num(declared)).max(axis=(0, 1)) / size
 
     def left(x: np.ndarray, table: mujoco.sysid.ParameterDict) -> tuple[list[np.ndarray], None, None]:
@@ -122,6 +122,8 @@ def judged(session: Session, effects: Sequence[Effect]) -> dict[str, float]:
 def run(options: argparse.Namespace) -> None:
     """Print a row a fold and method, and the means."""
     names = sorted(file.stem for file in rollout_files(options.dataset))
+    if options.folds < 2:
+        raise BadInput("--folds", "at least 2", str(options.folds))
     if len(names) < 2 * options.folds:
         raise BadInput(options.dataset, f"at least {2 * options.folds} rollouts", str(len(names)), "Say --folds.")
     mujoco.set_mju_user_warning(lambda text: None)
@@ -147,7 +149,7 @@ def run(options: argparse.Namespace) -> None:
                     f"  {method}: {'; '.join(f'{e.effect} {e.where} {_values(e)}' for e in sets[method])}", flush=True
                 )
     for method, own in rows.items():
-        means = {h: float(np.sqrt(np.mean([row[h] ** 2 for row in own]))) for h in own[0]}
+        means = {h: float(np.sqrt(np.mean([row[h] ** 2 for row in own]))) for h in HORIZONS if all(h in r for r in own)}
         print(f"all folds {method}: {_told(means)}", flush=True)
 
 

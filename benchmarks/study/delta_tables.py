@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.study.deltas import ARMS, GENERAL, NONE, OWN
-from benchmarks.study.motions import Motions
 from benchmarks.study.round_tables import paired
+from benchmarks.study.settings import frozen
 from benchmarks.study.tables import cell, head, line, rate, relative, signed
 from bumblebee.errors import BadInput
 from bumblebee.learning.delta import CARD, compare
@@ -17,13 +17,13 @@ from bumblebee.learning.delta import CARD, compare
 ALL = "all"
 
 
-def deltas_tables(run: Path, motions: Motions) -> str:
+def deltas_tables(run: Path) -> str:
     """All tables as Markdown.
 
     Raises:
         BadInput: if a step has not been done.
     """
-    clusters = [cluster for cluster in motions.clusters if (run / f"delta-{cluster}").exists()]
+    clusters = frozen(run)["clusters"]
     errors = {cluster: _read(run / f"errors-{cluster}.csv") for cluster in clusters}
     tried = pd.concat([_trials(run, cluster) for cluster in clusters], ignore_index=True)
     parts = [f"### Held-out recordings, error after 0.2 and 1 s [rad]\n\n{_errors(errors)}"]

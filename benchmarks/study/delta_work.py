@@ -4,7 +4,6 @@ python -m benchmarks.study.delta_work policy own-c0 --rounds ... --motions ... -
 """
 
 import argparse
-import json
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +18,7 @@ from benchmarks.study.jobs import Job
 from benchmarks.study.motions import read_motions
 from benchmarks.study.on_robot import KEY, exported, judged_rows, read_recordings, run_on_robot, write_csv
 from benchmarks.study.rounds import BASE, Place, learned_from
-from benchmarks.study.settings import FROZEN, SMALL, Study
+from benchmarks.study.settings import SMALL, Study, frozen
 from benchmarks.study.steps import GOES_ON
 from benchmarks.study.training import deadline, train
 from bumblebee.deploy.episodes import Episode
@@ -42,8 +41,8 @@ class Work:
     def __init__(self, options: argparse.Namespace, study: Study, config: DeltasConfig) -> None:
         self.study, self.config, self.out, self.what = study, config, options.out, options.what
         self.motions, self.over = read_motions(options.motions), deadline(options.seconds)
-        frozen = json.loads((self.out / FROZEN).read_text())
-        self.recorded, robot = frozen["recorded"], frozen["robot"]
+        began = frozen(self.out)
+        self.recorded, robot = began["recorded"], began["robot"]
         self.robot = options.robots / f"{robot}.json"
         self.recordings = options.rounds / Place(robot, BASE, 1).name
         self.cluster_of = self.motions.labels.set_index("name")["cluster"]

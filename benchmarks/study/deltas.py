@@ -8,8 +8,6 @@ judged by the rest of these recordings, and by what a policy is worth on the rob
 """  # noqa: E501
 
 import argparse
-import json
-import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -20,7 +18,7 @@ from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.on_robot import read_recordings
 from benchmarks.study.rounds import BASE, SMALL_CONFIG, Place, learned_from
 from benchmarks.study.rounds import RoundsConfig as Rounds
-from benchmarks.study.settings import FROZEN, SMALL, Study, freeze, sha256
+from benchmarks.study.settings import FROZEN, SMALL, Study, freeze, frozen, sha256, take_in
 from benchmarks.study.steps import Places, Runner, Step
 from bumblebee.deploy.stand_in import BASES
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
@@ -108,12 +106,11 @@ def begin(options: argparse.Namespace, study: Study, config: DeltasConfig, motio
     folder = options.rounds / Place(options.robot, BASE, 1).name
     if not list(folder.glob("record-*")):
         raise BadInput(folder, "recordings of the robot", "none", "Run `benchmarks.study.rounds run` first.")
-    recorded = json.loads((options.rounds / FROZEN).read_text())["recorded"]
+    recorded = frozen(options.rounds)["recorded"]
     clusters = clusters_with_episodes(read_recordings(folder), recorded, motions, config.delta.episode_seconds)
-    inputs = {"motions": motions.hash, "robot": options.robot, "recorded": recorded}
+    inputs = {"motions": motions.hash, "robot": options.robot, "recorded": recorded, "clusters": clusters}
     freeze(options.out, study, deltas=asdict(config), **inputs, base=sha256(options.rounds / BASE / FILE))
-    if not (options.out / BASE).exists():
-        shutil.copytree(options.rounds / BASE, options.out / BASE)
+    take_in(options.rounds / BASE, options.out / BASE)
     for cluster in sorted(set(motions.clusters) - set(clusters)):
         print(f"{cluster}: left out, none of its recordings is longer than an episode", flush=True)
     return clusters
@@ -132,7 +129,7 @@ def write_table(options: argparse.Namespace) -> None:
     """Write the tables of a run that is done."""
     from benchmarks.study.delta_tables import deltas_tables
 
-    text = deltas_tables(options.run, read_motions(options.motions))
+    text = deltas_tables(options.run)
     stamp = sha256(options.run / FROZEN)[:12]
     options.out.write_text(f"<!-- deltas {stamp} -->\n\n{text}")
     print(text, end="")
@@ -145,6 +142,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     own = commands.add_parser("run", help="train, judge, train on and try")
     own.add_argument("rounds", type=Path, help="folder of a run of `benchmarks.study.rounds`")
     own.add_argument("--robot", required=True, help="name of its sealed file")
+    own.add_argument("--motions", type=Path, required=True)
     own.add_argument("--robots", type=Path, required=True, help="folder of `benchmarks.study.robots`")
     own.add_argument("--gpus", type=int, default=1)
     own.add_argument("--each", type=int, default=2, help="trainings beside each other on a GPU")
@@ -157,8 +155,6 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     table.add_argument("run", type=Path)
     table.add_argument("--out", type=Path, required=True, help="Markdown file")
     table.set_defaults(work=write_table)
-    for part in (own, table):
-        part.add_argument("--motions", type=Path, required=True)
     return parser.parse_args(arguments)
 
 

@@ -11,7 +11,6 @@ The first round's recordings are the base policy's and shared; later rounds reco
 
 import argparse
 import json
-import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -20,7 +19,7 @@ import torch
 
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.robots import DECLARED
-from benchmarks.study.settings import FROZEN, SMALL, Study, freeze, sha256
+from benchmarks.study.settings import FROZEN, SMALL, Study, freeze, sha256, take_in
 from benchmarks.study.steps import Places, Runner, Step
 from bumblebee.deploy.stand_in import BASES
 from bumblebee.deploy.stand_in_effects import read_sealed
@@ -224,8 +223,7 @@ def begin(options: argparse.Namespace, study: Study, config: RoundsConfig, motio
     recorded = recorded_motions(motions, followed, config)
     inputs = {"motions": motions.hash, "robots": stamps, "recorded": recorded, "base": sha256(options.base / FILE)}
     freeze(options.out, study, rounds=asdict(config), **inputs)
-    if not (options.out / BASE).exists():
-        shutil.copytree(options.base, options.out / BASE)
+    take_in(options.base, options.out / BASE)
     return robots
 
 

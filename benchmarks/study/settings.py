@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import shutil
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import yaml
 
 from benchmarks.baselines.methods import OURS
 from bumblebee.errors import BadInput
+from bumblebee.io.write import new_folder
 from bumblebee.learning.config import PAPER, PpoConfig
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.presets import PAPER_RANDOMISATION, PAPER_TASK
@@ -140,6 +142,25 @@ def freeze(out: Path, study: Study, **inputs: Any) -> str:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(stated, indent=1) + "\n")
     return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def frozen(out: Path) -> dict[str, Any]:
+    """What `freeze` wrote.
+
+    Raises:
+        BadInput: if nothing was begun there.
+    """
+    path = Path(out) / FROZEN
+    if not path.exists():
+        raise BadInput(path, "the settings of a run", "no such file", "Begin the run first.")
+    return _read(path)
+
+
+def take_in(base: Path, folder: Path) -> None:
+    """Copy a base policy into a run, whole or not at all; nothing where it is there."""
+    if not folder.exists():
+        with new_folder(folder) as new:
+            shutil.copytree(base, new, dirs_exist_ok=True)
 
 
 def sha256(path: Path) -> str:

@@ -99,7 +99,7 @@ def test_every_step_runs_and_is_made_into_tables(folder: Path) -> None:
     cards = {what: out / f"delta-{what}" / "card.json" for what in (GENERAL, *motions.clusters)}
     counts = {what: json.loads(card.read_text())["rollouts"] for what, card in cards.items()}
     assert counts.pop(GENERAL) == sum(counts.values()) > max(counts.values())
-    text = deltas_tables(out, motions)
+    text = deltas_tables(out)
     assert text.count("| own |") == 9 and "| delta action | rollouts | left_ankle_pitch_joint |" in text
     errors = pd.read_csv(out / "errors-c0.csv")
     assert np.isfinite(errors["error"]).any() and set(errors["arm"]) == set(ARMS)
