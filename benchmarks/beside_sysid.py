@@ -23,12 +23,12 @@ import mujoco.sysid
 import numpy as np
 
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.diagnosis.dataset import Session, open_session
+from bumblebee.diagnosis.dataset import Session, motion_names, open_session
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.replay import replay
 from bumblebee.diagnosis.simulation import choose_starts, cut, residuals, vary
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
-from bumblebee.measured.rollout import rollout_files
+from bumblebee.measured.rollout import read_rollout, rollout_files
 from bumblebee.sim.effects import Effect
 
 HORIZONS = ("0.02", "0.2", "1.0")
@@ -55,9 +55,12 @@ KINDS = {
 }
 
 
-def folds(names: Sequence[str], count: int) -> list[list[str]]:
-    """Names of the rollouts that each fold holds out, evenly over their order."""
-    return [list(names[k::count]) for k in range(count)]
+def folds(names: Sequence[str], motions: Sequence[str], count: int) -> list[list[str]]:
+    """Names of the rollouts that each fold holds out, evenly over their order; repeats of a motion in one fold."""
+    parts: list[list[str]] = [[] for _ in range(count)]
+    for name, motion in zip(names, motions, strict=True):
+        parts[motions.index(motion) % count].append(name)
+    return parts
 
 
 def part(model: Path, dataset: Path, keep: Sequence[str], folder: Path) -> Session:
@@ -121,7 +124,8 @@ def judged(session: Session, effects: Sequence[Effect]) -> dict[str, float]:
 
 def run(options: argparse.Namespace) -> None:
     """Print a row a fold and method, and the means."""
-    names = sorted(file.stem for file in rollout_files(options.dataset))
+    files = sorted(rollout_files(options.dataset))
+    names = [file.stem for file in files]
     if options.folds < 2:
         raise BadInput("--folds", "at least 2", str(options.folds))
     if len(names) < 2 * options.folds:
@@ -129,7 +133,8 @@ def run(options: argparse.Namespace) -> None:
     mujoco.set_mju_user_warning(lambda text: None)
     config = replace(DiagnosisConfig(), max_windows=options.max_windows)
     rows: dict[str, list[dict[str, float]]] = {method: [] for method in METHODS}
-    for k, held_out in enumerate(folds(names, options.folds)):
+    motions = motion_names([read_rollout(file) for file in files], config.thresholds.dataset.split)
+    for k, held_out in enumerate(folds(names, motions, options.folds)):
         with tempfile.TemporaryDirectory() as scratch:
             rest = [name for name in names if name not in held_out]
             session = part(options.model, options.dataset, rest, Path(scratch) / "fitted")

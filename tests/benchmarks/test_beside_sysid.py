@@ -11,9 +11,13 @@ from tests.diagnosis import arm
 
 def test_every_rollout_is_held_out_once() -> None:
     names = [f"r{i}" for i in range(7)]
-    parts = beside_sysid.folds(names, 3)
+    parts = beside_sysid.folds(names, names, 3)
     assert sorted(name for part in parts for name in part) == names
     assert {len(part) for part in parts} == {2, 3}
+
+
+def test_repeats_of_a_motion_are_held_out_together() -> None:
+    assert beside_sysid.folds(["a", "b", "c", "d"], ["m", "n", "o", "m"], 2) == [["a", "c", "d"], ["b"]]
 
 
 def test_what_is_told_to_be_wrong_is_found_with_its_size() -> None:

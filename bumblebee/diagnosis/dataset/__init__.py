@@ -3,6 +3,7 @@
 from bumblebee.diagnosis.dataset.held_out import read_held_out, varied
 from bumblebee.diagnosis.dataset.informative_split import informative, window_errors
 from bumblebee.diagnosis.dataset.session import JUDGED_TWICE, Session, make_session, open_session
+from bumblebee.diagnosis.dataset.split import motion_names
 from bumblebee.diagnosis.dataset.time_steps import steps_of
 
 __all__ = [
@@ -10,6 +11,7 @@ __all__ = [
     "Session",
     "informative",
     "make_session",
+    "motion_names",
     "open_session",
     "read_held_out",
     "steps_of",
