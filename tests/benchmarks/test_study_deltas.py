@@ -2,7 +2,6 @@
 
 import argparse
 import json
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,19 +9,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.motion_pack import Packed, write_pack
 from benchmarks.study import delta_work, deltas, round_work, rounds
 from benchmarks.study.correction import DECLARED
 from benchmarks.study.delta_tables import deltas_tables
 from benchmarks.study.deltas import ARMS, GENERAL, SMALL_DELTAS, delta_folder, plan
 from benchmarks.study.jobs import base_of, experts_jobs
-from benchmarks.study.motions import LABELS, MOTIONS, read_motions
+from benchmarks.study.motions import read_motions
 from benchmarks.study.rounds import SMALL_CONFIG, Place
 from benchmarks.study.settings import SMALL
 from benchmarks.study.training import train
-from bumblebee.deploy.stand_in_effects import SCHEMA, seal
 from bumblebee.errors import BadInput
-from bumblebee.motion.embedded import make_library
+from tests.benchmarks import study_folder
 
 
 def test_an_arm_waits_for_its_own_delta_action_alone() -> None:
@@ -59,17 +56,7 @@ def test_a_cluster_of_motions_shorter_than_an_episode_is_left_out() -> None:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Motions in two clusters, and a round's recordings of a robot without effects by a policy of a few steps."""
     folder = tmp_path_factory.mktemp("deltas")
-    clips = sorted(make_library(), key=lambda clip: clip.frames)[:6]
-    splits = ["train", "train", "test"] * 2
-    rows = [Packed("made", True, replace(clip, split=split)) for clip, split in zip(clips, splits, strict=True)]
-    write_pack(folder / MOTIONS, rows)
-    names = [clip.name for clip in clips]
-    labels = pd.DataFrame({"name": names, "motion": names, "group": "made", "family": [c.family for c in clips]})
-    labels.assign(split=splits, seconds=1.0, cluster=["c0"] * 3 + ["c1"] * 3).to_csv(folder / LABELS, index=False)
-    (folder / "robots").mkdir()
-    sealed = {"schema": SCHEMA, "sealed": "for a test", "effects": [], "sha256": seal([])}
-    (folder / "robots" / "declared.json").write_text(json.dumps(sealed))
-    (folder / "robots" / "followed.json").write_text(json.dumps({"names": names[1:2]}))
+    study_folder.fill(folder)
     motions = read_motions(folder)
     train(experts_jobs(SMALL, motions)[0], motions, SMALL, folder, DECLARED)
     shared = ["--motions", str(folder), "--robots", str(folder / "robots"), "--small"]

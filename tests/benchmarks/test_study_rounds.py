@@ -10,36 +10,24 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.motion_pack import Packed, write_pack
 from benchmarks.study import round_work, rounds
 from benchmarks.study.correction import DECLARED
 from benchmarks.study.jobs import base_of, experts_jobs
-from benchmarks.study.motions import LABELS, MOTIONS, read_motions
+from benchmarks.study.motions import read_motions
 from benchmarks.study.round_tables import paired, rounds_tables
 from benchmarks.study.rounds import ARMS, BASE, SMALL_CONFIG, Place, RoundsConfig, learned_from, plan, recorded_motions
 from benchmarks.study.settings import SMALL
 from benchmarks.study.training import train
-from bumblebee.deploy.stand_in_effects import SCHEMA, seal
-from bumblebee.motion.embedded import make_library
+from tests.benchmarks import study_folder
 
 ROBOTS = ["declared", "robot-0"]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Six short motions in two clusters, one of each held out; a policy of a few steps; a robot without effects."""
+    """Six short motions in two clusters, one of each held out; a robot without effects."""
     folder = tmp_path_factory.mktemp("rounds")
-    clips = sorted(make_library(), key=lambda clip: clip.frames)[:6]
-    splits = ["train", "train", "test"] * 2
-    rows = [Packed("made", True, replace(clip, split=split)) for clip, split in zip(clips, splits, strict=True)]
-    write_pack(folder / MOTIONS, rows)
-    names = [clip.name for clip in clips]
-    labels = pd.DataFrame({"name": names, "motion": names, "group": "made", "family": [c.family for c in clips]})
-    labels.assign(split=splits, seconds=1.0, cluster=["c0"] * 3 + ["c1"] * 3).to_csv(folder / LABELS, index=False)
-    (folder / "robots").mkdir()
-    sealed = {"schema": SCHEMA, "sealed": "for a test", "effects": [], "sha256": seal([])}
-    (folder / "robots" / "declared.json").write_text(json.dumps(sealed))
-    (folder / "robots" / "followed.json").write_text(json.dumps({"names": names[1:2]}))
+    study_folder.fill(folder)
     return folder
 
 

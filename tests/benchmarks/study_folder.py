@@ -1,0 +1,27 @@
+"""Inputs of a study, small: motions in clusters and a sealed robot without effects."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+
+from benchmarks.motion_pack import Packed, write_pack
+from benchmarks.study.motions import LABELS, MOTIONS
+from bumblebee.deploy.stand_in_effects import SCHEMA, seal
+from bumblebee.motion.embedded import make_library
+
+
+def fill(folder: Path) -> None:
+    """Six short motions in two clusters, one of each held out; the declared robot below `robots`."""
+    clips = sorted(make_library(), key=lambda clip: clip.frames)[:6]
+    splits = ["train", "train", "test"] * 2
+    rows = [Packed("made", True, replace(clip, split=split)) for clip, split in zip(clips, splits, strict=True)]
+    write_pack(folder / MOTIONS, rows)
+    names = [clip.name for clip in clips]
+    labels = pd.DataFrame({"name": names, "motion": names, "group": "made", "family": [c.family for c in clips]})
+    labels.assign(split=splits, seconds=1.0, cluster=["c0"] * 3 + ["c1"] * 3).to_csv(folder / LABELS, index=False)
+    (folder / "robots").mkdir()
+    sealed = {"schema": SCHEMA, "sealed": "for a test", "effects": [], "sha256": seal([])}
+    (folder / "robots" / "declared.json").write_text(json.dumps(sealed))
+    (folder / "robots" / "followed.json").write_text(json.dumps({"names": names[1:2]}))
