@@ -1,10 +1,8 @@
 """The paper's transformer against MLPs: distilled from the same experts at equal steps, one line a case.
 
 `python -m benchmarks.generalist --out results.jsonl`: each arm learns by DAgger to do what the shipped policy does on
-the embedded motions, and is then tried on every one from its first frame. With `--run RUN --motions MOTIONS` the
-experts by cluster of a run of `benchmarks.study` are distilled, in its task and on its motions, into
-`RUN/s<seed>-<arm>`, where `benchmarks.study.trying` finds the policy. Cases that the file has are not run again; one
-that was cut off goes on.
+the embedded motions, and is then tried on every one from its first frame. Cases that the file has are not run again;
+one that was cut off goes on. Experts of real motions are distilled by `benchmarks.study run generalist`.
 """
 
 import argparse
@@ -12,6 +10,7 @@ import json
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,6 @@ from typing import Any
 import pandas as pd
 import torch
 
-from benchmarks.study.jobs import base_of, expert_of
-from benchmarks.study.motions import read_motions
-from benchmarks.study.settings import SMALL, TASK
-from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from bumblebee.learning import pretrained
 from bumblebee.learning.distill import DistillConfig
@@ -59,17 +54,6 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Given:
-    """What is distilled, and within which bounds: a run of the study and its motions, or the shipped policy."""
-
-    run: Path | None
-    motions: Path | None
-    scratch: Path
-    seconds: float
-    small: bool = False
-
-
-@dataclass(frozen=True)
 class Material:
     """Motions, the cluster of each, the experts of the clusters, whom they come from, and their task."""
 
@@ -95,23 +79,19 @@ def main() -> None:
     made.add_argument("--capacity", type=int, default=400_000)
     made.add_argument("--engine", choices=("mujoco", "mujoco_warp"), default="mujoco")
     made.add_argument("--seconds", type=float, default=1e9, help="of training a case in this call")
-    made.add_argument("--run", type=Path, help="run of benchmarks.study with the experts of the seeds")
-    made.add_argument("--motions", type=Path, help="motions of benchmarks.study")
-    made.add_argument("--small", action="store_true", help="the run is a small one")
     made.add_argument("--scratch", type=Path, default=Path("runs/generalist"))
     raise SystemExit(guarded(lambda: run(made.parse_args())))
 
 
 def run(options: argparse.Namespace) -> None:
     """The cases that the file lacks, a line each as they are done."""
-    given = Given(options.run, options.motions, options.scratch, options.seconds, options.small)
     known = read_done(options.out)
     asked = (getattr(options, name) for name in ("iterations", "worlds", "steps", "rate", "capacity", "engine"))
     settings = tuple(asked)
     cases = [Case(arm, seed, *settings) for seed in options.seeds for arm in options.arms]
     cases = [case for case in cases if asdict(case) not in known][: options.limit]
     with ProcessPoolExecutor(options.workers, mp_context=get_context("spawn")) as pool:
-        for line in pool.map(measured, cases, [given] * len(cases)):
+        for line in pool.map(partial(measured, scratch=options.scratch, seconds=options.seconds), cases):
             if line["done"]:
                 with options.out.open("a") as file:
                     file.write(json.dumps(line) + "\n")
@@ -123,35 +103,28 @@ def read_done(path: Path) -> list[dict]:
     return [json.loads(line)["case"] for line in path.read_text().splitlines()] if path.exists() else []
 
 
-def measured(case: Case, given: Given) -> dict[str, Any]:
-    """Distil one, and try it or leave that to the study."""
+def measured(case: Case, scratch: Path, seconds: float) -> dict[str, Any]:
+    """Distil one within so many seconds, and try it."""
     torch.set_num_threads(1)
-    own = shipped() if given.run is None else of_run(given, case.seed)
-    config = settings_of(case, own)
-    folder = given.scratch / "-".join(str(value) for value in asdict(case).values())
-    train = [index for index, clip in enumerate(own.clips) if clip.split == "train"]
-    clips, cluster = [own.clips[i] for i in train], [own.cluster[i] for i in train]
-    distiller = generalist_of(clips, cluster, own.experts, config, folder, own.base)
+    own = shipped()
+    config = settings_of(case, own.task)
+    folder = scratch / "-".join(str(value) for value in asdict(case).values())
+    distiller = generalist_of(own.clips, own.cluster, own.experts, config, folder, own.base)
     before, began = distiller.policy(), time.monotonic()
-    distiller.train(enough=lambda: time.monotonic() - began > given.seconds)
-    seconds, curve, student = time.monotonic() - began, distiller.curve(), distiller.policy()
-    line = {
+    distiller.train(enough=lambda: time.monotonic() - began > seconds)
+    curve, student = distiller.curve(), distiller.policy()
+    return {
         "case": asdict(case),
         "done": distiller.iteration >= case.iterations,
         "parameters": sum(tensor.numel() for tensor in student.actor.parameters()),
         "frames": distiller.iteration * distiller.frames_each,
-        "seconds_of_this_call": round(seconds, 1),
+        "seconds_of_this_call": round(time.monotonic() - began, 1),
         "samples_gib": round(distiller.gib, 3),
         "kl": round(float(curve["kl"].tail(max(len(curve) // 10, 1)).mean()), 4),
         "least_share": round(float(curve["least_share"].iloc[-1]), 4),
         "curve": [round(float(value), 4) for value in curve["kl"].iloc[:: max(len(curve) // 50, 1)]],
+        **tried(own, config, before, student),
     }
-    if given.run is None:
-        return line | tried(own, config, before, student)
-    made = given.run / f"s{case.seed}-{case.arm}"
-    made.mkdir(exist_ok=True)
-    student.save(made)
-    return line | {"policy": str(made)}
 
 
 def tried(own: Material, config: DistillConfig, before: Policy, student: Policy) -> dict[str, Any]:
@@ -186,21 +159,9 @@ def shipped() -> Material:
     )
 
 
-def of_run(given: Given, seed: int) -> Material:
-    """The experts of a run of the study, its motions, and the task that they were trained on in."""
-    assert given.run is not None
-    if given.motions is None:
-        raise BadInput("--motions", "the motions of the run", "nothing", "Give the folder that the study prepared.")
-    motions = read_motions(given.motions)
-    clips = [row.clip for row in motions.rows]
-    experts = {i: load_policy(given.run / expert_of(seed, name)) for i, name in enumerate(motions.clusters)}
-    task = SMALL.env if given.small else TASK
-    return Material(clips, list(motions.cluster_indices(clips)), experts, load_policy(given.run / base_of(seed)), task)
-
-
-def settings_of(case: Case, own: Material) -> DistillConfig:
+def settings_of(case: Case, experts: EnvConfig) -> DistillConfig:
     """The algorithm of a case, in the experts' task with a student beside it."""
-    task = replace(own.task, engine=case.engine, num_worlds=case.worlds)
+    task = replace(experts, engine=case.engine, num_worlds=case.worlds)
     config = DistillConfig(
         iterations=case.iterations,
         steps=case.steps,

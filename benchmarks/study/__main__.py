@@ -1,6 +1,7 @@
 """The command line of the study; see the package."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -33,7 +34,7 @@ def run_part(options: argparse.Namespace) -> None:
             "--gpus", f"1 to {present} GPUs of this machine" if present else "a machine with a GPU", str(options.gpus)
         )
     freeze(options.out, study, motions=motions.hash)
-    jobs = PARTS[options.part].jobs(study, motions)
+    jobs = chosen(PARTS[options.part].jobs(of_seeds(study, options.seeds), motions), options.only)
     for job in jobs:
         finished(options.out, job)  # refuses what was trained otherwise
     seconds = None if options.minutes is None else 60 * options.minutes
@@ -46,6 +47,39 @@ def run_part(options: argparse.Namespace) -> None:
     print("done" if whole else LATER, flush=True)
 
 
+def of_seeds(study: Study, seeds: list[int] | None) -> Study:
+    """The study with some of its seeds.
+
+    Raises:
+        BadInput: if it has no such seed.
+    """
+    if unknown := sorted(set(seeds or ()) - set(study.seeds)):
+        raise BadInput("--seeds", f"some of {', '.join(map(str, study.seeds))}", ", ".join(map(str, unknown)))
+    return replace(study, seeds=tuple(seed for seed in study.seeds if seeds is None or seed in seeds))
+
+
+def chosen(jobs: list[Job], only: list[str] | None) -> list[Job]:
+    """The jobs of these names and those that they start from or learn from.
+
+    Raises:
+        BadInput: if there is no such job.
+    """
+    if only is None:
+        return jobs
+    by_name, wanted = {job.name: job for job in jobs}, list(only)
+    if unknown := sorted(set(only) - set(by_name)):
+        raise BadInput("--only", f"some of {', '.join(by_name)}", ", ".join(unknown))
+    for name in wanted:  # grows while it is gone through
+        job = by_name[name]
+        wanted += [need for need in needs_of(job) if need not in wanted]
+    return [job for job in jobs if job.name in wanted]
+
+
+def needs_of(job: Job) -> tuple[str, ...]:
+    """Names of the jobs whose policies a job starts from or learns from."""
+    return tuple(dict.fromkeys((*((job.parent,) if job.parent else ()), *job.experts)))
+
+
 def steps_of(job: Job, options: argparse.Namespace) -> tuple[Step, Step]:
     """A job's training and its trials."""
     shared = ("--motions", str(options.motions), "--out", str(options.out))
@@ -53,7 +87,7 @@ def steps_of(job: Job, options: argparse.Namespace) -> tuple[Step, Step]:
     train = ("benchmarks.study.training", options.part, job.name, *shared, *small)
     trial = ("benchmarks.study.trying", job.name, *shared)
     folder, name = options.out / job.name, f"{job.name}.train"
-    parents = (f"{job.parent}.train",) if job.parent else ()
+    parents = tuple(f"{need}.train" for need in needs_of(job))
     return (
         Step(name, train, folder / DONE, parents, gpu=True),
         Step(f"{job.name}.trial", trial, folder / TRIALS, (name,)),
@@ -71,6 +105,7 @@ def run_table(options: argparse.Namespace) -> None:
     """Write the tables of a finished run."""
     study, motions = study_of(options), read_motions(options.motions)
     stamp = freeze(options.run, study, motions=motions.hash)
+    study = of_seeds(study, options.seeds)
     text = PARTS[options.part].tables(options.run, study, motions)
     options.out.write_text(f"<!-- study {stamp}, motions {motions.hash} -->\n\n{text}")
     print(text, end="")
@@ -101,6 +136,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     own.add_argument("--each", type=int, default=2, help="trainings beside each other on a GPU")
     own.add_argument("--jobs", type=int, default=2, help="processor cores that try policies")
     own.add_argument("--minutes", type=float, help="end this call after so long")
+    own.add_argument("--only", nargs="+", metavar="POLICY", help="these policies and what they start from")
     own.add_argument("--out", type=Path, required=True)
     own.set_defaults(work=run_part)
     table = commands.add_parser("table", help="the tables of a finished run")
@@ -110,6 +146,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     table.add_argument("--curves", type=Path, help="also draw the learning curves into this .svg")
     table.set_defaults(work=run_table)
     for part in (own, table):
+        part.add_argument("--seeds", nargs="+", type=int, help="some of the study's seeds")
         part.add_argument("--motions", type=Path, required=True)
         part.add_argument("--small", action="store_true", help="the same in seconds on two cores: shows that it runs")
     return parser.parse_args(arguments)

@@ -1,9 +1,12 @@
 """What is trained in the study: each policy as a job, from which parent, on which motions, for how many steps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from benchmarks.study.motions import Motions
 from benchmarks.study.settings import Study
+
+DONE = "done.json"
+"""File in a job's folder that says how it was trained; written last."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,10 @@ class Job:
     """Name of its task and algorithm, see `settings.settings_of`."""
     even: bool = False
     """Whether each cluster gets an equal share of the draws, however long its motions are."""
+    arm: str | None = None
+    """Name in `GENERALISTS` of what is distilled by DAgger; None: it learns by PPO."""
+    experts: tuple[str, ...] = ()
+    """Names of the jobs that it is distilled from, one for each cluster in their order."""
 
 
 def experts_jobs(study: Study, motions: Motions) -> list[Job]:
@@ -64,6 +71,35 @@ def paper_jobs(study: Study, motions: Motions) -> list[Job]:
     """The paper's teacher from nothing, a policy for each arm, all of equal steps."""
     seed = study.seeds[0]
     return [Job(paper_of(seed, arm), study.paper_steps, seed, settings=f"paper-{arm}") for arm in PAPER_ARMS]
+
+
+GENERALISTS = {
+    "transformer": "transformer, of the experts",
+    "mlp": "MLP of equal size, of the experts",
+    "init": "transformer, of the base policy",
+    "seeing": "MLP that sees what the experts see, of the experts",
+}
+"""Arms of the part `generalist`; all but the last see what a robot senses. `init` is the paper's General Init."""
+
+
+def generalist_jobs(study: Study, motions: Motions) -> list[Job]:
+    """For each seed the experts by cluster, the one policy at equal steps, and what is distilled of them."""
+    jobs: list[Job] = []
+    for seed in study.seeds:
+        own = experts_jobs(replace(study, seeds=(seed,)), motions)
+        experts = tuple(expert_of(seed, cluster) for cluster in motions.clusters)
+        kept = {job.name: job for job in own if job.name in (base_of(seed), *experts)}
+        base, frames = base_of(seed), study.distil.frames
+        teachers = {arm: (base,) * len(experts) if arm == "init" else experts for arm in GENERALISTS}
+        distilled = [Job(arm_of(seed, arm), frames, seed, base, arm=arm, experts=teachers[arm]) for arm in GENERALISTS]
+        longer = [job for job in own if job.name in (one_of(seed), even_of(seed))]
+        jobs += [*kept.values(), *distilled, *longer]
+    return jobs
+
+
+def arm_of(seed: int, arm: str) -> str:
+    """Name of an arm's generalist."""
+    return f"s{seed}-{arm}"
 
 
 def paper_of(seed: int, arm: str) -> str:

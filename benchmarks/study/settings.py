@@ -31,6 +31,27 @@ TASK = EnvConfig(
 
 
 @dataclass(frozen=True)
+class Distilling:
+    """What the arms of the part `generalist` share."""
+
+    iterations: int = 4000
+    worlds: int = 4096
+    steps: int = 2
+    """Control steps of each world an iteration."""
+    rate: float = 3e-4
+    """Adam's."""
+    capacity: int = 10_000_000
+    """Samples that are kept."""
+    margin: float = 0.05
+    """Share of motions by which a generalist may follow fewer than its experts and still keeps their success."""
+
+    @property
+    def frames(self) -> float:
+        """Control steps of all worlds."""
+        return float(self.iterations * self.worlds * self.steps)
+
+
+@dataclass(frozen=True)
 class Study:
     """Seeds, budgets and settings, the same for every arm."""
 
@@ -54,6 +75,8 @@ class Study:
     """The algorithm; its iterations follow from the steps."""
     child_rate: float = 3e-4
     """First learning rate of what is trained on; the rate adapts afterwards."""
+    distil: Distilling = field(default_factory=Distilling)
+    """The algorithm of the part `generalist`."""
 
 
 PAPER_CHANGES: dict[str, tuple[str, ...]] = {
@@ -112,6 +135,7 @@ SMALL = Study(
     paper_steps=512,
     paper_env=replace(PAPER_TASK, engine="mujoco", num_worlds=16, physics_hz=100.0, threads=1),
     paper_ppo=replace(PAPER, steps=16, epochs=1, hidden=(32, 32)),
+    distil=Distilling(iterations=3, worlds=8, steps=4, capacity=4000),
 )
 """The same study in seconds on two cores: it shows that every part runs, and nothing else."""
 

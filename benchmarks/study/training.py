@@ -16,7 +16,8 @@ from pathlib import Path
 import torch
 
 from benchmarks.study.correction import DECLARED, Correction
-from benchmarks.study.jobs import Job
+from benchmarks.study.distilling import distil
+from benchmarks.study.jobs import DONE, Job
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.parts import PARTS
 from benchmarks.study.settings import SMALL, Study, settings_of
@@ -29,7 +30,6 @@ from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.sampler import ClipShares
 
-DONE = "done.json"
 CHECKPOINT_EVERY = 60
 """Iterations: some 15 s of a GPU."""
 
@@ -69,6 +69,8 @@ def train(
     """
     if finished(out, job):
         return True
+    if job.arm is not None:
+        return _distilled(job, motions, study, out, over)
     folder = out / job.name
     folder.mkdir(parents=True, exist_ok=True)
     task, ppo = settings_of(study, job.settings, job.parent is not None)
@@ -93,6 +95,14 @@ def train(
     (folder / DONE).write_text(json.dumps(told) + "\n")
     (folder / CHECKPOINT).unlink(missing_ok=True)
     return True
+
+
+def _distilled(job: Job, motions: Motions, study: Study, out: Path, over: Callable[[], bool]) -> bool:
+    kl = distil(job, motions, study, out, over)
+    if kl is not None:
+        told = {"job": _plain(job), "kl": round(kl, 4)}
+        (out / job.name / DONE).write_text(json.dumps(told) + "\n")
+    return kl is not None
 
 
 def deadline(seconds: float | None) -> Callable[[], bool]:
