@@ -1,18 +1,20 @@
-"""Distils one job of the study: an arm of the part `generalist`, of the policies that the run has, by DAgger."""
+"""Distils one job of the study by DAgger, of the policies that the run has."""
 
 from collections.abc import Callable
 from pathlib import Path
 
 import torch
 
-from benchmarks.generalist import Case, settings_of
-from benchmarks.study.jobs import Job
+from benchmarks.generalist import ARMS, Case, settings_of
+from benchmarks.study.jobs import OTHERS, Job
 from benchmarks.study.motions import Motions
+from benchmarks.study.others import distil_other
 from benchmarks.study.settings import Study
 from benchmarks.study.settings import settings_of as trained_with
 from bumblebee.learning.distill import CHECKPOINT
 from bumblebee.learning.policy import load_policy
 from bumblebee.learning.teacher_student import generalist_of
+from bumblebee.progress import progress
 
 CURVE = "distill.csv"
 
@@ -28,18 +30,23 @@ def distil(job: Job, motions: Motions, study: Study, out: Path, over: Callable[[
         over: says when to stop and keep a checkpoint.
     """
     assert job.arm is not None and job.parent is not None
+    if job.arm in OTHERS:
+        return distil_other(job, motions, study, out, over)
     own, folder = study.distil, out / job.name
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(study.env.threads)
-    kind = "transformer" if job.arm == "init" else job.arm
+    kind = job.arm if job.arm in ARMS else "transformer"  # the others differ by whom they learn from
     case = Case(kind, job.seed, own.iterations, own.worlds, own.steps, own.rate, own.capacity, study.env.engine)
     config = settings_of(case, trained_with(study, "ours", child=True)[0])
     clips = [row.clip for row in motions.training()]
     experts = {index: load_policy(out / name) for index, name in enumerate(job.experts)}
     base = load_policy(out / job.parent)
-    distiller = generalist_of(clips, motions.cluster_indices(clips), experts, config, folder, base)
+    clusters = motions.cluster_indices(clips, job.seed if job.arm == "random" else None)
+    distiller = generalist_of(clips, clusters, experts, config, folder, base)
     if distiller.iteration < own.iterations:
-        distiller.train(enough=over)
+        before = distiller.iteration * distiller.frames_each
+        with progress(own.frames, f"distil {job.name}", "frames", start=before) as bar:
+            distiller.train(bar.update, over)
     if distiller.iteration < own.iterations:
         distiller.save_checkpoint(folder)
         return None

@@ -1,9 +1,13 @@
 """What is trained in the study: each policy as a job, from which parent, on which motions, for how many steps."""
 
+import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from benchmarks.study.motions import Motions
 from benchmarks.study.settings import Study
+from bumblebee.errors import BadInput
 
 DONE = "done.json"
 """File in a job's folder that says how it was trained; written last."""
@@ -26,7 +30,7 @@ class Job:
     even: bool = False
     """Whether each cluster gets an equal share of the draws, however long its motions are."""
     arm: str | None = None
-    """Name in `GENERALISTS` of what is distilled by DAgger; None: it learns by PPO."""
+    """Name in `GENERALISTS`, `MORE_GENERALISTS` or `OTHERS` of what is distilled by DAgger; None: it learns by PPO."""
     experts: tuple[str, ...] = ()
     """Names of the jobs that it is distilled from, one for each cluster in their order."""
 
@@ -82,12 +86,21 @@ GENERALISTS = {
 """Arms of the part `generalist`; all but the last see what a robot senses. `init` is the paper's General Init."""
 
 
+MORE_GENERALISTS = {
+    "general": "General Init: transformer, of the one policy",
+    "random": "Random: transformer, of experts of random clusters",
+}
+"""Further ones of the part `table-1`, as `transformer` is but for whom they learn from; all have equal steps."""
+OTHERS = {"omnih2o": "OmniH2O", "exbody2": "Exbody2", "hover": "HOVER"}
+"""Other groups' methods of the part `table-1`, by their names in `bumblebee.baselines.registry`."""
+
+
 def generalist_jobs(study: Study, motions: Motions) -> list[Job]:
     """For each seed the experts by cluster, the one policy at equal steps, and what is distilled of them."""
     jobs: list[Job] = []
     for seed in study.seeds:
         own = experts_jobs(replace(study, seeds=(seed,)), motions)
-        experts = tuple(expert_of(seed, cluster) for cluster in motions.clusters)
+        experts = experts_of(seed, motions.clusters)
         kept = {job.name: job for job in own if job.name in (base_of(seed), *experts)}
         base, frames = base_of(seed), study.distil.frames
         teachers = {arm: (base,) * len(experts) if arm == "init" else experts for arm in GENERALISTS}
@@ -97,9 +110,47 @@ def generalist_jobs(study: Study, motions: Motions) -> list[Job]:
     return jobs
 
 
+def table_1_jobs(study: Study, motions: Motions) -> list[Job]:
+    """For each seed the paper's method, its controls and other groups' methods.
+
+    All have as many control steps in all: a teacher those of the base policy and the experts together, a student those
+    of a generalist.
+    """
+    jobs: list[Job] = []
+    for seed in study.seeds:
+        own = replace(study, seeds=(seed,))
+        ours = {job.name: job for job in generalist_jobs(own, motions)}
+        every = {job.name: job for job in experts_jobs(own, motions)} | ours
+        pupil = ours[arm_of(seed, "transformer")]
+        random = experts_of(seed, random_names(motions))
+        teachers = {"general": (one_of(seed),) * len(random), "random": random}
+        first = [every[name] for name in (base_of(seed), one_of(seed), *pupil.experts)]
+        jobs += [*first, replace(pupil, name=arm_of(seed, "general"), arm="general", experts=teachers["general"])]
+        steps = study.base_steps + study.expert_steps * len(motions.clusters)
+        for name in OTHERS:
+            jobs.append(Job(teacher_of(seed, name), steps, seed, settings=name))
+        jobs += [pupil, *(every[name] for name in random)]
+        for name in OTHERS:
+            teacher = teacher_of(seed, name)
+            frames = study.distil.frames
+            jobs.append(Job(arm_of(seed, name), frames, seed, teacher, settings=name, arm=name, experts=(teacher,)))
+        jobs.append(replace(pupil, name=arm_of(seed, "random"), arm="random", experts=random))
+    return jobs
+
+
+def random_names(motions: Motions) -> list[str]:
+    """Names of the random clusters, as many as there are clusters."""
+    return [f"r{index}" for index in range(len(motions.clusters))]
+
+
 def arm_of(seed: int, arm: str) -> str:
-    """Name of an arm's generalist."""
+    """Name of an arm's generalist or student."""
     return f"s{seed}-{arm}"
+
+
+def teacher_of(seed: int, method: str) -> str:
+    """Name of the teacher of another group's method."""
+    return f"s{seed}-{method}-teacher"
 
 
 def paper_of(seed: int, arm: str) -> str:
@@ -125,3 +176,21 @@ def even_of(seed: int) -> str:
 def expert_of(seed: int, cluster: str) -> str:
     """Name of a cluster's expert; random clusters are r0, r1 ..."""
     return f"s{seed}-{cluster}"
+
+
+def experts_of(seed: int, clusters: Sequence[str]) -> tuple[str, ...]:
+    """Names of the experts of some clusters."""
+    return tuple(expert_of(seed, cluster) for cluster in clusters)
+
+
+def job_of(folder: Path) -> Job:
+    """The job whose finished policy is in `folder`.
+
+    Raises:
+        BadInput: if there is none.
+    """
+    path = Path(folder) / DONE
+    if not path.exists():
+        raise BadInput(path, "a finished policy of a run", "no such file", "Train it first.")
+    told = json.loads(path.read_text())["job"]
+    return Job(**{name: tuple(value) if isinstance(value, list) else value for name, value in told.items()})

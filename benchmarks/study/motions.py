@@ -42,10 +42,10 @@ class Motions:
         wanted = None if names is None else set(names)
         return [r for r in self.rows if r.clip.split == "train" and (wanted is None or r.clip.name in wanted)]
 
-    def cluster_indices(self, clips: Sequence[Clip]) -> list[int]:
-        """The index of each clip's cluster in `clusters`."""
-        index = {name: i for i, name in enumerate(self.clusters)}
-        named = self.labels.set_index("name")["cluster"]
+    def cluster_indices(self, clips: Sequence[Clip], random: int | None = None) -> list[int]:
+        """The index of each clip's cluster in `clusters`; of its random cluster by this seed, if there is one."""
+        named = self.labels.set_index("name")["cluster"] if random is None else self.random_clusters(random)
+        index = {name: i for i, name in enumerate(sorted(named.unique()))}
         return [index[named[clip.name]] for clip in clips]
 
     def random_clusters(self, seed: int) -> pd.Series:

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.study.generalist_tables import generalist_tables
-from benchmarks.study.jobs import Job, experts_jobs, generalist_jobs, paper_jobs
+from benchmarks.study.jobs import Job, experts_jobs, generalist_jobs, paper_jobs, table_1_jobs
 from benchmarks.study.motions import Motions
 from benchmarks.study.paper_tables import paper_tables
 from benchmarks.study.settings import Study
+from benchmarks.study.table_1 import table_1_tables
 from benchmarks.study.tables import experts_tables
 
 
@@ -24,5 +25,6 @@ class Part:
 PARTS = {
     "experts": Part("experts by cluster, at random, and one policy at equal steps", experts_jobs, experts_tables),
     "generalist": Part("what is distilled of the experts, against them", generalist_jobs, generalist_tables),
+    "table-1": Part("the paper's method, its controls and other groups' methods", table_1_jobs, table_1_tables),
     "paper-task": Part("the task as the paper prints it, and what makes it learn", paper_jobs, paper_tables),
 }

@@ -9,7 +9,7 @@ import argparse
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import MISSING, asdict, fields, replace
 from pathlib import Path
 
@@ -17,13 +17,16 @@ import torch
 
 from benchmarks.study.correction import DECLARED, Correction
 from benchmarks.study.distilling import distil
-from benchmarks.study.jobs import DONE, Job
+from benchmarks.study.jobs import DONE, OTHERS, Job
 from benchmarks.study.motions import Motions, read_motions
+from benchmarks.study.others import make_env, teachers_task
 from benchmarks.study.parts import PARTS
 from benchmarks.study.settings import SMALL, Study, settings_of
 from benchmarks.study.steps import GOES_ON
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.ppo import CHECKPOINT, Trainer
+from bumblebee.motion.clip import Clip
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
@@ -73,18 +76,16 @@ def train(
         return _distilled(job, motions, study, out, over)
     folder = out / job.name
     folder.mkdir(parents=True, exist_ok=True)
-    task, ppo = settings_of(study, job.settings, job.parent is not None)
-    frames = task.num_worlds * ppo.steps
-    ppo = replace(ppo, iterations=math.ceil(job.steps / frames), checkpoint_every=CHECKPOINT_EVERY)
-    torch.set_num_threads(task.threads)
+    torch.set_num_threads(study.env.threads)
     clips = [row.clip for row in motions.training(job.clips)]
-    model = task_model(task, correction.model)
-    engine = make_engine(
-        task.engine, model, task.num_worlds, task.threads, hooks=correction.hooks(model), buffers=task.buffers
-    )
-    shares = ClipShares.equal(motions.cluster_indices(clips)) if job.even else None
-    library = MotionLibrary(clips, task.ahead, device=engine.device)
-    env = TrackingEnv(library, engine, task, job.seed, correction.adapter(), shares)
+    if job.settings in OTHERS:
+        own = teachers_task(study, job.settings)
+        env, ppo = make_env(own, clips, job.seed), own.ppo
+    else:
+        shares = ClipShares.equal(motions.cluster_indices(clips)) if job.even else None
+        env, ppo = _environment(job, clips, study, correction, shares)
+    frames = env.num_envs * ppo.steps
+    ppo = replace(ppo, iterations=math.ceil(job.steps / frames), checkpoint_every=CHECKPOINT_EVERY)
     trainer = Trainer(env, ppo, folder, job.seed, None if job.parent is None else out / job.parent)
     trainer.train(job.name, over)
     if trainer.iteration < ppo.iterations:
@@ -97,12 +98,25 @@ def train(
     return True
 
 
+def _environment(
+    job: Job, clips: Sequence[Clip], study: Study, correction: Correction, shares: ClipShares | None
+) -> tuple[TrackingEnv, PpoConfig]:
+    """The job's task on its own engine, and its algorithm."""
+    task, ppo = settings_of(study, job.settings, job.parent is not None)
+    model = task_model(task, correction.model)
+    engine = make_engine(
+        task.engine, model, task.num_worlds, task.threads, hooks=correction.hooks(model), buffers=task.buffers
+    )
+    library = MotionLibrary(clips, task.ahead, device=engine.device)
+    return TrackingEnv(library, engine, task, job.seed, correction.adapter(), shares), ppo
+
+
 def _distilled(job: Job, motions: Motions, study: Study, out: Path, over: Callable[[], bool]) -> bool:
-    kl = distil(job, motions, study, out, over)
-    if kl is not None:
-        told = {"job": _plain(job), "kl": round(kl, 4)}
+    loss = distil(job, motions, study, out, over)
+    if loss is not None:
+        told = {"job": _plain(job), "loss" if job.arm in OTHERS else "kl": round(loss, 4)}
         (out / job.name / DONE).write_text(json.dumps(told) + "\n")
-    return kl is not None
+    return loss is not None
 
 
 def deadline(seconds: float | None) -> Callable[[], bool]:

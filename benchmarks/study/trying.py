@@ -12,8 +12,10 @@ from pathlib import Path
 import pandas as pd
 import torch
 
+from benchmarks.study.jobs import job_of
 from benchmarks.study.motions import Motions, read_motions
-from bumblebee.baselines.trial import Manner, follow
+from benchmarks.study.others import manner
+from bumblebee.baselines.trial import follow
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.learning.policy import load_policy
 from bumblebee.tracking.config import EnvConfig, Randomisation
@@ -31,12 +33,13 @@ def try_policy(folder: Path, motions: Motions) -> pd.DataFrame:
     """A row a piece and robot: what `follow` says, and which robot."""
     torch.set_num_threads(1)
     policy, tables = load_policy(folder), []
+    how = manner(job_of(folder), policy)
     clips = [row.clip for row in motions.rows]
     for robot, drawn in ROBOTS.items():
         model = task_model(EnvConfig(physics_hz=PHYSICS_HZ, randomisation=drawn or Randomisation()))
         for first in range(0, len(clips), _AT_ONCE):
             part = clips[first : first + _AT_ONCE]
-            tables.append(follow(policy, Manner(policy.shape.seen), part, model, robots=drawn).assign(robot=robot))
+            tables.append(follow(policy, how, part, model, robots=drawn).assign(robot=robot))
     return pd.concat(tables, ignore_index=True)
 
 

@@ -76,29 +76,56 @@ def follow(
     middle = action_middle(policy.shape.action)
     group = Group(manner.seen, (n, library.num_joints, len(library.ahead)), 0.0, engine.device)
     generator = torch.Generator().manual_seed(0)
-    limit = torch.tensor([success_threshold(clip.family) for clip in clips])
-    act, action = policy.follower(), torch.zeros(n, library.num_joints)
-    alive, alive_local, stands = torch.ones(3, n, dtype=torch.bool)
-    sums = torch.zeros(4, n)  # frames before the loss, and the three errors over them
+    judge, act, action = Judge(clips, dt), policy.follower(), torch.zeros(n, library.num_joints)
     for frame in range(int(library.length.max()) - 1):
         ref = library.frames(ids, torch.full((n,), (frame + 1) * dt))
         group.look(engine.state(), ref, action, Rows(torch.full((n,), frame == 0), by_mask=False), generator)
         action = act(group.exact)
         engine.step(joint_targets(ref, action, scale, middle))
-        state = engine.state()
-        running = frame + 1 < library.length
-        world, local = key_errors(state, ref)
-        down = fallen(state, ref) | engine.unstable()
-        alive &= ((world.amax(-1) <= limit) & ~down) | ~running
-        alive_local &= ((local.amax(-1) <= limit) & ~down) | ~running
-        stands &= (upright(state, ref) & ~engine.unstable()) | ~running
-        joints = (state.joint_pos - ref.joint_pos).abs().mean(-1)
-        counted = (alive & running).float()
-        errors = torch.stack((torch.ones(n), joints, world.mean(-1), local.mean(-1)))
-        sums += counted * torch.nan_to_num(errors)
-        if not bool(((alive | alive_local | stands) & running).any()):
+        if not bool(judge.see(engine.state(), ref, frame + 1 < library.length, engine.unstable()).any()):
             break
-    return _table(clips, torch.stack((alive, alive_local, stands)), sums, dt)
+    return judge.table()
+
+
+class Judge:
+    """Keeps who has lost its clip, by each rule, and the errors before that.
+
+    Args:
+        clips: N of them.
+        dt: of a control step [s].
+    """
+
+    def __init__(self, clips: Sequence[Clip], dt: float) -> None:
+        n = len(clips)
+        self._clips, self._dt = clips, dt
+        self._limit = torch.tensor([success_threshold(clip.family) for clip in clips])
+        self._kept = torch.ones(3, n, dtype=torch.bool)  # in the world, over the robot's own place, by `upright`
+        self._sums = torch.zeros(4, n)  # frames before the loss, and the three errors over them
+
+    def see(self, state: RobotState, ref: ReferenceFrame, running: Tensor, unstable: Tensor) -> Tensor:
+        """Take in a control step of all robots; which of those whose clip is not over are kept by any rule, (N,) bool.
+
+        Args:
+            state: the true one after the step.
+            ref: what it should be.
+            running: (N,) bool, whose clip is not over.
+            unstable: (N,) bool, whose state stopped being a number.
+        """
+        world, local = key_errors(state, ref)
+        down, limit = fallen(state, ref) | unstable, self._limit
+        kept = torch.stack(
+            ((world.amax(-1) <= limit) & ~down, (local.amax(-1) <= limit) & ~down, upright(state, ref) & ~unstable)
+        )
+        self._kept &= kept | ~running
+        joints = (state.joint_pos - ref.joint_pos).abs().mean(-1)
+        counted = (self._kept[0] & running).float()
+        errors = torch.stack((torch.ones(len(counted)), joints, world.mean(-1), local.mean(-1)))
+        self._sums += counted * torch.nan_to_num(errors)
+        return self._kept.any(0) & running
+
+    def table(self) -> pd.DataFrame:
+        """The rows of `follow`."""
+        return _table(self._clips, self._kept, self._sums, self._dt)
 
 
 def _started(library: MovingLibrary, model: mujoco.MjModel, threads: int, robots: Randomisation | None) -> Engine:

@@ -88,7 +88,7 @@ def run_episodes(
     robots = make_robots(len(episodes))
     own = [clips[episode.motion] for episode in episodes]
     lengths = np.array([clip.frames for clip in own])
-    rngs = [_generator(episode) for episode in episodes]
+    rngs = [episode_generator(episode) for episode in episodes]
     qpos, qvel = start_states(own, rngs, start or StartNoise())
     groups = _groups(episodes, policies, own, compensations)
     held = np.zeros_like(qpos[:, 7:])
@@ -226,6 +226,7 @@ def _fallen(true: Sensors, clips: list[Clip], robots: np.ndarray, tick: int, sto
     return ~((cosine > np.cos(np.radians(stop.tilt_deg))) & (drop < stop.drop_m))
 
 
-def _generator(episode: Episode) -> np.random.Generator:
+def episode_generator(episode: Episode) -> np.random.Generator:
+    """Draws of an episode's start and sensor noise, which depend on its motion and seed alone."""
     digest = hashlib.sha256(f"{episode.motion}/{episode.seed}".encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:8], "little"))

@@ -1,0 +1,164 @@
+"""Tries the policies of a run on the sealed robots, from readings, as a robot gives them.
+
+    python -m benchmarks.study.sealed_trials study/run --motions study/motions --robots study/robots --jobs 2
+
+Sensor noise, starts, what is known of the base's place and what is judged are those of the rounds; each policy follows
+every motion that is held out and as many training motions of each cluster, the first seconds of them. One processor
+core a policy; policies that have been tried are not tried again.
+"""
+
+import argparse
+import json
+import os
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pandas as pd
+import torch
+
+from benchmarks.study.jobs import DONE, job_of
+from benchmarks.study.motions import Motions, read_motions
+from benchmarks.study.others import manner
+from benchmarks.study.robots import DECLARED, RobotsConfig
+from bumblebee.baselines.library import MovingLibrary
+from bumblebee.baselines.trial import Judge, Manner
+from bumblebee.deploy.episodes import Episode, episode_generator, start_states
+from bumblebee.deploy.odometry import placed
+from bumblebee.deploy.robots import CONTROL_HZ
+from bumblebee.deploy.runner import robot_state
+from bumblebee.deploy.sensors import SensorNoise, add_noise, draws
+from bumblebee.deploy.servo_command import ServoCommand
+from bumblebee.deploy.stand_in_effects import read_sealed
+from bumblebee.deploy.stand_in_robots import StandInRobots
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.evaluation.contract import StartNoise
+from bumblebee.evaluation.thinning import thin
+from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.motion.clip import Clip
+from bumblebee.tracking.groups import Group
+from bumblebee.tracking.observations import action_middle, action_scale, joint_targets
+from bumblebee.tracking.rows import Rows
+from tasks.stand_in import cut
+
+SEALED_TRIALS = "sealed.csv"
+SEED = 1897
+"""Of starts and sensor noise; neither the search of the robots nor the rounds use it."""
+TRAINED = 40
+"""Training motions, shared among the clusters."""
+
+
+@torch.inference_mode()
+def follow_sealed(
+    policy: Policy, how: Manner, clips: Sequence[Clip], effects: Sequence[dict[str, Any]], base: str
+) -> pd.DataFrame:
+    """Roll out each clip once on a sealed robot, the policy seeing readings and the judge the truth.
+
+    Args:
+        policy: what acts.
+        how: it is run.
+        clips: N motions.
+        effects: of the robot's sealed file.
+        base: what is known of the base's place, one of `stand_in.BASES`.
+
+    Returns:
+        the rows of `baselines.trial.follow`.
+    """
+    n, dt = len(clips), 1.0 / CONTROL_HZ
+    library = MovingLibrary(clips, policy.shape.ahead)
+    ids, joints = torch.arange(n), library.num_joints
+    scale = action_scale() if how.scale is None else torch.full((joints,), how.scale)
+    middle = action_middle(policy.shape.action)
+    robots, noise = StandInRobots(n, effects), SensorNoise(base=base)
+    rngs = [episode_generator(Episode("", "", clip.name, SEED)) for clip in clips]
+    qpos, qvel = start_states(clips, rngs, StartNoise())
+    robots.reset(qpos, qvel, library.frames(ids, torch.zeros(n)).hold_pos.numpy().astype(np.float64))
+    normal = [rng.standard_normal((clip.frames, draws(joints))) for rng, clip in zip(rngs, clips, strict=True)]
+    place = placed(noise, qpos[:, :3], rngs, dt)
+    group = Group(how.seen, (n, joints, len(library.ahead)), 0.0, torch.device("cpu"))
+    generator, judge = torch.Generator(), Judge(clips, dt)
+    act, action, everyone = policy.follower(), torch.zeros(n, joints), np.arange(n)
+    alive = everyone
+    for tick in range(int(library.length.max()) - 1):
+        drawn = np.stack([one[min(tick, len(one) - 1)] for one in normal])
+        sensors = place(everyone, add_noise(robots.read(), noise, drawn))
+        ref = library.frames(ids, torch.full((n,), (tick + 1) * dt))
+        group.look(robot_state(sensors), ref, action, Rows(torch.full((n,), tick == 0), by_mask=False), generator)
+        action = act(torch.nan_to_num(group.exact))
+        target = joint_targets(ref, action, scale, middle).numpy().astype(np.float64)
+        robots.step(alive, ServoCommand(target[alive]))
+        true = robots.truth()
+        broken = torch.as_tensor(~np.isfinite(true.joint_pos).all(1))
+        alive = np.flatnonzero(judge.see(robot_state(true), ref, tick + 1 < library.length, broken).numpy())
+        if not len(alive):
+            break
+    return judge.table()
+
+
+def chosen_clips(motions: Motions, config: RobotsConfig) -> list[Clip]:
+    """What is followed: a piece of every held-out motion, and training motions of all clusters, cut."""
+    labels = motions.labels
+    held = labels[labels["split"] == "test"].drop_duplicates("motion")["name"]
+    names = [*held, *thin(labels[labels["split"] == "train"], TRAINED)]
+    by_name = {row.clip.name: row.clip for row in motions.rows}
+    return [cut(by_name[name], config.max_seconds) for name in names]
+
+
+def try_sealed(folder: Path, motions: Motions, robots: Path) -> None:
+    """Try one policy on all sealed robots and the declared one; its table whole or not at all."""
+    torch.set_num_threads(1)
+    mujoco.set_mju_user_warning(lambda text: None)  # a robot that falls apart is a fall
+    config, policy, tables = RobotsConfig(), load_policy(folder), []
+    how, clips = manner(job_of(folder), policy), chosen_clips(motions, config)
+    for path in sealed_files(robots):
+        rows = follow_sealed(policy, how, clips, read_sealed(path), config.base)
+        tables.append(rows.assign(robot=path.stem, sealed=json.loads(path.read_text())["sha256"]))
+    fresh = folder / f".{SEALED_TRIALS}.part"
+    pd.concat(tables, ignore_index=True).to_csv(fresh, index=False)
+    os.replace(fresh, folder / SEALED_TRIALS)
+
+
+def sealed_files(robots: Path) -> list[Path]:
+    """The declared robot and the sealed ones.
+
+    Raises:
+        BadInput: if there are none.
+    """
+    files = [robots / DECLARED, *sorted(robots.glob("robot-?.json"))]
+    if len(files) < 2 or not files[0].exists():
+        raise BadInput(robots, f"{DECLARED} and sealed robots", "none", "Run benchmarks.study.robots.")
+    return files
+
+
+def main() -> None:
+    """Try every finished policy of a run that has not been tried yet."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("run", type=Path)
+    parser.add_argument("--motions", type=Path, required=True)
+    parser.add_argument("--robots", type=Path, required=True)
+    parser.add_argument("--only", nargs="+", metavar="POLICY", help="these; all otherwise")
+    parser.add_argument("--jobs", type=int, default=1, help="processor cores")
+    options = parser.parse_args()
+    try:
+        sealed_files(options.robots)
+        motions = read_motions(options.motions)
+        folders = [path.parent for path in sorted(options.run.glob(f"*/{DONE}"))]
+        if options.only is not None:
+            folders = [options.run / name for name in options.only]
+        missing = [folder for folder in folders if not (folder / SEALED_TRIALS).exists()]
+        with ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) as pool:
+            work = [pool.submit(try_sealed, folder, motions, options.robots) for folder in missing]
+            for folder, one in zip(missing, work, strict=True):
+                one.result()
+                print(f"{folder.name}: tried", flush=True)
+    except BadInput as error:
+        print(error)
+        raise SystemExit(EXIT_BAD_INPUT) from None
+
+
+if __name__ == "__main__":
+    main()

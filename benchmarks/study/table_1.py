@@ -1,0 +1,84 @@
+"""The paper's table 1 with our numbers: its method, its controls and other groups' methods, at equal control steps."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from benchmarks.study.jobs import MORE_GENERALISTS, OTHERS, arm_of, teacher_of
+from benchmarks.study.motions import Motions
+from benchmarks.study.sealed_trials import SEALED_TRIALS
+from benchmarks.study.settings import Study
+from benchmarks.study.tables import RATES, SPLITS, cell, difference, estimate, head, line, rate, read_trials, signed
+from bumblebee.errors import BadInput
+
+OURS = "transformer"
+STUDENTS = {OURS: "BumbleBee: transformer, of the experts by cluster", **MORE_GENERALISTS, **OTHERS}
+TEACHERS = {name: f"{told}'s teacher, which sees the simulator" for name, told in OTHERS.items()}
+
+
+def table_1_tables(out: Path, study: Study, motions: Motions) -> str:
+    """All tables of the part `table-1` as Markdown; those of the sealed robots if policies were tried on them."""
+    every = _read(out, study, motions, sealed=False)
+    parts = [_of_robot(every, robot) for robot in ("declared", "drawn")]
+    if all((out / arm_of(seed, arm) / SEALED_TRIALS).exists() for seed in study.seeds for arm in STUDENTS):
+        sealed = _read(out, study, motions, sealed=True)
+        robots = sorted(sealed["robot"].unique())
+        parts += [_of_robot(sealed, robot, "from readings: ") for robot in robots]
+        hidden = sealed[sealed["robot"] != "declared"]
+        if not hidden.empty:
+            parts.append(f"### from readings: all sealed robots\n\n{_pairs(hidden)}")
+    return "\n".join(parts)
+
+
+def _read(out: Path, study: Study, motions: Motions, sealed: bool) -> pd.DataFrame:
+    """A row for each arm, seed, robot and piece; teachers are tried on the declared and drawn robots only."""
+    columns, rows = motions.labels[["name", "motion", "cluster"]], []
+    for seed in study.seeds:
+        names = {arm: arm_of(seed, arm) for arm in STUDENTS}
+        if not sealed:
+            names |= {f"{name}-teacher": teacher_of(seed, name) for name in OTHERS}
+        for arm, name in names.items():
+            table = _sealed(out / name / SEALED_TRIALS, columns) if sealed else read_trials(out / name, motions)
+            rows.append(table.assign(arm=arm, seed=seed))
+    return pd.concat(rows, ignore_index=True)
+
+
+def _sealed(path: Path, columns: pd.DataFrame) -> pd.DataFrame:
+    table = pd.read_csv(path)
+    if table["sealed"].isna().any():
+        raise BadInput(path, "trials on sealed robots", "rows without a robot's hash", "Try the policy again.")
+    return table.merge(columns, on="name", validate="many_to_one")
+
+
+def _of_robot(every: pd.DataFrame, robot: str, told: str = "") -> str:
+    rows = every[every["robot"] == robot]
+    return f"### {told}{robot} robot\n\n{_methods(rows)}\n{_pairs(rows)}"
+
+
+def _methods(rows: pd.DataFrame) -> str:
+    errors = ["MPJPE [rad]", "MPKPE [mm]", "MPKPE, own place [mm]"]
+    lines = head(["method", "motions", "n", *RATES.values(), *errors])
+    names = STUDENTS | {f"{name}-teacher": told for name, told in TEACHERS.items()}
+    for split, which in SPLITS.items():
+        for arm, told in names.items():
+            own = rows[(rows["arm"] == arm) & (rows["split"] == split)]
+            if own.empty:
+                continue
+            cells = [told, which, str(own["motion"].nunique()), *(cell(rate(own, column), 2) for column in RATES)]
+            cells += [cell(estimate(own, "mpjpe_rad"), 3)]
+            cells += [cell(estimate(own, column), 0) for column in ("mpkpe_mm", "mpkpe_local_mm")]
+            lines.append(line(cells))
+    return "\n".join(lines) + "\n"
+
+
+def _pairs(rows: pd.DataFrame) -> str:
+    lines = head(["BumbleBee less", "motions", *RATES.values(), "p, own place"])
+    for split, which in SPLITS.items():
+        own = rows[rows["split"] == split]
+        for arm, told in STUDENTS.items():
+            if arm == OURS:
+                continue
+            each = {column: difference(own, OURS, arm, column) for column in RATES}
+            cells = [told, which, *(signed(value) for value, _ in each.values())]
+            lines.append(line([*cells, f"{each['success_local'][1]:.3g}"]))
+    return "\n".join(lines) + "\n"
