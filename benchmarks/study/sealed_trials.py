@@ -25,6 +25,7 @@ from benchmarks.study.jobs import DONE, job_of
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.others import manner
 from benchmarks.study.robots import DECLARED, RobotsConfig
+from benchmarks.study.trying import SEALED_TRIALS
 from bumblebee.baselines.library import MovingLibrary
 from bumblebee.baselines.trial import Judge, Manner
 from bumblebee.deploy.episodes import Episode, episode_generator, start_states
@@ -45,7 +46,6 @@ from bumblebee.tracking.observations import action_middle, action_scale, joint_t
 from bumblebee.tracking.rows import Rows
 from tasks.stand_in import cut
 
-SEALED_TRIALS = "sealed.csv"
 SEED = 1897
 """Of starts and sensor noise; neither the search of the robots nor the rounds use it."""
 TRAINED = 40

@@ -6,9 +6,9 @@ import pandas as pd
 
 from benchmarks.study.jobs import MORE_GENERALISTS, OTHERS, arm_of, teacher_of
 from benchmarks.study.motions import Motions
-from benchmarks.study.sealed_trials import SEALED_TRIALS
 from benchmarks.study.settings import Study
 from benchmarks.study.tables import RATES, SPLITS, cell, difference, estimate, head, line, rate, read_trials, signed
+from benchmarks.study.trying import SEALED_TRIALS
 from bumblebee.errors import BadInput
 
 OURS = "transformer"

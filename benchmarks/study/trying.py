@@ -23,6 +23,8 @@ from bumblebee.tracking.model import task_model
 from bumblebee.tracking.presets import PAPER_RANDOMISATION
 
 TRIALS = "trials.csv"
+SEALED_TRIALS = "sealed.csv"
+"""Trials on sealed robots, see `sealed_trials`."""
 PHYSICS_HZ = 200.0
 ROBOTS: dict[str, Randomisation | None] = {"declared": None, "drawn": PAPER_RANDOMISATION}
 """Each piece once on the declared robot, once on a robot of its own of the paper's randomisation, the same for all."""

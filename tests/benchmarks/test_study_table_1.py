@@ -11,11 +11,11 @@ import pytest
 from benchmarks.study.jobs import DONE, MORE_GENERALISTS, OTHERS, Job, arm_of, job_of, table_1_jobs, teacher_of
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.others import manner, students_task, teachers_task
-from benchmarks.study.sealed_trials import SEALED_TRIALS, follow_sealed, sealed_files, try_sealed
+from benchmarks.study.sealed_trials import follow_sealed, sealed_files, try_sealed
 from benchmarks.study.settings import SMALL
 from benchmarks.study.table_1 import STUDENTS, table_1_tables
 from benchmarks.study.training import train
-from benchmarks.study.trying import TRIALS, write_trials
+from benchmarks.study.trying import SEALED_TRIALS, TRIALS, write_trials
 from bumblebee.deploy.stand_in import BASES
 from bumblebee.deploy.stand_in_effects import entry
 from bumblebee.deploy.undeclared.faults import largest
