@@ -45,7 +45,7 @@ PAIRS = (
 )
 """First less second; where the second is `experts`, the margin is judged."""
 VERDICT_BY = {"seeing": "success"}
-"""Rate by which a generalist keeps its experts' success; own place where it does not see its place in the world."""
+"""Rate by which a generalist keeps its experts' success; own place for students, who know their place by odometry."""
 
 
 def read_generalists(out: Path, study: Study, motions: Motions) -> pd.DataFrame:

@@ -8,7 +8,7 @@ from benchmarks.study.jobs import MORE_GENERALISTS, OTHERS, arm_of, teacher_of
 from benchmarks.study.motions import Motions
 from benchmarks.study.settings import Study
 from benchmarks.study.tables import RATES, SPLITS, cell, difference, estimate, head, line, rate, read_trials, signed
-from benchmarks.study.trying import SEALED_TRIALS
+from benchmarks.study.trying import SEALED_TRIALS, TRIALS
 from bumblebee.errors import BadInput
 
 OURS = "transformer"
@@ -17,10 +17,13 @@ TEACHERS = {name: f"{told}'s teacher, which sees the simulator" for name, told i
 
 
 def table_1_tables(out: Path, study: Study, motions: Motions) -> str:
-    """All tables of the part `table-1` as Markdown; those of the sealed robots if policies were tried on them."""
+    """All tables of the part `table-1` as Markdown, of the methods that have been tried so far.
+
+    Those of the sealed robots if the paper's method was tried on them.
+    """
     every = _read(out, study, motions, sealed=False)
     parts = [_of_robot(every, robot) for robot in ("declared", "drawn")]
-    if all((out / arm_of(seed, arm) / SEALED_TRIALS).exists() for seed in study.seeds for arm in STUDENTS):
+    if all((out / arm_of(seed, OURS) / SEALED_TRIALS).exists() for seed in study.seeds):
         sealed = _read(out, study, motions, sealed=True)
         robots = sorted(sealed["robot"].unique())
         parts += [_of_robot(sealed, robot, "from readings: ") for robot in robots]
@@ -31,15 +34,19 @@ def table_1_tables(out: Path, study: Study, motions: Motions) -> str:
 
 
 def _read(out: Path, study: Study, motions: Motions, sealed: bool) -> pd.DataFrame:
-    """A row for each arm, seed, robot and piece; teachers are tried on the declared and drawn robots only."""
-    columns, rows = motions.labels[["name", "motion", "cluster"]], []
-    for seed in study.seeds:
-        names = {arm: arm_of(seed, arm) for arm in STUDENTS}
-        if not sealed:
-            names |= {f"{name}-teacher": teacher_of(seed, name) for name in OTHERS}
-        for arm, name in names.items():
-            table = _sealed(out / name / SEALED_TRIALS, columns) if sealed else read_trials(out / name, motions)
-            rows.append(table.assign(arm=arm, seed=seed))
+    """A row for each arm, seed, robot and piece, of the methods that were tried with every seed.
+
+    Teachers are tried on the declared and drawn robots only.
+    """
+    columns, rows, file = motions.labels[["name", "motion", "cluster"]], [], SEALED_TRIALS if sealed else TRIALS
+    named = {arm: [arm_of(seed, arm) for seed in study.seeds] for arm in STUDENTS}
+    if not sealed:
+        named |= {f"{method}-teacher": [teacher_of(seed, method) for seed in study.seeds] for method in OTHERS}
+    for arm, names in named.items():
+        if arm == OURS or all((out / name / file).exists() for name in names):
+            for seed, name in zip(study.seeds, names, strict=True):
+                table = _sealed(out / name / file, columns) if sealed else read_trials(out / name, motions)
+                rows.append(table.assign(arm=arm, seed=seed))
     return pd.concat(rows, ignore_index=True)
 
 
@@ -76,7 +83,7 @@ def _pairs(rows: pd.DataFrame) -> str:
     for split, which in SPLITS.items():
         own = rows[rows["split"] == split]
         for arm, told in STUDENTS.items():
-            if arm == OURS:
+            if arm == OURS or not (own["arm"] == arm).any():
                 continue
             each = {column: difference(own, OURS, arm, column) for column in RATES}
             cells = [told, which, *(signed(value) for value, _ in each.values())]

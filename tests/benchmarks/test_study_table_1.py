@@ -138,3 +138,10 @@ def test_the_tables_have_a_row_for_each_method_and_pair_ours_with_every_other(mo
     assert "| HOVER's teacher, which sees the simulator | trained | 4 | 1.00" in text
     assert text.count("| OmniH2O | held out | +1.000") == 5  # four robots, and all sealed ones
     assert "### from readings: robot-0 robot" in text
+    for name in (arm_of(0, "random"), teacher_of(0, "exbody2")):
+        (tmp_path / name / TRIALS).unlink()
+    fewer = table_1_tables(tmp_path, SMALL, motions).split("### from readings")[0]
+    assert "Random" not in fewer and "Exbody2's teacher" not in fewer and "| Exbody2 |" in fewer
+    (tmp_path / arm_of(0, "transformer") / TRIALS).unlink()
+    with pytest.raises(BadInput, match="the trials of every policy"):
+        table_1_tables(tmp_path, SMALL, motions)
