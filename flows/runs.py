@@ -39,15 +39,21 @@ def runs_on(folder: Path, run: str) -> bool:
         return False
 
 
-def clear_lost(folder: Path, server: str, password: str) -> list[str]:
+def clear_lost(folder: Path, server: str, password: str, shared: bool = False) -> list[str]:
     """Set the runs and their stages to Crashed whose process is gone; the names of the runs.
 
     Call it before anybody knows the server's address: a run that is about to start has no record yet.
+
+    Args:
+        folder: with the records of the runs that began here.
+        server: Prefect's.
+        password: of its login.
+        shared: whether runs of other machines stand in its database, too: those without a record here are left alone.
     """
     wanted = {"state": {"type": {"any_": UNFINISHED}}}
     lost = []
     for run in ask(server, password, "flow_runs/filter", {"flow_runs": wanted}):
-        if runs_on(folder, run["id"]):
+        if runs_on(folder, run["id"]) or (shared and not (folder / "runs" / f"{run['id']}.json").exists()):
             continue
         stages = {"task_runs": wanted, "flow_runs": {"id": {"any_": [run["id"]]}}}
         for stage in ask(server, password, "task_runs/filter", stages):

@@ -1,4 +1,4 @@
-"""The servers of Prefect and MLflow on this machine alone: SQLite files under .servers/, any port, a login.
+"""The servers of Prefect and MLflow on this machine alone: SQLite files under .servers/ or a lab's databases, a login.
 
 One process keeps them: it holds a lock on .servers, and they end with it, also when it is killed. A second one uses
 them and leaves them alone.
@@ -25,6 +25,8 @@ from flows import login, runs
 from flows.environment import SERVERS, environment
 from flows.guard import ALIVE, proof
 from flows.processes import alive, born, same, stop
+from tasks.lab import read_lab
+from tasks.lab_checks import check_lab
 
 __all__ = ["Addresses", "alive", "running", "servers", "stop"]
 
@@ -171,7 +173,9 @@ def _require_ports(found: Addresses, prefect_port: int, mlflow_port: int) -> Non
 @contextmanager
 def _kept(workspace: Path, ports: dict[str, int]) -> Iterator[Addresses]:
     """Start both servers, and end them with the block. The lock is held."""
-    folder = workspace / SERVERS
+    folder, lab = workspace / SERVERS, read_lab(workspace)
+    if lab is not None:
+        check_lab(lab, workspace)
     file = folder / "addresses.json"
     _end_left_over(workspace)
     file.unlink(missing_ok=True)
@@ -191,7 +195,7 @@ def _kept(workspace: Path, ports: dict[str, int]) -> Iterator[Addresses]:
         addresses = Addresses(**urls, keeper=os.getpid(), pids=pids, born=times)
         for name in NAMES:
             _wait(started[name], urls[name], password, folder / f"{name}.log")
-        runs.clear_lost(folder, addresses.prefect, password)
+        runs.clear_lost(folder, addresses.prefect, password, shared=lab is not None)
         write_private(file, json.dumps(asdict(addresses)))
         yield addresses
     finally:

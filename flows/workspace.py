@@ -15,6 +15,7 @@ from bumblebee.errors import BadInput
 from flows.environment import environment
 from tasks import params, paths
 from tasks.filter_files import files_named
+from tasks.lab import FILE as LAB
 
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")
@@ -58,6 +59,8 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
     for name in CODE:
         _link(folder / name, HOME / name)
     _write(folder / ".dvcignore", (HOME / ".dvcignore").read_text())
+    if (HOME / LAB).exists() and not (folder / LAB).exists():
+        _write(folder / LAB, (HOME / LAB).read_text())
     _write(folder / "dvc.yaml", stages_with(folders_of(content), [file for _, file in files_named(content)]))
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     if edited is None or content != edited:

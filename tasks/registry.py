@@ -1,7 +1,7 @@
 """The one module that knows MLflow: runs with what they were made from, models with their aliases.
 
-Runs and models are written straight into the workspace's database and artifact folder, so that plain `dvc repro`
-and the flow leave the same history; the server only shows it. Why: docs/decisions/mlflow-store.md.
+Runs and models are written straight into the database and store of the workspace, or of its lab (`lab.yaml`), so that
+plain `dvc repro` and the flow leave the same history; the server only shows it. Why: docs/decisions/mlflow-store.md.
 """
 
 import fcntl
@@ -11,12 +11,14 @@ import logging
 import os
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bumblebee.errors import BadInput
+from tasks.lab import MlflowLab, read_lab
+from tasks.lab_checks import one_at_a_time
 from tasks.lineage import git_sha, history, inputs_of_stage, lineage
 from tasks.run_form import card_settings, fitted, flatten, metric_name, read_curve
 
@@ -39,6 +41,7 @@ def prepare() -> "MlflowClient":
 
 @cache
 def _prepared(workspace: Path) -> "MlflowClient":
+    lab = read_lab(workspace)
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     os.environ.setdefault("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT", "1")
@@ -46,12 +49,15 @@ def _prepared(workspace: Path) -> "MlflowClient":
     import mlflow
 
     SERVERS.mkdir(exist_ok=True)
-    uri = f"sqlite:///{(SERVERS / 'mlflow.db').resolve()}"
+    uri = f"sqlite:///{(SERVERS / 'mlflow.db').resolve()}" if lab is None else lab.mlflow.connection
     logging.getLogger("alembic").setLevel(logging.WARNING)
-    with _locked():
+    with _locked(), nullcontext() if lab is None else one_at_a_time(lab.mlflow.database):
         mlflow.set_tracking_uri(uri)
         mlflow.set_registry_uri(uri)
-        _serve_artifacts_locally()
+        if lab is None:
+            _serve_artifacts_locally()
+        else:
+            _store_artifacts_in(lab.mlflow)
         client = mlflow.MlflowClient(tracking_uri=uri, registry_uri=uri)
         name = experiment_name()
         if client.get_experiment_by_name(name) is None:
@@ -86,6 +92,22 @@ def _serve_artifacts_locally() -> None:
             super().__init__(str(root / inside))
 
     _artifact_repository_registry.register(SCHEME, Proxied)
+
+
+def _store_artifacts_in(own: MlflowLab) -> None:
+    """Let this process read and write `mlflow-artifacts:` addresses, which the server keeps in the same S3 folder."""
+    from mlflow.store.artifact.artifact_repository_registry import _artifact_repository_registry
+    from mlflow.store.artifact.s3_artifact_repo import S3ArtifactRepository
+
+    if own.s3_endpoint:
+        os.environ["MLFLOW_S3_ENDPOINT_URL"] = own.s3_endpoint
+
+    class Stored(S3ArtifactRepository):
+        def __init__(self, artifact_uri: str, *args: Any, **kwargs: Any) -> None:
+            inside = artifact_uri.removeprefix(f"{SCHEME}:").lstrip("/")
+            super().__init__(f"{own.artifacts.rstrip('/')}/{inside}", *args, **kwargs)
+
+    _artifact_repository_registry.register(SCHEME, Stored)
 
 
 def log_run(
@@ -236,7 +258,7 @@ def fetch(name: str, wanted: str, out: Path) -> Path:
     import mlflow
     from mlflow.exceptions import MlflowException
 
-    if not (SERVERS / "mlflow.db").exists():
+    if read_lab(Path.cwd()) is None and not (SERVERS / "mlflow.db").exists():
         raise BadInput(Path.cwd() / SERVERS / "mlflow.db", "a workspace's registry", "no file", "Give its --workspace.")
     if out.exists():
         raise BadInput(out, "a new folder", "one that exists", "Choose another --out.")

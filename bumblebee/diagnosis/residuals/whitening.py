@@ -137,6 +137,8 @@ class Sampled:
     """(K, W, C) by which coordinates were moved, in standard deviations."""
     valid: np.ndarray
     """(W,) windows whose simulations stayed finite."""
+    left: np.ndarray
+    """(W, M) residual from the unperturbed starts."""
 
     @property
     def slopes(self) -> np.ndarray:
@@ -152,7 +154,8 @@ def sample(noisy: NoisyWindows, rng: np.random.Generator) -> Sampled:
     base = noisy.residuals()[0]
     moved = noisy.residuals(starts) - base
     valid = np.isfinite(moved).all(axis=(0, 2, 3)) & np.isfinite(base).all(axis=(1, 2))
-    return Sampled(np.nan_to_num(moved).reshape(len(moved), len(windows), -1), signs, valid)
+    left = np.nan_to_num(base).reshape(len(windows), -1)
+    return Sampled(np.nan_to_num(moved).reshape(len(moved), len(windows), -1), signs, valid, left)
 
 
 def fit_whitener(
@@ -198,7 +201,7 @@ def factors_of(found: Sampled, sigma: np.ndarray, rule: Whitening, stepped: np.n
     own, what exceeds the noise in a signal counts along it and, by its root mean square, in every reading.
     """
     samples, windows, size = found.moved.shape
-    numeric = _own_numerical_error(np.zeros((windows, size)) if stepped is None else stepped, sigma, rule)
+    numeric = _own_numerical_error(np.zeros((windows, size)) if stepped is None else stepped, sigma, rule, found.left)
     each = np.sqrt((numeric**2).mean(axis=1))
     numeric, each = numeric.reshape(windows, -1), np.tile(each, (1, size // len(sigma)))
     reading = np.tile(sigma**2, size // len(sigma))
@@ -220,9 +223,16 @@ def factors_of(found: Sampled, sigma: np.ndarray, rule: Whitening, stepped: np.n
     return out
 
 
-def _own_numerical_error(stepped: np.ndarray, sigma: np.ndarray, rule: Whitening) -> np.ndarray:
-    """A window's own numerical error (W, N, D) as far as it exceeds the noise `sigma` (D,) of a signal."""
-    own = rule.stepped * np.nan_to_num(stepped).reshape(len(stepped), -1, len(sigma))
+def _own_numerical_error(stepped: np.ndarray, sigma: np.ndarray, rule: Whitening, left: np.ndarray) -> np.ndarray:
+    """A window's own numerical error (W, N, D) as far as it exceeds the noise `sigma` (D,) of a signal.
+
+    None in a signal of which far more is `left` (W, M): it explains nothing there, and would only take weight off.
+    """
+    shape = (len(stepped), -1, len(sigma))
+    changed = np.nan_to_num(stepped).reshape(shape)
+    own = rule.stepped * changed
     power = (own**2).mean(axis=1, keepdims=True)
-    beyond = np.maximum(power - sigma**2, 0.0)
+    remaining = (left.reshape(shape) ** 2).mean(axis=1, keepdims=True)
+    explains = remaining <= rule.explained**2 * (changed**2).mean(axis=1, keepdims=True)
+    beyond = np.maximum(power - sigma**2, 0.0) * explains
     return own * np.sqrt(beyond / np.where(power > 0, power, 1.0))

@@ -16,7 +16,9 @@ SIGMA = np.array([1e-6, 1e-4])
 def sampled() -> Sampled:
     """Starts without noise: what is left is the readings'."""
     size = READINGS * len(SIGMA)
-    return Sampled(np.zeros((8, WINDOWS, size)), np.ones((8, WINDOWS, 4)), np.ones(WINDOWS, bool))
+    return Sampled(
+        np.zeros((8, WINDOWS, size)), np.ones((8, WINDOWS, 4)), np.ones(WINDOWS, bool), np.zeros((WINDOWS, size))
+    )
 
 
 def test_without_an_error_of_the_steps_a_reading_counts_by_its_noise(sampled: Sampled) -> None:
@@ -42,3 +44,17 @@ def test_a_numerical_error_far_above_the_noise_is_no_evidence(sampled: Sampled) 
 def test_windows_that_diverge_in_longer_steps_keep_their_noise(sampled: Sampled) -> None:
     nothing = np.full((WINDOWS, READINGS, 2), np.nan)
     assert np.array_equal(factors_of(sampled, SIGMA, Whitening(), nothing), factors_of(sampled, SIGMA, Whitening()))
+
+
+def test_where_far_more_is_left_than_steps_can_change_they_take_no_weight(sampled: Sampled) -> None:
+    """A servo that lacks its friction errs by far more than its integrator: windows keep the weight of their noise."""
+    rule, rng = Whitening(), np.random.default_rng(0)
+    stepped = 1e-3 * rng.standard_normal((WINDOWS, READINGS, 2))
+    left = np.zeros((WINDOWS, READINGS, 2))
+    left[:3] = 10 * rule.explained * stepped[:3]  # in half of the windows
+    far = replace(sampled, left=left.reshape(WINDOWS, -1))
+    noise, near, found = (factors_of(*one) for one in (
+        (sampled, SIGMA, rule), (sampled, SIGMA, rule, stepped), (far, SIGMA, rule, stepped)
+    ))  # fmt: skip
+    assert np.array_equal(found[:3], noise[:3])
+    assert np.array_equal(found[3:], near[3:]) and not np.allclose(found[3:], noise[3:])

@@ -1,0 +1,136 @@
+"""A lab's shared servers: `lab.yaml` in the workspace says where PostgreSQL and S3 are; without it all is here.
+
+    prefect:
+      database: postgresql://bumblebee@db.lab/prefect
+    mlflow:
+      database: postgresql://bumblebee@db.lab/mlflow
+      artifacts: s3://bumblebee/mlflow
+      s3_endpoint: https://s3.lab:8333     # left out for Amazon's
+
+No secret stands in it: PostgreSQL's password comes from `~/.pgpass` (or PGPASSFILE), S3's keys from
+`~/.aws/credentials` (or AWS_SHARED_CREDENTIALS_FILE, AWS_PROFILE), as these programs' own clients read them.
+"""
+
+import re
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from bumblebee.errors import BadInput
+from bumblebee.io.read import read_yaml
+
+FILE = "lab.yaml"
+DATABASE = "postgresql://USER@HOST[:PORT]/DATABASE"
+BUCKET = re.compile(r"s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9._/-]+)?")
+
+
+@dataclass(frozen=True)
+class PrefectLab:
+    """Where Prefect's server keeps its runs."""
+
+    database: str
+    """As `DATABASE`."""
+
+    @property
+    def connection(self) -> str:
+        """As Prefect's setting takes it."""
+        return self.database.replace("postgresql://", "postgresql+asyncpg://", 1)
+
+
+@dataclass(frozen=True)
+class MlflowLab:
+    """Where runs, models and their files are."""
+
+    database: str
+    """As `DATABASE`."""
+    artifacts: str
+    """`s3://BUCKET/FOLDER`."""
+    s3_endpoint: str = ""
+    """Address of an S3 server; Amazon's without."""
+
+    @property
+    def connection(self) -> str:
+        """As SQLAlchemy takes it, with the driver that comes along."""
+        return self.database.replace("postgresql://", "postgresql+psycopg2://", 1)
+
+    @property
+    def bucket(self) -> str:
+        """The bucket's name."""
+        return urlsplit(self.artifacts).netloc
+
+    @property
+    def folder(self) -> str:
+        """The folder in it, without slashes at its ends."""
+        return urlsplit(self.artifacts).path.strip("/")
+
+
+@dataclass(frozen=True)
+class Lab:
+    """The whole file."""
+
+    prefect: PrefectLab
+    mlflow: MlflowLab
+
+    @property
+    def variables(self) -> dict[str, str]:
+        """What processes of the servers and stages get beside their environment; nothing secret."""
+        found = {"PREFECT_API_DATABASE_CONNECTION_URL": self.prefect.connection}
+        return found | ({"MLFLOW_S3_ENDPOINT_URL": self.mlflow.s3_endpoint} if self.mlflow.s3_endpoint else {})
+
+
+def read_lab(workspace: Path) -> Lab | None:
+    """The workspace's `lab.yaml`; None where there is none.
+
+    Raises:
+        BadInput: for an unknown or missing key, an address of another form, or one with a password in it.
+    """
+    path = Path(workspace) / FILE
+    if not path.exists():
+        return None
+    content = read_yaml(path)
+    parts: dict[str, Any] = {}
+    for field in fields(Lab):
+        kind = PrefectLab if field.name == "prefect" else MlflowLab
+        parts[field.name] = kind(**_strings(content, field.name, [own.name for own in fields(kind)], path))
+    if isinstance(content, dict) and (more := sorted(map(str, set(content) - set(parts)))):
+        raise BadInput(f"{path}: {more[0]}", " or ".join(parts), "an unknown key")
+    lab = Lab(**parts)
+    for where, url in (("prefect", lab.prefect.database), ("mlflow", lab.mlflow.database)):
+        _check_database(f"{path}: {where}.database", url)
+    if not BUCKET.fullmatch(lab.mlflow.artifacts):
+        raise BadInput(f"{path}: mlflow.artifacts", "s3://BUCKET/FOLDER", lab.mlflow.artifacts[:80])
+    if lab.mlflow.s3_endpoint and not re.fullmatch(r"https?://[A-Za-z0-9.-]+(:\d{1,5})?", lab.mlflow.s3_endpoint):
+        raise BadInput(f"{path}: mlflow.s3_endpoint", "https://HOST[:PORT]", lab.mlflow.s3_endpoint[:80])
+    if lab.prefect.database == lab.mlflow.database:
+        raise BadInput(f"{path}: mlflow.database", "another database than Prefect's", "the same one")
+    return lab
+
+
+def _strings(content: Any, section: str, names: list[str], path: Path) -> dict[str, str]:
+    """The section's values, all of them texts."""
+    own = content.get(section) if isinstance(content, dict) else None
+    if not isinstance(own, dict):
+        raise BadInput(f"{path}: {section}", f"a mapping with {', '.join(names)}", type(own).__name__)
+    for name in names:
+        if name != "s3_endpoint" and name not in own:
+            raise BadInput(f"{path}: {section}.{name}", "an address", "no such key")
+    for name, value in own.items():
+        if name not in names:
+            raise BadInput(f"{path}: {section}.{name}", " or ".join(names), "an unknown key")
+        if not isinstance(value, str):
+            raise BadInput(f"{path}: {section}.{name}", "a text", type(value).__name__)
+    return dict(own)
+
+
+def _check_database(where: str, url: str) -> None:
+    """Refuse what is no PostgreSQL address, and a password, which would stand in files and process lists."""
+    try:
+        parts = urlsplit(url)
+        known = parts.scheme == "postgresql" and parts.username and parts.hostname and (parts.port or 1)
+    except ValueError:
+        raise BadInput(where, DATABASE, "no address") from None
+    if parts.password is not None:
+        raise BadInput(where, f"{DATABASE}, without a password", "one with it", "Put the password into ~/.pgpass.")
+    if not known or not re.fullmatch(r"/[A-Za-z0-9_-]+", parts.path) or parts.query or parts.fragment:
+        raise BadInput(where, DATABASE, url[:80])

@@ -1,0 +1,72 @@
+"""lab.yaml: what is in it, and one line for what is wrong; no server is asked."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from bumblebee.errors import BadInput
+from flows.environment import environment
+from tasks.lab import read_lab
+from tasks.lab_checks import known_revisions
+
+GOOD = {
+    "prefect": {"database": "postgresql://bumblebee@db.lab:5433/prefect"},
+    "mlflow": {
+        "database": "postgresql://bumblebee@db.lab/mlflow",
+        "artifacts": "s3://bumblebee/mlflow",
+        "s3_endpoint": "https://s3.lab:8333",
+    },
+}
+
+
+def write(folder: Path, content: object) -> Path:
+    (folder / "lab.yaml").write_text(yaml.safe_dump(content))
+    return folder
+
+
+def changed(section: str, key: str, value: object) -> dict:
+    return {**GOOD, section: {**GOOD[section], key: value}}
+
+
+def test_without_the_file_everything_is_on_this_machine(tmp_path: Path) -> None:
+    assert read_lab(tmp_path) is None
+    assert "PREFECT_API_DATABASE_CONNECTION_URL" not in environment(tmp_path)
+
+
+def test_processes_are_told_where_things_are(tmp_path: Path) -> None:
+    lab = read_lab(write(tmp_path, GOOD))
+    assert lab is not None and (lab.mlflow.bucket, lab.mlflow.folder) == ("bumblebee", "mlflow")
+    told = environment(tmp_path)
+    assert told["PREFECT_API_DATABASE_CONNECTION_URL"] == "postgresql+asyncpg://bumblebee@db.lab:5433/prefect"
+    assert told["MLFLOW_S3_ENDPOINT_URL"] == "https://s3.lab:8333"
+
+
+@pytest.mark.parametrize(
+    ("content", "line"),
+    [
+        (changed("mlflow", "database", "postgresql://u:secret@db/mlflow"), "without a password, came one with it"),
+        (changed("prefect", "database", "sqlite:///x"), "prefect.database: expected postgresql://USER@HOST"),
+        (
+            changed("prefect", "database", "postgresql://db/prefect"),
+            "prefect.database: expected postgresql://USER@HOST",
+        ),
+        (changed("prefect", "database", "postgresql://u@db:99999/prefect"), "prefect.database: expected postgresql"),
+        (changed("mlflow", "artifacts", "/srv/artifacts"), "mlflow.artifacts: expected s3://BUCKET/FOLDER"),
+        (changed("mlflow", "s3_endpoint", "s3.lab"), "mlflow.s3_endpoint: expected https://HOST"),
+        (changed("mlflow", "bucket", "x"), "mlflow.bucket: expected database or artifacts or s3_endpoint"),
+        (changed("mlflow", "artifacts", 3), "mlflow.artifacts: expected a text, came int"),
+        (changed("mlflow", "database", GOOD["prefect"]["database"]), "another database than Prefect's"),
+        ({"prefect": GOOD["prefect"]}, "mlflow: expected a mapping with database, artifacts, s3_endpoint"),
+        ({**GOOD, "ray": {}}, "ray: expected prefect or mlflow, came an unknown key"),
+        ([1], "prefect: expected a mapping"),
+    ],
+)
+def test_what_is_wrong_is_one_line_and_shows_no_password(tmp_path: Path, content: object, line: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        read_lab(write(tmp_path, content))
+    assert line in str(caught.value) and "\n" not in str(caught.value) and "secret" not in str(caught.value)
+
+
+def test_the_versions_of_tables_that_the_installed_programs_know_are_found() -> None:
+    assert len(known_revisions("mlflow")) > 30 and len(known_revisions("prefect")) > 50
