@@ -1,4 +1,4 @@
-"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`, `plan`, `compensate`, `motions`.
+"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`, `plan`, `compensate`, `motions`, and plug-ins.
 
 Status 0: done, 2: unusable input or output, 1: an error that should not happen; one line on standard error each.
 """
@@ -6,6 +6,8 @@ Status 0: done, 2: unusable input or output, 1: an error that should not happen;
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +20,9 @@ from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
 app.add_typer(cli_motions.app, name="motions")
 app.command()(cli_plan.plan)
+for _plugin in sorted(entry_points(group="bumblebee.commands")):
+    with suppress(ImportError):  # what it needs is not installed
+        app.add_typer(_plugin.load(), name=_plugin.name)
 _UNUSABLE = typer.BadParameter.__bases__[0]  # the library's UsageError, which it does not export
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]

@@ -20,22 +20,28 @@ from bumblebee.measured import gate_words as words
 from flows import servers
 from flows import workspace as workspaces
 from flows.environment import environment
-from tasks.gate import automatic
+from tasks.gate import asked, rule
 
 
 def main(argv: list[str] | None = None) -> int:
     """Write the answer; resume the run that waits for it."""
     options = parser().parse_args(argv)
     place = gate.Gate(chosen(options), options.round)
-    gate.request(place, automatic(place.workspace))
-    author = gate.unix_user(options.by)
-    table = gate.answer(place, options.answer == "approve", author, options.seen, options.note, options.change)
-    where = f"round {options.round} of {place.workspace}"
+    given(place, options.answer == "approve", gate.unix_user(options.by), options.seen, options.note, options.change)
+    return 0
+
+
+def given(place: gate.Gate, approve: bool, author: gate.Author, seen: str, note: str, change: bool) -> None:
+    """Write an answer, say it, and resume the run that waits for it; see `gate.answer`."""
+    asked(place)
+    table = gate.answer(place, approve, author, seen, note, change, rule(place.workspace))
+    where = f"round {place.round} of {place.workspace}"
     print(f"{where}: {words.said(table)}; it answers {words.what(table)}", flush=True)
+    if table["status"] == "pending":
+        return
     addresses = servers.running(place.workspace)
     if not (addresses and resume(place.workspace, addresses.prefect, table)):
         print("start the loop again (or `dvc repro`): it goes on from here")
-    return 0
 
 
 def parser() -> argparse.ArgumentParser:

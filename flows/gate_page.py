@@ -40,6 +40,15 @@ def question(request: dict[str, Any], artifact: str) -> str:
     )
 
 
+def asked_of(rule: gate.GateConfig) -> str:
+    """A sentence for the dialog where its buttons do not answer: of whoever holds its login nothing more is known."""
+    if rule.people == 1 and not rule.group:
+        return ""
+    who = f"{rule.people} people" if rule.people > 1 else "One person"
+    of = f" of the group {cell(rule.group)}" if rule.group else ""
+    return f"\n\n**{who}{of} must answer, each by `bumblebee gate` in a terminal, not here.**"
+
+
 def page(request: dict[str, Any], place: gate.Gate, run: str = "") -> str:
     """Everything that a person needs to judge a round; `run` is the number of the run that asks, if it can be answered.
 

@@ -14,7 +14,7 @@ from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
 from flows import gate_page
 from flows.stages import Stage
-from tasks.gate import automatic
+from tasks.gate import asked, rule
 
 SEEN = "Hash of what was shown to you: the answer holds for nothing else."
 PAGE = {"how": "Prefect's page: whoever holds the login of this workspace"}  # more cannot be known of who clicked
@@ -36,9 +36,9 @@ def hold(folder: Path, stage: Stage) -> str | None:
     and the answer starts it again, after any restart. Any other run gets the line that says how to answer, to end with.
     """
     place = gate.Gate(folder.resolve(), int(stage.option("round") or 0))
-    if not place.summary.exists() or automatic(folder):
+    if not place.summary.exists() or rule(folder).mode == "auto":
         return None
-    request = gate.request(place)
+    request = asked(place)
     deployed = runtime.deployment.id is not None
     if request["status"] != "pending":
         if deployed:
@@ -71,18 +71,22 @@ def ask(place: gate.Gate, request: dict[str, Any]) -> None:
         key = pause_key(request, attempt)
         description = None
         if answered(key) is None:  # the run comes here again after the answer
-            description = gate_page.question(request, show(place, request, runtime.flow_run.id))
+            asked_of = gate_page.asked_of(rule(place.workspace))
+            description = gate_page.question(request, show(place, request, runtime.flow_run.id)) + asked_of
             log.warning(gate_page.where_to_answer(place.round, runtime.flow_run.ui_url))
         model = form(words.short(request), description)
         given: Any = suspend_flow_run(wait_for_input=model, timeout=None, key=key)
+        if asked(place)["status"] != "pending":  # answered in a terminal, which resumed this run
+            return
         try:
             author = gate.Author(given.by, PAGE)
-            table = gate.answer(place, given.answer == "approve", author, given.seen, given.note)
+            answer = given.answer == "approve", author, given.seen, given.note
+            table = gate.answer(place, *answer, rule=rule(place.workspace))
             log.info(f"round {place.round}: {words.said(table)}")
             return
         except BadInput as error:
             log.warning(f"the answer of {words.one_line(given.by)} on the page was not taken: {error}")
-        request = gate.request(place)
+        request = asked(place)
         if request["status"] != "pending":
             return
 

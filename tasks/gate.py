@@ -14,14 +14,15 @@ from tasks.params import load
 from tasks.stage import run_stage
 
 EXIT_PENDING, EXIT_REJECTED = 3, 4
-KEPT = ("round", "status", "by", "known_by", "at", "note", "seen")  # of an answer, in data/gates
+KEPT = ("round", "status", "by", "known_by", "at", "note", "seen", "approvals")  # of an answer, in data/gates
 
 
 def main(round: int) -> None:
     """Write data/gates/round-N.json if the answer is yes; end with status 3 (no answer yet) or 4 (rejected)."""
     place, passed = gate.Gate(Path.cwd(), round), paths.gate(round)
     passed.unlink(missing_ok=True)
-    table = gate.settle(place, automatic())
+    own = rule()
+    table = gate.settle(place, own.mode == "auto", own.people)
     if table["status"] == "pending":
         print(words.how_to_answer(place.workspace, table), file=sys.stderr, flush=True)
         raise SystemExit(EXIT_PENDING)
@@ -33,9 +34,15 @@ def main(round: int) -> None:
     print(line, flush=True)
 
 
-def automatic(workspace: Path = Path()) -> bool:
-    """Whether the gates answer themselves in this workspace."""
-    return load("gate", gate.GateConfig, workspace / "params.yaml").mode == "auto"
+def rule(workspace: Path = Path()) -> gate.GateConfig:
+    """How the gates of this workspace are answered."""
+    return load("gate", gate.GateConfig, workspace / "params.yaml")
+
+
+def asked(place: gate.Gate) -> dict[str, Any]:
+    """The request of a round with its answer, if one stands by the workspace's rule."""
+    own = rule(place.workspace)
+    return gate.request(place, own.mode == "auto", own.people)
 
 
 def command(argv: list[str]) -> int:
@@ -44,13 +51,14 @@ def command(argv: list[str]) -> int:
     place = gate.Gate(options.workspace.resolve(), options.round)
     if not place.workspace.is_dir():
         raise BadInput(options.workspace, "a workspace", "no such folder", "Check --workspace.")
-    table = gate.request(place, automatic(place.workspace))
+    table = asked(place)
     if not (options.approve or options.reject):
         show(table, place)
         return 0
     author = gate.unix_user(options.by)
-    table = gate.answer(place, options.approve, author, options.seen, options.note, options.change)
-    then = " Run `dvc repro` to go on." if options.approve else ""
+    own = rule(place.workspace)
+    table = gate.answer(place, options.approve, author, options.seen, options.note, options.change, own)
+    then = " Run `dvc repro` to go on." if table["status"] == "approved" else ""
     print(f"round {options.round}: {words.said(table)}; it answers {words.what(table)}.{then}")
     return 0
 
@@ -65,7 +73,7 @@ def show(table: dict[str, Any], place: gate.Gate) -> None:
     grid = Table(title=f"Round {table['round']}: {table['status']}", show_header=False)
     rows = {"files accepted": seen["accepted"], "files set aside": seen["quarantined"]}
     rows |= {"seconds accepted": f"{seen['seconds']:.1f}", "hash of what is seen": words.short(table)}
-    rows |= {"answer": words.said(table) if "by" in table else "none yet"}
+    rows |= {"answer": words.said(table) if "by" in table or table.get("approvals") else "none yet"}
     for number, old in enumerate(table["history"], 1):
         rows[f"earlier answer {number}"] = f"{words.said(old)}; it answered {words.what(old)}"
     for name, value in rows.items():

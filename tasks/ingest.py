@@ -181,7 +181,8 @@ def keep_rejected(out: Path, round: int) -> Path:
 def ask(round: int) -> None:
     """Leave the request at the gate; in the automatic mode answer it at once."""
     place = gate.Gate(Path.cwd(), round)
-    table = gate.settle(place, load("gate", gate.GateConfig).mode == "auto")
+    own = load("gate", gate.GateConfig)
+    table = gate.settle(place, own.mode == "auto", own.people)
     if table["status"] == "pending":
         print(gate_words.how_to_answer(place.workspace, table), flush=True)
     else:

@@ -70,7 +70,8 @@ NO_RESULT = {
     "tasks/sections.py": "the same",
     "tasks/parent.py": "ends with the process that started it",
     "tasks/recorder.py": "what MLflow is told",
-    "tasks/registry.py": "the same",
+    "bumblebee/measured/gate_record.py": "a copy of what was answered, which no stage reads",
+    "tasks/registry.py": "what MLflow is told",
     "tasks/lab.py": "where that is kept",
     "tasks/lab_checks.py": "the same",
     "tasks/run_form.py": "the same",
@@ -80,7 +81,10 @@ _PAGE = "draws the page for people, which no later stage reads"
 _NETWORK = "of learning/ppo.py it takes the algorithm; the task of policies and their motions are not its own"
 _CONTRACT = "of an exported policy it reads the contract and the hash, of which this is no part"
 NO_RESULT_OF = {
-    "ingest": {f"bumblebee/measured/{name}.py": _PAGE for name in ("gate_words", "overview", "overview_plots")},
+    "ingest": {
+        **{f"bumblebee/measured/{name}.py": _PAGE for name in ("gate_words", "overview", "overview_plots")},
+        "bumblebee/measured/gate_people.py": "who may answer; the request is not its result",
+    },
     "diagnose": {
         **{
             f"bumblebee/diagnosis/report/{name}.py": _PAGE

@@ -37,10 +37,16 @@ def _python(module: str, workspace: Path, *more: str) -> str:
 def how_to_answer(workspace: Path, table: dict[str, Any]) -> str:
     """The one line that tells a person what to do."""
     return (
-        f"round {table['round']} waits for an answer about {what(table)}: "
+        f"round {table['round']} waits for an answer about {what(table)}{so_far(table)}: "
         f"look with `{show_command(workspace, table['round'])}`, "
         f"then answer with `{answer_command(workspace, table, True)}`, or `reject` in place of `approve`"
     )
+
+
+def so_far(table: dict[str, Any]) -> str:
+    """Who has approved where more people must; "" for nobody."""
+    names = [one_line(f"{one['by']} ({known(one)})") for one in table.get("approvals", [])]
+    return f", approved by {', '.join(names)} so far, one more person must" if names else ""
 
 
 def what(table: dict[str, Any]) -> str:
@@ -59,8 +65,11 @@ def known(table: dict[str, Any]) -> str:
 
 def said(table: dict[str, Any]) -> str:
     """An answer in one line: approved by Ada (unix user ada, uid 1000, on lab) at ..., with the note."""
+    if "by" not in table:
+        return f"{table['status']}{so_far(table)}"
     note = f": {table['note']}" if table.get("note") else ""
-    return one_line(f"{table['status']} by {table['by']} ({known(table)}) at {table['at']}{note}")
+    first = "".join(f"{one['by']} ({known(one)}) and " for one in table.get("approvals", []))
+    return one_line(f"{table['status']} by {first}{table['by']} ({known(table)}) at {table['at']}{note}")
 
 
 def one_line(text: str) -> str:

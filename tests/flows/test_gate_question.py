@@ -152,3 +152,22 @@ def test_a_run_that_waits_at_a_gate_has_not_failed_and_is_not_complete() -> None
     state = outcome({}, [STAGE], "gate@1")
     assert state.name == WAITING and not state.is_failed() and not state.is_completed()
     assert state.type == Cancelled().type
+
+
+def test_where_two_must_approve_the_page_says_so_and_its_answer_is_not_taken(
+    place: gate.Gate, page: Page, caplog: pytest.LogCaptureFixture
+) -> None:
+    (place.workspace / "params.yaml").write_text("gate: {mode: ask, people: 2}\n")
+    ask(place)
+    (question,) = page.shown.values()
+    assert "2 people must answer, each by `bumblebee gate` in a terminal" in question
+    seen = gate.seen_of(place.summary)["sha256"]
+    page.answer("approve", "Ada", seen[:12])
+    ask(place)
+    assert gate.verdict(place, people=2) == "pending" and "a login of their own" in caplog.text
+    for login in ("ann", "bob"):
+        author = gate.Author(login, {"how": "unix user", "user": login, "uid": 1, "host": "lab"})
+        gate.answer(place, True, author, seen, rule=gate.GateConfig(people=2))
+    page.answer("approve", "bob", seen[:12])  # as the terminal resumes the run
+    assert gate_question.hold(place.workspace, STAGE) is None
+    assert gate.verdict(place, people=2) == "approved" and "too late" not in caplog.text

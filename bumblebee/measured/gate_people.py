@@ -1,0 +1,61 @@
+"""Who may answer a gate, and how many people have."""
+
+import grp
+import os
+import pwd
+from collections.abc import Mapping
+from typing import Any
+
+from bumblebee.errors import BadInput
+
+TERMINAL = "Answer in a terminal: `bumblebee gate approve` or `reject` knows who runs it."
+
+
+def login_of(answer: Mapping[str, Any]) -> str | None:
+    """The login under which an answer was given; None where nothing but a claim is known of its author."""
+    facts = answer.get("known_by") or {}
+    return str(facts.get("user")) if facts.get("how") == "unix user" else None
+
+
+def approvers(table: Mapping[str, Any]) -> list[str]:
+    """Logins of those who approved what a request shows, each once."""
+    given = [*table.get("approvals", []), *([table] if table.get("status") == "approved" else [])]
+    logins = [login_of(answer) for answer in given]
+    return list(dict.fromkeys(login for login in logins if login is not None))
+
+
+def require_allowed(known_by: Mapping[str, Any], people: int, group: str) -> None:
+    """Refuse an author of whom nothing is known where that matters, and one who is not in the group.
+
+    Args:
+        known_by: how the author was known, `gate.Author.known_by`.
+        people: how many must approve.
+        group: unix group whose members alone may answer; "" for everybody.
+
+    Raises:
+        BadInput: naming what is wanted.
+    """
+    if people == 1 and not group:
+        return
+    login = login_of({"known_by": known_by})
+    if login is None:
+        raise BadInput(
+            "the answer's author", "a login of their own, as gate.people and gate.group ask", "none", TERMINAL
+        )
+    if group and login not in members(group):
+        raise BadInput("the answer's author", f"a member of the group {group} (gate.group)", login)
+
+
+def members(group: str) -> set[str]:
+    """Logins of a unix group, those of whom it is the first group too.
+
+    Raises:
+        BadInput: if this machine has no such group.
+    """
+    try:
+        found = grp.getgrnam(group)
+    except KeyError:
+        raise BadInput("gate.group", "a group of this machine", repr(group), "Make it, or name another.") from None
+    first = {user.pw_name for user in pwd.getpwall() if user.pw_gid == found.gr_gid}
+    own = pwd.getpwuid(os.getuid()).pw_name if os.getgid() == found.gr_gid else None
+    return {*found.gr_mem, *first, *([own] if own else [])}

@@ -1,0 +1,77 @@
+"""`bumblebee gate`: a plug-in of the library's command line, under the login of whoever types it."""
+
+import getpass
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from bumblebee.errors import BadInput
+from bumblebee.measured import gate
+from flows import gate_answer
+from flows.gate_cli import app
+from tests.flows.test_gate_answer import waiting
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> gate.Gate:
+    monkeypatch.setattr(gate_answer.servers, "running", lambda folder: None)
+    return waiting(tmp_path / "lab", 3)
+
+
+def typed(place: gate.Gate, *words: str) -> str:
+    """What the command prints."""
+    result = CliRunner().invoke(app, [*words, "--workspace", str(place.workspace)])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_a_round_is_listed_shown_and_answered_under_the_login(
+    place: gate.Gate, capsys: pytest.CaptureFixture[str]
+) -> None:
+
+    seen = gate.seen_of(place.summary)["sha256"][:12]
+    listed = typed(place, "list")
+    assert seen in listed and "pending" in listed and "0 answers in the record" in listed
+    assert f"--seen {seen}" in typed(place, "show", "1")
+    said = typed(place, "approve", "1", "--seen", seen)
+    me = getpass.getuser()
+    assert f"approved by {me} (unix user {me}" in said
+    table = gate.read_approval(place.approval)
+    assert (table["status"], table["known_by"]["user"]) == ("approved", me)
+    assert "1 answers in the record" in typed(place, "list")
+
+
+def test_a_rejection_says_why_and_nothing_is_answered_unseen(place: gate.Gate) -> None:
+    seen = gate.seen_of(place.summary)["sha256"][:12]
+    with pytest.raises(BadInput, match="--note: expected why"):
+        typed(place, "reject", "1", "--seen", seen)
+    with pytest.raises(BadInput, match="--seen"):
+        typed(place, "approve", "1")
+    assert gate.verdict(place) == "pending"
+    typed(place, "reject", "1", "--seen", seen, "--note", "the floor was wet")
+    assert json.loads(place.approval.read_text())["note"] == "the floor was wet"
+
+
+def test_two_people_are_asked_for_where_the_settings_say_so(place: gate.Gate) -> None:
+    (place.workspace / "params.yaml").write_text("gate: {mode: ask, people: 2}\n")
+    seen = gate.seen_of(place.summary)["sha256"][:12]
+    assert "one more person must" in typed(place, "approve", "1", "--seen", seen)
+    assert gate.verdict(place, people=2) == "pending"
+    with pytest.raises(BadInput, match="a second one by"):
+        typed(place, "approve", "1", "--seen", seen)
+
+
+def test_the_librarys_command_line_finds_it(place: gate.Gate) -> None:
+    program = Path(sys.executable).with_name("bumblebee")
+    done = subprocess.run(
+        [str(program), "gate", "list", "--workspace", str(place.workspace)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0 and "pending" in done.stdout
+    done = subprocess.run([str(program), "gate", "list"], cwd="/", capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1

@@ -1,0 +1,132 @@
+"""Two people at a gate, groups, and the record of all answers, which nobody changes in silence."""
+
+import grp
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bumblebee.errors import BadInput
+from bumblebee.measured import gate, gate_record
+from bumblebee.measured import gate_words as words
+from bumblebee.measured.gate_people import approvers, members
+
+PAGE = gate.Author("Ann", {"how": "Prefect's page"})
+TWO = gate.GateConfig(people=2)
+
+
+def person(login: str) -> gate.Author:
+    return gate.Author(login.title(), {"how": "unix user", "user": login, "uid": 1000, "host": "lab"})
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> gate.Gate:
+    made = gate.Gate(tmp_path, 1)
+    write(made, 4)
+    return made
+
+
+def write(place: gate.Gate, accepted: int) -> None:
+    place.summary.parent.mkdir(parents=True, exist_ok=True)
+    counts = {"accepted": accepted, "quarantined": 1, "seconds": 8.0, "by_rule": {}}
+    place.summary.write_text(json.dumps(counts))
+
+
+def answer(place: gate.Gate, login: str, approve: bool = True, **more: Any) -> dict[str, Any]:
+    seen = gate.request(place, people=2)["seen"]["sha256"]
+    return gate.answer(place, approve, person(login), seen, rule=TWO, **more)
+
+
+def test_one_approval_of_two_lets_nothing_pass_and_says_who_is_missing(place: gate.Gate) -> None:
+    table = answer(place, "ann")
+    assert table["status"] == "pending" and gate.verdict(place, people=2) == "pending"
+    assert gate.settle(place, False, 2) == table
+    assert "approved by Ann (unix user ann, uid 1000, on lab) so far" in words.how_to_answer(place.workspace, table)
+    table = answer(place, "bob", note="both looked")
+    assert table["status"] == "approved" and approvers(table) == ["ann", "bob"]
+    assert words.said(table).startswith("approved by Ann (unix user ann, uid 1000, on lab) and Bob (")
+    assert gate.verdict(place, people=2) == gate.settle(place, False, 2)["status"] == "approved"
+
+
+def test_nobody_approves_twice_and_one_rejection_ends_it(place: gate.Gate) -> None:
+    answer(place, "ann")
+    with pytest.raises(BadInput, match="round 1: expected approvals by 2 people, came a second one by ann"):
+        answer(place, "ann")
+    assert answer(place, "bob", approve=False, note="slipped")["status"] == "rejected"
+    assert gate.verdict(place, people=2) == "rejected"
+    assert answer(place, "bob", change=True)["status"] == "pending"  # a change of mind needs the other one again
+
+
+def test_approvals_of_other_data_do_not_count(place: gate.Gate) -> None:
+    answer(place, "ann")
+    write(place, 5)
+    assert answer(place, "bob")["status"] == "pending"
+    assert answer(place, "ann")["status"] == "approved"
+
+
+def test_where_two_must_an_answer_by_one_from_before_does_not_stand(place: gate.Gate) -> None:
+    seen = gate.request(place)["seen"]["sha256"]
+    gate.answer(place, True, person("ann"), seen)
+    assert (gate.verdict(place), gate.verdict(place, people=2)) == ("approved", "pending")
+    asked = gate.request(place, people=2)
+    assert asked["status"] == "pending" and asked["history"][-1]["by"] == "Ann"
+
+
+def test_who_is_known_by_a_shared_login_alone_cannot_answer_for_two_or_for_a_group(place: gate.Gate) -> None:
+    seen = gate.request(place)["seen"]["sha256"]
+    for rule in (TWO, gate.GateConfig(group=grp.getgrgid(os.getgid()).gr_name)):
+        with pytest.raises(BadInput, match=r"a login of their own.*bumblebee gate approve"):
+            gate.answer(place, True, PAGE, seen, rule=rule)
+    assert gate.answer(place, True, PAGE, seen)["status"] == "approved"
+
+
+def test_only_the_groups_members_answer(place: gate.Gate) -> None:
+    own = grp.getgrgid(os.getgid()).gr_name
+    me = gate.unix_user("Me")
+    seen, rule = gate.request(place)["seen"]["sha256"], gate.GateConfig(group=own)
+    assert me.known_by["user"] in members(own)
+    with pytest.raises(BadInput, match=f"expected a member of the group {own}.*came nobody-at-all"):
+        gate.answer(place, True, person("nobody-at-all"), seen, rule=rule)
+    assert gate.answer(place, True, me, seen, rule=rule)["status"] == "approved"
+    with pytest.raises(BadInput, match=r"gate\.group: expected a group of this machine"):
+        members("no-such-group-here")
+
+
+def test_gates_that_answer_themselves_ask_nobody() -> None:
+    with pytest.raises(BadInput, match="mode"):
+        gate.GateConfig(mode="auto", people=2)
+    with pytest.raises(BadInput, match="people"):
+        gate.GateConfig(people=0)
+
+
+def test_the_record_has_every_answer_with_what_was_seen_and_shows_what_was_changed(place: gate.Gate) -> None:
+    answer(place, "ann")
+    answer(place, "bob", approve=False, note="slipped")
+    write(place, 5)
+    gate.settle(place, True)
+    folder = place.approval.parent
+    found = [entry["answer"] for entry in gate_record.check(folder)]
+    assert [(one["status"], one["by"].split()[0]) for one in found] == [
+        ("approved", "Ann"), ("rejected", "Bob"), ("approved", "automatic"),
+    ]  # fmt: skip
+    assert found[0]["seen"] == found[1]["seen"] != found[2]["seen"]
+    file = folder / gate_record.NAME
+    lines = file.read_text().splitlines(keepends=True)
+    for broken in (lines[1:], [lines[0], lines[2]], [lines[0].replace("Ann", "Eve"), *lines[1:]], [*lines, "{}\n"]):
+        file.write_text("".join(broken))
+        with pytest.raises(BadInput, match=r"record\.jsonl, line \d: expected what was written"):
+            gate_record.check(folder)
+    file.write_text("".join(lines) + lines[0][:40])  # a kill within a line
+    assert len(gate_record.check(folder)) == 3 and file.read_text() == "".join(lines)
+
+
+def test_a_broken_record_takes_no_answer(place: gate.Gate) -> None:
+    answer(place, "ann")
+    file = place.approval.parent / gate_record.NAME
+    file.write_text(file.read_text().replace("Ann", "Eve"))
+    before = place.approval.read_text()
+    with pytest.raises(BadInput, match="line 1"):
+        answer(place, "bob")
+    assert place.approval.read_text() == before
