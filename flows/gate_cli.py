@@ -37,7 +37,7 @@ def list_gates(workspace: Workspace = Path()) -> None:
         came = f"{seen['accepted']} files, {seen['quarantined']} set aside"
         grid.add_row(str(table["round"]), words.short(table), came, escape(words.said(table)))
     Console().print(grid if grid.row_count else "no round has come in")
-    print(f"{len(gate_record.check(folder / 'data' / 'approvals'))} answers in the record, unchanged since")
+    print(f"answers in the record: {len(gate_record.check(folder / 'data' / 'approvals'))}, unchanged since")
 
 
 @app.command()

@@ -240,7 +240,7 @@ def _joined(old: dict[str, Any], table: dict[str, Any], people: int) -> dict[str
     own = {key: table[key] for key in ("status", "by", "known_by", "at", "note")}
     if len(earlier) + 1 < people:
         kept = {key: table[key] for key in ("round", "seen", "history")}
-        return kept | {"status": "pending", "approvals": [*earlier, own]}
+        return kept | {"status": "pending", "approvals": [*earlier, own], "people": people}
     return table | {"approvals": earlier}
 
 

@@ -46,7 +46,7 @@ def how_to_answer(workspace: Path, table: dict[str, Any]) -> str:
 def so_far(table: dict[str, Any]) -> str:
     """Who has approved where more people must; "" for nobody."""
     names = [one_line(f"{one['by']} ({known(one)})") for one in table.get("approvals", [])]
-    return f", approved by {', '.join(names)} so far, one more person must" if names else ""
+    return f", approved by {', '.join(names)}, {len(names)} of {table.get('people', '?')} people" if names else ""
 
 
 def what(table: dict[str, Any]) -> str:

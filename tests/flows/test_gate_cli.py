@@ -37,14 +37,14 @@ def test_a_round_is_listed_shown_and_answered_under_the_login(
 
     seen = gate.seen_of(place.summary)["sha256"][:12]
     listed = typed(place, "list")
-    assert seen in listed and "pending" in listed and "0 answers in the record" in listed
+    assert seen in listed and "pending" in listed and "answers in the record: 0" in listed
     assert f"--seen {seen}" in typed(place, "show", "1")
     said = typed(place, "approve", "1", "--seen", seen)
     me = getpass.getuser()
     assert f"approved by {me} (unix user {me}" in said
     table = gate.read_approval(place.approval)
     assert (table["status"], table["known_by"]["user"]) == ("approved", me)
-    assert "1 answers in the record" in typed(place, "list")
+    assert "answers in the record: 1" in typed(place, "list")
 
 
 def test_a_rejection_says_why_and_nothing_is_answered_unseen(place: gate.Gate) -> None:
@@ -61,7 +61,7 @@ def test_a_rejection_says_why_and_nothing_is_answered_unseen(place: gate.Gate) -
 def test_two_people_are_asked_for_where_the_settings_say_so(place: gate.Gate) -> None:
     (place.workspace / "params.yaml").write_text("gate: {mode: ask, people: 2}\n")
     seen = gate.seen_of(place.summary)["sha256"][:12]
-    assert "one more person must" in typed(place, "approve", "1", "--seen", seen)
+    assert "1 of 2 people" in typed(place, "approve", "1", "--seen", seen)
     assert gate.verdict(place, people=2) == "pending"
     with pytest.raises(BadInput, match="a second one by"):
         typed(place, "approve", "1", "--seen", seen)

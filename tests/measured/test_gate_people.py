@@ -43,7 +43,9 @@ def test_one_approval_of_two_lets_nothing_pass_and_says_who_is_missing(place: ga
     table = answer(place, "ann")
     assert table["status"] == "pending" and gate.verdict(place, people=2) == "pending"
     assert gate.settle(place, False, 2) == table
-    assert "approved by Ann (unix user ann, uid 1000, on lab) so far" in words.how_to_answer(place.workspace, table)
+    assert "approved by Ann (unix user ann, uid 1000, on lab), 1 of 2 people" in words.how_to_answer(
+        place.workspace, table
+    )
     table = answer(place, "bob", note="both looked")
     assert table["status"] == "approved" and approvers(table) == ["ann", "bob"]
     assert words.said(table).startswith("approved by Ann (unix user ann, uid 1000, on lab) and Bob (")
