@@ -25,7 +25,7 @@ from bumblebee.io.write import unwritable, write_file
 from bumblebee.measured import gate_record
 from bumblebee.measured import gate_words as words
 from bumblebee.measured.gate_people import approvers, login_of, require_allowed
-from bumblebee.ranges import Range, Ranged
+from bumblebee.ranges import Range, Ranged, Text
 
 AUTOMATIC = "automatic (gate.mode: auto)"
 STATUSES = ("pending", "approved", "rejected")
@@ -41,7 +41,7 @@ class GateConfig(Ranged):
     """ask: a person answers, in the Prefect UI or by one command; auto: the gate answers itself and says so."""
     people: Annotated[int, Range(least=1, most=9)] = 1
     """People who must approve, each under a login of their own; the rejection of one ends it."""
-    group: str = ""
+    group: Annotated[str, Text(empty=True)] = ""
     """Unix group whose members alone may answer; everybody without."""
 
     def __post_init__(self) -> None:

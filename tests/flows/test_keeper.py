@@ -43,7 +43,7 @@ from pathlib import Path
 from flows import attend, runs, servers
 servers.FRONT = [sys.executable, "-c", Path({front!r}).read_text()]
 attend.WALK = [sys.executable, "-c", Path({walk!r}).read_text()]
-runs.clear_lost = lambda *_: []
+runs.clear_lost = lambda *_, **__: []
 with attend.ended_in_order():
     try:
         with servers.servers(Path({folder!r})) as addresses:
@@ -102,7 +102,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A workspace; servers that this process starts in it are stand-ins."""
     code = FRONT.format(home=str(servers.HOME))
     monkeypatch.setattr(servers, "FRONT", [sys.executable, "-c", code])
-    monkeypatch.setattr(runs, "clear_lost", lambda *_: [])
+    monkeypatch.setattr(runs, "clear_lost", lambda *_, **__: [])
     monkeypatch.setattr(os, "environ", dict(os.environ))
     yield tmp_path
 

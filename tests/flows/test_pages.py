@@ -21,7 +21,7 @@ import pytest
 import yaml
 
 from bumblebee.measured.intake import FINDING_COLUMNS
-from flows import front, login, runs, servers
+from flows import login, runs, servers
 from flows.servers import Addresses
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def register(folder: Path) -> None:
     import mlflow
 
     login.private(folder / ".servers")
-    uri = front.MLFLOW["_MLFLOW_SERVER_FILE_STORE"].format(folder=folder / ".servers")
+    uri = f"sqlite:///{folder / '.servers'}/mlflow.db"
     client = mlflow.MlflowClient(tracking_uri=uri, registry_uri=uri)
     client.create_registered_model("expert-c0")
     client.create_model_version("expert-c0", source=str(folder / "a.txt"))

@@ -226,13 +226,15 @@ def factors_of(found: Sampled, sigma: np.ndarray, rule: Whitening, stepped: np.n
 def _own_numerical_error(stepped: np.ndarray, sigma: np.ndarray, rule: Whitening, left: np.ndarray) -> np.ndarray:
     """A window's own numerical error (W, N, D) as far as it exceeds the noise `sigma` (D,) of a signal.
 
-    None in a signal of which far more is `left` (W, M): it explains nothing there, and would only take weight off.
+    None where far more is `left` (W, M) of a signal in most windows: the model lacks something, and numerical error
+    would only take weight off the windows and signals in which most happens.
     """
     shape = (len(stepped), -1, len(sigma))
     changed = np.nan_to_num(stepped).reshape(shape)
     own = rule.stepped * changed
     power = (own**2).mean(axis=1, keepdims=True)
     remaining = (left.reshape(shape) ** 2).mean(axis=1, keepdims=True)
-    explains = remaining <= rule.explained**2 * (changed**2).mean(axis=1, keepdims=True)
+    enough = remaining <= rule.explained**2 * (changed**2).mean(axis=1, keepdims=True)
+    explains = (enough.mean(axis=0) >= 0.5).all()
     beyond = np.maximum(power - sigma**2, 0.0) * explains
     return own * np.sqrt(beyond / np.where(power > 0, power, 1.0))
