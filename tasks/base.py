@@ -15,9 +15,10 @@ from tasks.training import Job, TrainingConfig, train_policy, training_clips
 class BaseConfig(TrainingConfig):
     """The training of the base policy."""
 
-    init: Literal["pretrained", "scratch"] = "pretrained"
-    """Go on from the policy that comes with BumbleBee, with its layers, or from nothing. The pretrained one has seen
-    the embedded library's training clips and real motions (bumblebee/learning/pretrained/README.md)."""
+    init: Literal["pretrained", "randomised", "scratch"] = "pretrained"
+    """Go on from a policy that comes with BumbleBee, with its layers, or from nothing. The pretrained one has seen
+    the embedded library's training clips and real motions (bumblebee/learning/pretrained/README.md); the randomised one
+    real motions on robots that differ, with delays (pretrained/randomised/README.md)."""
 
 
 def main() -> None:
@@ -26,7 +27,7 @@ def main() -> None:
     clips = training_clips()
     world = World(load_model(physics_hz=config.env.physics_hz), threads=config.env.threads)
     own = [clip for clip in clips if clip.split == "train"]
-    parent = pretrained.FOLDER if config.init == "pretrained" else None
+    parent = {"pretrained": pretrained.FOLDER, "randomised": pretrained.RANDOMISED}.get(config.init)
     train_policy(Job("base", "base", paths.BASE, own, clips, world, parent=parent), config)
 
 

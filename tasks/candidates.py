@@ -12,6 +12,7 @@ from bumblebee.deploy.policy import read_policy_contract
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.untrained import export_untrained
 from bumblebee.learning.export import export_shipped
+from bumblebee.learning.pretrained import NAMES
 from tasks import paths
 from tasks.control_config import ControlConfig
 from tasks.params import load, read
@@ -100,7 +101,7 @@ def beside(cluster: str, number: int, parent: int, kinds: Sequence[str]) -> list
 def came_along(base: Path) -> bool:
     """Whether the base policy began from the one that comes with BumbleBee."""
     card = base / "card.json"
-    return card.exists() and json.loads(card.read_text()).get("parent") == "pretrained"
+    return card.exists() and json.loads(card.read_text()).get("parent") in NAMES.values()
 
 
 def same(candidate: Candidate) -> tuple[str, str]:

@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from bumblebee.evaluation.summary import comparisons
+from bumblebee.learning.pretrained import NAMES
 from bumblebee.motion.store import read_index
 from bumblebee.ranges import Line, Name, Ranged, Seed
 from bumblebee.report.clusters_section import clusters_section
@@ -81,7 +82,7 @@ def collect(shape: Loop) -> LoopResults:
         published=_json(paths.PUBLISHED),
         sealed=sealed_truth(),
         rounds=tuple(round_results(turn, shape.clusters) for turn in shape.rounds if turn.n <= shape.final_round),
-        pretrained=base.get("parent") == "pretrained",
+        pretrained=base.get("parent") in NAMES.values(),
         base_trained_on=base.get("kept") != "parent",
         points=pd.read_parquet(points) if (points := paths.CLUSTERS / "map.parquet").exists() else None,
     )

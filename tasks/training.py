@@ -220,7 +220,7 @@ def _card(
 
 def _named(parent: Path) -> str:
     """The parent's folder, or that it is the policy that comes with the code, wherever that lies."""
-    return "pretrained" if parent == pretrained.FOLDER else str(parent)
+    return pretrained.NAMES.get(parent, str(parent))
 
 
 def _outcome(before: pd.DataFrame, kept: pd.DataFrame) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """The policy that comes with the code: small, safe to read, of the task's layout, and able to move."""
 
+from pathlib import Path
+
 import pytest
 import torch
 
@@ -12,10 +14,11 @@ from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.observations import layout
 
 
-def test_it_is_small_and_of_the_layout_that_the_task_has() -> None:
+@pytest.mark.parametrize("folder", pretrained.NAMES, ids=lambda folder: folder.name)
+def test_it_is_small_and_of_the_layout_that_the_task_has(folder: Path) -> None:
     """At most 4 MB with its critic; its observation and look-ahead are the environment's defaults."""
-    assert (pretrained.FOLDER / FILE).stat().st_size <= 4e6
-    policy = load_policy(pretrained.FOLDER)
+    assert (folder / FILE).stat().st_size <= 4e6
+    policy = load_policy(folder)
     assert policy.shape.ahead == EnvConfig().ahead
     assert policy.shape.observation == sum(size for _, size in layout(23, len(policy.shape.ahead)))
     assert policy.shape.actions == 23
@@ -23,11 +26,12 @@ def test_it_is_small_and_of_the_layout_that_the_task_has() -> None:
     assert all(value.isfinite().all() for value in policy.critic_state.values())
 
 
+@pytest.mark.parametrize("folder", pretrained.NAMES, ids=lambda folder: folder.name)
 @pytest.mark.parametrize("physics_hz", [100.0, 200.0])
-def test_it_follows_embedded_motions_without_training(physics_hz: float) -> None:
+def test_it_follows_embedded_motions_without_training(folder: Path, physics_hz: float) -> None:
     """Each of seven kinds from its first frame to its last, at the rates that base and refine train at."""
     clips = make_library(EmbeddedConfig(limit=7))
-    policy = load_policy(pretrained.FOLDER)
+    policy = load_policy(folder)
     trials = try_policy(policy, clips, World(load_model(physics_hz=physics_hz), threads=1), policy.shape.ahead)
     assert trials["success"].all()
     assert trials["key_error"].mean() < 0.03  # m

@@ -15,6 +15,7 @@ from bumblebee.learning.policy import load_policy
 from bumblebee.motion.store import write_library
 from bumblebee.tracking.sampler import ClipSampler
 from tasks import base, experts, training
+from tasks.candidates import came_along
 from tests.tracking.clips import waving
 
 TINY = {
@@ -74,14 +75,15 @@ def test_a_cluster_without_motions_is_bad_input(workspace: Path) -> None:
         training.cluster_clips("c7", 0.1)
 
 
-def test_base_goes_on_from_the_policy_that_comes_with_the_code(workspace: Path) -> None:
+@pytest.mark.parametrize(("init", "parent"), [("pretrained", "pretrained"), ("randomised", "pretrained-randomised")])
+def test_base_goes_on_from_a_policy_that_comes_with_the_code(workspace: Path, init: str, parent: str) -> None:
     """Its layers are the shipped policy's, whatever the section says; the card names the parent without its place."""
     content = yaml.safe_load(Path("params.yaml").read_text())
-    content["base"]["init"] = "pretrained"
+    content["base"]["init"] = init
     Path("params.yaml").write_text(yaml.safe_dump(content))
     base.main()
     card = json.loads(Path("models/base/card.json").read_text())
-    assert card["parent"] == "pretrained"
+    assert card["parent"] == parent and came_along(Path("models/base"))
     assert load_policy(Path("models/base")).shape.hidden == load_policy(pretrained.FOLDER).shape.hidden
 
 

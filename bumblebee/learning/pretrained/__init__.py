@@ -1,6 +1,10 @@
-"""The base policy that comes with BumbleBee, trained on a GPU; README.md beside it is its card."""
+"""The base policies that come with BumbleBee, trained on a GPU; README.md beside each is its card."""
 
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
 """A policy's folder, as `load_policy` reads it."""
+RANDOMISED = FOLDER / "randomised"
+"""Another one: it learnt on robots that differ, with delays, and follows less closely."""
+NAMES = {FOLDER: "pretrained", RANDOMISED: "pretrained-randomised"}
+"""What a policy's card calls the parent that it began from."""

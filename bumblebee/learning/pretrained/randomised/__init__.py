@@ -1,0 +1,1 @@
+"""The policy that learnt on robots that differ, with delays; README.md is its card."""
