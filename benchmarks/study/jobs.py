@@ -77,6 +77,27 @@ def paper_jobs(study: Study, motions: Motions) -> list[Job]:
     return [Job(paper_of(seed, arm), study.paper_steps, seed, settings=f"paper-{arm}") for arm in PAPER_ARMS]
 
 
+SURVIVORS = {
+    "place": "judged in its own place, and seeing it alone",
+    "wide": "wider randomisation",
+    "history": "ten steps of proprioception",
+    "loose": "episodes end at .8 m throughout",
+    "place-history": "own place, seeing it alone, ten steps",
+    "judged": "judged in its own place",
+    "default": "actions around the stand",
+}
+"""Arms of the part `robust`, by name of their settings; `settings.ROBUST_CHANGES` has what they change."""
+
+
+def robust_jobs(study: Study, motions: Motions) -> list[Job]:
+    """For each seed the base policy and, from nothing and of equal steps, one of each change of its task."""
+    jobs: list[Job] = []
+    for seed in study.seeds:
+        jobs.append(Job(base_of(seed), study.base_steps, seed))
+        jobs += [Job(arm_of(seed, arm), study.base_steps, seed, settings=f"robust-{arm}") for arm in SURVIVORS]
+    return jobs
+
+
 GENERALISTS = {
     "transformer": "transformer, of the experts",
     "mlp": "MLP of equal size, of the experts",

@@ -8,14 +8,21 @@ from benchmarks.study.jobs import PAPER_ARMS, paper_of
 from benchmarks.study.motions import Motions
 from benchmarks.study.settings import Study
 from benchmarks.study.tables import SPLITS, cell, estimate, head, line, rate, read_trials
+from benchmarks.study.trying import TRIALS
 from bumblebee.learning.ppo import CURVE
 
 
 def paper_tables(out: Path, study: Study, motions: Motions) -> str:
-    """Success of each arm with intervals over motions, and the reward and deviation at the end of its curve."""
+    """Success of each arm that was tried, with intervals over motions; reward and deviation at the end of its curve.
+
+    Raises:
+        BadInput: if none was.
+    """
     lines = head(["arm", "motions", "n", "success", "pelvis rule", "MPKPE [mm]", "reward", "deviation", "episode [s]"])
-    for arm, told in PAPER_ARMS.items():
-        name = paper_of(study.seeds[0], arm)
+    named = {arm: paper_of(study.seeds[0], arm) for arm in PAPER_ARMS}
+    tried = {arm: name for arm, name in named.items() if (out / name / TRIALS).exists()}
+    for arm, name in (tried or named).items():
+        told = PAPER_ARMS[arm]
         rows = read_trials(out / name, motions)
         rows = rows[rows["robot"] == "declared"]
         last = pd.read_csv(out / name / CURVE).tail(10).mean()

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.study.generalist_tables import generalist_tables
-from benchmarks.study.jobs import Job, experts_jobs, generalist_jobs, paper_jobs, table_1_jobs
+from benchmarks.study.jobs import Job, experts_jobs, generalist_jobs, paper_jobs, robust_jobs, table_1_jobs
 from benchmarks.study.motions import Motions
 from benchmarks.study.paper_tables import paper_tables
+from benchmarks.study.robust_tables import robust_tables
 from benchmarks.study.settings import Study
 from benchmarks.study.table_1 import table_1_tables
 from benchmarks.study.tables import experts_tables
@@ -27,4 +28,5 @@ PARTS = {
     "generalist": Part("what is distilled of the experts, against them", generalist_jobs, generalist_tables),
     "table-1": Part("the paper's method, its controls and other groups' methods", table_1_jobs, table_1_tables),
     "paper-task": Part("the task as the paper prints it, and what makes it learn", paper_jobs, paper_tables),
+    "robust": Part("what keeps a policy up on robots that nobody declared", robust_jobs, robust_tables),
 }

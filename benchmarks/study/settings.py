@@ -94,14 +94,43 @@ PAPER_CHANGES: dict[str, tuple[str, ...]] = {
 """Deviations of each arm of the part `paper-task` from what the paper prints."""
 
 
+PROPRIOCEPTION = ("gravity_b", "root_ang_vel_b", "joint_pos", "joint_vel", "last_action")
+"""What the arms with a history see over ten steps."""
+WIDE: dict[str, Any] = {
+    "friction": (0.3, 1.5),
+    "gains": 0.35,
+    "strength": 0.3,
+    "mass": 0.3,
+    "frictionloss": 2.0,
+    "push": 1.0,
+    "delay": (0.0, 0.06),
+}
+"""What the arm `wide` draws instead of the paper's ranges."""
+ROBUST_CHANGES: dict[str, tuple[str, ...]] = {
+    "judged": ("own",),
+    "place": ("own", "blind"),
+    "history": ("history",),
+    "loose": ("loose",),
+    "wide": ("wide",),
+    "place-history": ("own", "blind", "history"),
+    "default": ("default",),
+}
+"""Changes of the base policy's task in each arm of the part `robust`."""
+
+
 def settings_of(study: Study, name: str, child: bool) -> tuple[EnvConfig, PpoConfig]:
     """Task and algorithm by name.
 
     Args:
         study: the study's settings.
-        name: "ours", or "paper-" and an arm of `PAPER_CHANGES`.
+        name: "ours", "robust-" and an arm of `ROBUST_CHANGES`, or "paper-" and an arm of `PAPER_CHANGES`.
         child: whether a base policy is trained on: the curriculum is over, the first rate is gentler.
     """
+    if name.startswith("robust-"):
+        env = study.env
+        for change in ROBUST_CHANGES[name.removeprefix("robust-")]:
+            env = _changed(env, change)
+        return env, study.ppo
     if name == "ours":
         if not child:
             return study.env, study.ppo
@@ -112,6 +141,21 @@ def settings_of(study: Study, name: str, child: bool) -> tuple[EnvConfig, PpoCon
     for change in PAPER_CHANGES[name.removeprefix("paper-")]:
         env, ppo = _deviated(env, ppo, change)
     return env, ppo
+
+
+def _changed(env: EnvConfig, change: str) -> EnvConfig:
+    if change == "own":
+        return replace(env, place="own")
+    if change == "loose":
+        return replace(env, threshold_end=env.threshold_start)
+    if change == "wide":
+        return replace(env, randomisation=replace(env.randomisation, **WIDE))
+    if change == "default":
+        return replace(env, action="default")
+    seen = env.observation
+    if change == "blind":
+        return replace(env, observation=replace(seen, terms=("demo_in_place",)))
+    return replace(env, observation=replace(seen, terms=PROPRIOCEPTION, history=10, now=seen.terms))
 
 
 def _deviated(env: EnvConfig, ppo: PpoConfig, change: str) -> tuple[EnvConfig, PpoConfig]:

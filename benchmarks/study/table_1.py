@@ -38,19 +38,25 @@ def _read(out: Path, study: Study, motions: Motions, sealed: bool) -> pd.DataFra
 
     Teachers are tried on the declared and drawn robots only.
     """
-    columns, rows, file = motions.labels[["name", "motion", "cluster"]], [], SEALED_TRIALS if sealed else TRIALS
+    rows, file = [], SEALED_TRIALS if sealed else TRIALS
     named = {arm: [arm_of(seed, arm) for seed in study.seeds] for arm in STUDENTS}
     if not sealed:
         named |= {f"{method}-teacher": [teacher_of(seed, method) for seed in study.seeds] for method in OTHERS}
     for arm, names in named.items():
         if arm == OURS or all((out / name / file).exists() for name in names):
             for seed, name in zip(study.seeds, names, strict=True):
-                table = _sealed(out / name / file, columns) if sealed else read_trials(out / name, motions)
+                table = read_sealed(out / name, motions) if sealed else read_trials(out / name, motions)
                 rows.append(table.assign(arm=arm, seed=seed))
     return pd.concat(rows, ignore_index=True)
 
 
-def _sealed(path: Path, columns: pd.DataFrame) -> pd.DataFrame:
+def read_sealed(folder: Path, motions: Motions) -> pd.DataFrame:
+    """A policy's trials on sealed robots with the motion and cluster of each piece.
+
+    Raises:
+        BadInput: for rows without a robot's hash.
+    """
+    path, columns = folder / SEALED_TRIALS, motions.labels[["name", "motion", "cluster"]]
     table = pd.read_csv(path)
     if table["sealed"].isna().any():
         raise BadInput(path, "trials on sealed robots", "rows without a robot's hash", "Try the policy again.")

@@ -10,7 +10,6 @@ import torch
 from torch import Tensor
 
 from bumblebee.baselines import h2o_rows
-from bumblebee.baselines.exbody2_terms import over_robot
 from bumblebee.baselines.geometry import roll_pitch_yaw, wrapped
 from bumblebee.baselines.memory import FOOT_KEYS
 from bumblebee.baselines.scoring import Judged, Row, Scoring
@@ -20,7 +19,7 @@ from bumblebee.robot.facts import joint_names, stand_pose
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.tracking.config import EnvConfig, ObservationConfig
-from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.library import ReferenceFrame, over_robot
 from bumblebee.tracking.presets import PAPER_RANDOMISATION
 from bumblebee.tracking.rewards import RewardConfig
 from bumblebee.tracking.terminations import fallen
@@ -210,4 +209,4 @@ def exbody2() -> Baseline:
 
 def _key_distance(state: RobotState, ref: ReferenceFrame) -> Tensor:
     """Norm (B,) [m] over all coordinates of the key bodies' errors, the reference's root over the robot's."""
-    return (over_robot(ref, state.root_pos_w) - state.key_pos_w).flatten(1).norm(dim=-1)
+    return (over_robot(ref, state.root_pos_w).key_pos_w - state.key_pos_w).flatten(1).norm(dim=-1)

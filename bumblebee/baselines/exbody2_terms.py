@@ -10,7 +10,7 @@ from torch import Tensor
 from bumblebee.baselines.geometry import roll_pitch_yaw
 from bumblebee.robot.facts import KEY_BODIES, joint_names
 from bumblebee.sim.rotations import matrix, rotate_inverse
-from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.library import over_robot
 from bumblebee.tracking.terms import Seen
 
 _KEYS = 3 * len(KEY_BODIES)
@@ -41,7 +41,7 @@ def ex_joint_vel(seen: Seen) -> Tensor:
 
 def ex_key_errors(seen: Seen) -> Tensor:
     """Teacher: from the robot's key bodies to the reference's, its root over the robot's (B, 3 K) [m], world axes."""
-    return (over_robot(seen.ref, seen.state.root_pos_w) - seen.key_pos_w).flatten(1)
+    return (over_robot(seen.ref, seen.state.root_pos_w).key_pos_w - seen.key_pos_w).flatten(1)
 
 
 def ex_target_joint_pos(seen: Seen) -> Tensor:
@@ -64,13 +64,6 @@ def ex_target_keys(seen: Seen) -> Tensor:
     """The reference's key bodies from its own root, in its own base frame (B, 3 K) [m]."""
     ref = seen.ref
     return ((ref.key_pos_w - ref.root_pos_w[:, None]) @ matrix(ref.root_quat_w)).flatten(1)
-
-
-def over_robot(ref: ReferenceFrame, root_pos_w: Tensor) -> Tensor:
-    """Key bodies (B, K, 3) [m] of a reference whose root was moved over the robot's, at its own height."""
-    shift = root_pos_w - ref.root_pos_w
-    flat = torch.stack((shift[:, 0], shift[:, 1], torch.zeros_like(shift[:, 2])), dim=-1)
-    return ref.key_pos_w + flat[:, None]
 
 
 SIZES = {

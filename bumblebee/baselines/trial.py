@@ -13,7 +13,6 @@ import torch
 from torch import Tensor
 
 from bumblebee.baselines import env as _registered  # noqa: F401, the terms of the baselines
-from bumblebee.baselines.exbody2_terms import over_robot
 from bumblebee.baselines.library import MovingLibrary
 from bumblebee.learning.policy import Policy
 from bumblebee.motion.clip import Clip
@@ -22,7 +21,7 @@ from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.tracking.config import ObservationConfig, Randomisation
 from bumblebee.tracking.groups import Group
-from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.library import ReferenceFrame, over_robot
 from bumblebee.tracking.observations import action_middle, action_scale, joint_targets
 from bumblebee.tracking.randomisation import randomise_worlds
 from bumblebee.tracking.rows import Rows
@@ -173,4 +172,4 @@ def _table(clips: Sequence[Clip], kept: Tensor, sums: Tensor, dt: float) -> pd.D
 def key_errors(state: RobotState, ref: ReferenceFrame) -> tuple[Tensor, Tensor]:
     """Distances (B, K) [m] of the key bodies from the reference: in the world, and with its root over the robot's."""
     world = (state.key_pos_w - ref.key_pos_w).norm(dim=-1)
-    return world, (state.key_pos_w - over_robot(ref, state.root_pos_w)).norm(dim=-1)
+    return world, (state.key_pos_w - over_robot(ref, state.root_pos_w).key_pos_w).norm(dim=-1)

@@ -127,6 +127,10 @@ class EnvConfig(Ranged):
     action: Literal["reference", "default"] = "reference"
     """What an action of zero commands: the reference one step ahead with its gravity lead (ours), or the relaxed stand
     (the paper: actions are joint targets)."""
+    place: Literal["world", "own"] = "world"
+    """Where reward and ends of episodes compare robot and reference: in the world, or in the robot's own place, the
+    reference moved in the plane until it stands over the robot; a policy that sees `demo_in_place` never knows of
+    another."""
     reward: RewardConfig = field(default_factory=RewardConfig)
     """The reward."""
     randomisation: Randomisation = field(default_factory=Randomisation)

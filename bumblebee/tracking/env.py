@@ -19,7 +19,7 @@ from bumblebee.sim.cuda_graph import Captured
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.groups import Group
-from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
+from bumblebee.tracking.library import MotionLibrary, ReferenceFrame, over_robot
 from bumblebee.tracking.observations import action_middle, action_scale, middle_targets
 from bumblebee.tracking.randomisation import draw_push, push_phase, randomise_worlds, regular_push
 from bumblebee.tracking.rewards import Limits, Reward, Step
@@ -195,7 +195,7 @@ class TrackingEnv(VecEnv):
         self.episode_length_buf += 1
         outcome = Step(
             state=state,
-            ref=self._ref,
+            ref=self._ref if self.cfg.place == "world" else over_robot(self._ref, state.root_pos_w),
             torque=self.engine.torque(),
             joint_acc=(state.joint_vel - self._state.joint_vel) / self.dt,
             actions=(self._command, self._action, self._action_before),

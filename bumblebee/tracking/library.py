@@ -1,7 +1,7 @@
 """All motions of a library, packed into tensors, so that a batch of robots can look up a frame each at once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import torch
@@ -44,6 +44,17 @@ class ReferenceFrame:
     def ahead(self) -> int:
         """Number of frames further ahead."""
         return self.ahead_root_pos_w.shape[1]
+
+
+def over_robot(ref: ReferenceFrame, root_pos_w: Tensor) -> ReferenceFrame:
+    """The reference moved in the plane until its root stands over the robot's (B, 3) [m], at its own height.
+
+    What is compared with it is compared in the robot's own place: drift of the place in the world is forgiven.
+    """
+    shift = root_pos_w - ref.root_pos_w
+    flat = torch.cat((shift[:, :2], torch.zeros_like(shift[:, 2:])), dim=-1)
+    places = {"root_pos_w": ref.root_pos_w + flat, "key_pos_w": ref.key_pos_w + flat[:, None]}
+    return replace(ref, **places, ahead_root_pos_w=ref.ahead_root_pos_w + flat[:, None])
 
 
 class MotionLibrary:

@@ -16,7 +16,7 @@ from bumblebee.errors import BadInput
 from bumblebee.robot.facts import KEY_BODIES
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, matrix, multiply, turned
-from bumblebee.tracking.library import ReferenceFrame
+from bumblebee.tracking.library import ReferenceFrame, over_robot
 from bumblebee.tracking.noise import LEVELS
 from bumblebee.tracking.observations import layout, observe
 
@@ -163,6 +163,11 @@ def demo(seen: Seen) -> Tensor:
     return observe(seen.state, seen.ref, seen.last_action)
 
 
+def demo_in_place(seen: Seen) -> Tensor:
+    """`demo` with the reference moved over the robot: what sees it needs no odometry of its place in the plane."""
+    return observe(seen.state, over_robot(seen.ref, seen.state.root_pos_w), seen.last_action)
+
+
 Term = Callable[[Seen], Tensor]
 _THREE, _KEYS = 3, 3 * len(KEY_BODIES)
 _SIZES: dict[Term, int | None] = {  # None: one entry a joint
@@ -187,7 +192,7 @@ _SIZES: dict[Term, int | None] = {  # None: one entry a joint
     target_lin_vel_b: _THREE,
     target_ang_vel: _THREE,
 }
-TERMS: dict[str, Term] = {term.__name__: term for term in (*_SIZES, demo)}
+TERMS: dict[str, Term] = {term.__name__: term for term in (*_SIZES, demo, demo_in_place)}
 """Every term by its name."""
 
 SETS: dict[str, tuple[str, ...]] = {
@@ -248,7 +253,7 @@ def parts(terms: Sequence[str], joints: int = 23, ahead: int = 0) -> list[Part]:
     """Names and sizes of the parts of one control step, in order; `ahead` counts further reference frames."""
     out: list[Part] = []
     for name in expanded(terms):
-        if name == "demo":
+        if name in (demo.__name__, demo_in_place.__name__):
             out += layout(joints, ahead)
         else:
             size = _SIZES[TERMS[name]]

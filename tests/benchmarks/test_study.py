@@ -11,10 +11,20 @@ import pytest
 
 from benchmarks.motion_pack import Packed, write_pack
 from benchmarks.study.__main__ import main
-from benchmarks.study.jobs import PAPER_ARMS, base_of, even_of, experts_jobs, one_of, paper_jobs
+from benchmarks.study.jobs import (
+    PAPER_ARMS,
+    SURVIVORS,
+    base_of,
+    even_of,
+    experts_jobs,
+    one_of,
+    paper_jobs,
+    robust_jobs,
+)
 from benchmarks.study.motions import LABELS, MOTIONS, read_motions
 from benchmarks.study.paper_tables import paper_tables
-from benchmarks.study.settings import PAPER_CHANGES, SMALL, Study, freeze, settings_of
+from benchmarks.study.robust_tables import robust_tables
+from benchmarks.study.settings import PAPER_CHANGES, ROBUST_CHANGES, SMALL, Study, freeze, settings_of
 from benchmarks.study.steps import GOES_ON, Places, Runner, Step, ready
 from benchmarks.study.tables import difference, experts_tables, rate
 from benchmarks.study.training import finished, train
@@ -237,7 +247,8 @@ def test_each_arm_of_the_papers_task_differs_by_what_it_says_and_is_tried(folder
             write_trials(tmp_path / job.name, motions)
     assert len({job.name for job in jobs if finished(tmp_path, job)}) == 2
     with pytest.raises(BadInput, match="trials of every policy"):
-        paper_tables(tmp_path, SMALL, motions)
+        paper_tables(tmp_path / "none", SMALL, motions)
+    assert len(paper_tables(tmp_path, SMALL, motions).splitlines()) == 2 + 2 * 2
     for job in jobs:
         if not (tmp_path / job.name).exists():
             shutil.copytree(tmp_path / jobs[0].name, tmp_path / job.name)
@@ -255,3 +266,31 @@ def test_a_run_goes_on_with_settings_that_later_code_added(tmp_path: Path) -> No
     assert later != stamp
     with pytest.raises(BadInput, match="motions"):
         freeze(tmp_path, SMALL, motions="y")
+
+
+def test_each_change_of_the_task_differs_by_what_it_says_and_is_held_against_the_base_policy(
+    folder: Path, tmp_path: Path
+) -> None:
+    assert set(SURVIVORS) == set(ROBUST_CHANGES)
+    base, ppo = settings_of(Study(), "ours", False)
+    settings = {arm: settings_of(Study(), f"robust-{arm}", False) for arm in SURVIVORS}
+    assert {own for _, own in settings.values()} == {ppo}
+    assert settings["judged"][0] == replace(base, place="own")
+    assert settings["loose"][0] == replace(base, threshold_end=0.8)
+    assert settings["history"][0].observation.history == 10
+    assert settings["place-history"][0].observation.now == ("demo_in_place",)
+    assert len({repr(own) for own, _ in settings.values()}) == len(SURVIVORS)
+    motions = read_motions(folder)
+    study = replace(SMALL, base_steps=512)
+    jobs = {job.name: job for job in robust_jobs(study, motions)}
+    tried = [jobs[name] for name in ("s0-base", "s0-place-history")]
+    for job in tried:
+        assert train(job, motions, study, tmp_path)
+        write_trials(tmp_path / job.name, motions)
+    text = robust_tables(tmp_path, study, motions)
+    assert "| own place, seeing it alone, ten steps | held out | 2 | " in text
+    assert "all sealed robots" not in text
+    for job in tried:
+        rows = pd.read_csv(tmp_path / job.name / "trials.csv").assign(sealed="x")
+        rows.to_csv(tmp_path / job.name / "sealed.csv", index=False)
+    assert "all sealed robots" in robust_tables(tmp_path, study, motions)
