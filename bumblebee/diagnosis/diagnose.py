@@ -21,9 +21,18 @@ from bumblebee.diagnosis.discrepancy import (
 )
 from bumblebee.diagnosis.estimation import gauss_newton
 from bumblebee.diagnosis.prepare import Material, gather
-from bumblebee.diagnosis.report import Findings, document, effect_entries, loss_entries, unseen_notes
+from bumblebee.diagnosis.report import Findings, document, effect_entries, law_notes, loss_entries, unseen_notes
 from bumblebee.diagnosis.residuals import Problem, window_weights
-from bumblebee.diagnosis.selection import Refined, Search, grids, half_widths, least_simulation_error, refine, search
+from bumblebee.diagnosis.selection import (
+    Refined,
+    Search,
+    grids,
+    half_widths,
+    least_simulation_error,
+    refine,
+    search,
+    with_other_laws,
+)
 from bumblebee.diagnosis.selection import entries as rounding_entries
 from bumblebee.sim.effects import Effect
 
@@ -93,6 +102,7 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
         ]
     notes = [
         *notes,
+        *law_notes(found.last),
         *(n for b in found.budgets for n in b.notes()),
         *unseen_notes(material.session, effects, config.horizon, config.thresholds.report.verdicts),
     ]
@@ -111,7 +121,7 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
     if last.fit.chosen:
         holdout = holdout.relinearised(last.fit.effects)
     if not config.beyond:
-        return _Found(found, _moved(last, holdout), holdout, None, (time,))
+        return _Found(found, _finished(last, holdout, found), holdout, None, (time,))
     say("what is left")
     offers, budget = offers_of(found, material.candidates), Budget(larger * config.beyond_seconds)
     activity = JointActivity(material.typical, material.still)
@@ -125,14 +135,19 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
         lambda: discover(last.problem, holdout, last.fit, activity, say, offers, budget),
         tested,
     )
-    last = _moved(_with(beyond, last), beyond.holdout)
+    last = _finished(_with(beyond, last), beyond.holdout, found)
     return _Found(with_catalogue_effects(found, last.fit), last, beyond.holdout, beyond, (time, budget))
 
 
-def _moved(last: Refined, holdout: Holdout) -> Refined:
-    """The last fit at the values of least simulation error; where they cannot be computed it stays as it is."""
-    failures = last.problem.plant.failures
-    return failures.attempt("least simulation error", lambda: least_simulation_error(last, holdout), lambda: last)
+def _finished(last: Refined, holdout: Holdout, found: Search) -> Refined:
+    """The last fit at the values of least simulation error, with other laws that fit as well.
+
+    What cannot be computed is left out.
+    """
+    attempt = last.problem.plant.failures.attempt
+    moved = attempt("least simulation error", lambda: least_simulation_error(last, holdout), lambda: last)
+    every = found.columns.candidates
+    return attempt("laws of hysteresis", lambda: with_other_laws(moved, holdout, every), lambda: moved)
 
 
 def _steps_of_encoders(session: Session, found: _Found) -> tuple[list[dict[str, Any]], list[Effect]]:

@@ -3,7 +3,8 @@
     compare(problem, holdout, before, after).passes(problem.thresholds.comparison.validation)
 
 The rules differ in what they are asked of: an effect that is added (`Validation`, or `WhereFelt` and `WhereRare` for
-what few windows feel), many at once (`Together`), a swap (`WindowByWindow`, `NoWorseOnAverage`, `NoWorseWithinErrors`).
+what few windows feel), many at once (`Together`), a swap (`WindowByWindow`, `NoWorseOnAverage`, `NoWorseWithinErrors`),
+a law of which another may be as good (`NotRefuted`).
 Each is a frozen dataclass with its numbers in `thresholds/comparison.py`.
 """
 
@@ -21,6 +22,7 @@ from bumblebee.diagnosis.comparison.submodel import simulated_without
 from bumblebee.diagnosis.estimation import Fit, cost_of
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.thresholds.comparison import (
+    NotRefuted,
     NoWorseOnAverage,
     NoWorseWithinErrors,
     Together,
@@ -160,6 +162,13 @@ def _no_worse_within_errors(c: Comparison, rule: NoWorseWithinErrors) -> bool:
     return bool(loss.mean() < rule.z * loss.std(ddof=1) / np.sqrt(len(loss)))
 
 
+def _not_refuted(c: Comparison, rule: NotRefuted) -> bool:
+    """Beyond `z` standard errors, on fitted and validation windows together: the fits have as many numbers."""
+    sides = [c.fitted, *([c.validation] if c.validation else [])]
+    loss = np.concatenate([logs(new) - logs(old) for old, new in sides])
+    return bool(loss.mean() < margin(loss, rule.z))
+
+
 def _no_worse_on_average(c: Comparison, rule: NoWorseOnAverage) -> bool:
     if c.validation is None:
         return True
@@ -174,6 +183,7 @@ _JUDGES: dict[type, Callable[[Comparison, Any], bool]] = {
     Together: _together,
     WindowByWindow: _window_by_window,
     NoWorseWithinErrors: _no_worse_within_errors,
+    NotRefuted: _not_refuted,
     NoWorseOnAverage: _no_worse_on_average,
 }
 

@@ -1,7 +1,7 @@
 """What a diagnosis found, as a document, a page and lines for the terminal."""
 
 from bumblebee.diagnosis.report.document import Findings, document
-from bumblebee.diagnosis.report.effect_entries import effect_entries, loss_entries
+from bumblebee.diagnosis.report.effect_entries import effect_entries, law_notes, loss_entries
 from bumblebee.diagnosis.report.example_windows import examples
 from bumblebee.diagnosis.report.html import (
     error_rows,
@@ -44,6 +44,7 @@ __all__ = [
     "html_page",
     "items",
     "line_picture",
+    "law_notes",
     "loss_entries",
     "nothing_seen",
     "number",

@@ -53,6 +53,8 @@ def _entry(
     for c in reversed(group):
         half = last.half[last.fit.slices[last.fit.chosen.index(c)]]
         parameters |= _parameters(last.problem.plant, c, last.fit.of(c), half)
+        if other := last.other_laws.get(c):
+            parameters = _of_both_laws(parameters, _parameters(last.problem.plant, c, other.values, other.half))
     entry = label(first) | {
         "parameters": parameters,
         "equivalent": [label(o) for o in dict.fromkeys(others)],
@@ -106,6 +108,31 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
             known = float(nominal) + 0.0 if np.isfinite(nominal) else None  # no -0
             out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": unit}
     return out
+
+
+def _of_both_laws(own: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    """An effect's parameters with intervals that hold those of another law that fits as well."""
+    out = {}
+    for name, parameter in own.items():
+        ends = [parameter["ci95"], other.get(name, parameter)["ci95"]]
+        lows, highs = ([pair[k] for pair in ends] for k in (0, 1))
+        low, high = None if None in lows else min(lows), None if None in highs else max(highs)
+        out[name] = parameter | {"ci95": [low, high]}
+    return out
+
+
+def law_notes(last: Refined) -> list[str]:
+    """A note for each hysteresis of which these data do not tell the law."""
+    notes = []
+    for c, other in last.other_laws.items():
+        unit = unit_on(last.problem.plant, c.effect, c.where, "N m/rad")
+        slopes = sorted(float(values[0] / values[1]) for values in (last.fit.of(c), other.values))
+        notes.append(
+            f"hysteresis on {c.where}: a spring that yields and Dahl's law fit these data alike, and the intervals are "
+            f"those of both; what is known is the slope at a reversal, amplitude over width, {slopes[0]:.3g} to "
+            f"{slopes[1]:.3g} {unit}. To tell them apart: move the joint to and fro by more than the width"
+        )
+    return notes
 
 
 def _explained(problem: Problem, fit: Fit, groups: Sequence[Sequence[Candidate]]) -> np.ndarray:

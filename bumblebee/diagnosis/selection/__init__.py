@@ -1,7 +1,7 @@
 """Which effects: tests, trials, proposals and swaps, one after the other until nothing pays."""
 
 from bumblebee.diagnosis.selection.confounding import alike, detectable, rivals
-from bumblebee.diagnosis.selection.final_fit import Refined, half_widths, refine
+from bumblebee.diagnosis.selection.final_fit import Refined, half_widths, refine, with_other_laws
 from bumblebee.diagnosis.selection.forward import Search, search
 from bumblebee.diagnosis.selection.leads import Lead, leads
 from bumblebee.diagnosis.selection.proposals.encoder_resolution import entries, grids
@@ -27,4 +27,5 @@ __all__ = [
     "score_tests",
     "search",
     "try_one",
+    "with_other_laws",
 ]

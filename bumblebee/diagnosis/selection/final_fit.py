@@ -1,7 +1,7 @@
 """The last fit: everything whitened and linearised around what was found."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,7 +9,19 @@ from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate, effec
 from bumblebee.diagnosis.comparison import Holdout, drop_insignificant, drop_unpaid
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, interval, last_step, moves
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
+from bumblebee.diagnosis.selection.proposals.hysteresis_law import KIND as HYSTERESIS
+from bumblebee.diagnosis.selection.proposals.hysteresis_law import has_other_law, other_law
 from bumblebee.errors import BadInput
+
+
+@dataclass(frozen=True, eq=False)
+class OtherLaw:
+    """Another law of a chosen effect, which fits as well."""
+
+    values: np.ndarray
+    """(p,) its parameters."""
+    half: np.ndarray
+    """(p,) of 95 % intervals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +33,8 @@ class Refined:
     weights: np.ndarray
     half: np.ndarray
     """(P,) of 95 % intervals; 0 for parameters that were not fitted."""
+    other_laws: Mapping[Candidate, OtherLaw] = field(default_factory=dict)
+    """What another law of an effect comes to, where these data refute neither."""
 
 
 def _around(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
@@ -138,6 +152,19 @@ def _is_there(fit: Fit, half: np.ndarray, candidate: Candidate) -> bool:
 def _with_nuisance(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
     """A fit of the search with the numerical differences that it has in the steps of the last fit."""
     return replace(fit, nuisance=cost_of(problem, problem.residual([fit.effects])[0], weights)[1])
+
+
+def with_other_laws(last: Refined, holdout: Holdout, candidates: Sequence[Candidate]) -> Refined:
+    """The last fit with the other law of each hysteresis, where one of `candidates` has it and it is not refuted."""
+    others: dict[Candidate, OtherLaw] = {}
+    for c in last.fit.chosen:
+        if c.effect != HYSTERESIS or not has_other_law(candidates, c):
+            continue
+        other = other_law(last.problem, holdout, last.fit, c, last.weights)
+        if other is not None:
+            own = other.slices[-1]
+            others[c] = OtherLaw(other.values[own], half_widths(last.problem, other, last.weights)[own])
+    return replace(last, other_laws=others)
 
 
 def half_widths(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:

@@ -6,6 +6,8 @@ two, is taken out and everything is tested in their place; what promises as much
 It takes the place if the fitted windows are clearly better with it for its parameters and those that judge no worse.
 The search then goes on, since what a wrong name had hidden can now be seen.
 
+Hysteresis by one law is tried against the other (`proposals/hysteresis_law.py`).
+
 What a shaft's swing passes for (a lag, an old reading, a rotor) is tried against shafts of many stiffnesses, which no
 test at one of them would show (`proposals/joint_elasticity.py`).
 
@@ -28,6 +30,7 @@ from bumblebee.diagnosis.comparison import (
 )
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.selection.moves import Move, Terms, by_loss, by_slopes, refitted
+from bumblebee.diagnosis.selection.proposals.hysteresis_law import law_swaps
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import KIND as SHAFT
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import LIKE as SHAFT_LIKE
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import best_elasticity, is_of_series
@@ -95,8 +98,8 @@ def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
 
 
 def _shaped(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
-    """Fits with what a drive makes of its targets in the place of what that passes for."""
-    moves = (_refitted(run, rest, trial) for rest, trial in setpoint_swaps(run, free))
+    """Fits with what a drive makes of its targets in the place of what that passes for, or by a hysteresis's other law."""
+    moves = (_refitted(run, rest, trial) for rest, trial in chain(setpoint_swaps(run, free), law_swaps(run, free)))
     return (move for move in moves if move)
 
 

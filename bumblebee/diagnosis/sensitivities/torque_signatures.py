@@ -111,12 +111,12 @@ class Signatures:
     def _hysteresis(self, c: Candidate, j: int) -> np.ndarray:
         width, q = c.step[1], self.q[..., j]
         if c.step[2]:
-            z, out = bent_before(self.windows, j, width, self.plant.thresholds.history), np.empty_like(q)
+            z, out = bent_before(self.windows, j, width, self.plant.thresholds.path), np.empty_like(q)
             for k, path in enumerate(np.diff(q, axis=1, append=q[:, -1:]).T):
                 out[:, k] = z
                 z = bent(z, path, width)
             return -c.step[0] * out
-        centre = yielded(self.windows, j, width)
+        centre = yielded(self.windows, j, width, self.plant.thresholds.path)
         out = np.empty_like(q)
         for k in range(q.shape[1]):
             centre = np.clip(centre, q[:, k] - width, q[:, k] + width)

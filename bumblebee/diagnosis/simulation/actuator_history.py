@@ -11,9 +11,10 @@ from functools import lru_cache
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.simulation.joint_path import joint_path
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.windows import Windows, command_inputs
-from bumblebee.diagnosis.thresholds.simulation import ActuatorHistory
+from bumblebee.diagnosis.thresholds.simulation import ActuatorHistory, JointPath
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import Memory, RuntimeHooks, State, bent, history_length, states_of
 from bumblebee.sim.servo import Servos, servos_each, servos_of
@@ -101,22 +102,13 @@ def _bent(plant: Plant, windows: Windows, columns: Sequence[tuple[int, float]]) 
     """Dahl's z (W, H) of joints (columns in the log) and widths [rad]."""
     if not columns:
         return None
-    rule = plant.thresholds.history
+    rule = plant.thresholds.path
     return np.stack([bent_before(windows, column, width, rule) for column, width in columns], axis=1)
 
 
-def bent_before(windows: Windows, column: int, width: float, rule: ActuatorHistory) -> np.ndarray:
-    """Dahl's z (W,) of one joint (a column in the log) at the windows' starts, its path followed from the first tick.
-
-    Positions are means over a few ticks: what a sensor's noise would wind back is no motion.
-    """
-
-    def place(rollout: Rollout) -> np.ndarray:
-        wide = np.ones(2 * rule.smooth + 1)
-        known = np.convolve(np.ones(len(rollout.time)), wide, mode="same")
-        return np.convolve(rollout.joint_pos[:, column], wide, mode="same") / known
-
-    rows, paths = _together(windows, place)
+def bent_before(windows: Windows, column: int, width: float, rule: JointPath) -> np.ndarray:
+    """Dahl's z (W,) of a joint (a column of the log) at the windows' starts, its path followed from the first tick."""
+    rows, paths = _together(windows, lambda rollout: joint_path(rollout, column, rule))
     out = np.zeros(paths.shape)
     for k in range(1, paths.shape[1]):
         out[:, k] = bent(out[:, k - 1], paths[:, k] - paths[:, k - 1], width)
@@ -231,9 +223,9 @@ def read_at(windows: Windows, shift: float, delay: np.ndarray, order: Sequence[i
     return place, speed
 
 
-def yielded(windows: Windows, column: int, width: float) -> np.ndarray:
+def yielded(windows: Windows, column: int, width: float, rule: JointPath) -> np.ndarray:
     """Reference (W,) [rad] of an elasto-plastic spring of `width` on a joint, its path followed from the first tick."""
-    rows, paths = _together(windows, lambda rollout: rollout.joint_pos[:, column])
+    rows, paths = _together(windows, lambda rollout: joint_path(rollout, column, rule))
     out = paths.copy()
     for k in range(1, paths.shape[1]):
         out[:, k] = np.clip(out[:, k - 1], paths[:, k] - width, paths[:, k] + width)

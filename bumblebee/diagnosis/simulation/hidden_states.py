@@ -106,5 +106,5 @@ def set_plastic(batch: Batch, plant: Plant, windows: Windows, lead: Variation, c
         if kind == "hysteresis":
             column = plant.joints.index(joint)
             address = int(lead.model.jnt_plasticadr[lead.model.joint(joint).id])
-            centre = yielded(windows, column, values[1]) - lead.offset[column]
+            centre = yielded(windows, column, values[1], plant.thresholds.path) - lead.offset[column]
             plastic[:, address] = np.tile(centre, copies)

@@ -107,6 +107,14 @@ class NoWorseWithinErrors:
 
 
 @dataclass(frozen=True)
+class NotRefuted:
+    """Fitted and validation windows together do not refute a fit with as many numbers (Vuong 1989)."""
+
+    z: float = 2.0
+    """Standard errors of the mean loss beyond which a fit is refuted."""
+
+
+@dataclass(frozen=True)
 class NoWorseOnAverage:
     """The validation windows must be no further off on the mean, and not after 1 s either."""
 
@@ -185,6 +193,7 @@ class ComparisonThresholds:
     together: Together = field(default_factory=Together)
     window_by_window: WindowByWindow = field(default_factory=WindowByWindow)
     no_worse_within_errors: NoWorseWithinErrors = field(default_factory=NoWorseWithinErrors)
+    not_refuted: NotRefuted = field(default_factory=NotRefuted)
     no_worse_on_average: NoWorseOnAverage = field(default_factory=NoWorseOnAverage)
     confirmed: Confirmed = field(default_factory=Confirmed)
     withdrawn: Withdrawn = field(default_factory=Withdrawn)

@@ -265,6 +265,18 @@ class Stribeck:
 
 
 @dataclass(frozen=True)
+class HysteresisLaw:
+    """Of the two laws of hysteresis, each tried in the place of the other."""
+
+    widths: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+    """Widths of the other law, in those of the one: a spring that yields at a third of Dahl's width is most like it."""
+    shape: float = 0.3
+    """Share of a width that matters."""
+    iterations: int = 4
+    """Of the joint refit."""
+
+
+@dataclass(frozen=True)
 class FrictionFamily:
     """Of the sums of a joint's friction."""
 
@@ -349,6 +361,7 @@ class ProposalThresholds:
     all_joints: AllJoints = field(default_factory=AllJoints)
     packet_loss: PacketLoss = field(default_factory=PacketLoss)
     stribeck: Stribeck = field(default_factory=Stribeck)
+    hysteresis_law: HysteresisLaw = field(default_factory=HysteresisLaw)
     friction_family: FrictionFamily = field(default_factory=FrictionFamily)
     gain_parameters: GainParameters = field(default_factory=GainParameters)
     declared_scale: DeclaredScale = field(default_factory=DeclaredScale)
