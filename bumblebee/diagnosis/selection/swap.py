@@ -98,7 +98,7 @@ def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
 
 
 def _shaped(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
-    """Fits with what a drive makes of its targets in the place of what that passes for, or by a hysteresis's other law."""
+    """Fits with a drive's own set-points in the place of what they pass for, or with the other law of a hysteresis."""
     moves = (_refitted(run, rest, trial) for rest, trial in chain(setpoint_swaps(run, free), law_swaps(run, free)))
     return (move for move in moves if move)
 

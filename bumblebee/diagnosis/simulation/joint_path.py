@@ -18,7 +18,7 @@ from bumblebee.measured.rollout import Rollout
 _FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # passes no cubic
 
 
-@lru_cache(maxsize=512)
+@lru_cache(maxsize=4096)  # a robot's joints in some hundred rollouts
 def joint_path(rollout: Rollout, column: int, rule: JointPath) -> np.ndarray:
     """Positions (T,) [rad, m] of one joint (a column of the log) at the ticks, without the noise of the readings."""
     place, speed = rollout.joint_pos[:, column], rollout.joint_vel[:, column]

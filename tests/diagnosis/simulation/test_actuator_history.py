@@ -6,6 +6,7 @@ import pytest
 
 from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.simulation.actuator_history import bent_before, yielded
+from bumblebee.diagnosis.simulation.joint_path import joint_path
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from tests.diagnosis import arm
 
@@ -23,12 +24,12 @@ def test_an_elasto_plastic_spring_is_followed_from_the_first_tick(session: Sessi
     windows = cut(session.plant, session.layout, session.rollouts, choose_starts(session.rollouts, every, 0.2, 12))
     expected = []
     for i, k in zip(windows.rollout, windows.start, strict=True):
-        path = session.rollouts[i].joint_pos[: k + 1, 1]
+        path = joint_path(session.rollouts[i], 1, session.plant.thresholds.path)[: k + 1]
         at = path[0]
         for q in path:
             at = min(max(at, q - width), q + width)
         expected.append(at)
-    assert np.array_equal(yielded(windows, 1, width), expected)
+    assert np.array_equal(yielded(windows, 1, width, session.plant.thresholds.path), expected)
 
 
 @pytest.mark.parametrize("width", [0.003, 0.2])
@@ -37,11 +38,10 @@ def test_dahls_friction_is_followed_from_the_first_tick(session: Session, width:
     windows = cut(session.plant, session.layout, session.rollouts, choose_starts(session.rollouts, every, 0.2, 12))
     expected = []
     for i, k in zip(windows.rollout, windows.start, strict=True):
-        raw = session.rollouts[i].joint_pos[:, 1]
-        path = [np.mean(raw[max(t - 3, 0) : t + 4]) for t in range(k + 1)]
+        path = joint_path(session.rollouts[i], 1, session.plant.thresholds.path)[: k + 1]
         z = 0.0
         for move in np.diff(path):
             z = np.sign(move) + (z - np.sign(move)) * np.exp(-abs(move) / width) if move else z
         expected.append(z)
-    found = bent_before(windows, 1, width, session.plant.thresholds.history)
+    found = bent_before(windows, 1, width, session.plant.thresholds.path)
     assert found == pytest.approx(np.array(expected), abs=1e-9)
