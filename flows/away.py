@@ -1,8 +1,8 @@
 """One stage on another machine of the lab: `python -m flows.away STAGE`, in place of flows.reproduce.
 
 The head alone writes dvc.lock. A machine of the cluster pulls the stage's inputs, runs it in a work tree of its own and
-pushes files and run cache; then `dvc repro` here finds the run in the cache and runs nothing. One process a stage, which
-is a Ray driver: when it ends, also by a kill, Ray ends the stage. Why not prefect-ray: docs/decisions/stages-on-ray.md.
+pushes files and run cache; then `dvc repro` here finds the run in the cache and runs nothing. One process a stage, a
+driver of Ray's: when it ends, also by a kill, Ray ends the stage. Why not prefect-ray: docs/decisions/stages-on-ray.md.
 """
 
 import importlib
@@ -112,7 +112,7 @@ def settle(lab: Lab) -> None:
 
 
 def send(ray: Any, what: Errand, lab: Lab, wanted: int) -> int | None:
-    """Run the stage on whichever machine is free, and repeat what it prints; its status, None if the machine was lost."""
+    """Run the stage on whichever machine is free, and repeat what it prints; its status, None for a lost machine."""
     from dvc.repo import Repo
 
     with Repo(_wait_for_lock=True) as repo, repo.lock:

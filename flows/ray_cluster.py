@@ -23,7 +23,7 @@ from tasks.lab import FILE, RayLab, read_lab
 ANSWER = 10  # [s] within which the cluster's head must
 LOOK = 120  # [s] within which every machine must; the first process on one takes some
 PACKAGES = ("dvc", "mlflow", "mujoco", "numpy", "rsl-rl-lib", "scikit-learn", "scipy", "torch", "bumblebee")
-"""What decides results. Of bumblebee the code travels, so a machine may do without; another version may not be there."""
+"""What decides results. The code of bumblebee travels: a machine may do without it, but have no other version."""
 MODULES = {"s3": "dvc_s3", "ssh": "dvc_ssh"}  # of DVC, by the scheme of the remote
 
 
@@ -55,9 +55,7 @@ def _refused(own: RayLab, where: str, text: str) -> BadInput:
     if "ersion mismatch" in text:
         do = "Install the same versions everywhere."
         return BadInput(where, "the versions of Ray and Python that this process has", text[:300], do)
-    if "oken" in text or "uthenticat" in text:
-        return BadInput(where, f"the token of the cluster at {own.address}", text[:200], "Copy its ~/.ray/auth_token.")
-    do = f"This machine must belong to it: ray start --address={own.address}"
+    do = f"This machine must belong to it (ray start --address={own.address}) and have its token in ~/.ray/auth_token."
     return BadInput(f"{where}.address", f"to join {own.address}", text[:200], do)
 
 

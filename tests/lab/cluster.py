@@ -15,6 +15,7 @@ import psutil
 from tests.lab.machines import HOST, free_port
 
 START = 90.0  # [s]
+PATIENT = {"RAY_raylet_start_wait_time_s": "90"}  # a machine with two busy cores is slow to start
 TAKEN = range(10002, 20000)  # ports that Ray gives to its own worker processes
 
 
@@ -34,11 +35,12 @@ class Node:
 
     def kill(self) -> None:
         """End everything of it by SIGKILL, as when its power goes."""
-        root = psutil.Process(self.process.pid)
-        for each in [root, *root.children(recursive=True)]:
-            with suppress(psutil.Error):
-                each.kill()
-        self.process.wait()
+        if self.process.poll() is None:
+            root = psutil.Process(self.process.pid)
+            for each in [root, *root.children(recursive=True)]:
+                with suppress(psutil.Error):
+                    each.kill()
+            self.process.wait()
 
 
 @dataclass(frozen=True)
@@ -61,17 +63,17 @@ def cluster(folder: Path, workers: int) -> Iterator[Cluster]:
     own, nodes = port(), []
     try:
         head = ["--head", f"--port={own}", "--num-cpus=0", "--include-dashboard=false", f"--temp-dir={folder}/ray"]
-        nodes.append(_start(folder / "head", head)
+        nodes.append(_start(folder / "head", head))
         _until(lambda: _answers(f"{HOST}:{own}", 1), nodes)
         for number in range(workers):
             words = [f"--address={HOST}:{own}", "--num-cpus=1"]
-            nodes.append(_start(folder / f"worker{number}", words)
-        _until(lambda: _answers(f"{HOST}:{own}", 1 + workers), nodes)
+            nodes.append(_start(folder / f"worker{number}", words))
+            # One after the other: two that start at once on one machine get into each other's way.
+            _until(lambda: _answers(f"{HOST}:{own}", len(nodes)), nodes)
         yield Cluster(f"{HOST}:{own}", folder, tuple(nodes[1:]))
     finally:
         for node in reversed(nodes):
-            with suppress(psutil.Error):
-                node.kill()
+            node.kill()
 
 
 def new_token(path: Path) -> None:
@@ -88,7 +90,7 @@ def _start(folder: Path, words: list[str]) -> Node:
         process = subprocess.Popen(
             [*command, *memory],
             cwd=folder,
-            env={**os.environ, "BUMBLEBEE_NODE": str(folder)},
+            env={**os.environ, "BUMBLEBEE_NODE": str(folder), **PATIENT},
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
