@@ -84,7 +84,8 @@ def is_chatter(line: str) -> bool:
     """Lines of DVC that help nobody who watches the whole loop."""
     chatter = ("Running stage", "> python", "Updating lock file", "Generating lock file", "Use `dvc push`")
     advice = ("To track the changes with git", "git add dvc.lock", "To enable auto staging", "core.autostage")
-    return line.startswith(chatter) or any(words in line for words in advice)
+    pushed = (" file pushed", " files pushed")  # to a lab's shared remote
+    return line.startswith(chatter) or line.rstrip().endswith(pushed) or any(words in line for words in advice)
 
 
 @flow(name="loop", log_prints=False, persist_result=False, validate_parameters=False)

@@ -45,7 +45,7 @@ def facts(packages: tuple[str, ...], folder: str, module: str) -> dict[str, str]
 def run(parcel: bytes, workspace: str, words: list[str], variables: dict[str, str]) -> Iterator[str | int]:
     """Unpack the parcel into a work tree of its own and run `python -m WORDS` there.
 
-    Yields what it prints, line by line, and at last its exit status. The tree is removed.
+    Yields the machine's name, the lines that the program prints, and at last its exit status. The tree is removed.
 
     Args:
         parcel: as flows/parcel.py packs it.
@@ -60,6 +60,7 @@ def run(parcel: bytes, workspace: str, words: list[str], variables: dict[str, st
     with (own / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         tree = own / workspace
+        yield f"on {socket.gethostname()}"
         try:
             with tarfile.open(fileobj=io.BytesIO(parcel)) as packed:
                 packed.extractall(tree, filter="data")

@@ -6,10 +6,12 @@ Only this module and flows/away.py import Ray, and only where lab.yaml has a sec
 """
 
 import argparse
+import contextlib
 import importlib
+import os
 import socket
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -45,10 +47,25 @@ def connect(own: RayLab, where: str) -> Any:
         ) from None
     ray = importlib.import_module("ray")
     try:
-        ray.init(address=own.address, log_to_driver=False, logging_level="ERROR", include_dashboard=None)
+        with _quiet():
+            ray.init(address=own.address, log_to_driver=False, logging_level="ERROR")
     except Exception as error:  # Ray raises RuntimeError, ConnectionError and errors of its own
         raise _refused(own, where, " ".join(str(error).split())) from None
     return ray
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Drop what Ray's own code prints for each second in which the cluster refuses us; the error says it once."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    try:
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
 
 
 def _refused(own: RayLab, where: str, text: str) -> BadInput:

@@ -27,7 +27,7 @@ from bumblebee.errors import BadInput
 from bumblebee.io.read import read_yaml
 
 FILE = "lab.yaml"
-OF_RAY = {"RAY_AUTH_MODE": "token", "RAY_USAGE_STATS_ENABLED": "0", "RAY_BACKEND_LOG_LEVEL": "error"}
+OF_RAY = {"RAY_AUTH_MODE": "token", "RAY_USAGE_STATS_ENABLED": "0"}
 DATABASE = "postgresql://USER@HOST[:PORT]/DATABASE"
 BUCKET = re.compile(r"s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9._/-]+)?")
 

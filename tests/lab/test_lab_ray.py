@@ -4,8 +4,12 @@ The stages are the smoke profile's first ones, up to the experts of both cluster
 the head), filter, cluster, base, experts@c0, experts@c1.
 """
 
+import contextlib
 import os
+import re
+import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -127,7 +131,9 @@ def test_other_versions_on_the_cluster_are_one_line(stand: Stand, tmp_path: Path
     assert ended.returncode == 2 and line in ended.stderr and len(ended.stderr.splitlines()) == 1, ended.stderr
 
 
-def test_one_worker_is_killed_and_the_hashes_are_those_of_one_machine(stand: Stand, tmp_path: Path) -> None:
+def test_one_worker_is_killed_and_the_hashes_are_those_of_one_machine(
+    lab: LabOnThisMachine, stand: Stand, tmp_path: Path
+) -> None:
     (tmp_path / "one").mkdir()
     one = workspace(tmp_path / "one", None)
     alone = call(one, "-m", "dvc", "repro", "-q")
@@ -149,10 +155,41 @@ def test_one_worker_is_killed_and_the_hashes_are_those_of_one_machine(stand: Sta
     assert text.count("its machine was lost") == 1, text
     assert locked(made) == locked(one)
     assert set(locked(made)) == {"motions", "filter", "cluster", "base", "experts@c0", "experts@c1"}
+    assert logged_on_one(one) == logged_in_lab(lab) != []
+    assert files(colleague(tmp_path / "other", made)) == files(made)
     for worker in stand.cluster.workers:
         assert any((worker.folder / "cache" / "files").rglob("*")), "a worker that had nothing to do"
         if worker.process.returncode is None:
             assert not list((worker.folder / "trees").iterdir())
+
+
+def logged_on_one(folder: Path) -> list[str]:
+    """Names of the runs that MLflow has of a workspace without a lab."""
+    with contextlib.closing(sqlite3.connect(folder / ".servers" / "mlflow.db")) as history:
+        return sorted(name for (name,) in history.execute("SELECT name FROM runs"))
+
+
+def logged_in_lab(lab: LabOnThisMachine) -> list[str]:
+    """The same of the lab's database, whichever machine logged them."""
+    query = "SELECT runs.name FROM runs JOIN experiments USING (experiment_id) WHERE experiments.name = 'demo'"
+    return sorted(lab.postgres.sql(query, "mlflow").split("\n")[:-1])
+
+
+def colleague(folder: Path, made: Path) -> Path:
+    """Another folder with the pipeline and its lock, and `dvc pull` there."""
+    for name in ("dvc.yaml", "dvc.lock", "params.yaml", "lab.yaml", ".dvc/config", ".dvc/config.local"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(made / name, folder / name)
+    pulled = call(folder, "-m", "dvc", "pull", "-q")
+    assert pulled.returncode == 0, pulled.stderr
+    return folder
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """What stages made."""
+    outs = [out["path"] for stage in locked(folder).values() for out in stage["outs"]]
+    found = [file for out in outs for file in (folder / out).rglob("*") if file.is_file()]
+    return {str(file.relative_to(folder)): file.read_bytes() for file in found}
 
 
 def kill_a_worker_at_experts(made: clusters.Cluster, run: "subprocess.Popen[bytes]") -> str:
@@ -164,6 +201,7 @@ def kill_a_worker_at_experts(made: clusters.Cluster, run: "subprocess.Popen[byte
             worker, place = next(iter(at.items()))
             assert place is not None and psutil.pid_exists(worker.process.pid)
             worker.kill()
-            return f"experts@{place.name.rpartition('-')[2]}"
+            (name,) = re.findall(r"-(c\d+)-", place.name)
+            return f"experts@{name}"
         time.sleep(0.05)
     raise AssertionError(f"both workers at an expert: never; the run's status is {run.poll()}")
