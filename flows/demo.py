@@ -18,6 +18,7 @@ from flows.owned import require_own
 from flows.servers import Addresses, require_port, servers
 from flows.stages import changed_stages, read_stages, to_run
 from tasks import params, paths, sections
+from tasks.lab import on_cluster
 
 EXIT_WAITING = 3
 NULL = "null"  # the seed of a robot without undeclared effects
@@ -98,6 +99,7 @@ def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
         summarise(folder)
         return 0
     check = start_check(folder)
+    check_cluster(folder)
     with servers(folder, prefect_port, mlflow_port) as addresses:
         finish_check(check)
         announce(folder, addresses)
@@ -115,6 +117,14 @@ def start_check(folder: Path) -> "subprocess.Popen[str]":
     command = [sys.executable, "-m", "tasks.sections"]
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
     return subprocess.Popen(command, cwd=folder, env=environment(folder), text=True, **pipes)
+
+
+def check_cluster(folder: Path) -> None:
+    """Look at the lab's Ray cluster, where there is one, in a process that does not stay its client."""
+    if on_cluster(folder):
+        command = [sys.executable, "-m", "flows.ray_cluster"]
+        if status := subprocess.run(command, cwd=folder, env=environment(folder), check=False).returncode:
+            raise SystemExit(status)
 
 
 def finish_check(check: "subprocess.Popen[str]") -> None:

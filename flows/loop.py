@@ -25,7 +25,9 @@ from flows.environment import SERVERS, environment, without_login
 from flows.owned import require_own
 from flows.runs import recorded
 from flows.stages import Stage, changed_stages, downstream, read_stages, to_run
+from tasks.lab import on_cluster
 
+ON_CLUSTER = 32  # stages that may wait for a machine at once; each is a process here
 KEPT = 5  # last lines of a failed stage that its error repeats
 
 
@@ -46,7 +48,7 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
     A failure is a state and no exception: the stage has said what is wrong, a traceback of ours would bury it.
     """
     log = get_run_logger()
-    command = [sys.executable, "-m", "flows.reproduce", name]
+    command = [sys.executable, "-m", runner_of(Path(workspace)), name]
     last: deque[str] = deque(maxlen=KEPT)
     with (
         progress.stage(workspace, name) as told,
@@ -73,11 +75,17 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
     return Completed()
 
 
+def runner_of(workspace: Path) -> str:
+    """The module that brings a stage up to date: on this machine, or on one of the lab's Ray cluster."""
+    return "flows.away" if on_cluster(workspace) else "flows.reproduce"
+
+
 def is_chatter(line: str) -> bool:
     """Lines of DVC that help nobody who watches the whole loop."""
     chatter = ("Running stage", "> python", "Updating lock file", "Generating lock file", "Use `dvc push`")
     advice = ("To track the changes with git", "git add dvc.lock", "To enable auto staging", "core.autostage")
-    return line.startswith(chatter) or any(words in line for words in advice)
+    pushed = (" file pushed", " files pushed")  # to a lab's shared remote
+    return line.startswith(chatter) or line.rstrip().endswith(pushed) or any(words in line for words in advice)
 
 
 @flow(name="loop", log_prints=False, persist_result=False, validate_parameters=False)
@@ -168,6 +176,6 @@ def gates_last(stages: list[Stage]) -> list[Stage]:
     return order
 
 
-def runner(workers: int) -> ThreadPoolTaskRunner[Any]:
-    """A thread for each stage that may run at once; each only waits for its process."""
-    return ThreadPoolTaskRunner(max_workers=workers)
+def runner(folder: Path) -> ThreadPoolTaskRunner[Any]:
+    """A thread for each stage that may run at once; each only waits for its process, and on a cluster for a slot."""
+    return ThreadPoolTaskRunner(max_workers=ON_CLUSTER if on_cluster(folder) else os.cpu_count() or 1)

@@ -41,7 +41,7 @@ def walk() -> int:
 
     loops.at_end = lambda state: lost.leave(verdict(state, loops.WAITING)) if lost else None
     os.chdir(folder)
-    state = loops.loop.with_options(task_runner=loops.runner(os.cpu_count() or 1))(return_state=True)
+    state = loops.loop.with_options(task_runner=loops.runner(folder))(return_state=True)
     for logger in ("prefect", "prefect.flow_runs", "prefect.task_runs"):
         for handler in logging.getLogger(logger).handlers:
             handler.flush()  # what is on its way to the server must arrive before that ends

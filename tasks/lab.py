@@ -1,14 +1,20 @@
 """A lab's shared servers: `lab.yaml` in the workspace says where PostgreSQL and S3 are; without it all is here.
 
+With its section `ray`, which may be left out, stages run on several machines.
+
     prefect:
       database: postgresql://bumblebee@db.lab/prefect
     mlflow:
       database: postgresql://bumblebee@db.lab/mlflow
       artifacts: s3://bumblebee/mlflow
       s3_endpoint: https://s3.lab:8333     # left out for Amazon's
+    ray:
+      address: head.lab:6379
+      remote: /shared/bumblebee/dvc        # of DVC; or s3://BUCKET/FOLDER, ssh://HOST/FOLDER
 
 No secret stands in it: PostgreSQL's password comes from `~/.pgpass` (or PGPASSFILE), S3's keys from
-`~/.aws/credentials` (or AWS_SHARED_CREDENTIALS_FILE, AWS_PROFILE), as these programs' own clients read them.
+`~/.aws/credentials` (or AWS_SHARED_CREDENTIALS_FILE, AWS_PROFILE), Ray's token from `~/.ray/auth_token` (or
+RAY_AUTH_TOKEN_PATH), as these programs' own clients read them.
 """
 
 import re
@@ -21,8 +27,12 @@ from bumblebee.errors import BadInput
 from bumblebee.io.read import read_yaml
 
 FILE = "lab.yaml"
+OF_RAY = {"RAY_AUTH_MODE": "token", "RAY_USAGE_STATS_ENABLED": "0"}
 DATABASE = "postgresql://USER@HOST[:PORT]/DATABASE"
 BUCKET = re.compile(r"s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9._/-]+)?")
+
+CLUSTER = re.compile(r"[A-Za-z0-9.-]+:([1-9][0-9]{0,4})")
+REMOTE = re.compile(r"(s3://[a-z0-9.-]+|ssh://([A-Za-z0-9._-]+@)?[A-Za-z0-9.-]+(:\d{1,5})?)?/[A-Za-z0-9._/-]+")
 
 
 @dataclass(frozen=True)
@@ -66,17 +76,34 @@ class MlflowLab:
 
 
 @dataclass(frozen=True)
+class RayLab:
+    """The standing cluster on which stages run, and where its machines exchange what they make."""
+
+    address: str
+    """`HOST:PORT` of its head."""
+    remote: str
+    """Of DVC: a folder that every machine sees, `s3://BUCKET/FOLDER` or `ssh://HOST/FOLDER`."""
+
+
+@dataclass(frozen=True)
 class Lab:
     """The whole file."""
 
     prefect: PrefectLab
     mlflow: MlflowLab
+    ray: RayLab | None = None
+    """None: stages run on the machine of the flow."""
 
     @property
     def variables(self) -> dict[str, str]:
         """What processes of the servers and stages get beside their environment; nothing secret."""
         found = {"PREFECT_API_DATABASE_CONNECTION_URL": self.prefect.connection}
-        return found | ({"MLFLOW_S3_ENDPOINT_URL": self.mlflow.s3_endpoint} if self.mlflow.s3_endpoint else {})
+        if self.mlflow.s3_endpoint:
+            found["MLFLOW_S3_ENDPOINT_URL"] = self.mlflow.s3_endpoint
+        return found | (OF_RAY if self.ray is not None else {})
+
+
+KINDS: dict[str, Any] = {"prefect": PrefectLab, "mlflow": MlflowLab, "ray": RayLab}
 
 
 def read_lab(workspace: Path) -> Lab | None:
@@ -90,11 +117,12 @@ def read_lab(workspace: Path) -> Lab | None:
         return None
     content = read_yaml(path)
     parts: dict[str, Any] = {}
-    for field in fields(Lab):
-        kind = PrefectLab if field.name == "prefect" else MlflowLab
-        parts[field.name] = kind(**_strings(content, field.name, [own.name for own in fields(kind)], path))
+    for name, kind in KINDS.items():
+        if name == "ray" and isinstance(content, dict) and name not in content:
+            continue
+        parts[name] = kind(**_strings(content, name, [own.name for own in fields(kind)], path))
     if isinstance(content, dict) and (more := sorted(map(str, set(content) - set(parts)))):
-        raise BadInput(f"{path}: {more[0]}", " or ".join(parts), "an unknown key")
+        raise BadInput(f"{path}: {more[0]}", " or ".join(KINDS), "an unknown key")
     lab = Lab(**parts)
     for where, url in (("prefect", lab.prefect.database), ("mlflow", lab.mlflow.database)):
         _check_database(f"{path}: {where}.database", url)
@@ -104,7 +132,15 @@ def read_lab(workspace: Path) -> Lab | None:
         raise BadInput(f"{path}: mlflow.s3_endpoint", "https://HOST[:PORT]", lab.mlflow.s3_endpoint[:80])
     if lab.prefect.database == lab.mlflow.database:
         raise BadInput(f"{path}: mlflow.database", "another database than Prefect's", "the same one")
+    if lab.ray is not None:
+        _check_ray(lab.ray, f"{path}: ray")
     return lab
+
+
+def on_cluster(workspace: Path) -> bool:
+    """Whether the workspace's stages run on a lab's Ray cluster."""
+    lab = read_lab(workspace)
+    return lab is not None and lab.ray is not None
 
 
 def _strings(content: Any, section: str, names: list[str], path: Path) -> dict[str, str]:
@@ -121,6 +157,16 @@ def _strings(content: Any, section: str, names: list[str], path: Path) -> dict[s
         if not isinstance(value, str):
             raise BadInput(f"{path}: {section}.{name}", "a text", type(value).__name__)
     return dict(own)
+
+
+def _check_ray(ray: RayLab, where: str) -> None:
+    """Refuse what is no address of a cluster or no place for DVC."""
+    port = CLUSTER.fullmatch(ray.address)
+    if not port or int(port[1]) > 65535:
+        raise BadInput(f"{where}.address", "HOST:PORT of the cluster's head", ray.address[:80])
+    if not REMOTE.fullmatch(ray.remote):
+        expected = "a folder from / on, s3://BUCKET/FOLDER or ssh://HOST/FOLDER"
+        raise BadInput(f"{where}.remote", expected, re.sub(r":[^/@]*@", ":...@", ray.remote)[:80])
 
 
 def _check_database(where: str, url: str) -> None:

@@ -11,6 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+COMMIT = "BUMBLEBEE_COMMIT"  # variable
+
 
 def path_hash(path: Path) -> str:
     """DVC's hash of a file or folder (`.dir` at the end for a folder); "missing" where there is none."""
@@ -152,7 +154,12 @@ def versions() -> dict[str, str]:
 
 @cache
 def git_sha() -> str:
-    """The commit of the code, "-dirty" at the end where tracked files differ; "unknown" outside git."""
+    """The commit of the code, "-dirty" at the end where tracked files differ; "unknown" outside git.
+
+    A stage that came to another machine is told it by `COMMIT`: its work tree has the code without git.
+    """
+    if told := os.environ.get(COMMIT):
+        return told
     here = Path(__file__).resolve().parent
     git = ["git", "-C", str(here)]
     try:

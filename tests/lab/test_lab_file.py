@@ -29,6 +29,22 @@ def changed(section: str, key: str, value: object) -> dict:
     return {**GOOD, section: {**GOOD[section], key: value}}
 
 
+def cluster(**over: str) -> dict:
+    return {**GOOD, "ray": {"address": "head.lab:6379", "remote": "/shared/dvc", **over}}
+
+
+@pytest.mark.parametrize("remote", ["/shared/dvc", "s3://bumblebee/dvc", "ssh://me@files.lab:22/srv/dvc"])
+def test_a_cluster_is_read_and_its_token_demanded(tmp_path: Path, remote: str) -> None:
+    lab = read_lab(write(tmp_path, cluster(remote=remote)))
+    assert lab is not None and lab.ray is not None and lab.ray.remote == remote
+    assert environment(tmp_path)["RAY_AUTH_MODE"] == "token"
+
+
+def test_without_a_cluster_no_process_is_told_of_ray(tmp_path: Path) -> None:
+    lab = read_lab(write(tmp_path, GOOD))
+    assert lab is not None and lab.ray is None and not any(name.startswith("RAY") for name in lab.variables)
+
+
 def test_without_the_file_everything_is_on_this_machine(tmp_path: Path) -> None:
     assert read_lab(tmp_path) is None
     assert "PREFECT_API_DATABASE_CONNECTION_URL" not in environment(tmp_path)
@@ -58,7 +74,12 @@ def test_processes_are_told_where_things_are(tmp_path: Path) -> None:
         (changed("mlflow", "artifacts", 3), "mlflow.artifacts: expected a text, came int"),
         (changed("mlflow", "database", GOOD["prefect"]["database"]), "another database than Prefect's"),
         ({"prefect": GOOD["prefect"]}, "mlflow: expected a mapping with database, artifacts, s3_endpoint"),
-        ({**GOOD, "ray": {}}, "ray: expected prefect or mlflow, came an unknown key"),
+        ({**GOOD, "slurm": {}}, "slurm: expected prefect or mlflow or ray, came an unknown key"),
+        ({**GOOD, "ray": {}}, "ray.address: expected an address, came no such key"),
+        (cluster(address="ray://head:6379"), "ray.address: expected HOST:PORT of the cluster's head"),
+        (cluster(address="head:99999"), "ray.address: expected HOST:PORT of the cluster's head"),
+        (cluster(remote="shared/dvc"), "ray.remote: expected a folder from / on"),
+        (cluster(remote="ssh://me:secret@host/dvc"), "ray.remote: expected a folder from / on"),
         ([1], "prefect: expected a mapping"),
     ],
 )

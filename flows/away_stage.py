@@ -1,0 +1,38 @@
+"""One stage in a work tree of its own on a machine of the cluster: `python -m flows.away_stage STAGE [BEFORE ...]`.
+
+Its inputs come from the shared remote, and what it made goes there, at last the entry of the run cache by which the
+head writes it into the only dvc.lock that counts. So an entry that is there has its files.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+from flows import reproduce
+from flows.environment import environment
+from flows.parcel import REMOTE
+from tasks.parent import end_with_parent
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Pull, reproduce, push; the exit status of the first that fails."""
+    end_with_parent()
+    name, *before = sys.argv[1:] if argv is None else argv
+    variables = environment(Path.cwd())
+    os.environ.clear()
+    os.environ.update(variables)
+    from dvc.cli import main as dvc
+
+    if before and (status := int(dvc(["pull", "--quiet", "--force", "--remote", REMOTE, *before]))):
+        return status
+    if status := reproduce.main([name]):
+        return status
+    # Files first: whoever finds the run in the cache finds what it made.
+    for words in ([], ["--run-cache"]):
+        if status := int(dvc(["push", "--quiet", "--remote", REMOTE, *words, name])):
+            return status
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

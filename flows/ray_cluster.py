@@ -1,0 +1,164 @@
+"""The lab's standing Ray cluster: reached by its direct address, and checked before any stage starts.
+
+python -m flows.ray_cluster [--workspace FOLDER]     # status 2 and one line for what is wrong
+
+Only this module and flows/away.py import Ray, and only where lab.yaml has a section `ray`.
+"""
+
+import argparse
+import contextlib
+import importlib
+import os
+import socket
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from bumblebee.errors import BadInput
+from bumblebee.last_line import guarded
+from flows import node
+from tasks import params
+from tasks.lab import FILE, RayLab, read_lab
+
+ANSWER = 10  # [s] within which the cluster's head must
+LOOK = 120  # [s] within which every machine must; the first process on one takes some
+PACKAGES = ("dvc", "mlflow", "mujoco", "numpy", "rsl-rl-lib", "scikit-learn", "scipy", "torch", "bumblebee")
+"""What decides results. The code of bumblebee travels: a machine may do without it, but have no other version."""
+MODULES = {"s3": "dvc_s3", "ssh": "dvc_ssh"}  # of DVC, by the scheme of the remote
+
+
+def connect(own: RayLab, where: str) -> Any:
+    """The module `ray`, connected to the cluster.
+
+    Raises:
+        BadInput: when Ray is not installed, nothing answers, or the cluster refuses this process.
+    """
+    if find_spec("ray") is None:
+        raise BadInput(where, "the package ray", "none", "pip install 'bumblebee[lab]'")
+    host, _, port = own.address.rpartition(":")
+    try:
+        socket.create_connection((host, int(port)), timeout=ANSWER).close()
+    except OSError as error:
+        do = "Is `ray start --head` running there?"
+        raise BadInput(
+            f"{where}.address", f"a Ray cluster at {own.address}", str(error.strerror or error), do
+        ) from None
+    ray = importlib.import_module("ray")
+    try:
+        with _quiet():
+            ray.init(address=own.address, log_to_driver=False, logging_level="ERROR")
+    except Exception as error:  # Ray raises RuntimeError, ConnectionError and errors of its own
+        raise _refused(own, where, " ".join(str(error).split())) from None
+    return ray
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Drop what Ray's own code prints for each second in which the cluster refuses us; the error says it once."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    try:
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+def _refused(own: RayLab, where: str, text: str) -> BadInput:
+    if "ersion mismatch" in text:
+        do = "Install the same versions everywhere."
+        return BadInput(where, "the versions of Ray and Python that this process has", text[:300], do)
+    do = f"This machine must belong to it (ray start --address={own.address}) and have its token in ~/.ray/auth_token."
+    return BadInput(f"{where}.address", f"to join {own.address}", text[:200], do)
+
+
+def gpus(content: Mapping[str, Any], sections: Iterable[str]) -> int:
+    """GPUs for a stage that reads these sections: the most that one of them names, or 1 for the engine on a GPU."""
+    found = [0]
+    for name in sections:
+        section = content.get(name)
+        if isinstance(section, dict):
+            env = section.get("env")
+            on_gpu = isinstance(env, dict) and env.get("engine") == "mujoco_warp"
+            number = section.get("gpus", int(on_gpu))
+            found.append(number if isinstance(number, int) else 0)
+    return max(found)
+
+
+def require_room(ray: Any, wanted: int, name: str) -> None:
+    """Refuse a stage for which no machine that is up has the GPUs, or a free CPU slot at all.
+
+    Args:
+        ray: the connected module.
+        wanted: GPUs.
+        name: of the setting that wants them.
+    """
+    resources = [found["Resources"] for found in ray.nodes() if found["Alive"]]
+    most = max((int(each.get("GPU", 0)) for each in resources if each.get("CPU", 0) >= 1), default=-1)
+    if most < 0:
+        raise BadInput(name, "a machine of the Ray cluster with a CPU slot", "none", "ray start --address=... on one")
+    if wanted > most:
+        do = "Add a machine that has them, or ask for fewer."
+        raise BadInput(name, f"at most {most} GPUs, which one machine of the Ray cluster has", str(wanted), do)
+
+
+def check(workspace: Path) -> None:
+    """Look at every machine of the cluster; does nothing where lab.yaml names none.
+
+    Raises:
+        BadInput: naming the first fault.
+    """
+    lab = read_lab(workspace)
+    if lab is None or lab.ray is None:
+        return
+    where = f"{workspace / FILE}: ray"
+    ray = connect(lab.ray, where)
+    content = params.read(workspace / "params.yaml")
+    for name in content:
+        require_room(ray, gpus(content, [name]), f"{workspace / 'params.yaml'}: {name}.gpus")
+    for machine in _facts(ray, lab.ray):
+        _compare(machine, where)
+
+
+def _facts(ray: Any, own: RayLab) -> list[dict[str, str]]:
+    """What the machines with a CPU slot say, and first this one."""
+    at = importlib.import_module("ray.util.scheduling_strategies").NodeAffinitySchedulingStrategy
+    importlib.import_module("ray.cloudpickle").register_pickle_by_value(node)
+    scheme, _, _ = own.remote.partition("://")
+    asked = (PACKAGES, own.remote if own.remote.startswith("/") else "", MODULES.get(scheme, ""))
+    ask = ray.remote(num_cpus=0, max_retries=0)(node.facts)
+    ids = [found["NodeID"] for found in ray.nodes() if found["Alive"] and found["Resources"].get("CPU", 0) >= 1]
+    answers = [ask.options(scheduling_strategy=at(each, soft=False)).remote(*asked) for each in ids]
+    try:
+        return [node.facts(*asked), *ray.get(answers, timeout=LOOK)]
+    except Exception as error:
+        first = (str(error).strip().splitlines() or [type(error).__name__])[0]
+        raise BadInput(own.address, "every machine of the Ray cluster to answer", first[:200]) from None
+
+
+def _compare(machine: Mapping[str, str], where: str) -> None:
+    here = node.facts(PACKAGES, "", "")
+    for name in ("Python", *PACKAGES):
+        if machine[name] != here[name] and not (name == "bumblebee" and not machine[name]):
+            came = f"{machine[name] or 'none'} on {machine['host']}"
+            raise BadInput(
+                where, f"{name} {here[name]} on every machine", came, "Install the same versions everywhere."
+            )
+    if machine["fault"]:
+        raise BadInput(f"{where}.remote", f"DVC's remote to be usable on {machine['host']}", machine["fault"])
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Check; returns the exit status."""
+    made = argparse.ArgumentParser(prog="python -m flows.ray_cluster", description="Check the lab's Ray cluster.")
+    made.add_argument("--workspace", type=Path, default=Path("."), help="folder with lab.yaml (default: this one)")
+    workspace = made.parse_args(argv).workspace
+    return guarded(lambda: check(workspace))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
