@@ -19,3 +19,7 @@ class BadInput(Exception):
         words = " ".join((f"{line}. {do}" if do else line).split())
         # Names and values come from files: no control character of theirs reaches a terminal or a log.
         super().__init__("".join(sign if sign.isprintable() else "\ufffd" for sign in words))
+
+    def __reduce__(self) -> tuple[type["BadInput"], tuple[str, ...]]:
+        """What another process makes it from again: an exception is otherwise rebuilt from its text alone."""
+        return type(self), (self.where, self.expected, self.came, self.do)

@@ -1,6 +1,7 @@
 """Whatever happens, a command says one line and ends with a status that tells what it was."""
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
+from bumblebee.measured.rollout import BadRollout
 
 
 def raising(error: BaseException):
@@ -35,6 +37,16 @@ def test_every_error_is_one_line(error: BaseException, status: int, capsys: pyte
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    "error", [BadInput("a.csv", "a number", "x", "Give one."), BadRollout("a.csv", "q", "finite", "numbers", "nan", "")]
+)
+def test_bad_input_crosses_processes(error: BadInput):
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    assert vars(again) == vars(error)
 
 
 def test_the_traceback_of_the_unforeseen_is_kept_for_the_owner(capsys: pytest.CaptureFixture[str]):

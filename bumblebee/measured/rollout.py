@@ -47,6 +47,10 @@ class BadRollout(BadInput):
         where = f"{file}: column {column}: rule {rule}" if column else f"{file}: rule {rule}"
         super().__init__(where, expected, came, do)
 
+    def __reduce__(self) -> tuple[type["BadRollout"], tuple[str, ...]]:
+        """What another process makes it from again."""
+        return type(self), (self.file, self.column, self.rule, self.expected, self.came, self.do)
+
 
 @dataclass(frozen=True, eq=False)
 class Rollout:

@@ -23,8 +23,11 @@ from bumblebee.diagnosis.residuals import Problem
 
 
 def last_step(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, weights: np.ndarray) -> Fit:
-    """The fit near `values` (P,), with columns around it; on a fixed base, or with a limit, by Gauss and Newton."""
-    if not problem.plant.floating or any(c.effect in (*SATURATIONS, *ABRUPT) for c in chosen):
+    """The fit near `values` (P,), with columns around it; on a fixed base, or with a limit, by Gauss and Newton.
+
+    Of no candidates it is the fit of the declared model.
+    """
+    if not chosen or not problem.plant.floating or any(c.effect in (*SATURATIONS, *ABRUPT) for c in chosen):
         return gauss_newton(problem, chosen, values, weights, iterations=1)
     rule = problem.thresholds.estimation.response_surface
     start = found = clipped(chosen, np.asarray(values, dtype=float))

@@ -138,8 +138,7 @@ def _sure_of(problem: Problem, fit: Fit, weights: np.ndarray) -> Refined:
     if len(kept) == len(fit.chosen):
         return Refined(problem, fit, weights, half)
     values = np.concatenate([np.empty(0), *(fit.of(c) for c in kept)])
-    less = last_step(problem, kept, values, weights) if kept else gauss_newton(problem, (), (), weights)
-    return _sure_of(problem, less, weights)
+    return _sure_of(problem, last_step(problem, kept, values, weights), weights)
 
 
 def _is_there(fit: Fit, half: np.ndarray, candidate: Candidate) -> bool:

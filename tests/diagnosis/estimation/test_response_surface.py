@@ -32,7 +32,7 @@ class Rough:
 
     def residual(self, models: list[list[Effect]], coarse: bool = False) -> np.ndarray:
         """(V, W, M) of dry frictions."""
-        return np.stack([self._one(effects[0].values()[0]) for effects in models])
+        return np.stack([self._one(effects[0].values()[0] if effects else 0.0) for effects in models])
 
     def differences(self, effects: list[Effect], moved: list[list[Effect]], coarse: bool) -> np.ndarray:
         """Change of the prediction to others (V, W, M)."""
@@ -82,3 +82,11 @@ def test_a_limit_is_fitted_as_before() -> None:
     problem, limit = Rough(), Candidate("torque_limit", "j", (1.0,), (-0.18,))
     as_before = gauss_newton(problem, (limit,), (1.05 * FRICTION,), np.ones(W), iterations=1)
     assert last_step(problem, (limit,), (1.05 * FRICTION,), np.ones(W)).values[0] == as_before.values[0]
+
+
+def test_of_nothing_it_is_the_fit_of_the_declared_model() -> None:
+    problem, ones = Rough(), np.ones(W)
+    fit = last_step(problem, (), np.empty(0), ones)
+    assert fit.chosen == ()
+    assert fit.effects == []
+    assert fit.cost == pytest.approx(gauss_newton(problem, (), (), ones).cost)

@@ -55,3 +55,15 @@ def test_a_limit_whose_interval_holds_the_declared_one_is_not_named(
         last = refine(problem, begun, np.random.default_rng(0))
         assert [c.effect for c in last.fit.chosen] == (["torque_limit"] if named else [])
         assert len(last.half) == len(last.fit.chosen)
+
+
+def test_where_nothing_is_significant_in_the_end_nothing_is_named(
+    limited: tuple[Problem, list], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, chosen = limited
+    begun = gauss_newton(problem, chosen, [LIMIT], window_weights(problem.residual([[]])[0]), iterations=0)
+    monkeypatch.setattr(refining, "drop_insignificant", lambda problem, fit, *_: fit.without(fit.chosen))
+    last = refine(problem, begun, np.random.default_rng(0))
+    assert last.fit.chosen == ()
+    assert last.fit.cost > begun.cost
+    assert last.half.shape == (0,)
