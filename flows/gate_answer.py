@@ -27,32 +27,35 @@ def main(argv: list[str] | None = None) -> int:
     """Write the answer; resume the run that waits for it."""
     options = parser().parse_args(argv)
     place = gate.Gate(chosen(options), options.round)
-    given(place, options.answer == "approve", gate.unix_user(options.by), options.seen, options.note, options.change)
+    given(place, options.answer, gate.unix_user(options.by), options.seen, options.note, options.change)
     return 0
 
 
-def given(place: gate.Gate, approve: bool, author: gate.Author, seen: str, note: str, change: bool) -> None:
-    """Write an answer, say it, and resume the run that waits for it; see `gate.answer`."""
+def given(place: gate.Gate, verb: str, author: gate.Author, seen: str, note: str, change: bool) -> None:
+    """Write an answer, say it, and resume the run that waits for it; see `gate.decide`."""
     asked(place)
-    table = gate.answer(place, approve, author, seen, note, change, rule(place.workspace))
+    table = gate.decide(place, verb, author, seen, note, change, rule(place.workspace))
     where = f"round {place.round} of {place.workspace}"
     print(f"{where}: {words.said(table)}; it answers {words.what(table)}", flush=True)
     if table["status"] == "pending":
         return
     addresses = servers.running(place.workspace)
-    if not (addresses and resume(place.workspace, addresses.prefect, table)):
+    resumed = addresses and resume(place.workspace, addresses.prefect, table)
+    if table["status"] == "more":
+        print("to go on add rollouts and start the loop again (or `dvc repro`): changed data are asked about anew")
+    elif not resumed:
         print("start the loop again (or `dvc repro`): it goes on from here")
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     made = argparse.ArgumentParser(prog="python -m flows.gate_answer", description=__doc__)
-    made.add_argument("answer", choices=["approve", "reject"])
+    made.add_argument("answer", choices=list(gate.ANSWERS))
     made.add_argument("--round", type=int, required=True, help="the round that is meant")
     made.add_argument("--by", default="", help="name of the person who answers; needed")
     made.add_argument("--seen", default="", help="the hash that `tasks.gate --show` printed; needed")
     made.add_argument("--change", action="store_true", help="replace an answer that stands; it stays in the history")
-    made.add_argument("--note", default="", help="why")
+    made.add_argument("--note", default="", help="why; needed with `more`: what is wanted")
     where = made.add_mutually_exclusive_group()
     where.add_argument("--workspace", type=Path, help="folder of the workspace; by default this folder")
     where.add_argument("--name", default="", help="workspace under runs/")
@@ -88,7 +91,7 @@ async def _resume(table: dict[str, Any]) -> list[str]:
     from prefect.client.schemas.objects import StateType
     from prefect.client.schemas.responses import SetStateStatus
 
-    answer = "approve" if table["status"] == "approved" else "reject"
+    answer = next(verb for verb, status in gate.ANSWERS.items() if status == table["status"])
     values = {"answer": answer, "by": table["by"], "seen": words.short(table), "note": table["note"]}
     resumed = []
     async with get_client() as client:

@@ -1,4 +1,4 @@
-"""`bumblebee gate list|show|approve|reject`: the gates of a workspace from any terminal, under one's own login.
+"""`bumblebee gate list|show|approve|reject|more`: the gates of a workspace from any terminal, under one's own login.
 
 The library's command line finds it as a plug-in (entry point `bumblebee.commands`), since it knows nothing of flows.
 """
@@ -61,7 +61,7 @@ def approve(
     workspace: Workspace = Path(),
 ) -> None:
     """Let the round go on."""
-    _answer(True, round, seen, by, note, change, workspace)
+    _answer("approve", round, seen, by, note, change, workspace)
 
 
 @app.command()
@@ -78,16 +78,29 @@ def reject(
 
     if not note.strip():
         raise BadInput("--note", "why the round is rejected", "nothing", "Say what is wrong with its logs.")
-    _answer(False, round, seen, by, note, change, workspace)
+    _answer("reject", round, seen, by, note, change, workspace)
 
 
-def _answer(go_on: bool, round: int, seen: str, by: str, note: str, change: bool, workspace: Path) -> None:
+@app.command()
+def more(
+    round: Round,
+    seen: Seen = "",
+    by: By = "",
+    note: Note = "",
+    change: Change = False,
+    workspace: Workspace = Path(),
+) -> None:
+    """Ask for more rollouts before anybody judges the round; --note says which."""
+    _answer("more", round, seen, by, note, change, workspace)
+
+
+def _answer(verb: str, round: int, seen: str, by: str, note: str, change: bool, workspace: Path) -> None:
     from bumblebee.measured import gate
     from flows.gate_answer import given
 
     who = gate.unix_user(by)
     author = who if by else gate.Author(str(who.known_by["user"]), who.known_by)
-    given(gate.Gate(_folder(workspace), round), go_on, author, seen, note, change)
+    given(gate.Gate(_folder(workspace), round), verb, author, seen, note, change)
 
 
 def _folder(workspace: Path) -> Path:

@@ -61,13 +61,14 @@ def page(request: dict[str, Any], place: gate.Gate, run: str = "") -> str:
     rules = [(rule, n["files"], n["fatal"], n["warning"]) for rule, n in seen["findings"].items()]
     blocks = [
         f"# Round {number}: may the loop learn from these logs?",
-        "Approve, and the diagnosis corrects the simulator with the accepted files; reject, and the round stops here.",
+        "Approve, and the diagnosis corrects the simulator with the accepted files; reject, and the round stops here; "
+        "more, and it waits for more rollouts, which the note names.",
+        *wanted(request),
         table(("what", "how many"), counts),
         f"An answer holds for `{words.short(request)}`, the hash of what stands here, and for nothing else.",
         *([f"**[To answer, open the run](../../runs/flow-run/{run})** and choose {BUTTON}."] if run else []),
         "In a terminal:",
-        f"```\n{words.answer_command(place.workspace, request, True)}\n"
-        f"{words.answer_command(place.workspace, request, False)}\n```",
+        "```\n" + "\n".join(words.answer_command(place.workspace, request, verb) for verb in gate.ANSWERS) + "\n```",
         "## Findings",
         table(("rule", "files", "fatal", "warnings"), rules) if rules else "None.",
         *findings(place),
@@ -79,6 +80,14 @@ def page(request: dict[str, Any], place: gate.Gate, run: str = "") -> str:
         f"The same page as a file: `{place.summary.with_name('overview.html')}`",
     ]
     return "\n\n".join(blocks) + "\n"
+
+
+def wanted(request: dict[str, Any]) -> list[str]:
+    """Who asked for more, for what, and how it goes on."""
+    if request["status"] != "more":
+        return []
+    go_on = "Add rollouts and start a run again: changed data are asked about anew."
+    return [f"**{cell(words.said(request))}.** {go_on} To answer all the same, add `--change` to a command below."]
 
 
 def findings(place: gate.Gate) -> list[str]:

@@ -17,38 +17,41 @@ from flows.stages import Stage
 from tasks.gate import asked, rule
 
 SEEN = "Hash of what was shown to you: the answer holds for nothing else."
+CHOICE = "approve: the round goes on; reject: it stops here; more: it waits for more rollouts, and the note says which."
 PAGE = {"how": "Prefect's page: whoever holds the login of this workspace"}  # more cannot be known of who clicked
 
 
 class GateAnswer(RunInput):
     """What a person answers on Prefect's page; nothing is chosen beforehand."""
 
-    answer: Literal["approve", "reject"] = Field(description="approve: the round goes on; reject: it stops here.")
+    answer: Literal["approve", "reject", "more"] = Field(description=CHOICE)
     by: str = Field(description="Your name.", min_length=1, max_length=gate.LONGEST)
     seen: str = Field(description=SEEN)
-    note: str = Field(default="", description="Why, if there is something to say.", max_length=gate.LONGEST)
+    note: str = Field(default="", description="Why; with `more` what is wanted.", max_length=gate.LONGEST)
 
 
 def hold(folder: Path, stage: Stage) -> str | None:
     """Ask at a gate whose round has come in; None when the gate stage can run (it passes, or says who rejected).
 
     A run that Prefect started as a deployment is suspended: its process ends, the question stands on Prefect's page,
-    and the answer starts it again, after any restart. Any other run gets the line that says how to answer, to end with.
+    and the answer starts it again, after any restart. Any other run gets the line that says how to answer, to end with,
+    and every run does where somebody asked for more: no answer but other data lets it go on.
     """
     place = gate.Gate(folder.resolve(), int(stage.option("round") or 0))
-    if not place.summary.exists() or rule(folder).mode == "auto":
+    own = rule(folder)
+    if not place.summary.exists() or (own.mode == "auto" and gate.verdict(place, True, own.people) != "more"):
         return None
     request = asked(place)
     deployed = runtime.deployment.id is not None
-    if request["status"] != "pending":
-        if deployed:
-            say_if_late(request)
+    if deployed and request["status"] == "pending":
+        request = ask(place, request)
+    elif deployed:
+        say_if_late(request)
+    if request["status"] not in gate.WAITS:
         return None
-    if not deployed:
-        show(place, request)
-        return f"{words.how_to_answer(place.workspace, request)}; then start again, it goes on from here"
-    ask(place, request)
-    return None
+    show(place, request)
+    then = "; then start again, it goes on from here" if request["status"] == "pending" else ""
+    return words.how_to_answer(place.workspace, request) + then
 
 
 def show(place: gate.Gate, request: dict[str, Any], run: str | None = None) -> str:
@@ -60,8 +63,10 @@ def show(place: gate.Gate, request: dict[str, Any], run: str | None = None) -> s
     return str(made)
 
 
-def ask(place: gate.Gate, request: dict[str, Any]) -> None:
-    """Suspend the run until a person answers what it shows; an answer that cannot be taken is asked for anew.
+def ask(place: gate.Gate, request: dict[str, Any]) -> dict[str, Any]:
+    """Suspend the run until a person answers what it shows; the request with that answer.
+
+    One that cannot be taken is asked for anew.
 
     The pause is named after the hash of what is shown: data that change meanwhile are another pause with a question of
     its own, and the answer to the first is never applied to them.
@@ -76,19 +81,19 @@ def ask(place: gate.Gate, request: dict[str, Any]) -> None:
             log.warning(gate_page.where_to_answer(place.round, runtime.flow_run.ui_url))
         model = form(words.short(request), description)
         given: Any = suspend_flow_run(wait_for_input=model, timeout=None, key=key)
-        if asked(place)["status"] != "pending":  # answered in a terminal, which resumed this run
-            return
+        if (found := asked(place))["status"] != "pending":  # answered in a terminal, which resumed this run
+            return found
         try:
             author = gate.Author(given.by, PAGE)
-            answer = given.answer == "approve", author, given.seen, given.note
-            table = gate.answer(place, *answer, rule=rule(place.workspace))
+            table = gate.decide(place, given.answer, author, given.seen, given.note, rule=rule(place.workspace))
             log.info(f"round {place.round}: {words.said(table)}")
-            return
+            return table
         except BadInput as error:
             log.warning(f"the answer of {words.one_line(given.by)} on the page was not taken: {error}")
         request = asked(place)
         if request["status"] != "pending":
-            return
+            return request
+    raise AssertionError("count() has no end")
 
 
 def form(seen: str, description: str | None) -> type[GateAnswer]:
@@ -113,6 +118,6 @@ def answered(key: str) -> dict[str, Any] | None:
 def say_if_late(request: dict[str, Any]) -> None:
     """Log an answer from the page that came after another one: it was not taken."""
     given = answered(pause_key(request, 0)) or {}
-    if given and (given.get("answer") == "approve") != (request["status"] == "approved"):
+    if given and gate.ANSWERS.get(str(given.get("answer"))) != request["status"]:
         late = words.one_line(f"{given.get('answer')} by {given.get('by')}")
         get_run_logger().warning(f"{late} on the page came too late: round {request['round']} is {words.said(request)}")

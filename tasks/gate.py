@@ -14,16 +14,18 @@ from tasks.params import load
 from tasks.stage import run_stage
 
 EXIT_PENDING, EXIT_REJECTED = 3, 4
+TO_ANSWER = {verb: f"to {verb} this and nothing else" for verb in ("approve", "reject")}
+TO_ANSWER["more"] = "to ask for more rollouts than these"
 KEPT = ("round", "status", "by", "known_by", "at", "note", "seen", "approvals")  # of an answer, in data/gates
 
 
 def main(round: int) -> None:
-    """Write data/gates/round-N.json if the answer is yes; end with status 3 (no answer yet) or 4 (rejected)."""
+    """Write data/gates/round-N.json if the answer is yes; end with status 3 (it waits) or 4 (rejected)."""
     place, passed = gate.Gate(Path.cwd(), round), paths.gate(round)
     passed.unlink(missing_ok=True)
     own = rule()
     table = gate.settle(place, own.mode == "auto", own.people)
-    if table["status"] == "pending":
+    if table["status"] in gate.WAITS:
         print(words.how_to_answer(place.workspace, table), file=sys.stderr, flush=True)
         raise SystemExit(EXIT_PENDING)
     line = f"round {round}: {words.said(table)}"
@@ -46,18 +48,19 @@ def asked(place: gate.Gate) -> dict[str, Any]:
 
 
 def command(argv: list[str]) -> int:
-    """`--show`, `--approve` and `--reject`."""
+    """`--show`, `--approve`, `--reject` and `--more`."""
     options = _parser().parse_args(argv)
     place = gate.Gate(options.workspace.resolve(), options.round)
     if not place.workspace.is_dir():
         raise BadInput(options.workspace, "a workspace", "no such folder", "Check --workspace.")
     table = asked(place)
-    if not (options.approve or options.reject):
+    verb = next((verb for verb in gate.ANSWERS if getattr(options, verb)), None)
+    if verb is None:
         show(table, place)
         return 0
     author = gate.unix_user(options.by)
     own = rule(place.workspace)
-    table = gate.answer(place, options.approve, author, options.seen, options.note, options.change, own)
+    table = gate.decide(place, verb, author, options.seen, options.note, options.change, own)
     then = " Run `dvc repro` to go on." if table["status"] == "approved" else ""
     print(f"round {options.round}: {words.said(table)}; it answers {words.what(table)}.{then}")
     return 0
@@ -85,8 +88,10 @@ def show(table: dict[str, Any], place: gate.Gate) -> None:
     console.print(rules)
     print(f"the page with the plots: {folder / 'overview.html'}\nevery finding: {folder / 'findings.csv'}")
     change = "" if table["status"] == "pending" else " --change"
-    for verb, approve in (("approve", True), ("reject", False)):
-        print(f"to {verb} this and nothing else: {words.answer_command(place.workspace, table, approve)}{change}")
+    for verb, what in TO_ANSWER.items():
+        print(f"{what}: {words.answer_command(place.workspace, table, verb)}{change}")
+    if table["status"] == "more":
+        print("to go on: add rollouts and start again; changed data are asked about anew, and of everybody")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -97,6 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     choice.add_argument("--show", action="store_true", help="print what came and how to answer it")
     choice.add_argument("--approve", action="store_true", help="let the round go on")
     choice.add_argument("--reject", action="store_true", help="stop the round")
+    choice.add_argument("--more", action="store_true", help="ask for more rollouts; --note says which")
     parser.add_argument("--by", default="", help="name of the person who answers; needed")
     parser.add_argument("--seen", default="", help="the hash that --show printed; needed: nothing else is answered")
     parser.add_argument("--change", action="store_true", help="replace an answer that stands; it stays in the history")
@@ -105,6 +111,6 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    if {"--show", "--approve", "--reject", "--help", "-h"} & set(sys.argv[1:]):
+    if {"--show", "--approve", "--reject", "--more", "--help", "-h"} & set(sys.argv[1:]):
         raise SystemExit(guarded(lambda: command(sys.argv[1:])))
     run_stage(main, logs=False)

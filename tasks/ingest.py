@@ -183,7 +183,7 @@ def ask(round: int) -> None:
     place = gate.Gate(Path.cwd(), round)
     own = load("gate", gate.GateConfig)
     table = gate.settle(place, own.mode == "auto", own.people)
-    if table["status"] == "pending":
+    if table["status"] in gate.WAITS:
         print(gate_words.how_to_answer(place.workspace, table), flush=True)
     else:
         print(f"round {round}: {gate_words.said(table)}", flush=True)

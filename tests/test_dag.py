@@ -83,7 +83,10 @@ _CONTRACT = "of an exported policy it reads the contract and the hash, of which 
 NO_RESULT_OF = {
     "ingest": {
         **{f"bumblebee/measured/{name}.py": _PAGE for name in ("gate_words", "overview", "overview_plots")},
-        "bumblebee/measured/gate_people.py": "who may answer; the request is not its result",
+        **{
+            f"bumblebee/measured/{name}.py": "who answers, and how; the request is not its result"
+            for name in ("gate_people", "gate_table")
+        },
     },
     "diagnose": {
         **{

@@ -1,36 +1,66 @@
 """The gate after an intake: a request that a person answers, and the answer as a file that the next stage depends on.
 
-{"round", "status": "pending" | "approved" | "rejected", "seen": {what the person saw}, "history": [earlier answers]},
-and with an answer "by" (the name that was given), "known_by" (how the program knew), "at" and "note". An answer holds
-for one summary.json, by its hash. Whoever answers first wins; another answer must say that it changes the first. Where
-two people must approve, "approvals" has those of before the last. All answers stand in record.jsonl beside it, too.
+A person approves, rejects, or asks for more rollouts; what the file says of it stands in `gate_table`. An answer holds
+for one summary.json, by its hash. Whoever answers first wins; another answer must say that it changes the first. All
+answers stand in record.jsonl beside it, too, and one counts from when it stands there.
 """
 
 import fcntl
-import json
 import os
-import pwd
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from bumblebee.errors import BadInput
-from bumblebee.io.limits import LIMITS
-from bumblebee.io.read import file_hash, read_json
-from bumblebee.io.write import unwritable, write_file
+from bumblebee.io.read import file_hash
+from bumblebee.io.write import unwritable
 from bumblebee.measured import gate_record
 from bumblebee.measured import gate_words as words
-from bumblebee.measured.gate_people import approvers, login_of, require_allowed
+from bumblebee.measured.gate_people import AUTOMATIC, ITSELF, Author, is_automatic, require_allowed, unix_user
+from bumblebee.measured.gate_table import (
+    LONGEST,
+    OF_ANSWER,
+    STATUSES,
+    SUMMARY_LIMITS,
+    WAITS,
+    history,
+    holds,
+    joined,
+    read_approval,
+    read_object,
+    stands,
+    with_answer,
+    write_json,
+)
 from bumblebee.ranges import Range, Ranged, Text
 
-AUTOMATIC = "automatic (gate.mode: auto)"
-STATUSES = ("pending", "approved", "rejected")
-SUMMARY_LIMITS = replace(LIMITS, text_bytes=1 << 30, nodes=20_000_000)  # a line for each of many thousand rollouts
-LONGEST = 500  # characters of a name or a note
+__all__ = [
+    "ANSWERS",
+    "AUTOMATIC",
+    "ITSELF",
+    "LONGEST",
+    "STATUSES",
+    "SUMMARY_LIMITS",
+    "WAITS",
+    "Author",
+    "Gate",
+    "GateConfig",
+    "answer",
+    "decide",
+    "is_automatic",
+    "read_approval",
+    "request",
+    "seen_of",
+    "settle",
+    "unix_user",
+    "verdict",
+    "write_json",
+]
+
+ANSWERS = {"approve": "approved", "reject": "rejected", "more": "more"}
+"""What a person says, and the status that it gives the request."""
 
 
 @dataclass(frozen=True)
@@ -70,47 +100,32 @@ class Gate:
         """What the ingest stage showed."""
         return self.workspace / "data" / "measured" / f"r{self.round}" / "summary.json"
 
+    @property
+    def subject(self) -> dict[str, Any]:
+        """What tells this gate's answers from others in the record."""
+        return {"round": self.round}
 
-@dataclass(frozen=True)
-class Author:
-    """Who answers, and how that is known."""
+    def seen(self) -> dict[str, Any]:
+        """What a person sees of what lies there now."""
+        return seen_of(self.summary)
 
-    by: str
-    """The name that was given: a claim."""
-    known_by: dict[str, Any] = field(default_factory=dict)
-    """{"how": "unix user", "user", "uid", "host"}, {"how": "automatic"}, or {"how": what else vouches for it}."""
-
-
-ITSELF = Author(AUTOMATIC, {"how": "automatic"})
-
-
-def unix_user(by: str) -> Author:
-    """Whoever runs this process; the name that they give stands beside it."""
-    uid = os.getuid()
-    try:
-        user = pwd.getpwuid(uid).pw_name
-    except KeyError:  # a container may run under a number without a name
-        user = str(uid)
-    return Author(by, {"how": "unix user", "user": user, "uid": uid, "host": socket.gethostname()})
+    def sha256(self) -> str:
+        """The hash of it."""
+        return file_hash(self.summary)
 
 
 def seen_of(summary: Path) -> dict[str, Any]:
     """What a person sees of an intake, with the hash that binds an answer to it."""
-    table = _read(summary)
+    table = read_object(summary)
     keys = ("accepted", "quarantined", "seconds")
     counts = {key: table.get(key) for key in keys}
     return {"sha256": file_hash(summary), **counts, "findings": table.get("by_rule", {})}
 
 
 def request(gate: Gate, automatic: bool = False, people: int = 1) -> dict[str, Any]:
-    """The request of a round with its answer, if one stands; else a new request, and the old answer is history.
-
-    An answer to another summary does not stand, nor does one that the loop gave itself unless it is `automatic` now,
-    nor an approval by fewer than `people`.
-    """
-    seen = seen_of(gate.summary)
+    """The request with its answer, if one stands (`gate_table.stands`); else a new one: the old answer is history."""
     old = read_approval(gate.approval) if gate.approval.exists() else None
-    if old and _stands(old, seen["sha256"], automatic, people):
+    if old and stands(old, gate.sha256(), automatic, people) and _recorded_alone(gate, old) is None:
         return old
     with _locked(gate.approval):
         return _asked(gate, automatic, people)
@@ -121,7 +136,7 @@ def settle(gate: Gate, automatic: bool, people: int = 1) -> dict[str, Any]:
     with _locked(gate.approval):
         table = _asked(gate, automatic, people)
         if automatic and table["status"] == "pending":
-            table = _with_answer(table, True, ITSELF, "")
+            table = with_answer(table, "approved", ITSELF, "", 1)
             _keep(gate, table)
         return table
 
@@ -135,128 +150,100 @@ def answer(
     change: bool = False,
     rule: GateConfig = GateConfig(),
 ) -> dict[str, Any]:
-    """Approve or reject what the request shows; who, when and what was seen are kept, earlier answers too.
+    """Approve or reject what the request shows; see `decide`."""
+    return decide(gate, "approve" if approve else "reject", author, seen, note, change, rule)
 
-    Where more people must approve than have, the request goes on waiting and keeps the approval.
+
+def decide(
+    gate: Gate,
+    verb: str,
+    author: Author,
+    seen: str,
+    note: str = "",
+    change: bool = False,
+    rule: GateConfig = GateConfig(),
+) -> dict[str, Any]:
+    """Answer what the request shows; who, when and what was seen are kept, earlier answers too.
+
+    Where more people must approve than have, the request goes on waiting and keeps the approval. It also waits on when
+    somebody asks for more; approvals from before that count no more.
 
     Args:
         gate: the round that is meant.
-        approve: whether it may go on.
+        verb: one of `ANSWERS`.
         author: who answers.
         seen: the hash of what that person saw, at least its first 12 digits.
-        note: why.
+        note: why; what is wanted, for `more`.
         change: whether to replace an answer that stands.
         rule: who may answer, and how many must.
 
     Raises:
         BadInput: for no name, another hash than what lies there now, an answer that stands already, an author who may
-            not answer or has approved before.
+            not answer or has approved before, or more of nothing.
     """
     if words.one_line(author.by) in ("", "NAME"):
         raise BadInput("--by", "the name of the person who answers", repr(author.by) if author.by else "no name")
+    if verb == "more" and not words.one_line(note):
+        raise BadInput("--note", "what is wanted", "nothing", "Say which rollouts are missing.")
     require_allowed(author.known_by, rule.people, rule.group)
     with _locked(gate.approval):
         old = read_approval(gate.approval)
-        if old["seen"].get("sha256") != file_hash(gate.summary):
+        if old["seen"].get("sha256") != gate.sha256():
             raise words.other_data(gate.workspace, old, seen)
         words.require_seen(gate.workspace, old, seen)
+        old = _caught_up(gate, old, rule.people)
         if old["status"] != "pending" and not change:
-            raise words.answered_already(gate.workspace, old, approve)
-        table = _with_answer(old, approve, author, note)
-        if approve and rule.people > 1:
-            table = _joined(old, table, rule.people)
+            raise words.answered_already(gate.workspace, old, verb)
+        table = with_answer(old, ANSWERS[verb], author, note, rule.people)
         _keep(gate, table)
         return table
 
 
 def verdict(gate: Gate, automatic: bool = False, people: int = 1) -> str:
-    """approved, rejected or pending; an answer that does not stand (see `request`) counts as pending."""
+    """approved, rejected, more or pending; an answer that does not stand (see `request`) counts as pending."""
     if not gate.approval.exists():
         return "pending"
     table = read_approval(gate.approval)
-    return str(table["status"]) if _stands(table, file_hash(gate.summary), automatic, people) else "pending"
-
-
-def read_approval(path: Path) -> dict[str, Any]:
-    """A request or answer, checked."""
-    table = _read(path)
-    if table.get("status") not in STATUSES:
-        raise BadInput(f"{path}: status", f"one of {', '.join(STATUSES)}", repr(table.get("status")))
-    if not isinstance(table.get("seen"), dict) or not isinstance(table.get("history"), list):
-        raise BadInput(path, "the keys seen and history", ", ".join(sorted(map(str, table))))
-    if type(table.get("round")) is not int:
-        raise BadInput(f"{path}: round", "the round's number", repr(table.get("round")))
-    if table["status"] != "pending" and not all(isinstance(table.get(key), str) for key in ("by", "at", "note")):
-        raise BadInput(path, "by, at and note of an answer", ", ".join(sorted(table)))
-    if not isinstance(table.get("known_by", {}), dict):
-        raise BadInput(f"{path}: known_by", "how the author was known", repr(table["known_by"]))
-    return table
-
-
-def is_automatic(table: dict[str, Any]) -> bool:
-    """Whether the loop gave this answer itself; answers of before `known_by` say so by their name."""
-    if "known_by" in table:
-        return bool(table["known_by"].get("how") == ITSELF.known_by["how"])
-    return bool(table.get("by") == AUTOMATIC)
-
-
-def write_json(path: Path, table: dict[str, Any]) -> None:
-    """Write JSON whole or not at all."""
-    write_file(Path(path), json.dumps(table, indent=1, ensure_ascii=False) + "\n")
-
-
-def _stands(table: dict[str, Any], sha256: str, automatic: bool, people: int) -> bool:
-    """Whether a request or answer holds for what lies there now, as the gates are answered now."""
-    enough = people == 1 or table["status"] != "approved" or len(approvers(table)) >= people
-    return table["seen"].get("sha256") == sha256 and (automatic or not is_automatic(table)) and enough
+    return str(table["status"]) if stands(table, gate.sha256(), automatic, people) else "pending"
 
 
 def _asked(gate: Gate, automatic: bool, people: int) -> dict[str, Any]:
     """The request that stands, or a new one, written; the lock is held."""
-    seen = seen_of(gate.summary)
     old = read_approval(gate.approval) if gate.approval.exists() else None
-    if old and _stands(old, seen["sha256"], automatic, people):
+    if old is not None:
+        old = _caught_up(gate, old, people)
+    seen = gate.seen()
+    if old and stands(old, seen["sha256"], automatic, people):
         return old
-    table = {"round": gate.round, "status": "pending", "seen": seen, "history": _history(old)}
+    table = {**gate.subject, "status": "pending", "seen": seen, "history": history(old)}
     write_json(gate.approval, table)
     return table
 
 
-def _with_answer(old: dict[str, Any], approve: bool, author: Author, note: str) -> dict[str, Any]:
-    at = datetime.now(UTC).isoformat(timespec="seconds")
-    return {
-        **{"round": old["round"], "status": "approved" if approve else "rejected"},
-        **{"by": words.one_line(author.by)[:LONGEST], "known_by": author.known_by, "at": at},
-        **{"note": words.one_line(note)[:LONGEST], "seen": old["seen"], "history": _history(old)},
-    }
+def _caught_up(gate: Gate, old: dict[str, Any], people: int) -> dict[str, Any]:
+    """The table with an answer that stands in the record alone, since a kill came after that; the lock is held."""
+    left = _recorded_alone(gate, old)
+    if left is None:
+        return old
+    table = joined(old, left, people)
+    write_json(gate.approval, table)
+    return table
 
 
-def _joined(old: dict[str, Any], table: dict[str, Any], people: int) -> dict[str, Any]:
-    """An approval with those of before: the answer where they are enough, a request that waits on where not."""
-    earlier = [] if old["status"] != "pending" else old.get("approvals", [])
-    who = login_of(table)
-    if any(login_of(one) == who for one in earlier):
-        raise BadInput(f"round {table['round']}", f"approvals by {people} people", f"a second one by {who}")
-    own = {key: table[key] for key in ("status", "by", "known_by", "at", "note")}
-    if len(earlier) + 1 < people:
-        kept = {key: table[key] for key in ("round", "seen", "history")}
-        return kept | {"status": "pending", "approvals": [*earlier, own], "people": people}
-    return table | {"approvals": earlier}
+def _recorded_alone(gate: Gate, old: dict[str, Any]) -> dict[str, Any] | None:
+    """The record's last answer to what the table shows, where the table does not have it."""
+    entry = gate_record.last(gate.approval.parent, gate.subject)
+    if entry is None or entry["seen"].get("sha256") != old["seen"].get("sha256") or holds(old, entry):
+        return None
+    return {key: entry[key] for key in OF_ANSWER}
 
 
 def _keep(gate: Gate, table: dict[str, Any]) -> None:
     """Write a table that somebody has answered; the answer stands in the record, too, with what it answers."""
     last = table if table["status"] != "pending" else {**table, **table["approvals"][-1]}
-    entry = {key: last[key] for key in ("round", "status", "by", "known_by", "at", "note", "seen")}
+    entry = {key: last[key] for key in (*gate.subject, *OF_ANSWER, "seen")}
     gate_record.append(gate.approval.parent, entry)
     write_json(gate.approval, table)
-
-
-def _history(old: dict[str, Any] | None) -> list[dict[str, Any]]:
-    """All earlier answers, the last one last; a request without an answer leaves none."""
-    if old is None or old["status"] == "pending":
-        return old["history"] if old else []
-    return [*old["history"], {key: value for key, value in old.items() if key != "history"}]
 
 
 @contextmanager
@@ -273,12 +260,3 @@ def _locked(path: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
-
-
-def _read(path: Path) -> dict[str, Any]:
-    if not Path(path).exists():
-        raise BadInput(path, "a file that the ingest stage writes", "no such file", "Run the ingest stage.")
-    table = read_json(path, SUMMARY_LIMITS)
-    if not isinstance(table, dict):
-        raise BadInput(path, "a JSON object", type(table).__name__)
-    return table

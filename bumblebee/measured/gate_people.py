@@ -1,14 +1,47 @@
-"""Who may answer a gate, and how many people have."""
+"""Who answers a gate, who may, and how many people have."""
 
 import grp
 import os
 import pwd
+import socket
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from bumblebee.errors import BadInput
 
-TERMINAL = "Answer in a terminal: `bumblebee gate approve` or `reject` knows who runs it."
+TERMINAL = "Answer in a terminal: `bumblebee gate approve`, `reject` or `more` knows who runs it."
+AUTOMATIC = "automatic (gate.mode: auto)"
+
+
+@dataclass(frozen=True)
+class Author:
+    """Who answers, and how that is known."""
+
+    by: str
+    """The name that was given: a claim."""
+    known_by: dict[str, Any] = field(default_factory=dict)
+    """{"how": "unix user", "user", "uid", "host"}, {"how": "automatic"}, or {"how": what else vouches for it}."""
+
+
+ITSELF = Author(AUTOMATIC, {"how": "automatic"})
+
+
+def unix_user(by: str) -> Author:
+    """Whoever runs this process; the name that they give stands beside it."""
+    uid = os.getuid()
+    try:
+        user = pwd.getpwuid(uid).pw_name
+    except KeyError:  # a container may run under a number without a name
+        user = str(uid)
+    return Author(by, {"how": "unix user", "user": user, "uid": uid, "host": socket.gethostname()})
+
+
+def is_automatic(answer: Mapping[str, Any]) -> bool:
+    """Whether the loop gave this answer itself; answers of before `known_by` say so by their name."""
+    if "known_by" in answer:
+        return bool(answer["known_by"].get("how") == ITSELF.known_by["how"])
+    return bool(answer.get("by") == AUTOMATIC)
 
 
 def login_of(answer: Mapping[str, Any]) -> str | None:

@@ -1,11 +1,14 @@
 """Everything that was answered at gates, line by line: each line holds the hash of the one before it.
 
-Lines are only ever added. Who changes or removes an earlier one breaks the chain, and `check` says where.
+Lines are only ever added. Who changes or removes an earlier one breaks the chain, and `check` says where. One process
+at a time adds a line, whichever gate it answers: the file itself is locked.
 """
 
+import fcntl
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +20,24 @@ START = "0" * 64
 
 
 def append(folder: Path, entry: dict[str, Any]) -> None:
-    """Add an entry; the gates' lock is held.
+    """Add an entry.
 
     Raises:
         BadInput: if the disk does not take it, or the record is broken.
     """
     path = Path(folder) / NAME
-    lines = check(folder)
-    row = json.dumps({"before": lines[-1]["sha256"] if lines else START, "answer": entry}, ensure_ascii=False)
-    whole = json.dumps({"sha256": _hash(row), "row": row}, ensure_ascii=False) + "\n"
     try:
-        with path.open("a", encoding="utf-8") as file:
-            file.write(whole)
+        with path.open("a+b") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            file.seek(0)
+            text = file.read()
+            whole = text[: text.rfind(b"\n") + 1]
+            lines = _entries(whole, path)
+            if whole != text:
+                file.truncate(len(whole))
+            row = json.dumps({"before": lines[-1]["sha256"] if lines else START, "answer": entry}, ensure_ascii=False)
+            added = json.dumps({"sha256": _hash(row), "row": row}, ensure_ascii=False) + "\n"
+            file.write(added.encode())
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
@@ -44,12 +53,42 @@ def check(folder: Path) -> list[dict[str, Any]]:
     path = Path(folder) / NAME
     if not path.exists():
         return []
-    text = path.read_text(encoding="utf-8")
-    whole = text[: text.rfind("\n") + 1]
+    text = _read(path)
+    whole = text[: text.rfind(b"\n") + 1]
     if whole != text:
-        path.write_text(whole, encoding="utf-8")
-    found, before = [], START
-    for number, line in enumerate(whole.splitlines(), 1):
+        with path.open("r+b") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            text = file.read()  # whoever was writing has done so
+            whole = text[: text.rfind(b"\n") + 1]
+            file.truncate(len(whole))
+    return _entries(whole, path)
+
+
+def last(folder: Path, subject: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The last answer to a gate, as far as the record is what was written."""
+    path = Path(folder) / NAME
+    if not path.exists():
+        return None
+    text = _read(path)
+    try:
+        entries = _entries(text[: text.rfind(b"\n") + 1], path)
+    except BadInput:
+        return None  # `check` names it, and nothing is added to it
+    about = (one["answer"] for one in reversed(entries))
+    return next((one for one in about if all(one.get(key) == value for key, value in subject.items())), None)
+
+
+def _read(path: Path) -> bytes:
+    with path.open("rb") as file:
+        fcntl.flock(file, fcntl.LOCK_SH)
+        return file.read()
+
+
+def _entries(text: bytes, path: Path) -> list[dict[str, Any]]:
+    """The chain's entries, up to the first line that breaks it."""
+    found: list[dict[str, Any]] = []
+    before = START
+    for number, line in enumerate(text.split(b"\n")[:-1], 1):
         try:
             outer = json.loads(line)
             row = json.loads(outer["row"])

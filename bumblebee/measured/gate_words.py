@@ -21,10 +21,11 @@ def show_command(workspace: Path, round: int) -> str:
     return f"{_python('tasks.gate', workspace)} --round {round} --show"
 
 
-def answer_command(workspace: Path, table: dict[str, Any], approve: bool) -> str:
-    """Answers what the request shows and nothing else; NAME is to be filled in."""
-    verb = "approve" if approve else "reject"
-    return f"{_python('flows.gate_answer', workspace, verb)} --round {table['round']} --seen {short(table)} --by NAME"
+def answer_command(workspace: Path, table: dict[str, Any], verb: str) -> str:
+    """Answers what the request shows and nothing else; NAME is to be filled in, and WHAT for `more`."""
+    wanted = " --note WHAT" if verb == "more" else ""
+    command = _python("flows.gate_answer", workspace, verb)
+    return f"{command} --round {table['round']} --seen {short(table)}{wanted} --by NAME"
 
 
 def _python(module: str, workspace: Path, *more: str) -> str:
@@ -34,12 +35,23 @@ def _python(module: str, workspace: Path, *more: str) -> str:
     return shlex.join(parts)
 
 
+def title(table: dict[str, Any]) -> str:
+    """What is asked about, as a sentence begins."""
+    return f"round {table['round']}"
+
+
 def how_to_answer(workspace: Path, table: dict[str, Any]) -> str:
     """The one line that tells a person what to do."""
+    look = f"look with `{show_command(workspace, table['round'])}`"
+    answer = f"`{answer_command(workspace, table, 'approve')}"
+    if table["status"] == "more":
+        return (
+            f"{title(table)} waits for more than {what(table)}: {said(table)}; to go on add rollouts and start again: "
+            f"changed data are asked about anew; or {look}, and answer all the same with {answer} --change`"
+        )
     return (
-        f"round {table['round']} waits for an answer about {what(table)}{so_far(table)}: "
-        f"look with `{show_command(workspace, table['round'])}`, "
-        f"then answer with `{answer_command(workspace, table, True)}`, or `reject` in place of `approve`"
+        f"{title(table)} waits for an answer about {what(table)}{so_far(table)}: {look}, then answer with {answer}`, "
+        f"or `reject` in place of `approve`, or `more --note WHAT` to ask for more rollouts"
     )
 
 
@@ -69,7 +81,8 @@ def said(table: dict[str, Any]) -> str:
         return f"{table['status']}{so_far(table)}"
     note = f": {table['note']}" if table.get("note") else ""
     first = "".join(f"{one['by']} ({known(one)}) and " for one in table.get("approvals", []))
-    return one_line(f"{table['status']} by {first}{table['by']} ({known(table)}) at {table['at']}{note}")
+    status = "more asked for" if table["status"] == "more" else table["status"]
+    return one_line(f"{status} by {first}{table['by']} ({known(table)}) at {table['at']}{note}")
 
 
 def one_line(text: str) -> str:
@@ -90,12 +103,12 @@ def require_seen(workspace: Path, table: dict[str, Any], seen: str) -> None:
 
 def other_data(workspace: Path, table: dict[str, Any], seen: str) -> BadInput:
     """The line for an answer to something else than what lies there now."""
-    expected = f"{short(table)}, what round {table['round']} of {Path(workspace).resolve()} shows now"
+    expected = f"{short(table)}, what {title(table)} of {Path(workspace).resolve()} shows now"
     look = f"Look again with `{show_command(workspace, table['round'])}`."
     return BadInput("--seen", expected, repr(seen), look)
 
 
-def answered_already(workspace: Path, table: dict[str, Any], approve: bool) -> BadInput:
+def answered_already(workspace: Path, table: dict[str, Any], verb: str) -> BadInput:
     """The line for an answer where another stands."""
-    change = f"To change it: `{answer_command(workspace, table, approve)} --change`."
-    return BadInput(f"round {table['round']}", "no answer yet", f"one that was already {said(table)}", change)
+    change = f"To change it: `{answer_command(workspace, table, verb)} --change`."
+    return BadInput(title(table), "no answer yet", f"one that was already {said(table)}", change)

@@ -76,7 +76,8 @@ def _asked(summary: dict[str, Any], sha256: str) -> str:
         return "<div class=ask><p><b>No file can be used: there is nothing to approve.</b></p></div>"
     text = (
         "<p>Approve, and the diagnosis corrects the simulator with the accepted files. "
-        "Reject, and the round stops here. Files that were set aside are not used either way.</p>"
+        "Reject, and the round stops here. More, and it waits for more rollouts. "
+        "Files that were set aside are not used either way.</p>"
     )
     if not sha256:
         return f"<div class=ask>{text}</div>"
@@ -88,6 +89,7 @@ def _asked(summary: dict[str, Any], sha256: str) -> str:
         "or in the workspace's folder:</p>"
         f"<pre>python -m flows.gate_answer approve {command}</pre>"
         f"<pre>python -m flows.gate_answer reject {command}</pre>"
+        f"<pre>python -m flows.gate_answer more {command} --note WHAT</pre>"
         f"<p class=note>Whole commands, for any folder: <code>python -m tasks.gate --round {int(summary['round'])} "
         f"--show</code>. SHA-256 of summary.json: {sha256}</p></div>"
     )

@@ -75,3 +75,18 @@ def test_the_librarys_command_line_finds_it(place: gate.Gate) -> None:
     assert done.returncode == 0 and "pending" in done.stdout
     done = subprocess.run([str(program), "gate", "list"], cwd="/", capture_output=True, text=True, check=False)
     assert done.returncode == 2 and done.stderr.count("\n") == 1
+
+
+def test_more_is_asked_for_listed_and_shown(place: gate.Gate) -> None:
+    seen = gate.seen_of(place.summary)["sha256"][:12]
+    with pytest.raises(BadInput, match="--note: expected what is wanted"):
+        typed(place, "more", "1", "--seen", seen)
+    said = typed(place, "more", "1", "--seen", seen, "--note", "ten more walks")
+    me = getpass.getuser()
+    assert f"more asked for by {me} (unix user {me}" in said and "add rollouts and start the loop again" in said
+    listed = " ".join(typed(place, "list").split())
+    assert "more asked for" in listed and "answers in the record: 1" in listed
+    shown = typed(place, "show", "1")
+    assert "ten more walks" in shown and "to go on: add rollouts" in shown and "--change" in shown
+    with pytest.raises(BadInput, match="more asked for by"):
+        typed(place, "approve", "1", "--seen", seen)

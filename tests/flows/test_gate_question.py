@@ -36,9 +36,9 @@ class Page:
         self.shown[key] = wait_for_input._description
         raise Suspended(key)
 
-    def answer(self, answer: str, by: str, seen: str) -> None:
+    def answer(self, answer: str, by: str, seen: str, note: str = "") -> None:
         """To the last question."""
-        self.given[list(self.shown)[-1]] = {"answer": answer, "by": by, "seen": seen}
+        self.given[list(self.shown)[-1]] = {"answer": answer, "by": by, "seen": seen, "note": note}
 
 
 @pytest.fixture
@@ -171,3 +171,51 @@ def test_where_two_must_approve_the_page_says_so_and_its_answer_is_not_taken(
     page.answer("approve", "bob", seen[:12])  # as the terminal resumes the run
     assert gate_question.hold(place.workspace, STAGE) is None
     assert gate.verdict(place, people=2) == "approved" and "too late" not in caplog.text
+
+
+def test_more_asked_for_on_the_page_ends_the_run_waiting_until_other_data_come(place: gate.Gate, page: Page) -> None:
+    ask(place)
+    seen = gate.seen_of(place.summary)["sha256"][:12]
+    page.answer("more", "Ada", seen, note="the wet floor")
+    for _ in range(2):  # and so does each run that starts without them
+        told = gate_question.hold(place.workspace, STAGE)
+        assert (
+            told is not None and "more asked for by Ada" in told and "the wet floor" in told and "add rollouts" in told
+        )
+    assert gate.verdict(place) == "more" and len(page.shown) == 1
+    come_in(place, 9)
+    ask(place)
+    assert gate.verdict(place) == "pending" and len(page.shown) == 2
+
+
+def test_more_without_a_note_is_not_taken_on_the_page(
+    place: gate.Gate, page: Page, caplog: pytest.LogCaptureFixture
+) -> None:
+    ask(place)
+    page.answer("more", "Ada", gate.seen_of(place.summary)["sha256"][:12])
+    ask(place)
+    assert gate.verdict(place) == "pending" and "expected what is wanted" in caplog.text
+
+
+def test_more_asked_for_in_a_terminal_ends_the_suspended_run_so(
+    place: gate.Gate, page: Page, caplog: pytest.LogCaptureFixture
+) -> None:
+    ask(place)
+    seen = gate.seen_of(place.summary)["sha256"]
+    gate.decide(place, "more", gate.unix_user("Bob"), seen, "the wet floor")
+    page.answer("more", "Bob", seen[:12], note="the wet floor")  # as the terminal resumes the run
+    told = gate_question.hold(place.workspace, STAGE)
+    assert told is not None and "more asked for by Bob" in told and "too late" not in caplog.text
+
+
+def test_a_gate_that_answers_itself_does_not_overrule_who_asked_for_more(place: gate.Gate, page: Page) -> None:
+    gate.decide(place, "more", gate.unix_user("Bob"), gate.request(place)["seen"]["sha256"], "the wet floor")
+    (place.workspace / "params.yaml").write_text("gate: {mode: auto}\n")
+    assert "more asked for by Bob" in str(gate_question.hold(place.workspace, STAGE))
+
+
+def test_the_page_says_who_asked_for_more(place: gate.Gate) -> None:
+    gate.decide(place, "more", gate.unix_user("Bob"), gate.request(place)["seen"]["sha256"], EVIL)
+    text = gate_page.page(gate.request(place), place)
+    assert "**more asked for by Bob" in text and "Add rollouts" in text and " more --workspace " in text
+    assert "<script" not in text and "[click]" not in text

@@ -20,8 +20,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
+from bumblebee.measured import gate
 from bumblebee.measured.intake import FINDING_COLUMNS
 from flows import login, runs, servers
+from flows.loop import WAITING
 from flows.servers import Addresses
 
 if TYPE_CHECKING:
@@ -262,6 +264,23 @@ def test_a_person_logs_in_watches_a_run_and_answers_its_gate_on_prefects_page(se
     assert (answer["status"], answer["by"]) == ("approved", "Ada")
     assert answer["known_by"]["how"].startswith("Prefect's page")
     assert (served.folder / "g.txt").exists()
+
+
+def test_more_asked_for_on_prefects_page_ends_the_run_waiting_and_other_data_are_asked_about_anew(served: Served):
+    """By the call that the page makes."""
+    place = gate.Gate(served.folder, 1)
+    summary = json.loads(place.summary.read_text())
+    for accepted in (5, 9):
+        place.summary.write_text(json.dumps(summary | {"accepted": accepted}))
+        seen = gate.request(place)["seen"]["sha256"][:12]
+        run = served.start()
+        served.until(run["id"], "Suspended")
+        given = {"answer": "more" if accepted == 5 else "approve", "by": "Ada", "seen": seen, "note": "the wet floor"}
+        assert served.ask(f"flow_runs/{run['id']}/resume", run_input=given)["status"] == "ACCEPT"
+        ended = served.until(run["id"], WAITING, "Completed")
+        assert ended["name"] == (WAITING if accepted == 5 else "Completed")
+    answer = gate.read_approval(place.approval)
+    assert (answer["status"], answer["history"][-1]["status"]) == ("approved", "more")
 
 
 @pytest.mark.browser

@@ -101,6 +101,26 @@ def test_a_rejected_round_stops_and_says_who_and_why(workspace: Setup, capsys: p
     assert not Path("data/gates/round-1.json").exists()
 
 
+def test_a_round_of_which_more_is_wanted_waits_until_more_has_come(
+    workspace: Setup, capsys: pytest.CaptureFixture[str]
+) -> None:
+    workspace()
+    ingest.main(1)
+    assert answer("more", "Ann", "--note", "the wet floor") == 0
+    capsys.readouterr()
+    for _ in range(2):
+        assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_PENDING
+        line = capsys.readouterr().err
+        assert line.count("\n") == 1 and "more asked for by Ann" in line and "the wet floor" in line
+        ingest.main(1)  # the same data
+        capsys.readouterr()
+    workspace(seed=4)
+    ingest.main(1)
+    assert answer("approve", "Ann") == 0
+    gate_task.main(1)
+    assert Path("data/gates/round-1.json").exists()
+
+
 def test_other_data_need_another_answer(workspace: Setup, capsys: pytest.CaptureFixture[str]) -> None:
     workspace()
     ingest.main(1)
