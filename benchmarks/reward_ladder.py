@@ -73,14 +73,14 @@ def arms() -> dict[str, Arm]:
     }
 
 
-def train(folder: Path, arm: Arm, clips: list[Clip], steps: float) -> None:
+def train(folder: Path, arm: Arm, clips: list[Clip], steps: float, seed: int) -> None:
     """Train into `folder`, or go on."""
     task = EnvConfig(threads=1, reward=arm.rewards)
     engine = make_engine(task.engine, task_model(task), task.num_worlds, 1)
-    env = TrackingEnv(MotionLibrary(clips, task.ahead), engine, task, seed=0)
+    env = TrackingEnv(MotionLibrary(clips, task.ahead), engine, task, seed=seed)
     ppo = replace(PpoConfig(), initial_std=arm.std)
     ppo = replace(ppo, iterations=math.ceil(steps / (task.num_worlds * ppo.steps)))
-    trainer = Trainer(env, ppo, folder, 0, None)
+    trainer = Trainer(env, ppo, folder, seed, None)
     trainer.train(folder.name)
     trainer.policy().save(folder)
 
@@ -127,6 +127,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--steps", type=float, default=1.8e6, help="control steps of each arm")
+    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", nargs="*", choices=list(arms()), default=list(arms()))
     options = parser.parse_args()
     torch.set_num_threads(1)
@@ -137,7 +138,7 @@ def main() -> None:
             if (folder / TRIALS).exists():
                 continue
             folder.mkdir(parents=True, exist_ok=True)
-            train(folder, arms()[name], [clip for clip in clips if clip.split == "train"], options.steps)
+            train(folder, arms()[name], [clip for clip in clips if clip.split == "train"], options.steps, options.seed)
             policy = load_policy(folder)
             trials = follow(policy, Manner(policy.shape.seen), clips, task_model(EnvConfig()))
             trials.to_csv(folder / TRIALS, index=False)
