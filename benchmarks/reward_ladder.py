@@ -9,13 +9,14 @@ actions' first deviation) differs. Beside what was learnt stands what the refere
 
 import argparse
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 import torch
 
 from benchmarks.motion_pack import EMBEDDED_SHARE
+from benchmarks.reward_arms import Arm, arms
 from benchmarks.study.printed_rewards import earned, on_reference
 from bumblebee.baselines.trial import Manner, follow
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
@@ -28,49 +29,12 @@ from bumblebee.motion.embedded import make_library
 from bumblebee.motion.filter import filter_clips
 from bumblebee.motion.pieces import hold_out
 from bumblebee.sim.engine_choice import make_engine
-from bumblebee.tracking.config import EnvConfig, RewardConfig
+from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
-from bumblebee.tracking.rewards import DEMO_SHARPNESS, DEMO_WEIGHTS
 
 TRIALS = "trials.csv"
-
-
-@dataclass(frozen=True)
-class Arm:
-    """A reward and the actions' first deviation."""
-
-    told: str
-    rewards: RewardConfig
-    std: float = 0.2
-
-
-def arms() -> dict[str, Arm]:
-    """Each with all changes of those before it, ours the last."""
-    printed = RewardConfig(preset="paper")
-    ramped = replace(printed, ramp_start=0.05, ramp_share=0.5)
-    steps = (
-        ("actions", "action terms a hundredth", ("action_rate", "action_smoothness"), 0.01),
-        ("limits", "limits as ours", ("torque_limits", "dof_position_limits", "dof_velocity_limits"), None),
-        ("feet", "feet as ours", ("feet_orientation",), None),
-    )
-    out = {
-        "printed": Arm("as printed", printed, 1.0),
-        "ramped": Arm("first deviation .2, penalties from .05 up over half of the training", ramped),
-        "floor": Arm("the same, a step earns at least 0", replace(ramped, floor=0.0)),
-    }
-    weights: dict[str, float] = {}
-    for name, told, terms, factor in steps:
-        weights |= {t: -2.0 * factor if factor else DEMO_WEIGHTS[t] for t in terms}
-        out[name] = Arm(
-            f"ramped, {told}" if name == "actions" else f"and {told}", replace(ramped, weights=dict(weights))
-        )
-    gentle = replace(ramped, weights=dict(weights), sharpness=dict(DEMO_SHARPNESS))
-    return out | {
-        "kernels": Arm("and kernels as ours", gentle),
-        "ours": Arm("ours", RewardConfig(), PpoConfig().initial_std),
-    }
 
 
 def train(folder: Path, arm: Arm, clips: list[Clip], steps: float, seed: int) -> None:

@@ -67,6 +67,12 @@ PAPER_ARMS = {
     "three-adaptive": "all three but the rate",
     "reference": "all three, action around the reference",
     "floor": "all three, a step earns at least 0",
+    "actions": "all three, action terms a hundredth",
+    "limits": "and limits as ours",
+    "feet": "and feet as ours",
+    "kernels": "and kernels as ours",
+    "ours": "all three, our rewards",
+    "ours-reference": "all three, our rewards, action around the reference",
 }
 """Arms of the part `paper-task`, by name of their settings; `settings.PAPER_CHANGES` has what they change."""
 

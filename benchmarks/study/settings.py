@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from benchmarks.baselines.methods import OURS
+from benchmarks.reward_arms import arms
 from bumblebee.errors import BadInput
 from bumblebee.io.write import new_folder
 from bumblebee.learning.config import PAPER, PpoConfig
@@ -90,8 +91,14 @@ PAPER_CHANGES: dict[str, tuple[str, ...]] = {
     "three-adaptive": ("std", "ramp"),
     "reference": ("std", "ramp", "adaptive", "reference"),
     "floor": ("std", "ramp", "adaptive", "floor"),
+    "actions": ("std", "ramp", "adaptive", "actions"),
+    "limits": ("std", "ramp", "adaptive", "limits"),
+    "feet": ("std", "ramp", "adaptive", "feet"),
+    "kernels": ("std", "ramp", "adaptive", "kernels"),
+    "ours": ("std", "ramp", "adaptive", "ours"),
+    "ours-reference": ("std", "ramp", "adaptive", "ours", "reference"),
 }
-"""Deviations of each arm of the part `paper-task` from what the paper prints."""
+"""What each arm of the part `paper-task` changes of the printed task; rewards are in `benchmarks/reward_arms.py`."""
 
 
 PROPRIOCEPTION = ("gravity_b", "root_ang_vel_b", "joint_pos", "joint_vel", "last_action")
@@ -166,6 +173,8 @@ def _deviated(env: EnvConfig, ppo: PpoConfig, change: str) -> tuple[EnvConfig, P
         return env, replace(ppo, schedule="adaptive", desired_kl=0.015, desired_kl_end=0.01, **rates)
     if change == "reference":
         return replace(env, action="reference"), ppo
+    if change not in ("ramp", "floor"):
+        return replace(env, reward=arms()[change].rewards), ppo
     ramp = {"ramp_start": 0.05, "ramp_share": 0.5} if change == "ramp" else {"floor": 0.0}
     return replace(env, reward=replace(env.reward, **ramp)), ppo
 

@@ -3,7 +3,8 @@
 import pandas as pd
 import pytest
 
-from benchmarks.reward_ladder import arms, worth
+from benchmarks.reward_arms import arms
+from benchmarks.reward_ladder import worth
 from benchmarks.study.printed_rewards import PHYSICS_HZ, PRINTED, by_policy, earned, on_reference
 from bumblebee.baselines.trial import Manner
 from bumblebee.learning import pretrained
