@@ -91,6 +91,7 @@ SURVIVORS = {
     "place-history": "own place, seeing it alone, ten steps",
     "judged": "judged in its own place",
     "default": "actions around the stand",
+    "place-loose": "own place, seeing it alone, .8 m throughout",
 }
 """Arms of the part `robust`, by name of their settings; `settings.ROBUST_CHANGES` has what they change."""
 

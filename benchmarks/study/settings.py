@@ -121,6 +121,7 @@ ROBUST_CHANGES: dict[str, tuple[str, ...]] = {
     "wide": ("wide",),
     "place-history": ("own", "blind", "history"),
     "default": ("default",),
+    "place-loose": ("own", "blind", "loose"),
 }
 """Changes of the base policy's task in each arm of the part `robust`."""
 
