@@ -75,7 +75,7 @@ def errand(workspace: Path, name: str) -> Errand:
         stays = f"it reads {outside[0]}"
     elif not stays and parcel.size(workspace, inputs) > parcel.LIMIT:
         stays = "its inputs are large and lie here"
-    if name.partition("@")[0] == "gate":
+    if name.partition("@")[0] in ("gate", "publish"):
         stays = "its answers are kept here"
     return Errand(name, before, inputs, tuple(sections), stays)
 

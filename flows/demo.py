@@ -164,7 +164,9 @@ def summarise(folder: Path) -> None:
     if published.exists():
         models = json.loads(published.read_text())["models"]
         for name, facts in models.items():
-            print(f"  models:/{name}@champion  version {facts['champion']}")
+            version = facts["champion"] or "none yet"
+            waits = f"; {facts['proposal']['version']} is proposed: bumblebee gate show {name}"
+            print(f"  models:/{name}@champion  version {version}{waits if 'proposal' in facts else ''}")
     report = folder / paths.REPORT
     if report.exists():
         print(f"report: {shown(report)}")

@@ -42,7 +42,7 @@ def given(place: gate.Gate, verb: str, author: gate.Author, seen: str, note: str
     addresses = servers.running(place.workspace)
     resumed = addresses and resume(place.workspace, addresses.prefect, table)
     if table["status"] == "more":
-        print("to go on add rollouts and start the loop again (or `dvc repro`): changed data are asked about anew")
+        print(f"to go on {words.go_on(table)}")
     elif not resumed:
         print("start the loop again (or `dvc repro`): it goes on from here")
 

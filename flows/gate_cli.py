@@ -3,15 +3,17 @@
 The library's command line finds it as a plug-in (entry point `bumblebee.commands`), since it knows nothing of flows.
 """
 
+import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-app = typer.Typer(help="Answer what the loop asks people: may it learn from a round's logs?", no_args_is_help=True)
+HELP = "Answer what the loop asks people: may it learn from a round's logs, may a version become champion?"
+app = typer.Typer(help=HELP, no_args_is_help=True)
 
 Workspace = Annotated[Path, typer.Option("--workspace", help="Folder with params.yaml; by default this one.")]
-Round = Annotated[int, typer.Argument(min=1, help="The round that is meant.")]
+What = Annotated[str, typer.Argument(help="The number of a round, or a model's name for its promotion.")]
 Seen = Annotated[str, typer.Option("--seen", help="The hash that `show` printed: the answer holds for nothing else.")]
 Note = Annotated[str, typer.Option("--note", help="Why.")]
 By = Annotated[str, typer.Option("--by", help="Your name, beside your login; by default the login.")]
@@ -20,87 +22,112 @@ Change = Annotated[bool, typer.Option("--change", help="Replace an answer that s
 
 @app.command("list")
 def list_gates(workspace: Workspace = Path()) -> None:
-    """Every round that has come in: what stands, who answered, and whether the record of all answers is whole."""
+    """Every round and every proposed version: what stands, who answered, and whether the record is whole."""
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
     from bumblebee.measured import gate, gate_record
     from bumblebee.measured import gate_words as words
+    from tasks import promotion_answer
     from tasks.gate import asked
+    from tasks.promotion_gate import questions
 
     folder = _folder(workspace)
-    grid = Table("round", "hash", "what came", "answer")
+    grid = Table("what", "hash", "what came", "answer")
     for path in sorted((folder / "data" / "measured").glob("r*/summary.json"), key=lambda path: _number(path)):
         table = asked(gate.Gate(folder, _number(path)))
         seen = table["seen"]
         came = f"{seen['accepted']} files, {seen['quarantined']} set aside"
         grid.add_row(str(table["round"]), words.short(table), came, escape(words.said(table)))
+    for place in questions(folder):
+        table = promotion_answer.asked(place)
+        grid.add_row(place.model, words.short(table), escape(words.what(table)), escape(words.said(table)))
     Console().print(grid if grid.row_count else "no round has come in")
     print(f"answers in the record: {len(gate_record.check(folder / 'data' / 'approvals'))}, unchanged since")
 
 
 @app.command()
-def show(round: Round, workspace: Workspace = Path()) -> None:
-    """What came in a round, where its plots are, and the commands that answer."""
+def show(what: What, workspace: Workspace = Path()) -> None:
+    """What came in a round, or what a version can; where its plots are, and the commands that answer."""
     from bumblebee.measured import gate
-    from tasks.gate import asked
-    from tasks.gate import show as shown
+    from tasks import gate as rounds
+    from tasks import promotion_answer
 
-    place = gate.Gate(_folder(workspace), round)
-    shown(asked(place), place)
+    place = _place(what, workspace)
+    if isinstance(place, gate.Gate):
+        rounds.show(rounds.asked(place), place)
+    else:
+        promotion_answer.show(promotion_answer.asked(place), place)
 
 
 @app.command()
 def approve(
-    round: Round,
+    what: What,
     seen: Seen = "",
     by: By = "",
     note: Note = "",
     change: Change = False,
     workspace: Workspace = Path(),
 ) -> None:
-    """Let the round go on."""
-    _answer("approve", round, seen, by, note, change, workspace)
+    """Let the round go on, or the version become champion."""
+    _answer("approve", what, seen, by, note, change, workspace)
 
 
 @app.command()
 def reject(
-    round: Round,
+    what: What,
     seen: Seen = "",
     by: By = "",
     note: Note = "",
     change: Change = False,
     workspace: Workspace = Path(),
 ) -> None:
-    """Stop the round; say why."""
+    """Stop the round, or leave the champion as it is; say why."""
     from bumblebee.errors import BadInput
 
     if not note.strip():
-        raise BadInput("--note", "why the round is rejected", "nothing", "Say what is wrong with its logs.")
-    _answer("reject", round, seen, by, note, change, workspace)
+        raise BadInput("--note", "why it is rejected", "nothing", "Say what is wrong with it.")
+    _answer("reject", what, seen, by, note, change, workspace)
 
 
 @app.command()
 def more(
-    round: Round,
+    what: What,
     seen: Seen = "",
     by: By = "",
     note: Note = "",
     change: Change = False,
     workspace: Workspace = Path(),
 ) -> None:
-    """Ask for more rollouts before anybody judges the round; --note says which."""
-    _answer("more", round, seen, by, note, change, workspace)
+    """Ask for more before anybody judges: rollouts of a round, trials of a version; --note says which."""
+    _answer("more", what, seen, by, note, change, workspace)
 
 
-def _answer(verb: str, round: int, seen: str, by: str, note: str, change: bool, workspace: Path) -> None:
+def _answer(verb: str, what: str, seen: str, by: str, note: str, change: bool, workspace: Path) -> None:
     from bumblebee.measured import gate
     from flows.gate_answer import given
+    from tasks import promotion_answer
 
     who = gate.unix_user(by)
     author = who if by else gate.Author(str(who.known_by["user"]), who.known_by)
-    given(gate.Gate(_folder(workspace), round), verb, author, seen, note, change)
+    place = _place(what, workspace)
+    answer = given if isinstance(place, gate.Gate) else promotion_answer.given
+    answer(place, verb, author, seen, note, change)
+
+
+def _place(what: str, workspace: Path) -> Any:
+    """A round's gate, or a model's promotion."""
+    from bumblebee.errors import BadInput
+    from bumblebee.measured import gate
+    from tasks.promotion_gate import Promotion
+
+    folder = _folder(workspace)
+    if re.fullmatch(r"[1-9][0-9]{0,8}", what):
+        return gate.Gate(folder, int(what))
+    if not re.fullmatch(r"[a-z][a-z0-9_-]*", what, re.IGNORECASE):
+        raise BadInput("what is answered", "the number of a round, or a model's name", repr(what))
+    return Promotion(folder, what)
 
 
 def _folder(workspace: Path) -> Path:

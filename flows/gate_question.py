@@ -39,8 +39,10 @@ def hold(folder: Path, stage: Stage) -> str | None:
     """
     place = gate.Gate(folder.resolve(), int(stage.option("round") or 0))
     own = rule(folder)
-    if not place.summary.exists() or (own.mode == "auto" and gate.verdict(place, True, own.people) != "more"):
+    if not place.summary.exists():
         return None
+    if own.mode == "auto" and gate.settle(place, True, own.people)["status"] != "more":
+        return None  # settled here where the intake's files came from a cache, and no stage ran that could
     request = asked(place)
     deployed = runtime.deployment.id is not None
     if deployed and request["status"] == "pending":

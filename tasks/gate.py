@@ -91,7 +91,7 @@ def show(table: dict[str, Any], place: gate.Gate) -> None:
     for verb, what in TO_ANSWER.items():
         print(f"{what}: {words.answer_command(place.workspace, table, verb)}{change}")
     if table["status"] == "more":
-        print("to go on: add rollouts and start again; changed data are asked about anew, and of everybody")
+        print(f"to go on: {words.go_on(table)}, and of everybody")
 
 
 def _parser() -> argparse.ArgumentParser:

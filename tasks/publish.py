@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,11 +12,13 @@ import pandas as pd
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.summary import compare
+from bumblebee.measured import gate, gate_words
 from bumblebee.ranges import Ranged
 from tasks import paths, registry
 from tasks.lineage import path_hash
 from tasks.model_card import Evaluated, licences_of, model_card
 from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent, both, unchanged
+from tasks.promotion_gate import Promotion, PromotionConfig, settle
 from tasks.rollouts_config import RolloutsConfig
 from tasks.sections import Loop, loop
 from tasks.stage import load, output_file, run_stage
@@ -32,6 +34,8 @@ class PublishConfig(Ranged):
     replace_incomparable: bool = False
     """Whether a new version takes @champion from one that was evaluated under another contract, so unseen which is
     better. The first version always becomes champion."""
+    promotion: PromotionConfig = field(default_factory=PromotionConfig)
+    """Who is asked before a version becomes champion."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,8 @@ class Standard:
     """Its robot."""
     replace_incomparable: bool
     """As configured."""
+    asks: bool = False
+    """Whether a version that holds is proposed to people, and no champion yet."""
 
 
 def main() -> None:
@@ -70,22 +76,40 @@ def main() -> None:
     episodes = pd.read_parquet(paths.EPISODES)
     contract = str(summary["contract_sha256"])
     models: dict[str, Any] = {}
+    standard = Standard(contract, engine, config.replace_incomparable, config.promotion.mode == "ask")
     for candidate in candidates(shape):
         result = result_of(summary, candidate.policy, engine)
         if result is None:
             print(f"{candidate.policy}: not published, it has no results in the evaluation (no motion of its cluster)")
             continue
-        standard = Standard(contract, engine, config.replace_incomparable)
-        facts = publish(candidate, result, standard, related(candidate, episodes, engine))
-        facts["versions"] = [*models.get(candidate.model, {}).get("versions", []), facts["version"]]
+        before = models.get(candidate.model, {})
+        facts = publish(candidate, result, standard, related(candidate, episodes, engine), before.get("proposal"))
+        facts["versions"] = [*before.get("versions", []), facts["version"]]
         models[candidate.model] = facts
+    content = {"schema": 1, "evaluation_contract": contract, "engine": engine, "models": models}
+    if any("proposal" in facts for facts in models.values()):
+        write(content)
+        for name in [name for name, facts in models.items() if "proposal" in facts]:
+            ask(Promotion(Path.cwd(), name), config.promotion.people)
     for name in models:
         models[name]["champion"] = registry.champion_version(name)
         made, champion, reason = (models[name][key] for key in ("version", "champion", "reason"))
         print(f"{name}: version {made}, champion is {champion} ({reason})")
-    content = {"schema": 1, "evaluation_contract": contract, "engine": engine, "models": models}
+    write(content)
+
+
+def write(content: dict[str, Any]) -> None:
+    """Write published.json."""
     with output_file(paths.PUBLISHED) as file:
         file.write_text(json.dumps(content, indent=1) + "\n")
+
+
+def ask(place: Promotion, people: int) -> None:
+    """Leave the request; where it was approved before, the version becomes champion."""
+    table = gate.request(place, False, people)
+    settle(place, table)
+    waits = table["status"] in gate.WAITS
+    print(gate_words.how_to_answer(place.workspace, table) if waits else f"{place.model}: {gate_words.said(table)}")
 
 
 def candidates(shape: Loop) -> Iterator[Candidate]:
@@ -146,10 +170,26 @@ def result_of(summary: dict[str, Any], policy: str, engine: str) -> dict[str, An
     return None
 
 
-def publish(candidate: Candidate, result: dict[str, Any], standard: Standard, related: Verdict) -> dict[str, Any]:
-    """One version of one model, with its alias if it earns it; its facts for published.json."""
+def publish(
+    candidate: Candidate,
+    result: dict[str, Any],
+    standard: Standard,
+    related: Verdict,
+    proposed: dict[str, Any] | None = None,
+) -> dict[str, Any]:
+    """One version of one model, with its alias if it earns it; its facts for published.json.
+
+    Args:
+        candidate: the policy.
+        result: its numbers.
+        standard: by which it is measured.
+        related: how it compares with its parent.
+        proposed: an earlier version that waits to become champion: to be measured by in its place.
+    """
     policy = ExportedPolicy.load(candidate.folder)
     champion = registry.champion_tags(candidate.model)
+    if proposed is not None:
+        champion = registry.version_tags(candidate.model, proposed["version"])
     best = against_champion(
         result["success"],
         champion,
@@ -172,12 +212,22 @@ def publish(candidate: Candidate, result: dict[str, Any], standard: Standard, re
     licences = licences_of(paths.FILTERED)
     card = model_card(candidate.model, candidate.policy, candidate.folder, candidate.parent, evaluated, licences)
     version = registry.register(candidate.model, candidate.folder, tags, metrics, card)
-    if verdict.promoted:
+    if verdict.promoted and not standard.asks:
         registry.set_alias(candidate.model, CHAMPION, version)
         registry.describe(candidate.model, card)
     facts = {"version": version, "policy": candidate.policy, "folder": str(candidate.folder)}
     decided = {"unchanged": is_unchanged(candidate), "promoted": verdict.promoted, "reason": verdict.reason}
-    return {**facts, **decided, **metrics, "onnx_sha256": policy.sha256}
+    facts |= {**decided, **metrics, "onnx_sha256": policy.sha256}
+    if not standard.asks:
+        return facts
+    facts["promoted"] = False
+    now = registry.champion_version(candidate.model)
+    own = {key: facts[key] for key in ("version", "policy", "folder", "reason", *metrics, "onnx_sha256")}
+    figures = {"success_ci95": result["success"]["ci95"], "evaluation_contract": standard.contract}
+    proposal = {**own, **figures, "engine": standard.engine, "champion": now} if verdict.promoted else proposed
+    if proposal is None or proposal["version"] == now:
+        return facts
+    return facts | {"proposal": proposal, "reason": f"{verdict.reason}; version {proposal['version']} asks people"}
 
 
 if __name__ == "__main__":

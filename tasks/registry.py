@@ -303,6 +303,27 @@ def champion_version(name: str) -> str | None:
     return None if found is None else str(found.version)
 
 
+def version_tags(name: str, version: str) -> dict[str, str] | None:
+    """The tags of a version, or None where there is none."""
+    found = _version(name, version)
+    return None if found is None else dict(found.tags)
+
+
+def version_card(name: str, version: str) -> str:
+    """What the page of a version says."""
+    found = _version(name, version)
+    return "" if found is None else str(found.description or "")
+
+
+def _version(name: str, version: str) -> Any:
+    from mlflow.exceptions import MlflowException
+
+    try:
+        return prepare().get_model_version(name, version)
+    except MlflowException:
+        return None
+
+
 def champion_tags(name: str) -> dict[str, str] | None:
     """The tags of the champion's version, or None where there is no champion."""
     found = _champion(name)

@@ -1,4 +1,4 @@
-"""The gate after an intake: a request that a person answers, and the answer as a file that the next stage depends on.
+"""Gates: a request that a person answers, and the answer as a file, on which the stage after an intake depends.
 
 A person approves, rejects, or asks for more rollouts; what the file says of it stands in `gate_table`. An answer holds
 for one summary.json, by its hash. Whoever answers first wins; another answer must say that it changes the first. All
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import file_hash
@@ -67,6 +67,8 @@ ANSWERS = {"approve": "approved", "reject": "rejected", "more": "more"}
 class GateConfig(Ranged):
     """How the gate after each intake is answered."""
 
+    section = "gate"  # of params.yaml; no field
+
     mode: Literal["ask", "auto"] = "ask"
     """ask: a person answers, in the Prefect UI or by one command; auto: the gate answers itself and says so."""
     people: Annotated[int, Range(least=1, most=9)] = 1
@@ -78,7 +80,29 @@ class GateConfig(Ranged):
         """Refuse gates that answer themselves and ask people."""
         super().__post_init__()
         alone = self.mode == "ask" or (self.people == 1 and not self.group)
-        self.require(alone, "mode", "ask, where gate.people or gate.group ask for people")
+        self.require(alone, "mode", "ask, where people or group ask for people")
+
+
+class Question(Protocol):
+    """What people are asked about."""
+
+    @property
+    def workspace(self) -> Path:
+        """The folder with dvc.yaml and params.yaml."""
+
+    @property
+    def approval(self) -> Path:
+        """Where the request and its answer lie."""
+
+    @property
+    def subject(self) -> dict[str, Any]:
+        """What tells this gate's answers from others in the record."""
+
+    def seen(self) -> dict[str, Any]:
+        """What a person sees of what lies there now, with its hash."""
+
+    def sha256(self) -> str:
+        """The hash of it."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +146,7 @@ def seen_of(summary: Path) -> dict[str, Any]:
     return {"sha256": file_hash(summary), **counts, "findings": table.get("by_rule", {})}
 
 
-def request(gate: Gate, automatic: bool = False, people: int = 1) -> dict[str, Any]:
+def request(gate: Question, automatic: bool = False, people: int = 1) -> dict[str, Any]:
     """The request with its answer, if one stands (`gate_table.stands`); else a new one: the old answer is history."""
     old = read_approval(gate.approval) if gate.approval.exists() else None
     if old and stands(old, gate.sha256(), automatic, people) and _recorded_alone(gate, old) is None:
@@ -131,7 +155,7 @@ def request(gate: Gate, automatic: bool = False, people: int = 1) -> dict[str, A
         return _asked(gate, automatic, people)
 
 
-def settle(gate: Gate, automatic: bool, people: int = 1) -> dict[str, Any]:
+def settle(gate: Question, automatic: bool, people: int = 1) -> dict[str, Any]:
     """The request; where the gates answer themselves and nobody else did, with the automatic answer."""
     with _locked(gate.approval):
         table = _asked(gate, automatic, people)
@@ -142,7 +166,7 @@ def settle(gate: Gate, automatic: bool, people: int = 1) -> dict[str, Any]:
 
 
 def answer(
-    gate: Gate,
+    gate: Question,
     approve: bool,
     author: Author,
     seen: str,
@@ -155,7 +179,7 @@ def answer(
 
 
 def decide(
-    gate: Gate,
+    gate: Question,
     verb: str,
     author: Author,
     seen: str,
@@ -169,7 +193,7 @@ def decide(
     somebody asks for more; approvals from before that count no more.
 
     Args:
-        gate: the round that is meant.
+        gate: the round, or the promotion, that is meant.
         verb: one of `ANSWERS`.
         author: who answers.
         seen: the hash of what that person saw, at least its first 12 digits.
@@ -185,7 +209,7 @@ def decide(
         raise BadInput("--by", "the name of the person who answers", repr(author.by) if author.by else "no name")
     if verb == "more" and not words.one_line(note):
         raise BadInput("--note", "what is wanted", "nothing", "Say which rollouts are missing.")
-    require_allowed(author.known_by, rule.people, rule.group)
+    require_allowed(author.known_by, rule.people, rule.group, rule.section)
     with _locked(gate.approval):
         old = read_approval(gate.approval)
         if old["seen"].get("sha256") != gate.sha256():
@@ -199,7 +223,7 @@ def decide(
         return table
 
 
-def verdict(gate: Gate, automatic: bool = False, people: int = 1) -> str:
+def verdict(gate: Question, automatic: bool = False, people: int = 1) -> str:
     """approved, rejected, more or pending; an answer that does not stand (see `request`) counts as pending."""
     if not gate.approval.exists():
         return "pending"
@@ -207,7 +231,7 @@ def verdict(gate: Gate, automatic: bool = False, people: int = 1) -> str:
     return str(table["status"]) if stands(table, gate.sha256(), automatic, people) else "pending"
 
 
-def _asked(gate: Gate, automatic: bool, people: int) -> dict[str, Any]:
+def _asked(gate: Question, automatic: bool, people: int) -> dict[str, Any]:
     """The request that stands, or a new one, written; the lock is held."""
     old = read_approval(gate.approval) if gate.approval.exists() else None
     if old is not None:
@@ -220,7 +244,7 @@ def _asked(gate: Gate, automatic: bool, people: int) -> dict[str, Any]:
     return table
 
 
-def _caught_up(gate: Gate, old: dict[str, Any], people: int) -> dict[str, Any]:
+def _caught_up(gate: Question, old: dict[str, Any], people: int) -> dict[str, Any]:
     """The table with an answer that stands in the record alone, since a kill came after that; the lock is held."""
     left = _recorded_alone(gate, old)
     if left is None:
@@ -230,7 +254,7 @@ def _caught_up(gate: Gate, old: dict[str, Any], people: int) -> dict[str, Any]:
     return table
 
 
-def _recorded_alone(gate: Gate, old: dict[str, Any]) -> dict[str, Any] | None:
+def _recorded_alone(gate: Question, old: dict[str, Any]) -> dict[str, Any] | None:
     """The record's last answer to what the table shows, where the table does not have it."""
     entry = gate_record.last(gate.approval.parent, gate.subject)
     if entry is None or entry["seen"].get("sha256") != old["seen"].get("sha256") or holds(old, entry):
@@ -238,7 +262,7 @@ def _recorded_alone(gate: Gate, old: dict[str, Any]) -> dict[str, Any] | None:
     return {key: entry[key] for key in OF_ANSWER}
 
 
-def _keep(gate: Gate, table: dict[str, Any]) -> None:
+def _keep(gate: Question, table: dict[str, Any]) -> None:
     """Write a table that somebody has answered; the answer stands in the record, too, with what it answers."""
     last = table if table["status"] != "pending" else {**table, **table["approvals"][-1]}
     entry = {key: last[key] for key in (*gate.subject, *OF_ANSWER, "seen")}

@@ -57,13 +57,14 @@ def approvers(table: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys(login for login in logins if login is not None))
 
 
-def require_allowed(known_by: Mapping[str, Any], people: int, group: str) -> None:
+def require_allowed(known_by: Mapping[str, Any], people: int, group: str, section: str = "gate") -> None:
     """Refuse an author of whom nothing is known where that matters, and one who is not in the group.
 
     Args:
         known_by: how the author was known, `gate.Author.known_by`.
         people: how many must approve.
         group: unix group whose members alone may answer; "" for everybody.
+        section: of the settings that say so.
 
     Raises:
         BadInput: naming what is wanted.
@@ -72,14 +73,13 @@ def require_allowed(known_by: Mapping[str, Any], people: int, group: str) -> Non
         return
     login = login_of({"known_by": known_by})
     if login is None:
-        raise BadInput(
-            "the answer's author", "a login of their own, as gate.people and gate.group ask", "none", TERMINAL
-        )
-    if group and login not in members(group):
-        raise BadInput("the answer's author", f"a member of the group {group} (gate.group)", login)
+        asked = f"a login of their own, as {section}.people and {section}.group ask"
+        raise BadInput("the answer's author", asked, "none", TERMINAL)
+    if group and login not in members(group, section):
+        raise BadInput("the answer's author", f"a member of the group {group} ({section}.group)", login)
 
 
-def members(group: str) -> set[str]:
+def members(group: str, section: str = "gate") -> set[str]:
     """Logins of a unix group, those of whom it is the first group too.
 
     Raises:
@@ -88,7 +88,9 @@ def members(group: str) -> set[str]:
     try:
         found = grp.getgrnam(group)
     except KeyError:
-        raise BadInput("gate.group", "a group of this machine", repr(group), "Make it, or name another.") from None
+        raise BadInput(
+            f"{section}.group", "a group of this machine", repr(group), "Make it, or name another."
+        ) from None
     first = {user.pw_name for user in pwd.getpwall() if user.pw_gid == found.gr_gid}
     own = pwd.getpwuid(os.getuid()).pw_name if os.getgid() == found.gr_gid else None
     return {*found.gr_mem, *first, *([own] if own else [])}

@@ -94,7 +94,7 @@ def read_approval(path: Path) -> Table:
         raise BadInput(f"{path}: status", f"one of {', '.join(STATUSES)}", repr(table.get("status")))
     if not isinstance(table.get("seen"), dict) or not isinstance(table.get("history"), list):
         raise BadInput(path, "the keys seen and history", ", ".join(sorted(map(str, table))))
-    if type(table.get("round")) is not int:
+    if type(table.get("round")) is not int and not isinstance(table.get("model"), str):
         raise BadInput(f"{path}: round", "the round's number", repr(table.get("round")))
     if table["status"] != "pending" and not all(isinstance(table.get(key), str) for key in ("by", "at", "note")):
         raise BadInput(path, "by, at and note of an answer", ", ".join(sorted(table)))

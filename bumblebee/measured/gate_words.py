@@ -16,14 +16,18 @@ def short(table: dict[str, Any]) -> str:
     return str(table["seen"].get("sha256", ""))[:SHORT]
 
 
-def show_command(workspace: Path, round: int) -> str:
+def show_command(workspace: Path, table: dict[str, Any]) -> str:
     """Prints what came and how to answer it."""
-    return f"{_python('tasks.gate', workspace)} --round {round} --show"
+    if "model" in table:
+        return _python("bumblebee", workspace, "gate", "show", table["model"])
+    return f"{_python('tasks.gate', workspace)} --round {table['round']} --show"
 
 
 def answer_command(workspace: Path, table: dict[str, Any], verb: str) -> str:
     """Answers what the request shows and nothing else; NAME is to be filled in, and WHAT for `more`."""
     wanted = " --note WHAT" if verb == "more" else ""
+    if "model" in table:
+        return f"{_python('bumblebee', workspace, 'gate', verb, table['model'])} --seen {short(table)}{wanted}"
     command = _python("flows.gate_answer", workspace, verb)
     return f"{command} --round {table['round']} --seen {short(table)}{wanted} --by NAME"
 
@@ -37,21 +41,28 @@ def _python(module: str, workspace: Path, *more: str) -> str:
 
 def title(table: dict[str, Any]) -> str:
     """What is asked about, as a sentence begins."""
-    return f"round {table['round']}"
+    return f"promotion of {table['model']}" if "model" in table else f"round {table['round']}"
+
+
+def go_on(table: dict[str, Any]) -> str:
+    """What to do where somebody asked for more."""
+    if "model" in table:
+        return "publish again with what is wanted: other figures are asked about anew"
+    return "add rollouts and start again: changed data are asked about anew"
 
 
 def how_to_answer(workspace: Path, table: dict[str, Any]) -> str:
     """The one line that tells a person what to do."""
-    look = f"look with `{show_command(workspace, table['round'])}`"
+    look = f"look with `{show_command(workspace, table)}`"
     answer = f"`{answer_command(workspace, table, 'approve')}"
     if table["status"] == "more":
         return (
-            f"{title(table)} waits for more than {what(table)}: {said(table)}; to go on add rollouts and start again: "
-            f"changed data are asked about anew; or {look}, and answer all the same with {answer} --change`"
+            f"{title(table)} waits for more than {what(table)}: {said(table)}; to go on {go_on(table)}; "
+            f"or {look}, and answer all the same with {answer} --change`"
         )
     return (
         f"{title(table)} waits for an answer about {what(table)}{so_far(table)}: {look}, then answer with {answer}`, "
-        f"or `reject` in place of `approve`, or `more --note WHAT` to ask for more rollouts"
+        f"or `reject` in place of `approve`, or `more --note WHAT` to ask for more"
     )
 
 
@@ -64,6 +75,9 @@ def so_far(table: dict[str, Any]) -> str:
 def what(table: dict[str, Any]) -> str:
     """What an answer is about, in a few words."""
     seen = table["seen"]
+    if "model" in table:
+        success = "?" if seen.get("success") is None else f"{seen['success']:.3f}"
+        return f"{short(table)} (version {seen.get('version')}, success {success}, {seen.get('engine')})"
     return f"{short(table)} ({seen.get('accepted')} files accepted, {seen.get('quarantined')} set aside)"
 
 
@@ -95,7 +109,7 @@ def require_seen(workspace: Path, table: dict[str, Any], seen: str) -> None:
     """Refuse an answer without the hash of what the request shows now, or with another."""
     given = seen.strip().lower()
     if not given:
-        look = f"Look first with `{show_command(workspace, table['round'])}`; it prints the command with the hash."
+        look = f"Look first with `{show_command(workspace, table)}`; it prints the command with the hash."
         raise BadInput("--seen", "the hash of what was looked at", "nothing", look)
     if len(given) < SHORT or not str(table["seen"].get("sha256", "")).startswith(given):
         raise other_data(workspace, table, seen)
@@ -104,7 +118,7 @@ def require_seen(workspace: Path, table: dict[str, Any], seen: str) -> None:
 def other_data(workspace: Path, table: dict[str, Any], seen: str) -> BadInput:
     """The line for an answer to something else than what lies there now."""
     expected = f"{short(table)}, what {title(table)} of {Path(workspace).resolve()} shows now"
-    look = f"Look again with `{show_command(workspace, table['round'])}`."
+    look = f"Look again with `{show_command(workspace, table)}`."
     return BadInput("--seen", expected, repr(seen), look)
 
 

@@ -83,7 +83,7 @@ def test_more_is_asked_for_listed_and_shown(place: gate.Gate) -> None:
         typed(place, "more", "1", "--seen", seen)
     said = typed(place, "more", "1", "--seen", seen, "--note", "ten more walks")
     me = getpass.getuser()
-    assert f"more asked for by {me} (unix user {me}" in said and "add rollouts and start the loop again" in said
+    assert f"more asked for by {me} (unix user {me}" in said and "add rollouts and start again" in said
     listed = " ".join(typed(place, "list").split())
     assert "more asked for" in listed and "answers in the record: 1" in listed
     shown = typed(place, "show", "1")

@@ -85,6 +85,9 @@ def test_runs_and_models_can_be_found_again_even_when_the_workspace_has_moved(
     again = registry.register("generalist", workspace / "p1", {"onnx_sha256": "1"}, {"success": 0.5})
     assert (first, second, again) == ("1", "2", "1")
     assert registry.champion_version("generalist") is None
+    tags = registry.version_tags("generalist", second)
+    assert tags is not None and tags["onnx_sha256"] == "2"
+    assert registry.version_tags("generalist", "9") is None and registry.version_card("generalist", second) == ""
     registry.set_alias("generalist", "champion", second)
     registry.set_alias("generalist", "champion", first)
 
