@@ -125,7 +125,7 @@ def _place(what: str, workspace: Path) -> Any:
     folder = _folder(workspace)
     if re.fullmatch(r"[1-9][0-9]{0,8}", what):
         return gate.Gate(folder, int(what))
-    if not re.fullmatch(r"[a-z][a-z0-9_-]*", what, re.IGNORECASE):
+    if not re.fullmatch(r"[a-z][a-z0-9_-]{0,99}", what, re.IGNORECASE):
         raise BadInput("what is answered", "the number of a round, or a model's name", repr(what))
     return Promotion(folder, what)
 

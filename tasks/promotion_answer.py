@@ -7,7 +7,7 @@ from typing import Any
 from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
 from tasks.params import load
-from tasks.promotion_gate import Promotion, require_as_shown, settle
+from tasks.promotion_gate import Promotion, require_as_shown, require_no_champion, settle
 from tasks.publish import PublishConfig
 
 
@@ -28,6 +28,8 @@ def given(place: Promotion, verb: str, author: gate.Author, seen: str, note: str
     with chdir(place.workspace):
         if verb == "approve":
             require_as_shown(table)
+        else:
+            require_no_champion(table)
         if verb == "approve" and table["status"] == "approved" and not change and settle(place, table):
             return  # approved before, by a process that ended before the alias moved
         table = gate.decide(place, verb, author, seen, note, change, own)

@@ -115,3 +115,15 @@ def require_as_shown(table: dict[str, Any]) -> None:
     if champion not in (seen["champion"], str(seen["version"])):
         expected = f"champion {seen['champion'] or 'none'}, with which it was compared"
         raise BadInput(where, expected, f"version {champion}" if champion else "none", do)
+
+
+def require_no_champion(table: dict[str, Any]) -> None:
+    """Refuse to hold back a version that has the alias already.
+
+    Raises:
+        BadInput: naming the version.
+    """
+    model, version = table["model"], str(table["seen"]["version"])
+    if registry.champion_version(model) == version:
+        do = f"To undo it move the alias {CHAMPION} back on MLflow's page of {model}."
+        raise BadInput(words.title(table), "a version that is not champion yet", f"version {version}, which is", do)

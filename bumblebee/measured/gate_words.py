@@ -27,6 +27,7 @@ def answer_command(workspace: Path, table: dict[str, Any], verb: str) -> str:
     """Answers what the request shows and nothing else; NAME is to be filled in, and WHAT for `more`."""
     wanted = " --note WHAT" if verb == "more" else ""
     if "model" in table:
+        wanted = " --note WHY" if verb == "reject" else wanted
         return f"{_python('bumblebee', workspace, 'gate', verb, table['model'])} --seen {short(table)}{wanted}"
     command = _python("flows.gate_answer", workspace, verb)
     return f"{command} --round {table['round']} --seen {short(table)}{wanted} --by NAME"

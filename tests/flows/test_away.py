@@ -73,6 +73,7 @@ def workspace(tmp_path: Path) -> Path:
     home, folder = tmp_path / "home", tmp_path / "work"
     (home / "tasks" / "__pycache__").mkdir(parents=True)
     (home / "tasks" / "__pycache__" / "own.pyc").write_bytes(b"")
+    (home / "tasks" / "__init__.py").touch()
     (home / "tasks" / "own.py").write_text(CODE)
     (folder / "data").mkdir(parents=True)
     (folder / "tasks").symlink_to(home / "tasks")
@@ -85,7 +86,7 @@ def test_a_parcel_has_code_settings_and_inputs_and_no_caches(workspace: Path):
     packed = parcel.pack(workspace, ["data/in.txt", "data/not-there"], "[core]\n")
     with tarfile.open(fileobj=io.BytesIO(packed)) as found:
         names = [entry.name for entry in found if entry.isfile()]
-    assert sorted(names) == [".dvc/config", "data/in.txt", "params.yaml", "tasks/own.py"]
+    assert sorted(names) == [".dvc/config", "data/in.txt", "params.yaml", "tasks/__init__.py", "tasks/own.py"]
     assert parcel.size(workspace, ["data"]) == 4
 
 

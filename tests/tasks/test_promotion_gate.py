@@ -185,6 +185,15 @@ def test_a_version_that_the_numbers_hold_back_is_not_asked_about(registry: Regis
         say("approve")
 
 
+def test_a_version_that_is_champion_is_not_rejected_any_more(registry: Registry) -> None:
+    publish.main()
+    say("approve")
+    version = registry.champions["generalist"]
+    with pytest.raises(BadInput, match=rf"expected a version that is not champion yet, came version {version}"):
+        say("reject", "bob", change=True)
+    assert promotion_answer.asked(place())["status"] == "approved"
+
+
 def test_without_asking_all_is_as_before(registry: Registry) -> None:
     settings("mode: auto")
     publish.main()
@@ -222,6 +231,7 @@ def test_the_command_lists_shows_and_answers_it_under_the_login(registry: Regist
     seen = promotion_answer.asked(place())["seen"]["sha256"][:12]
     shown = typed("show", "generalist")
     assert "policy.onnx" in shown and seen in shown and "gate approve generalist" in shown
+    assert f"--seen {seen} --note WHY" in shown  # a rejection says why
     said = typed("approve", "generalist", "--seen", seen)
     assert f"approved by {getpass.getuser()}" in said and "is champion" in said
     assert "generalist" in registry.champions
