@@ -215,7 +215,7 @@ def publish(
     if verdict.promoted and not standard.asks:
         registry.set_alias(candidate.model, CHAMPION, version)
         registry.describe(candidate.model, card)
-    facts = {"version": version, "policy": candidate.policy, "folder": str(candidate.folder)}
+    facts: dict[str, Any] = {"version": version, "policy": candidate.policy, "folder": str(candidate.folder)}
     decided = {"unchanged": is_unchanged(candidate), "promoted": verdict.promoted, "reason": verdict.reason}
     facts |= {**decided, **metrics, "onnx_sha256": policy.sha256}
     if not standard.asks:
