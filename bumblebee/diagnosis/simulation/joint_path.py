@@ -20,14 +20,20 @@ _FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # passes no cubic
 
 @lru_cache(maxsize=4096)  # a robot's joints in some hundred rollouts
 def joint_path(rollout: Rollout, column: int, rule: JointPath) -> np.ndarray:
-    """Positions (T,) [rad, m] of one joint (a column of the log) at the ticks, without the noise of the readings."""
+    """Positions (T,) [rad, m] of one joint (a column of the log) at the ticks, without the noise of the readings.
+
+    As read where there are too few rows, or steps and sizes too far apart for floating point.
+    """
     place, speed = rollout.joint_pos[:, column], rollout.joint_vel[:, column]
     if len(place) < rule.least_rows:
         return place
     period = float(np.median(np.diff(rollout.time)))
     read = np.stack((place - place[0], speed * period), axis=1)
     noise = np.maximum(white_noise(read), np.array([rule.least_place, rule.least_speed * period]))
-    return place[0] + _smoothed(np.diff(rollout.time) / period, read, noise, rule)[:, 0]
+    try:
+        return place[0] + _smoothed(np.diff(rollout.time) / period, read, noise, rule)[:, 0]
+    except np.linalg.LinAlgError:
+        return place
 
 
 def white_noise(signals: np.ndarray) -> np.ndarray:
@@ -41,12 +47,20 @@ def _smoothed(steps: np.ndarray, read: np.ndarray, noise: np.ndarray, rule: Join
     """Positions and velocities (T, 2) by readings of `noise` (2,), `steps` (T - 1,) apart; time is in periods."""
     largest = max(float((np.diff(read[:, 1]) ** 2).mean()), noise[1] ** 2)
     tried = [largest * 10.0**-k for k in range(rule.decades)]
-    usual = min(tried, key=lambda s: _solved(steps, read, noise, np.full(len(steps), s))[1])
+    usual = min(tried, key=lambda s: _doubt(steps, read, noise, np.full(len(steps), s)))
     size = np.full(len(steps), usual)
     for _ in range(rule.rounds):
         states, _ = _solved(steps, read, noise, size)
         size = (rule.freedom * rule.rest * usual + _jerked(steps, states)) / (rule.freedom + 2)
     return _solved(steps, read, noise, size)[0]
+
+
+def _doubt(steps: np.ndarray, read: np.ndarray, noise: np.ndarray, size: np.ndarray) -> float:
+    """-2 log-likelihood of accelerations of these intensities; infinite where it cannot be computed."""
+    try:
+        return _solved(steps, read, noise, size)[1]
+    except np.linalg.LinAlgError:
+        return np.inf
 
 
 def _solved(steps: np.ndarray, read: np.ndarray, noise: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, float]:

@@ -63,3 +63,11 @@ def test_white_noise_is_told_from_a_smooth_motion() -> None:
     _, place, speed = mostly_at_rest(2000)
     read = np.stack((place, speed), axis=1) + np.array(NOISE) * np.random.default_rng(0).standard_normal((2000, 2))
     assert white_noise(read) == pytest.approx(np.array(NOISE), rel=0.1)
+
+
+def test_a_joint_that_rests_under_coarse_readings_is_no_error() -> None:
+    """Positions that flicker and velocities of zero: the least intensities are too far below for floating point."""
+    time = 0.05 * np.arange(60)
+    place = 0.3 + 0.01 * np.random.default_rng(0).integers(0, 2, 60)
+    path = joint_path(rollout(time, place, np.zeros(60)), 0, JointPath())
+    assert np.isfinite(path).all() and path.min() >= 0.3 - 1e-9 and path.max() <= 0.31 + 1e-9
