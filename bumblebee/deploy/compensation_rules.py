@@ -33,7 +33,7 @@ NOT_UNDONE = {
     "link_inertia": "it asks for torque only as the whole body accelerates, which is not planned for",
     "ground_friction": "it is in the floor, not in a joint",
     "ground_compliance": "it is in the floor, not in a joint",
-    "ground_slope": "it is in the floor, not in a joint",
+    "ground_slope": "it is in the floor or the mount, not in a joint",
     "thermal_fade": "it depends on the motor's heat, which is not measured",
     "strength_drift": "it depends on how long the robot has run since it was measured",
     "external_wrench": "it acts on a body of a floating robot: only the feet could answer it",

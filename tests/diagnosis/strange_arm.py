@@ -1,6 +1,6 @@
 """The same arm with any effect of the catalogue, by equations of its own: 1 ms steps, explicit servo.
 
-Effects are {(id, place): parameters in the catalogue's order}; "" is the whole arm.
+Effects are {(id, place): parameters in the catalogue's order}; "" is the whole arm. `gravity` [m/s^2] is the arm's own.
 """
 
 import mujoco
@@ -42,6 +42,8 @@ def _model(effects: Truth) -> mujoco.MjModel:
         elif kind == "ground_slope":
             x, y = values
             model.opt.gravity[:] = 9.81 * np.array([-np.sin(y), np.sin(x), -np.cos(x) * np.cos(y)])
+        elif kind == "gravity":  # where it points, whatever is declared
+            model.opt.gravity[:] = values
     model.opt.timestep, model.opt.integrator = 0.001, mujoco.mjtIntegrator.mjINT_EULER
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     mujoco.mj_setConst(model, mujoco.MjData(model))

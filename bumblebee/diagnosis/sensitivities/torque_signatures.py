@@ -168,7 +168,7 @@ class Signatures:
         base = self._inverse_dynamics(self.plant.model)
         out = []
         for f in c.free:
-            model, turn = self._copy(), [0.0, 0.0]
+            model, turn = self._copy(), [0.0, 0.0, 0.0]
             turn[f] = c.step[f]
             model.opt.gravity = sloped(model.opt.gravity, *turn)
             out.append(base - self._inverse_dynamics(model))

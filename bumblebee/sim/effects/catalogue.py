@@ -133,7 +133,10 @@ CATALOGUE: dict[str, Kind] = {
     "link_inertia": _body(*((axis + axis, "kg m^2", 1e-9, _INF) for axis in _AXES)),
     "ground_friction": Kind("geom", (Parameter("friction", "", 0.0, 5.0),)),
     "ground_compliance": Kind("geom", (Parameter("time", "s", 2e-3, 0.5),)),
-    "ground_slope": Kind("whole", tuple(Parameter(axis, "rad", -0.5, 0.5) for axis in ("x", "y"))),
+    # The turn about the world's axes that takes the declared gravity to the true one; with gravity along z, z is 0.
+    "ground_slope": Kind(
+        "whole", (*(Parameter(axis, "rad", -0.5, 0.5) for axis in ("x", "y")), Parameter("z", "rad", -0.5, 0.5, 0.0))
+    ),
     "thermal_fade": _joint(("rate", "1/s", -1.0, 1.0), native=False),
     "strength_drift": _joint(("rate", "1/s", -1.0, 1.0), native=False),
     "external_wrench": _body(
