@@ -116,7 +116,7 @@ CATALOGUE: dict[str, Kind] = {
         ("amplitude", "N m", 0.0, _INF), ("width", "rad", 1e-5, 3.0), ("dahl", "", 0.0, 1.0, 0.0, True)
     ),
     "cogging": _joint(
-        ("sine", "N m", -_INF, _INF), ("cosine", "N m", -_INF, _INF), ("periods", "1/turn", 0.1, 500.0), native=False
+        ("sine", "N m", -_INF, _INF), ("cosine", "N m", -_INF, _INF), ("periods", "1/turn", 0.1, 2000.0), native=False
     ),
     # encoder 0: it reads the motor; 1: it reads the joint, behind the play or the shaft, which needs a hook.
     "backlash": _joint(("gap", "rad", 0.0, 0.5), ("encoder", "", 0.0, 1.0, 0.0, True)),
