@@ -113,8 +113,10 @@ def _stribeck(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str
 
 def _load_friction(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str, str]:
     draft.arrays["load_friction"][columns] = effect.value()
-    size = draft.limits.friction_share * effect.value()
-    return f"{_along(draft)}, of the torque that the drive reports", f"{size:.3g} of it"
+    coefficient, difference = effect.values()
+    mean = ", the mean of both directions" if difference else ""
+    size = draft.limits.friction_share * coefficient
+    return f"{_along(draft)}, of the torque that the drive reports{mean}", f"{size:.3g} of it"
 
 
 def _asymmetric(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str, str]:

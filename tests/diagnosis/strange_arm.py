@@ -70,7 +70,7 @@ class _Drives:
     def _look_up(self, kind: str, index: int, neutral: float) -> np.ndarray:
         out = np.full(3, neutral)
         for (name, place), values in self.e.items():
-            if name == kind:
+            if name == kind and index < len(values):
                 out[[JOINTS.index(place)] if place else slice(None)] = values[index]
         return out
 
@@ -101,7 +101,8 @@ class _Drives:
     def passive(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
         fall = np.exp(-((v / self.get("stribeck_friction", 1, 1.0)) ** 2))
         dry = self.get("coulomb_friction") + self.get("stribeck_friction") * fall
-        dry = dry + self.get("load_dependent_friction") * np.abs(force)
+        way = np.where(v > 0, 0.5, -0.5) * self.get("load_dependent_friction", 1)
+        dry = dry + (self.get("load_dependent_friction") + way) * np.abs(force)
         out = -dry * np.tanh(v / _STICK) - self.get("viscous_friction") * v - self.get("asymmetric_friction") / 2
         out += self.get("joint_spring", 1) - self.get("joint_spring") * q
         angle = self.get("cogging", 2) * q

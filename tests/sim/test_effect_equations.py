@@ -49,6 +49,15 @@ def test_a_torque_follows_its_equation(kind: str) -> None:
     check([single(kind, "j", *values)], reference(torque), share=0.25 if kind == "stribeck_friction" else 0.15)
 
 
+def test_friction_by_load_and_direction_follows_its_equation() -> None:
+    """A share of 0.35 of the servo's torque forward and 0.05 backward."""
+
+    def torque(t: float, q: float, v: float) -> float:
+        return servo(t, q, v) - (0.2 + 0.15 * sign(v)) * abs(servo(t, q, v)) * sign(v)
+
+    check([single("load_dependent_friction", "j", 0.2, 0.3)], reference(torque), share=0.15)
+
+
 def test_friction_of_two_directions_holds_between_its_bounds() -> None:
     """Coulomb 1.0 with a difference of 0.8: a standing joint takes up to 1.4 N m one way and 0.6 the other."""
     effects = [single("coulomb_friction", "j", 1.0), single("asymmetric_friction", "j", 0.8)]

@@ -124,7 +124,7 @@ class _OnJoint:
 
     def _of_any_drive(self) -> Iterator[Candidate]:
         s, j, rule, soft = self.scales, self.j, self.rules.drive, self.rules.transmission
-        yield self._make("load_dependent_friction", rule.load)
+        yield self._make("load_dependent_friction", rule.load, 0.0)
         yield self._make("command_delay", rule.time)
         yield self._make("command_filter", rule.time)
         yield self._make("dropped_commands", rule.dropped)

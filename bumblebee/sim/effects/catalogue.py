@@ -89,7 +89,8 @@ CATALOGUE: dict[str, Kind] = {
     "viscous_friction": _joint(("damping", "N m s/rad", 0.0, _INF)),
     "quadratic_friction": _joint(("coefficient", "N m s^2/rad^2", 0.0, _INF)),
     "stribeck_friction": _joint(("stiction", "N m", 0.0, _INF), ("velocity", "rad/s", 1e-3, 100.0), native=False),
-    "load_dependent_friction": _joint(("coefficient", "", 0.0, 2.0), native=False),
+    # The coefficient is the mean of both directions, the difference that of forward and backward motion.
+    "load_dependent_friction": _joint(("coefficient", "", 0.0, 2.0), ("difference", "", -4.0, 4.0, 0.0), native=False),
     "armature": _joint(("armature", "kg m^2", 0.0, _INF)),
     "motor_strength": _joint(("factor", "", 1e-3, 20.0)),
     "kp": _joint(("factor", "", 1e-3, 20.0)),
