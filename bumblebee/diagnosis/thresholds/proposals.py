@@ -296,6 +296,8 @@ class FrictionFamily:
 class TorqueRipple:
     """Of torque ripple, looked for at all numbers of periods in a turn of the joint."""
 
+    joints: int = 2
+    """Joints that are asked in a round, those that lack most torque."""
     most: float = 1000.0
     """Periods a turn at most: at 1 rad/s a step of 1 ms is then a sixth of one."""
     phase: float = 0.5

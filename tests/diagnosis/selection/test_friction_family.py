@@ -1,12 +1,17 @@
 """A joint's friction is the sum of the members that are worth their numbers."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
+from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.selection.proposals.friction_family import complete_frictions
 from bumblebee.measured.rollout import Rollout
+from tests.diagnosis import arm
 from tests.diagnosis.selection.test_swap import begun, names
+from tests.diagnosis.test_catalogue import CONFIG
 
 MASS, DRY, DRAG = 5.0, 3.0, 1.5  # [kg, N, N s^2/m^2]
 LOAD = ("load_dependent_friction", "x")
@@ -79,6 +84,20 @@ def test_friction_that_goes_with_the_load_alike_both_ways_keeps_one_coefficient(
     run = begun(XML, record(0.0, 0.3, 0.3), {LOAD: (0.3, 0.0)})
     assert not complete_frictions(run)
     assert set(run.fit.effects[0].parameters) == {"coefficient"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("forward", "backward"), [(0.4, 0.2), (0.3, 0.3)])
+def test_a_diagnosis_says_a_difference_between_the_directions_only_where_there_is_one(
+    forward: float, backward: float
+) -> None:
+    session = arm.session_of(record(0.0, forward, backward), XML)
+    (entry,) = diagnose(session, replace(CONFIG, max_windows=50, max_holdout_windows=25)).document["effects"]
+    assert (entry["effect"], entry["where"]) == (LOAD[0], ["x"])
+    truth = {"coefficient": (forward + backward) / 2, "difference": forward - backward}
+    assert entry["parameters"].keys() == {name for name, value in truth.items() if value}
+    for name, told in entry["parameters"].items():
+        assert told["ci95"][0] < truth[name] < told["ci95"][1]
 
 
 def test_a_constant_torque_that_stands_for_the_difference_goes() -> None:

@@ -2,9 +2,9 @@
 
 A motor's cogging behind a gear has the motor's own periods times the gear's ratio in a turn of the joint: tens to
 hundreds, and no whole number. A wave that is off by half a period over the joint's travel explains nothing, so the few
-numbers that all candidates are screened at miss it, and what is left then passes for friction. On joints whose own
-readings are off, waves of all numbers are asked how much they explain, closely enough that one keeps step over the
-whole travel: a periodogram in the angle, by the answers to impulses, which costs no simulation.
+numbers that all candidates are screened at miss it, and what is left then passes for friction. On joints that lack
+torque, waves of all numbers are asked how much they explain, closely enough that one keeps step over the whole travel:
+a periodogram in the angle, by the answers to impulses, which costs no simulation.
 
 The angle is the encoder's, carried on smoothly between its readings, for a simulation without the ripple has left it
 by a period before a window ends. A log slower than the ripple is no obstacle: a wave is averaged over the parts of a
@@ -22,8 +22,8 @@ from bumblebee.diagnosis.candidates import Candidate, is_chosen
 from bumblebee.diagnosis.estimation import LeftOver
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.moves import Terms, refitted
-from bumblebee.diagnosis.selection.proposals.joint_misfit import odd_joints
 from bumblebee.diagnosis.selection.score_tests import Scores, score_tests
+from bumblebee.diagnosis.selection.screening import restless
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial, try_one
 from bumblebee.diagnosis.sensitivities import Columns
@@ -34,16 +34,20 @@ KIND = "cogging"
 
 
 def ripple_trials(run: SearchState) -> list[Trial]:
-    """The ripple that explains most on each of the joints that are furthest off; none where none is beyond chance.
+    """The ripple that explains most on each of the joints that lack most torque; none where none is beyond chance.
 
     Each joint is asked once, and again when something was found on it.
     """
+    rule = run.problem.thresholds.selection.proposals.torque_ripple
+    open_ = {c.where: c for c in run.candidates if c.effect == KIND and not is_chosen(c, run.fit.chosen)}
+    open_ = {where: c for where, c in open_.items() if (KIND, where) not in run.hopeless}
+    if not open_ or run.answers is None:
+        return []
+    left, joints = run.small_fit().clean(run.small), len(run.problem.plant.joints)
+    poor = [where for where in restless(run.small, run.answers.white, left, joints) if where in open_]
     found = []
-    for where, _ in odd_joints(run.problem, run.fit.clean(run.problem)):
-        like = next((c for c in run.candidates if (c.effect, c.where) == (KIND, where)), None)
-        if like is None or is_chosen(like, run.fit.chosen) or (KIND, where) in run.hopeless:
-            continue
-        run.hopeless.add((KIND, where))
+    for like in (open_[where] for where in poor[: rule.joints]):
+        run.hopeless.add((KIND, like.where))
         trials = [_tried(run, candidate, steps) for candidate, steps in promising(run, like)]
         best = min((t for t in trials if t is not None), key=lambda t: t.cost, default=None)
         if best is not None and best.cost < run.fit.cost - run.bound**2 / 2:
