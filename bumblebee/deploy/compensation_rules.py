@@ -33,7 +33,7 @@ NOT_UNDONE = {
     "link_inertia": "it asks for torque only as the whole body accelerates, which is not planned for",
     "ground_friction": "it is in the floor, not in a joint",
     "ground_compliance": "it is in the floor, not in a joint",
-    "ground_slope": "it is in the floor, not in a joint",
+    "ground_slope": "it is in the floor or the mount, not in a joint",
     "thermal_fade": "it depends on the motor's heat, which is not measured",
     "strength_drift": "it depends on how long the robot has run since it was measured",
     "external_wrench": "it acts on a body of a floating robot: only the feet could answer it",
@@ -113,8 +113,10 @@ def _stribeck(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str
 
 def _load_friction(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str, str]:
     draft.arrays["load_friction"][columns] = effect.value()
-    size = draft.limits.friction_share * effect.value()
-    return f"{_along(draft)}, of the torque that the drive reports", f"{size:.3g} of it"
+    coefficient, difference = effect.values()
+    mean = ", the mean of both directions" if difference else ""
+    size = draft.limits.friction_share * coefficient
+    return f"{_along(draft)}, of the torque that the drive reports{mean}", f"{size:.3g} of it"
 
 
 def _asymmetric(draft: Draft, effect: Effect, columns: Sequence[int]) -> tuple[str, str]:

@@ -1,6 +1,6 @@
 """The same arm with any effect of the catalogue, by equations of its own: 1 ms steps, explicit servo.
 
-Effects are {(id, place): parameters in the catalogue's order}; "" is the whole arm.
+Effects are {(id, place): parameters in the catalogue's order}; "" is the whole arm. `gravity` [m/s^2] is the arm's own.
 """
 
 import mujoco
@@ -42,6 +42,8 @@ def _model(effects: Truth) -> mujoco.MjModel:
         elif kind == "ground_slope":
             x, y = values
             model.opt.gravity[:] = 9.81 * np.array([-np.sin(y), np.sin(x), -np.cos(x) * np.cos(y)])
+        elif kind == "gravity":  # where it points, whatever is declared
+            model.opt.gravity[:] = values
     model.opt.timestep, model.opt.integrator = 0.001, mujoco.mjtIntegrator.mjINT_EULER
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -68,7 +70,7 @@ class _Drives:
     def _look_up(self, kind: str, index: int, neutral: float) -> np.ndarray:
         out = np.full(3, neutral)
         for (name, place), values in self.e.items():
-            if name == kind:
+            if name == kind and index < len(values):
                 out[[JOINTS.index(place)] if place else slice(None)] = values[index]
         return out
 
@@ -99,7 +101,8 @@ class _Drives:
     def passive(self, q: np.ndarray, v: np.ndarray, force: np.ndarray) -> np.ndarray:
         fall = np.exp(-((v / self.get("stribeck_friction", 1, 1.0)) ** 2))
         dry = self.get("coulomb_friction") + self.get("stribeck_friction") * fall
-        dry = dry + self.get("load_dependent_friction") * np.abs(force)
+        way = np.where(v > 0, 0.5, -0.5) * self.get("load_dependent_friction", 1)
+        dry = dry + (self.get("load_dependent_friction") + way) * np.abs(force)
         out = -dry * np.tanh(v / _STICK) - self.get("viscous_friction") * v - self.get("asymmetric_friction") / 2
         out += self.get("joint_spring", 1) - self.get("joint_spring") * q
         angle = self.get("cogging", 2) * q

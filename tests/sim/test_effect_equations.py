@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.sim.effects import CATALOGUE, Effect, add_to_spec, runtime_hooks, single
+from bumblebee.sim.effects import CATALOGUE, Effect, add_to_spec, runtime_hooks, single, sloped
 from tests.sim.hinge import (
     ARM,
     FINE,
@@ -47,6 +47,15 @@ def test_a_torque_follows_its_equation(kind: str) -> None:
     """I a = servo + effect."""
     values, torque = TORQUES[kind]
     check([single(kind, "j", *values)], reference(torque), share=0.25 if kind == "stribeck_friction" else 0.15)
+
+
+def test_friction_by_load_and_direction_follows_its_equation() -> None:
+    """A share of 0.35 of the servo's torque forward and 0.05 backward."""
+
+    def torque(t: float, q: float, v: float) -> float:
+        return servo(t, q, v) - (0.2 + 0.15 * sign(v)) * abs(servo(t, q, v)) * sign(v)
+
+    check([single("load_dependent_friction", "j", 0.2, 0.3)], reference(torque), share=0.15)
 
 
 def test_friction_of_two_directions_holds_between_its_bounds() -> None:
@@ -170,6 +179,13 @@ def test_a_shifted_centre_of_mass_and_another_inertia_swing_as_a_pendulum(
 def test_a_slope_turns_gravity() -> None:
     model = model_with(single("ground_slope", "", 0.0, 0.2), gravity=9.81)
     np.testing.assert_allclose(model.opt.gravity, [-9.81 * np.sin(0.2), 0.0, -9.81 * np.cos(0.2)], atol=1e-4)
+
+
+def test_gravity_that_is_declared_along_x_turns_about_y_and_z() -> None:
+    """By two small turns its parts along y and z are those of the cross product."""
+    turned = sloped((-9.81, 0.0, 0.0), 0.0, 0.02, -0.01)
+    np.testing.assert_allclose(turned[1:], [9.81 * 0.01, 9.81 * 0.02], rtol=1e-3)
+    assert np.linalg.norm(turned) == pytest.approx(9.81)
 
 
 def test_a_wrench_pushes_the_link() -> None:

@@ -124,7 +124,7 @@ class _OnJoint:
 
     def _of_any_drive(self) -> Iterator[Candidate]:
         s, j, rule, soft = self.scales, self.j, self.rules.drive, self.rules.transmission
-        yield self._make("load_dependent_friction", rule.load)
+        yield self._make("load_dependent_friction", rule.load, 0.0)
         yield self._make("command_delay", rule.time)
         yield self._make("command_filter", rule.time)
         yield self._make("dropped_commands", rule.dropped)
@@ -184,7 +184,7 @@ class _OnJoint:
 
 def _on_whole(plant: Plant, rules: CandidateThresholds) -> list[Candidate]:
     rule = rules.drive
-    found = [Candidate("ground_slope", "", _AXES, (rules.body.slope, rules.body.slope), (0, 1))]
+    found = _turned_gravity(plant, rules.body.slope)
     driven = plant.actuator >= 0
     if driven.sum() < 2:
         return found
@@ -195,6 +195,16 @@ def _on_whole(plant: Plant, rules: CandidateThresholds) -> list[Candidate]:
     if not plant.torque_input and plant.scalable[driven].all():
         found += [Candidate(kind, "", (0.0,), (rule.time,)) for kind in ("torque_lag", "encoder_delay")]
     return found
+
+
+def _turned_gravity(plant: Plant, step: float) -> list[Candidate]:
+    """Gravity from another direction: the two angles that turn it, not the one about the axis that it is next to."""
+    gravity = np.abs(plant.model.opt.gravity)
+    if not gravity.any():
+        return []
+    free = tuple(sorted(np.argsort(gravity, kind="stable")[:2].tolist()))
+    steps = tuple(step if axis in free else 0.0 for axis in range(3))
+    return [Candidate("ground_slope", "", (0.0,) * 3, steps, free)]
 
 
 def _on_body(plant: Plant, body: str, total: float, rule: BodySteps) -> list[Candidate]:

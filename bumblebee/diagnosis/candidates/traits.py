@@ -16,6 +16,8 @@ class Traits:
 
     experiment: str = ""
     """What a person would do to tell it from effects that look the same."""
+    on_fixed_base: str = ""
+    """The same where the robot's base is bolted down, if it is another."""
     column: Literal["torque", "late", "simulated"] = "torque"
     """Where its sensitivity comes from: from a torque on the robot; from one to first order, which is poor for light
     joints of stiff servos; or from simulation alone, for no torque stands for it."""
@@ -106,7 +108,10 @@ TRAITS: dict[str, Traits] = {
     "link_inertia": Traits("swing the link fast about each axis"),
     "ground_friction": Traits("push a standing robot sideways until it slips", column="simulated", fine_steps=True),
     "ground_compliance": Traits("drop the robot's foot on the floor", column="simulated", fine_steps=True),
-    "ground_slope": Traits("turn the robot by 180 degrees on the spot"),
+    "ground_slope": Traits(
+        "turn the robot by 180 degrees on the spot",
+        on_fixed_base="put a level on the mount, or bolt it down turned by 180 degrees",
+    ),
     "thermal_fade": Traits("repeat the motion after a pause"),
     "strength_drift": Traits("repeat the motion after a pause, without one"),
     "external_wrench": Traits("unplug what is tethered, and repeat in another heading"),
@@ -136,6 +141,11 @@ IMU_TILT = "imu_offset"
 def exclude(one: str, other: str) -> bool:
     """Whether a joint cannot have both."""
     return other in TRAITS[one].not_beside or one in TRAITS[other].not_beside
+
+
+def experiment(kind: str, floating: bool) -> str:
+    """What a person would do to tell a kind from what looks the same, on a robot whose base is free or not."""
+    return (not floating and TRAITS[kind].on_fixed_base) or TRAITS[kind].experiment
 
 
 def naming_order(kind: str) -> int:

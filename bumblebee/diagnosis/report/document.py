@@ -9,7 +9,7 @@ from bumblebee.diagnosis.dataset import Session, varied
 from bumblebee.diagnosis.discrepancy import Discovery
 from bumblebee.diagnosis.prepare import Material
 from bumblebee.diagnosis.report.discrepancy_entries import NOT_TESTED, structure_table, unexplained
-from bumblebee.diagnosis.report.notes import LONE, factor_notes, latency_notes, unexplained_error
+from bumblebee.diagnosis.report.notes import LONE, factor_notes, latency_notes, mount_notes, unexplained_error
 from bumblebee.diagnosis.report.prediction_error import (
     block_of,
     floor_block,
@@ -88,6 +88,7 @@ def _notes(session: Session, findings: Findings, rule: Verdicts) -> list[str]:
         *session.plant.failures.notes(rule.failures),
         *latency_notes(findings.entries, driven, rule),
         *factor_notes(findings.entries, driven),
+        *mount_notes(findings.entries, session.plant.floating),
     ]
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from bumblebee.diagnosis.candidates import INVERSE, SHAPED, TRAITS, Candidate, Formula, label, without
+from bumblebee.diagnosis.candidates import INVERSE, SHAPED, Candidate, Formula, experiment, label, without
 from bumblebee.diagnosis.comparison import Holdout, wald
 from bumblebee.diagnosis.discrepancy import Discovery
 from bumblebee.diagnosis.estimation import Fit
@@ -69,7 +69,8 @@ def _entry(
     if others:
         kinds = dict.fromkeys([first.effect, *(o.effect for o in others)])
         most = last.problem.thresholds.report.effects.experiments
-        entry["separate_by"] = [TRAITS[k].experiment for k in kinds if TRAITS[k].experiment][:most]
+        told = [experiment(kind, last.problem.plant.floating) for kind in kinds]
+        entry["separate_by"] = [text for text in told if text][:most]
     return entry
 
 

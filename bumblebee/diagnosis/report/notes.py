@@ -9,6 +9,9 @@ One factor on everything that is a force: motion alone cannot tell it.
 Masses, inertias, friction, springs and torques times the same number move the same way. As long as one drive
 keeps its declared strength that drive sets the factor; where every drive's was fitted the declared masses do.
 
+Gravity from another direction: under a robot that stands it is a sloping floor, under one that is bolted down a mount
+that is not level.
+
 What only rollouts show that were not fitted: it can be neither named nor ruled out, and a note says so.
 
 A target that is limited in rate, a hit, a slip may happen once, in a run that was put aside. Nothing that is fitted
@@ -17,6 +20,7 @@ tells of it, and no test of what is left sees it; the error after is then large,
 What must not be overlooked: a correction that is worse, a large error that nothing explains, what was not tested.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -76,6 +80,21 @@ def factor_notes(effects: Sequence[dict[str, Any]], driven: Sequence[str]) -> li
         "the strength of every drive was fitted: strengths, friction and inertias are identifiable only up to one "
         "common scale, which the declared masses fix; their intervals are conditional on it. To fix it: weigh a link, "
         "or log the torque"
+    ]
+
+
+def mount_notes(effects: Sequence[dict[str, Any]], floating: bool) -> list[str]:
+    """A note where a robot that is bolted down was found to stand under turned gravity.
+
+    Args:
+        effects: the contract's list.
+        floating: whether the base is free.
+    """
+    turns = [entry["parameters"] for entry in effects if entry["effect"] == "ground_slope" and not floating]
+    return [
+        f"gravity comes from {math.degrees(math.hypot(*(p['value'] for p in turn.values()))):.1f} degrees off its "
+        "declared direction: the mount is not level. Level it, or keep the corrected model's gravity"
+        for turn in turns
     ]
 
 

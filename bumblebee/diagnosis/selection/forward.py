@@ -26,6 +26,7 @@ from bumblebee.diagnosis.selection.proposals.packet_loss import find_packet_loss
 from bumblebee.diagnosis.selection.proposals.saturation import saturation_trials
 from bumblebee.diagnosis.selection.proposals.setpoints import setpoint_trials
 from bumblebee.diagnosis.selection.proposals.stribeck import add_dry_friction, add_stribeck_friction
+from bumblebee.diagnosis.selection.proposals.torque_ripple import ripple_trials
 from bumblebee.diagnosis.selection.score_tests import Scores
 from bumblebee.diagnosis.selection.state import Loss, SearchState
 from bumblebee.diagnosis.selection.swap import swap
@@ -130,6 +131,7 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
             tried, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
         late = attempt("drives that follow their targets late", partial(setpoint_trials, run, tried), list)
         tried += [t for t in late if t.candidate not in run.closed]
+        tried += attempt("torque ripple", partial(ripple_trials, run), list)
         some = _where_limits_matter(tried, run)
         if judged != (run.fit, some):
             judged = (run.fit, some)

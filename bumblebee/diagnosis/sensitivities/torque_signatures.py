@@ -81,7 +81,6 @@ class Signatures:
             "quadratic_friction": lambda: -v * np.abs(v),
             "asymmetric_friction": lambda: np.full_like(q, -0.5),
             "armature": lambda: -self.a[..., j],
-            "load_dependent_friction": lambda: -np.abs(torque) * sign,
             "motor_strength": lambda: torque,
             "kp": lambda: torque - servos.bias[..., j, 2] * v,
             "kd": lambda: servos.bias[..., j, 2] * v,
@@ -92,6 +91,8 @@ class Signatures:
             return [step[0] * simple[c.effect]()]
         if c.effect == "stribeck_friction":
             return [-step[0] * np.exp(-((v / step[1]) ** 2)) * sign]
+        if c.effect == "load_dependent_friction":
+            return [-step[0] * np.abs(torque) * sign, -0.5 * step[1] * np.abs(torque) * sign**2][: len(c.free)]
         if c.effect == "joint_spring":
             return [-step[0] * q, np.full_like(q, step[1])]
         if c.effect == "cogging":
@@ -168,7 +169,7 @@ class Signatures:
         base = self._inverse_dynamics(self.plant.model)
         out = []
         for f in c.free:
-            model, turn = self._copy(), [0.0, 0.0]
+            model, turn = self._copy(), [0.0, 0.0, 0.0]
             turn[f] = c.step[f]
             model.opt.gravity = sloped(model.opt.gravity, *turn)
             out.append(base - self._inverse_dynamics(model))

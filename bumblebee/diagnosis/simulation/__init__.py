@@ -18,6 +18,7 @@ from bumblebee.diagnosis.simulation.condition_plants import make_plants
 from bumblebee.diagnosis.simulation.conditions import Condition, in_words
 from bumblebee.diagnosis.simulation.declared import declared_values, touching
 from bumblebee.diagnosis.simulation.failures import LEFT_OUT, NOT_TRIED
+from bumblebee.diagnosis.simulation.joint_path import joint_path
 from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, plant_by, refuse_unlogged
 from bumblebee.diagnosis.simulation.readings import (
     Layout,
@@ -74,6 +75,7 @@ __all__ = [
     "fold_dampers",
     "in_words",
     "inputs_of",
+    "joint_path",
     "joint_units",
     "lagged",
     "layout_of",

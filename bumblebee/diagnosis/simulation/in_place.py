@@ -144,8 +144,8 @@ def _ground_compliance(at: Target, time: float) -> None:
     at.model.geom_solref[[ground, *touching(at.model, ground)], 0] = time
 
 
-def _slope(at: Target, x: float, y: float) -> None:
-    at.model.opt.gravity = native.sloped(at.model.opt.gravity, x, y)
+def _slope(at: Target, x: float, y: float, z: float) -> None:
+    at.model.opt.gravity = native.sloped(at.model.opt.gravity, x, y, z)
 
 
 WRITE: dict[str, Callable[..., None]] = {

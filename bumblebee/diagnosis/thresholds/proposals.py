@@ -293,6 +293,28 @@ class FrictionFamily:
 
 
 @dataclass(frozen=True)
+class TorqueRipple:
+    """Of torque ripple, looked for at all numbers of periods in a turn of the joint."""
+
+    joints: int = 2
+    """Joints that are asked in a round, those that lack most torque."""
+    most: float = 1000.0
+    """Periods a turn at most: at 1 rad/s a step of 1 ms is then a sixth of one."""
+    phase: float = 0.5
+    """[rad] of a wave that the encoder's noise may be at most."""
+    dense: float = 0.25
+    """Distance of the numbers, as a share of the width of a peak, one wave over the travel."""
+    angles: int = 40
+    """Angles that a wave is averaged over in each part of a window that has an answer to impulses."""
+    tried: int = 2
+    """Highest peaks of a joint that are tried in the simulator."""
+    iterations: int = 6
+    """Steps of the refit of each."""
+    together: int = 200
+    """Waves whose columns are in memory at once."""
+
+
+@dataclass(frozen=True)
 class GainParameters:
     """Of two effects on one servo's gains."""
 
@@ -363,6 +385,7 @@ class ProposalThresholds:
     stribeck: Stribeck = field(default_factory=Stribeck)
     hysteresis_law: HysteresisLaw = field(default_factory=HysteresisLaw)
     friction_family: FrictionFamily = field(default_factory=FrictionFamily)
+    torque_ripple: TorqueRipple = field(default_factory=TorqueRipple)
     gain_parameters: GainParameters = field(default_factory=GainParameters)
     declared_scale: DeclaredScale = field(default_factory=DeclaredScale)
     encoder_resolution: EncoderResolution = field(default_factory=EncoderResolution)

@@ -89,7 +89,8 @@ CATALOGUE: dict[str, Kind] = {
     "viscous_friction": _joint(("damping", "N m s/rad", 0.0, _INF)),
     "quadratic_friction": _joint(("coefficient", "N m s^2/rad^2", 0.0, _INF)),
     "stribeck_friction": _joint(("stiction", "N m", 0.0, _INF), ("velocity", "rad/s", 1e-3, 100.0), native=False),
-    "load_dependent_friction": _joint(("coefficient", "", 0.0, 2.0), native=False),
+    # The coefficient is the mean of both directions, the difference that of forward and backward motion.
+    "load_dependent_friction": _joint(("coefficient", "", 0.0, 2.0), ("difference", "", -4.0, 4.0, 0.0), native=False),
     "armature": _joint(("armature", "kg m^2", 0.0, _INF)),
     "motor_strength": _joint(("factor", "", 1e-3, 20.0)),
     "kp": _joint(("factor", "", 1e-3, 20.0)),
@@ -116,7 +117,7 @@ CATALOGUE: dict[str, Kind] = {
         ("amplitude", "N m", 0.0, _INF), ("width", "rad", 1e-5, 3.0), ("dahl", "", 0.0, 1.0, 0.0, True)
     ),
     "cogging": _joint(
-        ("sine", "N m", -_INF, _INF), ("cosine", "N m", -_INF, _INF), ("periods", "1/turn", 0.1, 500.0), native=False
+        ("sine", "N m", -_INF, _INF), ("cosine", "N m", -_INF, _INF), ("periods", "1/turn", 0.1, 2000.0), native=False
     ),
     # encoder 0: it reads the motor; 1: it reads the joint, behind the play or the shaft, which needs a hook.
     "backlash": _joint(("gap", "rad", 0.0, 0.5), ("encoder", "", 0.0, 1.0, 0.0, True)),
@@ -133,7 +134,10 @@ CATALOGUE: dict[str, Kind] = {
     "link_inertia": _body(*((axis + axis, "kg m^2", 1e-9, _INF) for axis in _AXES)),
     "ground_friction": Kind("geom", (Parameter("friction", "", 0.0, 5.0),)),
     "ground_compliance": Kind("geom", (Parameter("time", "s", 2e-3, 0.5),)),
-    "ground_slope": Kind("whole", tuple(Parameter(axis, "rad", -0.5, 0.5) for axis in ("x", "y"))),
+    # The turn about the world's axes that takes the declared gravity to the true one; with gravity along z, z is 0.
+    "ground_slope": Kind(
+        "whole", (*(Parameter(axis, "rad", -0.5, 0.5) for axis in ("x", "y")), Parameter("z", "rad", -0.5, 0.5, 0.0))
+    ),
     "thermal_fade": _joint(("rate", "1/s", -1.0, 1.0), native=False),
     "strength_drift": _joint(("rate", "1/s", -1.0, 1.0), native=False),
     "external_wrench": _body(

@@ -6,7 +6,7 @@ written anew, so that MuJoCo's implicit treatment of both stays. The others are 
 | effect | what is written before a step |
 |---|---|
 | stribeck_friction | frictionloss + stiction exp(-(v / velocity)^2) |
-| load_dependent_friction | frictionloss + coefficient abs(servo torque) |
+| load_dependent_friction | frictionloss + (coefficient + difference / 2 sgn(v)) abs(servo torque), sgn smooth at rest |
 | torque_speed_limit | forcerange: limit (1 - v / speed) in the direction of motion |
 | thermal_fade, strength_drift | gains times 1 - rate int (torque / limit)^2 dt - rate t |
 | encoder_delay, encoder_quantisation | the servo's torque at the old, rounded reading instead of the present one |
@@ -61,6 +61,8 @@ WRITTEN = {
 }
 # What is carried from step to step: saved, and on a GPU kept in place. tests/test_forgotten.py finds what is missing.
 _REMEMBERED = ("time", "heat", "lagged", "fresh", "past_q", "past_v", "states", "bent", "setpoint", "pace")
+
+_AT_REST = 0.01  # [rad/s, m/s] below which a friction of either direction goes over into the other
 
 
 def bent(z: np.ndarray, path: np.ndarray, width: float) -> np.ndarray:
@@ -190,7 +192,8 @@ class StepHooks:
         torque = strength * servos.torque(q, v, u, reach) if self._shaping else now
         torque = self._delayed(q, v, u, strength, limit, torque) if self._late else torque
         if self._rubbing:
-            extra = h.stiction[:, 0] * np.exp(-((v / h.stiction[:, 1]) ** 2)) + h.load_friction * np.abs(torque)
+            share = h.load_friction[:, 0] + 0.5 * h.load_friction[:, 1] * np.tanh(v / _AT_REST)
+            extra = h.stiction[:, 0] * np.exp(-((v / h.stiction[:, 1]) ** 2)) + np.maximum(share, 0.0) * np.abs(torque)
             loss = self._loss0 + extra + self._discovered(q, v, u, torque, rubs=True)
             self._loss[:, servos.dof] = np.maximum(loss, 0.0)
         if self._pushing:

@@ -54,8 +54,8 @@ class RuntimeHooks:
     """(J, 2): largest acceleration [rad/s^2], infinite for none, and speed [rad/s] of the set-point."""
     stiction: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     """(J, 2): extra dry friction at rest [N m] and the speed [rad/s] at which it has gone."""
-    load_friction: np.ndarray = field(default_factory=_none)
-    """(J,) extra dry friction as a share of the servo's torque."""
+    load_friction: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    """(J, 2): extra dry friction as a share of the servo's torque, and how much more of it forward than backward."""
     speed_limit: np.ndarray = field(default_factory=_none)
     """(J,) [rad/s]: no-load speed; infinite for none."""
     thermal: np.ndarray = field(default_factory=_none)
@@ -136,11 +136,14 @@ _ABSENT = {
 _LISTS = [f.name for f in fields(RuntimeHooks) if f.default == ()]
 
 
+_SHAPED = ("stiction", "profile")  # the second number shapes the first, which is none where the effect is absent
+
+
 def _is_there(hooks: RuntimeHooks, name: str) -> bool:
     value = getattr(hooks, name)
     if isinstance(value, tuple):
         return bool(value)
-    first = value[:, 0] if value.ndim == 2 else value
+    first = value[:, 0] if name in _SHAPED else value
     return bool((first != _ABSENT.get(name, 0.0)).any())
 
 
@@ -160,6 +163,7 @@ class _Making:
         arrays = {name: np.full(count, _ABSENT.get(name, 0.0)) for name in _ACTS if name not in _LISTS}
         self.made: dict[str, Any] = arrays | dict.fromkeys(_LISTS, ())
         self.made |= {"imu": np.zeros(3), "dropped_together": True, "stiction": np.tile((0.0, 1.0), (count, 1))}
+        self.made["load_friction"] = np.zeros((count, 2))
         self.made["profile"] = np.tile((np.inf, NO_SPEED_LIMIT), (count, 1))
 
     def column(self, kind: str, place: str) -> int:
@@ -196,9 +200,12 @@ def _setpoint(name: str) -> Callable[[_Making, Effect], None]:
     return hook
 
 
-def _stiction(making: _Making, effect: Effect) -> None:
-    for column in making.columns(effect):
-        making.made["stiction"][column] = effect.values()
+def _rows(name: str) -> Callable[[_Making, Effect], None]:
+    def hook(making: _Making, effect: Effect) -> None:
+        for column in making.columns(effect):
+            making.made[name][column] = effect.values()
+
+    return hook
 
 
 def _cogging(making: _Making, effect: Effect) -> None:
@@ -241,8 +248,8 @@ HOOKS: dict[str, Callable[[_Making, Effect], None]] = {
     "torque_lag": _array("torque_lag"),
     "dropped_commands": _dropped,
     **{kind: _setpoint(name) for kind, name in SETPOINT_ARRAYS.items()},
-    "stribeck_friction": _stiction,
-    "load_dependent_friction": _array("load_friction"),
+    "stribeck_friction": _rows("stiction"),
+    "load_dependent_friction": _rows("load_friction"),
     "torque_speed_limit": _array("speed_limit"),
     "thermal_fade": _array("thermal"),
     "strength_drift": _array("drift"),

@@ -37,9 +37,9 @@ def spread_inertia(moments: Sequence[float], factor: float, spread: float) -> np
     return np.asarray(moments, dtype=float) * (1 + spread * (factor - 1))
 
 
-def sloped(gravity: Sequence[float], x: float, y: float) -> np.ndarray:
-    """Gravity (3,) turned by the rotation vector (x, y, 0) [rad]."""
-    axis = np.array([x, y, 0.0])
+def sloped(gravity: Sequence[float], x: float, y: float, z: float = 0.0) -> np.ndarray:
+    """Gravity (3,) [m/s^2] turned by the rotation vector (x, y, z) [rad] of the world."""
+    axis = np.array([x, y, z])
     angle = float(np.linalg.norm(axis))
     g = np.array(gravity, dtype=float)
     if angle < 1e-12:

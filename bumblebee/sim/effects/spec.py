@@ -199,8 +199,8 @@ def _ground_compliance(spec: mujoco.MjSpec, name: str, time: float) -> None:
         geom.solref = [time, *geom.solref[1:]]
 
 
-def _slope(spec: mujoco.MjSpec, name: str, x: float, y: float) -> None:
-    spec.option.gravity = native.sloped(spec.option.gravity, x, y)
+def _slope(spec: mujoco.MjSpec, name: str, x: float, y: float, z: float) -> None:
+    spec.option.gravity = native.sloped(spec.option.gravity, x, y, z)
 
 
 ADDED: dict[str, Callable[..., None]] = {

@@ -4,25 +4,29 @@ A real gear's friction has several of these at once, each small beside the first
 stand out among all candidates of the robot; as a further number of a friction that was found it has to be worth its
 number by the information criterion, to be sure beside the others, and to be no worse on the windows that judge. So the
 nested sums of a joint are gone through upward, the best next member first, all refitted jointly, and downward again
-where a member has become worth less than its number.
+where a member has become worth less than its number. Friction that goes with the load may differ by the direction of
+the motion, which is one more number. By whether the drive pulls or holds it may not: there a friction that differs and
+a drive of another strength are the same torque while the joint moves.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, is_chosen
-from bumblebee.diagnosis.comparison import compare, criterion, refitted_without, wald
+from bumblebee.diagnosis.comparison import columns_without, compare, criterion, refitted_without, wald
 from bumblebee.diagnosis.selection.moves import Move, Terms, refitted
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import try_one
 
+LOAD = "load_dependent_friction"
 MEMBERS = (
     "coulomb_friction",
     "viscous_friction",
     "stribeck_friction",
-    "load_dependent_friction",
+    LOAD,
     "asymmetric_friction",
     "quadratic_friction",
 )
@@ -33,7 +37,7 @@ def complete_frictions(run: SearchState) -> bool:
     changed = False
     for where in dict.fromkeys(c.where for c in run.fit.chosen if c.effect in MEMBERS):
         for _ in MEMBERS:
-            move = _next_member(run, where)
+            move = _next_member(run, where) or _by_direction(run, where)
             if move is None:
                 break
             run.take(move, rivals=len(MEMBERS))  # no further name but a number of the same friction
@@ -58,6 +62,23 @@ def _next_member(run: SearchState, where: str) -> Move | None:
         if move is not None and gain > (best[0] if best else rule.clearly) and move.passes():
             best = gain, move
     return best[1] if best else None
+
+
+def _by_direction(run: SearchState, where: str) -> Move | None:
+    """A coefficient of the load's friction for each direction in the place of one for both, if worth its number."""
+    rule, rules = run.problem.thresholds.selection.proposals.friction_family, run.problem.thresholds.comparison
+    both = (c for c in run.fit.chosen[run.given :] if (c.effect, c.where) == (LOAD, where) and len(c.free) == 1)
+    for plain in both:
+        candidate = replace(plain, step=(plain.step[0], plain.step[0]), free=(0, 1))
+        rest = columns_without(run.problem, run.fit, [plain])
+        start = np.concatenate((rest.values, run.fit.of(plain)))
+        terms = Terms(rule.sure, (rules.no_worse_on_average,), rule.iterations, weighed_after=True)
+        move = refitted(run.now, rest, candidate, [start], terms)
+        if move is None or criterion(run.problem, move.after) < criterion(run.problem, run.fit) + rule.clearly:
+            continue
+        if move.passes():
+            return move
+    return None
 
 
 def _promising(run: SearchState, where: str) -> Iterator[tuple[Candidate, np.ndarray]]:
