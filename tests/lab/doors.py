@@ -72,7 +72,7 @@ class Doors(Served):
         """`name:password`; for the workspace's own login, too."""
         return f"{name}:{self.passwords.get(name, self.password)}"
 
-    def code(self, url: str, who: str = "", body: Any = None, method: str = "GET", **headers: str) -> int:
+    def code(self, url: str, who: str = "", body: Any = None, method: str = "", **headers: str) -> int:
         """The status of an answer."""
         return self.answer(url, who, body, method, **headers)[0]
 

@@ -1,4 +1,4 @@
-"""Both servers for people from elsewhere, over the servers' own TLS and through nginx: who gets in, and who may what."""
+"""Both servers for people from elsewhere, over their own TLS and through nginx: who gets in, and who may what."""
 
 import asyncio
 import json
