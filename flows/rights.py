@@ -12,7 +12,9 @@ ONE = r"[0-9a-f-]{36}"
 READS = ("GET", "HEAD", "OPTIONS")
 API = r"/(ajax-)?api/[234]\.0"
 MLFLOW, FILES = rf"{API}/mlflow", rf"{API}/mlflow-artifacts"
-RUNS_CODE = rf"{MLFLOW}/(assistant|gateway|webhooks|prompt-optimization|scorers)(/.*)?|{API}/jobs(/.*)?|/gateway/.*"
+RUNS_CODE = (
+    rf"{MLFLOW}/(assistant|gateway[a-z-]*|webhooks|prompt-optimization|scorers)(/.*)?|{API}/jobs(/.*)?|/gateway/.*"
+)
 SECRETS = r"/api/.*block_documents.*"
 ASKED = (  # of Prefect, by POST though nothing changes
     r"/api/(ui/)?(flows|flow_runs|task_runs|deployments|logs|artifacts|artifacts/latest|work_pools|work_queues|variables"

@@ -22,7 +22,9 @@ MODEL = """
 import mlflow
 client = mlflow.MlflowClient()
 client.create_registered_model("expert-c0")
-client.create_model_version("expert-c0", source="mlflow-artifacts:/somewhere")
+with mlflow.start_run() as run:
+    mlflow.log_text("weights", "model/policy.onnx")
+client.create_model_version("expert-c0", source=f"{run.info.artifact_uri}/model", run_id=run.info.run_id)
 client.set_registered_model_alias("expert-c0", "champion", "1")
 """
 LOOK = """
@@ -183,8 +185,8 @@ def resumed(served: Doors, run: str, who: str, place: gate.Gate, verb: str = "ap
     seen = gate.seen_of(place.summary)["sha256"][:12]
     given = {"answer": verb, "by": "whoever", "seen": seen, "note": "", **more}
     code, body = served.answer(f"{served.prefect}/api/flow_runs/{run}/resume", who, {"run_input": given})
-    assert code == 200
-    return json.loads(body)
+    assert code in (200, 201)
+    return dict(json.loads(body))
 
 
 def test_two_people_of_the_group_answer_a_gate_on_the_page_under_their_own_names(served: Doors) -> None:
@@ -241,9 +243,8 @@ def test_the_pages_work_in_a_browser_and_call_nobody_else(served: Doors) -> None
     place = came_in(served, 50)
     run = served.start()["id"]
     served.until(run, "Suspended")
-    own = (served.prefect, served.mlflow, served.prefect.replace("https", "wss"), "data:", "blob:")
+    own = (served.prefect, served.mlflow, "data:", "blob:")
     left: list[str] = []
-    sockets: list[str] = []
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         user = {"username": "ann", "password": served.passwords["ann"], "origin": served.mlflow}
@@ -253,7 +254,6 @@ def test_the_pages_work_in_a_browser_and_call_nobody_else(served: Doors) -> None
         context.set_default_timeout(120_000)
         context.on("request", lambda request: None if request.url.startswith(own) else left.append(request.url))
         page = context.new_page()
-        page.on("websocket", lambda socket: socket.on("framereceived", lambda frame: sockets.append(str(frame))))
         page.goto(f"{served.prefect}/v2/runs/flow-run/{run}")
         page.get_by_placeholder("admin:pass").fill("ann:guess")
         page.get_by_role("button", name="Login").click()
@@ -269,13 +269,10 @@ def test_the_pages_work_in_a_browser_and_call_nobody_else(served: Doors) -> None
         dialog.locator("textarea").first.fill("Ann")
         dialog.get_by_role("button", name="Resume").click()
         page.get_by_text("your answer is kept").wait_for()
-        page.goto(f"{served.prefect}/v2/events")
-        page.wait_for_timeout(1)
         page.goto(f"{served.mlflow}/#/models")
         page.get_by_text("expert-c0").first.wait_for()
         browser.close()
     assert left == [], "a page called another machine"
-    assert any("auth_success" in frame for frame in sockets)
     assert gate.read_approval(place.approval)["approvals"][0]["known_by"]["user"] == "ann"
 
 
