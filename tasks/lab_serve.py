@@ -114,8 +114,12 @@ def require_server(address: Any, where: str) -> str:
     """
     here = isinstance(address, str) and re.fullmatch(r"http://(127\.0\.0\.1|localhost)(:[0-9]{1,5})?", address)
     if not here and (not isinstance(address, str) or not ADDRESS.fullmatch(address)):
-        raise BadInput(where, "https://HOST[:PORT]", re.sub(r"//[^/@]*@", "//...@", str(address))[:80])
+        raise BadInput(where, "https://HOST[:PORT]", _without_password(str(address)))
     return str(address)
+
+
+def _without_password(address: str) -> str:
+    return re.sub(r"//[^/@]*@", "//...@", address)[:80]
 
 
 def _content(path: Path) -> dict[str, Any]:
@@ -127,7 +131,7 @@ def _check(own: ServeLab, where: str) -> None:
     for name, url in own.addresses.items():
         found = ADDRESS.fullmatch(url)
         if not found or int(found[4] or 443) > 65535:
-            came = "plain http" if url.startswith("http://") else url[:80]
+            came = "plain http" if url.startswith("http://") else _without_password(url)
             raise BadInput(f"{where}.{name}", "https://HOST[:PORT], as people open it", came)
     if own.prefect == own.mlflow:
         raise BadInput(f"{where}.mlflow", "another address than Prefect's", "the same one")
