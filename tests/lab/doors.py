@@ -68,9 +68,9 @@ class Doors(Served):
     certificate: Path
     passwords: dict[str, str] = field(default_factory=dict)
 
-    def pair(self, name: str) -> str:
-        """`name:password`; for the workspace's own login, too."""
-        return f"{name}:{self.passwords.get(name, self.password)}"
+    def pair(self, who: str) -> str:
+        """`name:password` of a name, of the workspace's own login, too; what is a pair stays as it is."""
+        return who if ":" in who else f"{who}:{self.passwords.get(who, self.password)}"
 
     def code(self, url: str, who: str = "", body: Any = None, method: str = "", **headers: str) -> int:
         """The status of an answer."""
@@ -80,8 +80,7 @@ class Doors(Served):
         """Status and body; `who` is a name, or a whole `name:password`."""
         told = {"Content-Type": "application/json", **{key.replace("_", "-"): value for key, value in headers.items()}}
         if who:
-            pair = who if ":" in who else self.pair(who)
-            told["Authorization"] = "Basic " + base64.b64encode(pair.encode()).decode()
+            told["Authorization"] = "Basic " + base64.b64encode(self.pair(who).encode()).decode()
         data = None if body is None else json.dumps(body).encode()
         asked = urllib.request.Request(url, data, told, method=method or ("GET" if body is None else "POST"))
         context = ssl.create_default_context(cafile=str(self.certificate))
@@ -99,15 +98,15 @@ class Doors(Served):
         known = {"PATH": os.environ["PATH"], "PYTHONPATH": str(servers.HOME), "NO_PROXY": "localhost,127.0.0.1"}
         name, _, password = self.pair(who).partition(":")
         known |= {"PREFECT_API_URL": f"{self.prefect}/api", "PREFECT_API_AUTH_STRING": self.pair(who)}
-        known |= {"PREFECT_API_SSL_CERT_FILE": str(self.certificate), "PREFECT_HOME": str(self.folder / f"of-{who}")}
+        known |= {"PREFECT_API_SSL_CERT_FILE": str(self.certificate), "PREFECT_HOME": str(self.folder / f"of-{name}")}
         known |= {"MLFLOW_TRACKING_URI": self.mlflow, "MLFLOW_TRACKING_USERNAME": name}
         known |= {"MLFLOW_TRACKING_PASSWORD": password, "MLFLOW_TRACKING_SERVER_CERT_PATH": str(self.certificate)}
         return known | {"DO_NOT_TRACK": "true", "PREFECT_SERVER_ANALYTICS_ENABLED": "false"}
 
-    def program(self, who: str, code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    def program(self, who: str, code: str, folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
         """A program of somebody's, elsewhere."""
         return subprocess.run(
-            [sys.executable, "-c", code],
+            [sys.executable, "-c", code, *options],
             cwd=folder,
             env=self.variables(who),
             capture_output=True,

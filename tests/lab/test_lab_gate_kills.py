@@ -4,6 +4,8 @@ and the work goes on.
 
 import os
 import signal
+import subprocess
+import sys
 import time
 import urllib.error
 from collections.abc import Callable
@@ -14,9 +16,9 @@ import psutil
 import pytest
 
 from bumblebee.measured import gate, gate_record
-from flows import gate_answer, login
+from flows import login
 from flows.environment import SERVERS
-from flows.servers import Addresses
+from flows.servers import HOME, Addresses
 from tests.flows.test_pages import LIMIT, Served
 from tests.lab import machines
 from tests.lab.conftest import LabOnThisMachine
@@ -41,7 +43,7 @@ def walk_of(keeper: int) -> psutil.Process:
 def answer_in_a_terminal(folder: Path) -> None:
     seen = gate.request(gate.Gate(folder, 1))["seen"]["sha256"]
     words = ["approve", "--workspace", str(folder), "--round", "1", "--seen", seen, "--by", "Ada"]
-    assert gate_answer.main(words) == 0
+    subprocess.run([sys.executable, "-m", "flows.gate_answer", *words], cwd=HOME, check=True, timeout=LIMIT)
 
 
 def of_page(folder: Path) -> dict[str, Any]:
@@ -64,7 +66,7 @@ def again(what: Callable[[], Any]) -> Any:
 def done_once(folder: Path) -> bool:
     """Whether the stage behind the gate is made, by one answer in the record."""
     answers = gate_record.check(folder / "data" / "approvals")
-    return (folder / "g.txt").exists() and [one["by"] for one in answers] == ["Ada"]
+    return (folder / "g.txt").exists() and [one["answer"]["by"] for one in answers] == ["Ada"]
 
 
 def test_prefects_server_killed_and_answered_meanwhile_the_run_goes_on_at_the_next_start(folder: Path) -> None:
@@ -80,21 +82,7 @@ def test_prefects_server_killed_and_answered_meanwhile_the_run_goes_on_at_the_ne
     assert done_once(folder)
 
 
-def test_the_process_that_runs_flows_killed_the_page_still_answers_after_the_next_start(folder: Path) -> None:
-    with serving(folder) as (addresses, process):
-        pages = served(folder, addresses)
-        run = pages.start()["id"]
-        pages.until(run, "Suspended")
-        walk_of(addresses.keeper).kill()
-        assert process.wait(timeout=LIMIT) == 1
-    with serving(folder) as (addresses, _):
-        pages = served(folder, addresses)
-        assert pages.ask(f"flow_runs/{run}/resume", **of_page(folder))["status"] == "ACCEPT"
-        pages.until(run, "Completed")
-    assert done_once(folder)
-
-
-def test_killed_between_a_terminals_answer_and_the_run_that_it_resumed_another_run_asks_nobody_again(
+def test_the_process_that_runs_flows_killed_right_after_an_answer_on_the_page_the_run_goes_on_at_the_next_start(
     folder: Path,
 ) -> None:
     with serving(folder) as (addresses, process):
@@ -102,7 +90,7 @@ def test_killed_between_a_terminals_answer_and_the_run_that_it_resumed_another_r
         run = pages.start()["id"]
         pages.until(run, "Suspended")
         walk_of(addresses.keeper).suspend()  # it cannot take up the run any more
-        answer_in_a_terminal(folder)
+        assert pages.ask(f"flow_runs/{run}/resume", **of_page(folder))["status"] == "ACCEPT"
         walk_of(addresses.keeper).kill()
         assert process.wait(timeout=LIMIT) == 1
     with serving(folder) as (addresses, _):

@@ -35,6 +35,15 @@ async def flows():
         return [flow.name for flow in await client.read_flows()]
 print(mlflow.MlflowClient().get_model_version_by_alias("expert-c0", "champion").version, asyncio.run(flows()))
 """
+STAGE = """
+from pathlib import Path
+from tasks import registry
+from tests.tasks.test_registry import policy_folder
+print(registry.log_run("base", "c0", 1, {"seed": 3}, {"success": 0.5}, None, [Path("lab.yaml")], {}))
+folder = policy_folder(Path("policy").resolve(), 2.0)
+version = registry.register("of-a-laptop", folder, {"onnx_sha256": "1", "policy": "c0"}, {"success": 0.5}, "# Card")
+registry.set_alias("of-a-laptop", "champion", version)
+"""
 LOG = """
 import mlflow
 mlflow.set_experiment("of-a-laptop")
@@ -131,6 +140,30 @@ def test_writers_log_runs_with_files_and_readers_do_not(served: Doors, tmp_path:
     assert served.code(f"{served.mlflow}/api/2.0/mlflow/runs/delete", "ann", {"run_id": run}) == 200
 
 
+def test_without_the_database_a_stage_logs_and_a_policy_is_fetched_through_the_server(
+    served: Doors, tmp_path: Path
+) -> None:
+    (tmp_path / "lab.yaml").write_text(f"tracking: {served.mlflow}\n")
+    done = served.program("ann", STAGE, tmp_path)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert not (tmp_path / ".servers" / "mlflow.db").exists()
+    run = done.stdout.split()[0]
+    found = json.loads(served.answer(f"{served.mlflow}/api/2.0/mlflow/runs/get?run_id={run}", "carl")[1])["run"]
+    assert {"key": "cluster", "value": "c0"} in found["data"]["tags"]
+    fetch = "import sys; from tasks.fetch import main; sys.exit(main(sys.argv[1:]))"
+    options = ["of-a-laptop@champion", "--out", str(tmp_path / "fetched"), "--server", served.mlflow]
+    (tmp_path / "elsewhere").mkdir()
+    done = served.program("carl", fetch, tmp_path / "elsewhere", *options)
+    assert done.returncode == 0, done.stderr[-2000:]
+    policy = (tmp_path / "policy" / "policy.onnx").read_bytes()
+    assert (tmp_path / "fetched" / "policy.onnx").read_bytes() == policy
+    options[2] += "-again"
+    done = served.program("carl:guess", fetch, tmp_path / "elsewhere", *options)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "a login that it knows" in done.stderr
+    done = served.program("carl", fetch, tmp_path / "elsewhere", "nobody@champion", *options[1:])
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "models: " in done.stderr
+
+
 def test_a_flow_of_a_writer_runs_elsewhere_and_nobody_changes_which_code_runs_here(
     served: Doors, tmp_path: Path
 ) -> None:
@@ -177,6 +210,7 @@ def came_in(served: Doors, accepted: int) -> gate.Gate:
     place = gate.Gate(served.folder, 1)
     summary = json.loads(place.summary.read_text())
     place.summary.write_text(json.dumps(summary | {"accepted": accepted}))
+    gate.request(place, people=2)  # as stage ingest does
     return place
 
 
