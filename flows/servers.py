@@ -26,9 +26,9 @@ from flows import login, people, runs
 from flows.environment import SERVERS, environment
 from flows.guard import ALIVE, proof
 from flows.processes import alive, born, same, stop
-from tasks.lab import read_lab
+from tasks.lab import FILE, read_lab
 from tasks.lab_checks import check_lab
-from tasks.lab_serve import ServeLab
+from tasks.lab_serve import ServeLab, tls
 
 __all__ = ["Addresses", "alive", "running", "servers", "stop"]
 
@@ -142,6 +142,8 @@ def servers(
     require_port("--mlflow-port", mlflow_port)
     workspace = workspace.resolve()
     folder = login.private(workspace / SERVERS)
+    if door is not None and door.certificate:
+        tls(door, f"{workspace / FILE}: serve")
     if door is not None and not people.read(folder):
         do = "Add each person, yourself too: `bumblebee lab user add NAME`."
         raise BadInput(folder / people.FILE, "personal logins, before servers listen for people", "none", do)

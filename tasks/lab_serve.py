@@ -66,10 +66,10 @@ class ServeLab:
 
 
 def read_serve(workspace: Path) -> ServeLab | None:
-    """The section `serve` of the workspace's `lab.yaml`; None where there is none.
+    """The section `serve` of the workspace's `lab.yaml`; None where there is none. `tls` looks at its certificate.
 
     Raises:
-        BadInput: for an unknown or missing key, another form, no TLS, or a certificate that cannot be used.
+        BadInput: for an unknown or missing key, another form, or no TLS.
     """
     path = Path(workspace) / FILE
     own = _content(path).get("serve")
@@ -145,8 +145,6 @@ def _check(own: ServeLab, where: str) -> None:
         raise BadInput(f"{where}.{beyond[0]}_listen", "TLS beyond this machine", "no certificate", do)
     if bool(own.certificate) != bool(own.key):
         raise BadInput(f"{where}.certificate", "certificate and key together", "one of them")
-    if own.certificate:
-        tls(own, where)
 
 
 def _places(own: ServeLab, where: str) -> dict[str, ipaddress.IPv4Address]:

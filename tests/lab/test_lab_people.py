@@ -19,21 +19,21 @@ from tests.lab.conftest import LabOnThisMachine
 from tests.lab.doors import Doors
 
 MODEL = """
-import mlflow
-client = mlflow.MlflowClient()
-client.create_registered_model("expert-c0")
+import mlflow, sys
+client, name = mlflow.MlflowClient(), sys.argv[1]
+client.create_registered_model(name)
 with mlflow.start_run() as run:
     mlflow.log_text("weights", "model/policy.onnx")
-client.create_model_version("expert-c0", source=f"{run.info.artifact_uri}/model", run_id=run.info.run_id)
-client.set_registered_model_alias("expert-c0", "champion", "1")
+client.create_model_version(name, source=f"{run.info.artifact_uri}/model", run_id=run.info.run_id)
+client.set_registered_model_alias(name, "champion", "1")
 """
 LOOK = """
-import asyncio, mlflow
+import asyncio, mlflow, sys
 from prefect.client.orchestration import get_client
 async def flows():
     async with get_client() as client:
         return [flow.name for flow in await client.read_flows()]
-print(mlflow.MlflowClient().get_model_version_by_alias("expert-c0", "champion").version, asyncio.run(flows()))
+print(mlflow.MlflowClient().get_model_version_by_alias(sys.argv[1], "champion").version, asyncio.run(flows()))
 """
 STAGE = """
 from pathlib import Path
@@ -107,22 +107,28 @@ def test_who_is_removed_is_out_at_once(served: Doors) -> None:
     assert served.code(url, f"dora:{password}") == 401
 
 
+def name_of(served: Doors) -> str:
+    """A model of these doors: all have one database."""
+    return f"expert-{served.mlflow.rpartition(':')[2]}"
+
+
 def test_only_the_group_of_lab_yaml_moves_a_champion_and_everybody_sees_it(served: Doors, tmp_path: Path) -> None:
+    model = name_of(served)
     for name in ("bob", "carl"):
-        done = served.program(name, MODEL, tmp_path)
+        done = served.program(name, MODEL, tmp_path, model)
         assert done.returncode and "members of the group leads may do this (lab.yaml, serve.promote)" in done.stderr
-    done = served.program("ann", MODEL, tmp_path)
+    done = served.program("ann", MODEL, tmp_path, model)
     assert done.returncode == 0, done.stderr[-2000:]
     for name in served.passwords:
-        done = served.program(name, LOOK, tmp_path)
+        done = served.program(name, LOOK, tmp_path, model)
         assert done.returncode == 0 and done.stdout.startswith("1 ["), done.stderr[-2000:]
     alias = f"{served.mlflow}/api/2.0/mlflow/registered-models/alias"
     for method in ("POST", "DELETE"):
-        body = {"name": "expert-c0", "alias": "champion", "version": "1"}
+        body = {"name": model, "alias": "champion", "version": "1"}
         assert served.code(alias, "bob", body, method=method) == 403
-    body = {"name": "expert-c0"}
+    body = {"name": model}
     assert served.code(f"{served.mlflow}/api/2.0/mlflow/registered-models/delete", "bob", body, method="DELETE") == 403
-    assert served.program("carl", LOOK, tmp_path).stdout.startswith("1 ")
+    assert served.program("carl", LOOK, tmp_path, model).stdout.startswith("1 ")
 
 
 def test_writers_log_runs_with_files_and_readers_do_not(served: Doors, tmp_path: Path) -> None:
@@ -304,7 +310,7 @@ def test_the_pages_work_in_a_browser_and_call_nobody_else(served: Doors) -> None
         dialog.get_by_role("button", name="Resume").click()
         page.get_by_text("your answer is kept").wait_for()
         page.goto(f"{served.mlflow}/#/models")
-        page.get_by_text("expert-c0").first.wait_for()
+        page.get_by_text(name_of(served)).first.wait_for()
         browser.close()
     assert left == [], "a page called another machine"
     assert gate.read_approval(place.approval)["approvals"][0]["known_by"]["user"] == "ann"

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from flows import people, servers
 from flows.environment import SERVERS
 from flows.lab_cli import app
 from tasks.lab import read_lab
-from tasks.lab_serve import read_serve, read_tracking
+from tasks.lab_serve import ServeLab, read_serve, read_tracking, tls
 from tests.lab.doors import certificate
 from tests.lab.machines import free_port
 
@@ -62,7 +63,6 @@ def test_beyond_loopback_with_a_certificate_and_its_key(tmp_path: Path) -> None:
         ({"prefect_listen": "127.0.0.1:80"}, "serve.prefect_listen: expected ADDRESS:PORT"),
         ({"prefect_listen": "127.0.0.1"}, "serve.prefect_listen: expected ADDRESS:PORT"),
         ({"prefect_listen": None}, "serve.prefect_listen: expected an address, came no such key"),
-        ({"certificate": "/not/there.pem", "key": "/not/there.key"}, "serve.certificate: expected a file"),
         ({"certificate": "/not/there.pem"}, "certificate and key together"),
         ({"promote": "Leads!"}, "serve.promote: expected a group's name"),
         ({"password": "x"}, "serve.password: expected prefect or mlflow"),
@@ -77,13 +77,17 @@ def test_what_is_wrong_is_one_line(tmp_path: Path, over: dict[str, Any], line: s
 
 def test_a_key_that_others_can_read_or_of_another_certificate_is_refused(tmp_path: Path) -> None:
     made, key = certificate(tmp_path)
+    own = ServeLab(**{**GOOD, "certificate": str(made), "key": str(key)})
+    tls(own)
     key.chmod(0o644)
     with pytest.raises(BadInput, match=r"serve\.key: expected a file that only its owner can read"):
-        read_serve(write(tmp_path, certificate=str(made), key=str(key)))
+        tls(own)
     (tmp_path / "other").mkdir()
     _, other = certificate(tmp_path / "other")
     with pytest.raises(BadInput, match=r"serve\.certificate: expected a certificate and its key"):
-        read_serve(write(tmp_path, certificate=str(made), key=str(other)))
+        tls(replace(own, key=str(other)))
+    with pytest.raises(BadInput, match=r"serve\.certificate: expected a file, by its whole path"):
+        tls(replace(own, certificate=str(tmp_path / "not-there.pem")))
 
 
 @pytest.mark.parametrize(
@@ -119,8 +123,12 @@ def test_without_people_or_tls_or_on_a_taken_port_nothing_starts_and_one_line_sa
     assert done.returncode == 2 and done.stderr.count("\n") == 1
     assert "expected personal logins, before servers listen for people, came none" in done.stderr
     people.add(tmp_path / SERVERS, "ann", ())
-    done = serve(write(tmp_path, prefect_listen="0.0.0.0:4200"))
-    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "expected TLS" in done.stderr
+    for over, line in (
+        ({"prefect_listen": "0.0.0.0:4200"}, "expected TLS"),
+        ({"certificate": "/not/there.pem", "key": "/not/there.key"}, "serve.certificate: expected a file"),
+    ):
+        done = serve(write(tmp_path, **over))
+        assert done.returncode == 2 and done.stderr.count("\n") == 1 and line in done.stderr
     with servers.listener() as taken:
         taken.listen()
         done = serve(write(tmp_path, **{**ports, "mlflow_listen": f"127.0.0.1:{taken.getsockname()[1]}"}))
