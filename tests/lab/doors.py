@@ -65,6 +65,7 @@ class Doors(Served):
 
     prefect: str
     mlflow: str
+    store: str
     certificate: Path
     passwords: dict[str, str] = field(default_factory=dict)
 
@@ -151,7 +152,8 @@ def with_gate(folder: Path, lab: dict[str, Any], rule: str) -> Path:
 def opened(folder: Path, lab: dict[str, Any], proxied: bool) -> Iterator[Doors]:
     """A workspace's doors, by the servers' own TLS or through nginx as docs/lab.md sets it up."""
     made, key = certificate(folder.parent)
-    ports = {name: machines.free_port() for name in ("prefect", "mlflow", "prefect_behind", "mlflow_behind")}
+    ports = {name: machines.free_port() for name in ("prefect", "mlflow", "prefect_behind", "mlflow_behind", "store")}
+    ports["store_behind"] = urlsplit(lab["mlflow"]["s3_endpoint"]).port or 80
     behind = "_behind" if proxied else ""
     own = {name: f"https://localhost:{ports[name]}" for name in ("prefect", "mlflow")}
     own |= {f"{name}_listen": f"127.0.0.1:{ports[name + behind]}" for name in ("prefect", "mlflow")}
@@ -162,7 +164,8 @@ def opened(folder: Path, lab: dict[str, Any], proxied: bool) -> Iterator[Doors]:
     with serving(folder) as (found, _), nginx(folder.parent, made, key, ports) if proxied else _nothing():
         password = runs.login.read(folder / SERVERS)
         assert password is not None
-        doors = Doors(folder, found, password, own["prefect"], own["mlflow"], made, passwords)
+        store = f"https://localhost:{ports['store']}" if proxied else lab["mlflow"]["s3_endpoint"]
+        doors = Doors(folder, found, password, own["prefect"], own["mlflow"], store, made, passwords)
         end = time.monotonic() + LIMIT
         while not all(answers(url) for url in (doors.prefect, doors.mlflow)):
             assert time.monotonic() < end
@@ -192,6 +195,7 @@ def nginx(folder: Path, made: Path, key: Path, ports: dict[str, int]) -> Iterato
         "listen 4200": f"listen 127.0.0.1:{ports['prefect']}",
         "listen 5000": f"listen 127.0.0.1:{ports['mlflow']}",
     }
+    texts |= {"listen 8333": f"listen 127.0.0.1:{ports['store']}", "1:18333": f"1:{ports['store_behind']}"}
     texts |= {"1:14200": f"1:{ports['prefect_behind']}", "1:15000": f"1:{ports['mlflow_behind']}"}
     for old, new in texts.items():
         assert old in text

@@ -13,6 +13,8 @@ import pytest
 from bumblebee.measured import gate
 from flows import people
 from flows.environment import SERVERS
+from tasks.lab import Lab, MlflowLab, PrefectLab
+from tasks.lab_checks import check_lab
 from tests.flows.test_pages import CHROMIUM
 from tests.lab import doors
 from tests.lab.conftest import LabOnThisMachine
@@ -314,6 +316,12 @@ def test_the_pages_work_in_a_browser_and_call_nobody_else(served: Doors) -> None
         browser.close()
     assert left == [], "a page called another machine"
     assert gate.read_approval(place.approval)["approvals"][0]["known_by"]["user"] == "ann"
+
+
+def test_the_store_answers_there_too(served: Doors, lab: LabOnThisMachine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AWS_CA_BUNDLE", str(served.certificate))
+    own = MlflowLab(**{**lab.content()["mlflow"], "s3_endpoint": served.store})
+    check_lab(Lab(PrefectLab(lab.postgres.url("prefect")), own), served.folder)
 
 
 def test_no_password_stands_in_a_file_or_a_command_line(served: Doors) -> None:
