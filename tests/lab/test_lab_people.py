@@ -115,22 +115,18 @@ def name_of(served: Doors) -> str:
 
 
 def test_only_the_group_of_lab_yaml_moves_a_champion_and_everybody_sees_it(served: Doors, tmp_path: Path) -> None:
-    model = name_of(served)
-    for name in ("bob", "carl"):
-        done = served.program(name, MODEL, tmp_path, model)
-        assert done.returncode and "members of the group leads may do this (lab.yaml, serve.promote)" in done.stderr
+    model, at = name_of(served), f"{served.mlflow}/api/2.0/mlflow/registered-models"
     done = served.program("ann", MODEL, tmp_path, model)
     assert done.returncode == 0, done.stderr[-2000:]
-    for name in served.passwords:
-        done = served.program(name, LOOK, tmp_path, model)
-        assert done.returncode == 0 and done.stdout.startswith("1 ["), done.stderr[-2000:]
-    alias = f"{served.mlflow}/api/2.0/mlflow/registered-models/alias"
-    for method in ("POST", "DELETE"):
-        body = {"name": model, "alias": "champion", "version": "1"}
-        assert served.code(alias, "bob", body, method=method) == 403
-    body = {"name": model}
-    assert served.code(f"{served.mlflow}/api/2.0/mlflow/registered-models/delete", "bob", body, method="DELETE") == 403
-    assert served.program("carl", LOOK, tmp_path, model).stdout.startswith("1 ")
+    body = {"name": model, "alias": "champion", "version": "1"}
+    for name in ("bob", "carl"):
+        for method, what in (("POST", "alias"), ("DELETE", "alias"), ("DELETE", "delete"), ("POST", "set-tag")):
+            code, said = served.answer(f"{at}/{what}", name, body, method)
+            assert code == 403 and b"members of the group leads may do this (lab.yaml, serve.promote)" in said
+    done = served.program("bob", MODEL, tmp_path, model)
+    assert done.returncode and "members of the group leads may do this" in done.stderr
+    done = served.program("carl", LOOK, tmp_path, model)
+    assert done.returncode == 0 and done.stdout.startswith("1 ["), done.stderr[-2000:]
 
 
 def test_writers_log_runs_with_files_and_readers_do_not(served: Doors, tmp_path: Path) -> None:
