@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 from flows import guard, login
 from flows.guard import App, Message, Receive, Send
-from flows.page_answer import PageAnswers
+from flows.page_answer import PageAnswers, Unread, once
 from flows.people import Busy, People, Person
 from flows.rights import CANCEL, READS, Rights
 
@@ -106,7 +106,11 @@ class Door:
                 await guard.reply(send, 403, said("a run can be cancelled from elsewhere, not set to another state"))
                 return
         elif self.answers is not None:
-            told = await self.answers.take(run, content.get("run_input"), who, inner, self.app, body)
+            try:
+                told = await self.answers.take(run, content.get("run_input"), who, inner, self.app, body)
+            except Unread:
+                await guard.reply(send, 503, said("Prefect does not say what this run asks: try again"))
+                return
             if told is not None:
                 await guard.reply(send, 200, json.dumps(told))
                 return
@@ -200,13 +204,3 @@ async def read_body(receive: Receive) -> bytes | None:
             return None
         if not message.get("more_body", False):
             return body
-
-
-def once(body: bytes) -> Receive:
-    """What the application receives where the body has been read already."""
-    left = [{"type": "http.request", "body": body, "more_body": False}]
-
-    async def receive() -> Message:
-        return left.pop() if left else {"type": "http.disconnect"}
-
-    return receive

@@ -62,6 +62,7 @@ class DoorServer(uvicorn.Server):
             limit_concurrency=CONNECTIONS,
             ssl_context_factory=(lambda config, default: tls(own)) if own.certificate else None,
         )
+        config.load()  # what is wrong with it is said before anything answers
         super().__init__(config)
         self.listener = listener
 

@@ -46,6 +46,8 @@ def main(argv: list[str] | None = None) -> int:
         return 1
     listener = socket.socket(fileno=options.socket)
     port = int(listener.getsockname()[1])
+    if options.door is not None:
+        os.environ["MLFLOW_SERVER_ALLOWED_HOSTS"] = "*"  # the guard and the door before it judge them
     app = prefect_app(port, password) if options.server == "prefect" else mlflow_app(options.workspace)
     door = None
     if options.door is not None:
@@ -89,7 +91,6 @@ def mlflow_app(workspace: Path) -> Any:
     if lab is not None:
         database, artifacts = lab.mlflow.connection, lab.mlflow.artifacts
     os.environ |= {name: value.format(database=database, artifacts=artifacts) for name, value in MLFLOW.items()}
-    os.environ["MLFLOW_SERVER_ALLOWED_HOSTS"] = "*"  # the guard and the door before it judge them
     import_module("mlflow.server.handlers").initialize_backend_stores(
         os.environ["_MLFLOW_SERVER_FILE_STORE"],
         os.environ["_MLFLOW_SERVER_REGISTRY_STORE"],

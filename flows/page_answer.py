@@ -13,11 +13,15 @@ from typing import Any
 from bumblebee.errors import BadInput
 from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
-from flows.guard import App, Message
+from flows.guard import App, Message, Receive
 from flows.people import Person
 from tasks.gate import asked, rule
 
 QUESTION = re.compile(r"gate-([1-9][0-9]{0,8})-([0-9a-f]{12})-[0-9]+")  # `gate_question.pause_key`
+
+
+class Unread(Exception):
+    """Prefect does not say what a run asks: there is none, or its database is away."""
 
 
 class PageAnswers:
@@ -38,9 +42,14 @@ class PageAnswers:
             scope: of the request that resumes the run.
             app: Prefect's.
             body: of that request.
+
+        Raises:
+            Unread: when it cannot be known what the run asks.
         """
-        found = json.loads(await call(app, {**scope, "method": "GET", "path": f"/api/flow_runs/{run}"}) or b"{}")
-        state = found.get("state") or {}
+        found = await call(app, {**scope, "method": "GET", "path": f"/api/flow_runs/{run}"})
+        if found is None:
+            raise Unread
+        state = json.loads(found).get("state") or {}
         question = QUESTION.fullmatch(str((state.get("state_details") or {}).get("pause_key")))
         if state.get("type") != "PAUSED" or question is None or not isinstance(values, dict):
             return None
@@ -72,11 +81,8 @@ def answer(place: gate.Gate, values: dict[str, Any], who: Person) -> tuple[str |
 
 
 async def call(app: App, scope: Message, body: bytes = b"") -> bytes | None:
-    """What an application answers to a request of ours; None where it is not 200."""
+    """What an application answers to a request of ours; None where that is not what was wanted."""
     status, parts = 0, []
-
-    async def receive() -> Message:
-        return {"type": "http.request", "body": body, "more_body": False}
 
     async def send(message: Message) -> None:
         nonlocal status
@@ -85,8 +91,20 @@ async def call(app: App, scope: Message, body: bytes = b"") -> bytes | None:
 
     kept = [(name, value) for name, value in scope["headers"] if name.lower() not in LENGTHS]
     headers = [*kept, (b"content-length", str(len(body)).encode()), (b"content-type", b"application/json")]
-    await app({**scope, "headers": headers, "raw_path": scope["path"].encode(), "query_string": b""}, receive, send)
-    return b"".join(parts) if status == 200 else None
+    await app({**scope, "headers": headers, "raw_path": scope["path"].encode(), "query_string": b""}, once(body), send)
+    return b"".join(parts) if status in (200, 201) else None
+
+
+def once(body: bytes) -> Receive:
+    """What an application receives where the body has been read already; then nothing."""
+    left = [body]
+
+    async def receive() -> Message:
+        if not left:
+            await asyncio.Event().wait()
+        return {"type": "http.request", "body": left.pop(), "more_body": False}
+
+    return receive
 
 
 LENGTHS = (b"content-length", b"content-type", b"accept-encoding", b"transfer-encoding")

@@ -8,6 +8,7 @@ import os
 import sys
 from pathlib import Path
 
+from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from flows import gate_answer
 from flows import workspace as workspaces
@@ -41,7 +42,10 @@ def started(options: argparse.Namespace) -> int:
                 announce(folder, addresses)
                 if door is not None:
                     print(f"people     {door.prefect} and {door.mlflow}, each with a login of their own", flush=True)
-                gate_answer.resume_answered(folder, addresses.prefect)
+                try:
+                    gate_answer.resume_answered(folder, addresses.prefect)
+                except (BadInput, OSError) as error:  # a gate's file, or the server: the pages are open all the same
+                    print(f"runs that were answered meanwhile wait on: {error}", file=sys.stderr)
                 return serve(folder, addresses)
         except KeyboardInterrupt:
             print("servers stopped", file=sys.stderr)

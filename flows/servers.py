@@ -1,7 +1,7 @@
-"""The servers of Prefect and MLflow on this machine alone: SQLite files under .servers/ or a lab's databases, a login.
+"""The servers of Prefect and MLflow: SQLite files under .servers/ or a lab's databases, a login, on this machine alone.
 
-One process keeps them: it holds a lock on .servers, and they end with it, also when it is killed. A second one uses
-them and leaves them alone.
+With a door people of other machines get in, too (`flows/door.py`). One process keeps the servers: it holds a lock on
+.servers, and they end with it, also when it is killed. A second one uses them and leaves them alone.
 """
 
 import fcntl

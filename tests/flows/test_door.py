@@ -9,6 +9,7 @@ import pytest
 
 from flows import login, people
 from flows.door import BODY, Door
+from flows.page_answer import PageAnswers
 from flows.people import WRONG, People
 from flows.rights import Rights
 from tests.flows.test_rights import NUMBER
@@ -160,6 +161,14 @@ def test_a_run_may_be_cancelled_by_everybody_and_set_to_no_other_state(tmp_path:
         assert asked.ask(HOST, asked.pair("bob"), method="POST", path=path, body=body)[0] == 403
     assert asked.ask(HOST, asked.pair("bob"), method="POST", path=path, body=b"x" * (BODY + 1))[0] == 413
     assert len(asked.reached) == 1
+
+
+def test_where_prefect_does_not_say_what_a_run_asks_no_answer_gets_past_the_door(tmp_path: Path) -> None:
+    asked = Asked(tmp_path, "prefect")
+    asked.door.answers = PageAnswers(tmp_path)
+    status, said = asked.ask(HOST, asked.pair("bob"), method="POST", path=f"/api/flow_runs/{NUMBER}/resume", body=b"{}")
+    assert status == 503 and "try again" in said
+    assert [scope["method"] for scope in asked.reached] == ["GET"]
 
 
 def test_a_socket_logs_in_as_a_person_and_is_closed_when_that_one_is_removed(tmp_path: Path) -> None:
