@@ -150,10 +150,11 @@ def with_gate(folder: Path, lab: dict[str, Any], rule: str) -> Path:
 
 @contextmanager
 def opened(folder: Path, lab: dict[str, Any], proxied: bool) -> Iterator[Doors]:
-    """A workspace's doors, by the servers' own TLS or through nginx as docs/lab.md sets it up."""
+    """A workspace's doors, by the servers' own TLS or through nginx as docs/lab.md sets it up; `lab` may be empty."""
     made, key = certificate(folder.parent)
     ports = {name: machines.free_port() for name in ("prefect", "mlflow", "prefect_behind", "mlflow_behind", "store")}
-    ports["store_behind"] = urlsplit(lab["mlflow"]["s3_endpoint"]).port or 80
+    endpoint = lab["mlflow"]["s3_endpoint"] if lab else ""
+    ports["store_behind"] = urlsplit(endpoint).port or 80
     behind = "_behind" if proxied else ""
     own = {name: f"https://localhost:{ports[name]}" for name in ("prefect", "mlflow")}
     own |= {f"{name}_listen": f"127.0.0.1:{ports[name + behind]}" for name in ("prefect", "mlflow")}
@@ -164,7 +165,7 @@ def opened(folder: Path, lab: dict[str, Any], proxied: bool) -> Iterator[Doors]:
     with serving(folder) as (found, _), nginx(folder.parent, made, key, ports) if proxied else _nothing():
         password = runs.login.read(folder / SERVERS)
         assert password is not None
-        store = f"https://localhost:{ports['store']}" if proxied else lab["mlflow"]["s3_endpoint"]
+        store = f"https://localhost:{ports['store']}" if proxied else endpoint
         doors = Doors(folder, found, password, own["prefect"], own["mlflow"], store, made, passwords)
         end = time.monotonic() + LIMIT
         while not all(answers(url) for url in (doors.prefect, doors.mlflow)):

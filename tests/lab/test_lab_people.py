@@ -320,6 +320,12 @@ def test_the_store_answers_there_too(served: Doors, lab: LabOnThisMachine, monke
     check_lab(Lab(PrefectLab(lab.postgres.url("prefect")), own), served.folder)
 
 
+def test_what_prefect_says_of_its_settings_holds_no_secret(served: Doors, lab: LabOnThisMachine) -> None:
+    code, said = served.answer(f"{served.prefect}/api/admin/settings", "carl")
+    assert code == 200
+    assert not any(secret.encode() in said for secret in (served.password, lab.password, lab.secret))
+
+
 def test_no_password_stands_in_a_file_or_a_command_line(served: Doors) -> None:
     secrets = [password.encode() for password in served.passwords.values()]
     for file in (served.folder / SERVERS).rglob("*"):

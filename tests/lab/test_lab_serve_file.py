@@ -16,7 +16,7 @@ from flows.environment import SERVERS
 from flows.lab_cli import app
 from tasks.lab import read_lab
 from tasks.lab_serve import ServeLab, read_serve, read_tracking, tls
-from tests.lab.doors import certificate
+from tests.lab.doors import certificate, opened
 from tests.lab.machines import free_port
 
 GOOD = {
@@ -38,6 +38,14 @@ def test_alone_it_opens_the_workspaces_own_history(tmp_path: Path) -> None:
     own = read_serve(write(tmp_path))
     assert own is not None and own.places["mlflow"] == ("127.0.0.1", 15000) and own.write == ""
     assert read_lab(tmp_path) is None and read_tracking(tmp_path) is None
+
+
+def test_people_reach_a_workspaces_own_sqlite_history(tmp_path: Path) -> None:
+    with opened(tmp_path / "alone", {}, proxied=False) as served:
+        assert served.code(f"{served.prefect}/api/flow_runs/filter", "carl", {}) == 200
+        assert served.code(f"{served.mlflow}/api/2.0/mlflow/experiments/search?max_results=1", "carl") == 200
+        assert served.code(f"{served.mlflow}/api/2.0/mlflow/experiments/search?max_results=1", "bumblebee") == 401
+        assert (served.folder / SERVERS / "mlflow.db").exists()
 
 
 def test_beyond_loopback_with_a_certificate_and_its_key(tmp_path: Path) -> None:
