@@ -13,6 +13,7 @@ from typing import Any
 from bumblebee.errors import BadInput
 from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
+from bumblebee.measured.gate_people import login_of
 from flows.guard import App, Message, Receive
 from flows.people import Person
 from tasks.gate import asked, rule
@@ -74,7 +75,10 @@ def answer(place: gate.Gate, values: dict[str, Any], who: Person) -> tuple[str |
         asked(place)
         table = gate.decide(place, verb, author, seen, note, rule=rule(place.workspace))
     except BadInput as error:
-        return str(error), asked(place)["status"] == "pending"
+        stands = asked(place)
+        if stands["status"] == gate.ANSWERS.get(verb) and login_of(stands) == who.name:
+            return None, False  # their own, sent again, since the run did not go on
+        return str(error), stands["status"] == "pending"
     if table["status"] == "pending":
         return f"{words.said(table)}: your answer is kept, the run waits for the others", True
     return None, False

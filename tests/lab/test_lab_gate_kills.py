@@ -46,10 +46,10 @@ def answer_in_a_terminal(folder: Path) -> None:
     subprocess.run([sys.executable, "-m", "flows.gate_answer", *words], cwd=HOME, check=True, timeout=LIMIT)
 
 
-def of_page(folder: Path) -> dict[str, Any]:
+def of_page(folder: Path) -> dict[str, str]:
     """What the page sends as an answer."""
     seen = gate.request(gate.Gate(folder, 1))["seen"]["sha256"][:12]
-    return {"run_input": {"answer": "approve", "by": "Ada", "seen": seen, "note": ""}}
+    return {"answer": "approve", "by": "Ada", "seen": seen, "note": ""}
 
 
 def again(what: Callable[[], Any]) -> Any:
@@ -90,7 +90,7 @@ def test_the_process_that_runs_flows_killed_right_after_an_answer_on_the_page_th
         run = pages.start()["id"]
         pages.until(run, "Suspended")
         walk_of(addresses.keeper).suspend()  # it cannot take up the run any more
-        assert pages.ask(f"flow_runs/{run}/resume", **of_page(folder))["status"] == "ACCEPT"
+        assert pages.resume(run, **of_page(folder))["status"] == "ACCEPT"
         walk_of(addresses.keeper).kill()
         assert process.wait(timeout=LIMIT) == 1
     with serving(folder) as (addresses, _):
@@ -107,7 +107,7 @@ def test_the_database_killed_while_a_gate_waits_the_page_answers_when_it_is_back
         pages.until(run, "Suspended")
         lab.postgres.kill()
         lab.postgres.start()
-        told = again(lambda: pages.ask(f"flow_runs/{run}/resume", **of_page(folder)))
+        told = again(lambda: pages.resume(run, **of_page(folder)))
         assert told["status"] == "ACCEPT"
         again(lambda: pages.until(run, "Completed"))
         assert process.poll() is None

@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import ssl
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from flows import people
 from flows.environment import SERVERS
 from tasks.lab import Lab, MlflowLab, PrefectLab
 from tasks.lab_checks import check_lab
-from tests.flows.test_pages import CHROMIUM
+from tests.flows.test_pages import CHROMIUM, asks_not_yet
 from tests.lab import doors
 from tests.lab.conftest import LabOnThisMachine
 from tests.lab.doors import Doors
@@ -222,9 +223,12 @@ def resumed(served: Doors, run: str, who: str, place: gate.Gate, verb: str = "ap
     """What the page is told, by the call that it makes."""
     seen = gate.seen_of(place.summary)["sha256"][:12]
     given = {"answer": verb, "by": "whoever", "seen": seen, "note": "", **more}
-    code, body = served.answer(f"{served.prefect}/api/flow_runs/{run}/resume", who, {"run_input": given})
-    assert code in (200, 201)
-    return dict(json.loads(body))
+    while True:
+        code, body = served.answer(f"{served.prefect}/api/flow_runs/{run}/resume", who, {"run_input": given})
+        assert code in (200, 201)
+        if not asks_not_yet(told := dict(json.loads(body))):
+            return told
+        time.sleep(0.3)
 
 
 def test_two_people_of_the_group_answer_a_gate_on_the_page_under_their_own_names(served: Doors) -> None:
@@ -254,6 +258,7 @@ def test_of_two_answers_one_wins_and_the_other_is_told(served: Doors) -> None:
     served.until(run, "Suspended")
     assert resumed(served, run, "bob", place, "reject", note="wet")["status"] == "ACCEPT"
     told = resumed(served, run, "ann", place)
+    assert told["status"] != "ACCEPT"
     assert "Cannot resume" in told["details"]["reason"] or "rejected by" in told["details"]["reason"]
     assert gate.read_approval(place.approval)["status"] == "rejected"
 
