@@ -15,7 +15,7 @@ from flows import guard, login
 from flows.guard import App, Message, Receive, Send
 from flows.page_answer import PageAnswers, Unread, once
 from flows.people import Busy, People, Person
-from flows.rights import CANCEL, READS, Rights
+from flows.rights import CANCEL, MAKES_EXPERIMENT, READS, Rights, placed
 
 ON_RUN = re.compile(r"/api/flow_runs/([0-9a-f-]{36})/(resume|set_state)")
 FREE = ("/api/health", "/api/ready")  # of Prefect: its page asks before anybody logs in
@@ -81,6 +81,12 @@ class Door:
             await guard.reply(send, 403, said(reason))
         elif self.server == "prefect" and (run := ON_RUN.fullmatch(path)):
             await self._on_run(run[1], run[2], who, scope, receive, send)
+        elif self.server == "mlflow" and method == "POST" and MAKES_EXPERIMENT.fullmatch(path):
+            body = await read_body(receive)
+            if body is None or not placed(parsed(body)):
+                await guard.reply(send, 403, said("an experiment's files belong into mlflow-artifacts:/FOLDER"))
+            else:
+                await self.app(self._scope(scope, who), once(body), send)
         else:
             await self.app(self._scope(scope, who), receive, send)
 

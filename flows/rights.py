@@ -6,7 +6,9 @@ secrets, are changed on the servers' machine alone: no login from elsewhere gets
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 ONE = r"[0-9a-f-]{36}"
 READS = ("GET", "HEAD", "OPTIONS")
@@ -59,6 +61,8 @@ RULES: dict[str, list[Rule]] = {
 PATTERNS = {name: [(who, methods, re.compile(path)) for who, methods, path in rules] for name, rules in RULES.items()}
 CROOKED = re.compile(r"//|/\.{1,2}(/|$)|[%\\]")  # what a server might read as another path than we did
 CANCEL = ("CANCELLING", "CANCELLED")
+MAKES_EXPERIMENT = re.compile(rf"{MLFLOW}/experiments/create")
+PLACE = re.compile(r"(mlflow-artifacts:(/[A-Za-z0-9_-]+)+)?")  # in the lab's store; "" for where the server puts it
 
 
 @dataclass(frozen=True)
@@ -90,3 +94,10 @@ class Rights:
         key = "write" if "write" in wanted else "promote"
         who = f"members of the group {group}" if group else "nobody"
         return f"{who} may do this (lab.yaml, serve.{key})"
+
+
+def placed(content: Mapping[str, Any]) -> bool:
+    """Whether an experiment that is asked for keeps its files in the lab's store, and not in a folder of the server."""
+    names = [name for name in content if name.replace("_", "").lower() == "artifactlocation"]
+    named = isinstance(content.get("name"), str)  # what is no plain object here, the server could read as one
+    return named and all(isinstance(content[name], str) and PLACE.fullmatch(content[name]) for name in names)

@@ -163,6 +163,26 @@ def test_a_run_may_be_cancelled_by_everybody_and_set_to_no_other_state(tmp_path:
     assert len(asked.reached) == 1
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        b'{"name": "x", "artifact_location": "file:///etc"}',
+        b'{"name": "x", "artifactLocation": "/etc"}',
+        b'{"name": "x", "artifact_location": "mlflow-artifacts:/a/../../etc"}',
+        b'{"name": "x", "artifact_location": "mlflow-artifacts://evil.example/a"}',
+        b'{"name": "x", "artifact_location": "mlflow-artifacts:/a", "artifactLocation": "s3://evil/a"}',
+        b'{"name": "x", "artifact_location": 3}',
+        b'"{\\"name\\": \\"x\\", \\"artifact_location\\": \\"/etc\\"}"',
+        b"",
+    ],
+)
+def test_nobody_makes_an_experiment_whose_files_lie_elsewhere(tmp_path: Path, body: bytes) -> None:
+    asked, path = Asked(tmp_path), "/api/2.0/mlflow/experiments/create"
+    assert asked.ask(HOST, asked.pair("ann"), method="POST", path=path, body=body)[0] == 403 and asked.reached == []
+    for good in (b'{"name": "x"}', b'{"name": "x", "artifact_location": "mlflow-artifacts:/runs"}'):
+        assert asked.ask(HOST, asked.pair("ann"), method="POST", path=path, body=good)[0] == 299
+
+
 def test_where_prefect_does_not_say_what_a_run_asks_no_answer_gets_past_the_door(tmp_path: Path) -> None:
     asked = Asked(tmp_path, "prefect")
     asked.door.answers = PageAnswers(tmp_path)
