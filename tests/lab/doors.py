@@ -117,6 +117,21 @@ class Doors(Served):
         )
 
 
+async def first_answer(served: Doors, token: str, path: str) -> str:
+    """What Prefect's server says to a socket that logs in; "" where it closes it."""
+    from websockets.asyncio.client import connect
+    from websockets.exceptions import ConnectionClosed
+
+    url = served.prefect.replace("https", "wss") + path
+    context = ssl.create_default_context(cafile=str(served.certificate))
+    try:
+        async with connect(url, subprotocols=["prefect"], proxy=None, ssl=context) as socket:  # type: ignore[list-item]
+            await socket.send(json.dumps({"type": "auth", "token": token}))
+            return str(await socket.recv())
+    except ConnectionClosed:
+        return ""
+
+
 @contextmanager
 def serving(folder: Path) -> Iterator[tuple[servers.Addresses, "subprocess.Popen[str]"]]:
     """`make serve` in a workspace, until the block ends."""

@@ -3,7 +3,6 @@
 import asyncio
 import json
 import os
-import ssl
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,49 +18,8 @@ from tasks.lab_checks import check_lab
 from tests.flows.test_pages import CHROMIUM, asks_not_yet
 from tests.lab import doors
 from tests.lab.conftest import LabOnThisMachine
-from tests.lab.doors import Doors
-
-MODEL = """
-import mlflow, sys
-client, name = mlflow.MlflowClient(), sys.argv[1]
-client.create_registered_model(name)
-with mlflow.start_run() as run:
-    mlflow.log_text("weights", "model/policy.onnx")
-client.create_model_version(name, source=f"{run.info.artifact_uri}/model", run_id=run.info.run_id)
-client.set_registered_model_alias(name, "champion", "1")
-"""
-LOOK = """
-import asyncio, mlflow, sys
-from prefect.client.orchestration import get_client
-async def flows():
-    async with get_client() as client:
-        return [flow.name for flow in await client.read_flows()]
-print(mlflow.MlflowClient().get_model_version_by_alias(sys.argv[1], "champion").version, asyncio.run(flows()))
-"""
-STAGE = """
-from pathlib import Path
-from tasks import registry
-from tests.tasks.test_registry import policy_folder
-print(registry.log_run("base", "c0", 1, {"seed": 3}, {"success": 0.5}, None, [Path("lab.yaml")], {}))
-folder = policy_folder(Path("policy").resolve(), 2.0)
-version = registry.register("of-a-laptop", folder, {"onnx_sha256": "1", "policy": "c0"}, {"success": 0.5}, "# Card")
-registry.set_alias("of-a-laptop", "champion", version)
-"""
-LOG = """
-import mlflow
-mlflow.set_experiment("of-a-laptop")
-with mlflow.start_run() as run:
-    mlflow.log_metric("success", 0.5)
-    mlflow.log_text("a file", "file.txt")
-print(run.info.run_id)
-"""
-FLOW = """
-from prefect import flow
-@flow(name="of-a-laptop")
-def own():
-    return 1
-own()
-"""
+from tests.lab.doors import Doors, first_answer
+from tests.lab.programs import FLOW, LOG, LOOK, MODEL, STAGE
 
 
 @pytest.fixture(scope="module", params=["its own TLS", "nginx"])
@@ -183,21 +141,6 @@ def test_a_flow_of_a_writer_runs_elsewhere_and_nobody_changes_which_code_runs_he
         assert served.code(f"{served.prefect}/api/admin/database/clear", name, {"confirm": True}) == 403
         assert served.code(f"{served.prefect}/api/block_documents/filter", name, {"include_secrets": True}) == 403
         assert served.code(f"{served.mlflow}/ajax-api/3.0/mlflow/assistant/message", name, {}) == 403
-
-
-async def first_answer(served: Doors, token: str, path: str) -> str:
-    """What Prefect's server says to a socket that logs in; "" where it closes it."""
-    from websockets.asyncio.client import connect
-    from websockets.exceptions import ConnectionClosed
-
-    url = served.prefect.replace("https", "wss") + path
-    context = ssl.create_default_context(cafile=str(served.certificate))
-    try:
-        async with connect(url, subprotocols=["prefect"], proxy=None, ssl=context) as socket:  # type: ignore[list-item]
-            await socket.send(json.dumps({"type": "auth", "token": token}))
-            return str(await socket.recv())
-    except ConnectionClosed:
-        return ""
 
 
 def test_prefects_sockets_want_a_login_of_ones_own_too(served: Doors) -> None:
