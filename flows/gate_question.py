@@ -15,6 +15,7 @@ from bumblebee.measured import gate_words as words
 from flows import gate_page
 from flows.stages import Stage
 from tasks.gate import asked, rule
+from tasks.lab_serve import read_serve
 
 SEEN = "Hash of what was shown to you: the answer holds for nothing else."
 CHOICE = "approve: the round goes on; reject: it stops here; more: it waits for more rollouts, and the note says which."
@@ -78,12 +79,13 @@ def ask(place: gate.Gate, request: dict[str, Any]) -> dict[str, Any]:
         key = pause_key(request, attempt)
         description = None
         if answered(key) is None:  # the run comes here again after the answer
-            asked_of = gate_page.asked_of(rule(place.workspace))
+            personal = read_serve(place.workspace) is not None
+            asked_of = gate_page.asked_of(rule(place.workspace), personal)
             description = gate_page.question(request, show(place, request, runtime.flow_run.id)) + asked_of
             log.warning(gate_page.where_to_answer(place.round, runtime.flow_run.ui_url))
         model = form(words.short(request), description)
         given: Any = suspend_flow_run(wait_for_input=model, timeout=None, key=key)
-        if (found := asked(place))["status"] != "pending":  # answered in a terminal, which resumed this run
+        if (found := asked(place))["status"] != "pending":  # by a terminal or a personal login, which resumed this run
             return found
         try:
             author = gate.Author(given.by, PAGE)

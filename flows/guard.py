@@ -72,18 +72,27 @@ class Guard:
         elif self.ask and not allowed(headers, self.password):
             await refuse(scope, receive, send, 401, f"user {login.USER}, password in .servers/{login.NAME}")
         else:
-            await self.app(scope, receive, _with_headers(send))
+            await self.app(scope, receive, with_headers(send))
 
 
-def foreign(headers: list[tuple[bytes, str]], reads: bool) -> str | None:
-    """Why a request is not one of this server's own pages or of a program on this machine; None when it is."""
+def foreign(
+    headers: list[tuple[bytes, str]], reads: bool, own: re.Pattern[str] = OWN_HOST, scheme: str = "http"
+) -> str | None:
+    """Why a request is not one of this server's own pages or of a program; None when it is.
+
+    Args:
+        headers: the request's, names in small letters.
+        reads: whether it only reads.
+        own: names of this server, with the port where it is not the scheme's.
+        scheme: of its pages.
+    """
     given: dict[bytes, list[str]] = {}
     for name, value in headers:
         given.setdefault(name, []).append(value)
     hosts = given.get(b"host", [])
-    if len(hosts) != 1 or not OWN_HOST.fullmatch(hosts[0]):
+    if len(hosts) != 1 or not own.fullmatch(hosts[0]):
         return "unknown host"
-    if any(origin != f"http://{hosts[0]}" for origin in given.get(b"origin", [])):
+    if any(origin != f"{scheme}://{hosts[0]}" for origin in given.get(b"origin", [])):
         return "a page of another origin"
     links = reads and given.get(b"sec-fetch-mode") == ["navigate"]  # a link to a page may stand anywhere
     if not links and set(given.get(b"sec-fetch-site", [])) & {"cross-site", "same-site"}:
@@ -116,15 +125,18 @@ async def refuse(scope: Message, receive: Receive, send: Send, status: int, reas
 
 
 async def reply(send: Send, status: int, text: str) -> None:
-    """A short answer in plain text."""
-    headers = {**HEADERS, b"content-type": b"text/plain; charset=utf-8", b"cache-control": b"no-store"}
+    """A short answer in plain text, or in JSON."""
+    kind = b"application/json" if text.startswith("{") else b"text/plain; charset=utf-8"
+    headers = {**HEADERS, b"content-type": kind, b"cache-control": b"no-store"}
     if status == 401:
         headers[b"www-authenticate"] = b'Basic realm="bumblebee", charset="UTF-8"'
     await send({"type": "http.response.start", "status": status, "headers": list(headers.items())})
     await send({"type": "http.response.body", "body": text.encode() + b"\n"})
 
 
-def _with_headers(send: Send) -> Send:
+def with_headers(send: Send) -> Send:
+    """What the application answers, with the headers that every page gets."""
+
     async def wrapped(message: Message) -> None:
         if message["type"] == "http.response.start":
             kept = [

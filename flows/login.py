@@ -62,6 +62,15 @@ def read(folder: Path) -> str | None:
     return match[1] if match else None
 
 
+def write_private(path: Path, text: str) -> None:
+    """Write a file whole, for its owner only."""
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    part.unlink(missing_ok=True)
+    with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as stream:
+        stream.write(text)
+    part.replace(path)
+
+
 def pair(password: str) -> str:
     """`user:password`, as Prefect's page and client take it."""
     return f"{USER}:{password}"

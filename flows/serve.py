@@ -1,17 +1,23 @@
-"""`make serve`: both servers open until Ctrl-C, and the loop as a deployment that Prefect's pages start and resume."""
+"""`make serve`: both servers open until Ctrl-C, and the loop as a deployment that Prefect's pages start and resume.
+
+With a section `serve` in `lab.yaml` for people from elsewhere, too, each with a login of their own.
+"""
 
 import argparse
 import os
 import sys
 from pathlib import Path
 
+from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
+from flows import gate_answer
 from flows import workspace as workspaces
 from flows.attend import attend, ended_in_order
 from flows.demo import add_ports, announce
 from flows.environment import environment
 from flows.owned import require_own
 from flows.servers import Addresses, require_port, servers
+from tasks.lab_serve import read_serve
 
 DEPLOYMENT = "demo"
 
@@ -31,8 +37,15 @@ def started(options: argparse.Namespace) -> int:
             folder = workspaces.named(options.name)
             require_own(folder)
             os.environ.update(environment(folder))
-            with servers(folder, options.prefect_port, options.mlflow_port) as addresses:
+            door = read_serve(folder)
+            with servers(folder, options.prefect_port, options.mlflow_port, door) as addresses:
                 announce(folder, addresses)
+                if door is not None:
+                    print(f"people     {door.prefect} and {door.mlflow}, each with a login of their own", flush=True)
+                try:
+                    gate_answer.resume_answered(folder, addresses.prefect)
+                except (BadInput, OSError) as error:  # a gate's file, or the server: the pages are open all the same
+                    print(f"runs that were answered meanwhile wait on: {error}", file=sys.stderr)
                 return serve(folder, addresses)
         except KeyboardInterrupt:
             print("servers stopped", file=sys.stderr)

@@ -1,7 +1,7 @@
-"""The servers of Prefect and MLflow on this machine alone: SQLite files under .servers/ or a lab's databases, a login.
+"""The servers of Prefect and MLflow: SQLite files under .servers/ or a lab's databases, a login, on this machine alone.
 
-One process keeps them: it holds a lock on .servers, and they end with it, also when it is killed. A second one uses
-them and leaves them alone.
+With a door people of other machines get in, too (`flows/door.py`). One process keeps the servers: it holds a lock on
+.servers, and they end with it, also when it is killed. A second one uses them and leaves them alone.
 """
 
 import fcntl
@@ -17,16 +17,18 @@ import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 from typing import IO
 
 from bumblebee.errors import BadInput
-from flows import login, runs
+from flows import login, people, runs
 from flows.environment import SERVERS, environment
 from flows.guard import ALIVE, proof
 from flows.processes import alive, born, same, stop
-from tasks.lab import read_lab
+from tasks.lab import FILE, read_lab
 from tasks.lab_checks import check_lab
+from tasks.lab_serve import ServeLab, tls
 
 __all__ = ["Addresses", "alive", "running", "servers", "stop"]
 
@@ -51,6 +53,8 @@ class Addresses:
     """The servers' own processes, Prefect's first."""
     born: tuple[float, ...] = ()
     """When these started, and at the end the keeper: seconds since 1970."""
+    door: tuple[str, ...] = ()
+    """Of both for people from elsewhere, where `lab.yaml` has a section `serve`."""
 
     def lost(self) -> list[str]:
         """The servers whose process is gone."""
@@ -67,22 +71,22 @@ def require_port(name: str, port: int) -> None:
         raise BadInput(name, "0 (any free port) or a port from 1024 to 65535", str(port))
 
 
-def listener(wanted: int = 0) -> socket.socket:
+def listener(wanted: int = 0, host: str = HOST) -> socket.socket:
     """A socket that is bound to the port, or to a free one; nobody else can take it any more.
 
     Raises:
-        BadInput: when the wanted port is taken.
+        BadInput: when the wanted port is taken, or the address is none of this machine's.
     """
     bound = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        bound.bind((HOST, wanted))
+        bound.bind((host, wanted))
         if wanted:  # with SO_REUSEADDR a port that somebody listens on can be refused only here
             bound.listen()
     except OSError as error:
         bound.close()
         remedy = "Give another port, or none for a free one."
-        raise BadInput(f"port {wanted} of {HOST}", "a free port", str(error.strerror), remedy) from None
+        raise BadInput(f"port {wanted} of {host}", "a free port", str(error.strerror), remedy) from None
     return bound
 
 
@@ -99,7 +103,7 @@ def written(workspace: Path) -> Addresses | None:
     """What the last keeper wrote down."""
     try:
         table = json.loads((workspace / SERVERS / "addresses.json").read_text())
-        return Addresses(**{**table, "pids": tuple(table["pids"]), "born": tuple(table["born"])})
+        return Addresses(**{**table, **{name: tuple(table.get(name, ())) for name in ("pids", "born", "door")}})
     except (OSError, ValueError, TypeError, KeyError):
         return None
 
@@ -117,25 +121,42 @@ def answers(url: str, password: str) -> bool:
 
 
 @contextmanager
-def servers(workspace: Path, prefect_port: int = 0, mlflow_port: int = 0) -> Iterator[Addresses]:
+def servers(
+    workspace: Path, prefect_port: int = 0, mlflow_port: int = 0, door: ServeLab | None = None
+) -> Iterator[Addresses]:
     """Both servers for the length of a block.
 
     Those that another process keeps for this workspace are used and left to it.
 
+    Args:
+        workspace: its folder.
+        prefect_port: of Prefect's server on loopback; 0 for a free one.
+        mlflow_port: of MLflow's.
+        door: how people from elsewhere get in; None: they do not.
+
     Raises:
-        BadInput: when a wanted port is taken or none, others are in use, or a server ends at once.
+        BadInput: when a wanted port is taken or none, others are in use, a server ends at once, or there is a door and
+            nobody with a login of their own.
     """
     require_port("--prefect-port", prefect_port)
     require_port("--mlflow-port", mlflow_port)
     workspace = workspace.resolve()
     folder = login.private(workspace / SERVERS)
+    if door is not None and door.certificate:
+        tls(door, f"{workspace / FILE}: serve")
+    if door is not None and not people.read(folder):
+        do = "Add each person, yourself too: `bumblebee lab user add NAME`."
+        raise BadInput(folder / people.FILE, "personal logins, before servers listen for people", "none", do)
     with (folder / "lock").open("a+") as lock:
         found = _lock_or_running(workspace, lock)
         if found is not None:
             _require_ports(found, prefect_port, mlflow_port)
+            if door is not None and found.door != tuple(door.addresses.values()):
+                came = f"those of process {found.keeper}, which do not"
+                raise BadInput(workspace, f"servers that answer at {door.prefect}", came, "End it, then start again.")
             yield found
             return
-        with _kept(workspace, {"prefect": prefect_port, "mlflow": mlflow_port}) as made:
+        with _kept(workspace, {"prefect": prefect_port, "mlflow": mlflow_port}, door) as made:
             yield made
 
 
@@ -171,7 +192,7 @@ def _require_ports(found: Addresses, prefect_port: int, mlflow_port: int) -> Non
 
 
 @contextmanager
-def _kept(workspace: Path, ports: dict[str, int]) -> Iterator[Addresses]:
+def _kept(workspace: Path, ports: dict[str, int], door: ServeLab | None) -> Iterator[Addresses]:
     """Start both servers, and end them with the block. The lock is held."""
     folder, lab = workspace / SERVERS, read_lab(workspace)
     if lab is not None:
@@ -182,36 +203,32 @@ def _kept(workspace: Path, ports: dict[str, int]) -> Iterator[Addresses]:
     password = login.ensure(folder)
     login.private(folder / "artifacts")
     started: dict[str, subprocess.Popen[bytes]] = {}
-    listeners: dict[str, socket.socket] = {}
+    listeners: dict[str, list[socket.socket]] = {}
     try:
         for name in NAMES:
-            listeners[name] = listener(ports[name])
-        urls = {name: f"http://{HOST}:{each.getsockname()[1]}" for name, each in listeners.items()}
+            listeners[name] = [listener(ports[name])]
+            if door is not None:
+                host, port = door.places[name]
+                listeners[name].append(listener(port, host))
+        urls = {name: f"http://{HOST}:{each[0].getsockname()[1]}" for name, each in listeners.items()}
         for name in NAMES:
             started[name] = _start(name, listeners[name], workspace)
-            listeners[name].close()
+            for each in listeners[name]:
+                each.close()
         pids = tuple(each.pid for each in started.values())
         times = tuple(born(pid) for pid in (*pids, os.getpid()))
-        addresses = Addresses(**urls, keeper=os.getpid(), pids=pids, born=times)
+        public = () if door is None else tuple(door.addresses.values())
+        addresses = Addresses(**urls, keeper=os.getpid(), pids=pids, born=times, door=public)
         for name in NAMES:
             _wait(started[name], urls[name], password, folder / f"{name}.log")
         runs.clear_lost(folder, addresses.prefect, password, shared=lab is not None)
-        write_private(file, json.dumps(asdict(addresses)))
+        login.write_private(file, json.dumps(asdict(addresses)))
         yield addresses
     finally:
-        for each in listeners.values():
+        for each in chain(*listeners.values()):
             each.close()
         file.unlink(missing_ok=True)  # ours: the lock is held from before it was written until after this
         stop([each.pid for each in started.values()])
-
-
-def write_private(path: Path, text: str) -> None:
-    """Write a file whole, for its owner only."""
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    part.unlink(missing_ok=True)
-    with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as stream:
-        stream.write(text)
-    part.replace(path)
 
 
 def _end_left_over(workspace: Path) -> None:
@@ -221,9 +238,12 @@ def _end_left_over(workspace: Path) -> None:
         stop([pid for pid, when in zip(old.pids, old.born, strict=False) if same(pid, when)])
 
 
-def _start(name: str, bound: socket.socket, workspace: Path) -> subprocess.Popen[bytes]:
+def _start(name: str, bound: list[socket.socket], workspace: Path) -> subprocess.Popen[bytes]:
+    """Start one server on its sockets, the loopback's first."""
     command = [*FRONT, name, "--workspace", str(workspace)]
-    command += ["--socket", str(bound.fileno()), "--keeper", str(os.getpid())]
+    for option, each in zip(("--socket", "--door"), bound, strict=False):
+        command += [option, str(each.fileno())]
+    command += ["--keeper", str(os.getpid())]
     settings = {key: value for key, value in environment(workspace).items() if key not in ADDRESSES}
     path = workspace / SERVERS / f"{name}.log"
     with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW, 0o600), "ab") as log:
@@ -236,7 +256,7 @@ def _start(name: str, bound: socket.socket, workspace: Path) -> subprocess.Popen
             stdout=log,
             stderr=log,
             start_new_session=True,
-            pass_fds=(bound.fileno(),),
+            pass_fds=tuple(each.fileno() for each in bound),
         )
 
 

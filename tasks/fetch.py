@@ -1,7 +1,8 @@
-"""Copies a registered policy out of a workspace's own store, without a server.
+"""Copies a registered policy out of a workspace's own store without a server, or from a lab's server.
 
     python -m tasks.fetch expert-c0@champion --out policy [--workspace runs/demo]
     python -m tasks.fetch expert-c0/2 --out policy
+    python -m tasks.fetch expert-c0@champion --out policy --server https://data.lab:5000
 
 The folder then holds policy.onnx, contract.json, card.json, README.md (the model card) and lineage.json.
 """
@@ -15,6 +16,7 @@ from pathlib import Path
 from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from tasks import registry
+from tasks.lab_serve import require_server
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -28,9 +30,10 @@ def _fetch(options: argparse.Namespace) -> int:
         raise BadInput("model", "<name>@<alias> or <name>/<version>", options.model, "Such as expert-c0@champion.")
     if not options.workspace.is_dir():
         raise BadInput(options.workspace, "a workspace", "no folder", "Give --workspace.")
+    server = require_server(options.server, "--server") if options.server else ""
     out = options.out.absolute()
     os.chdir(options.workspace)  # the store is the workspace's
-    print(registry.fetch(named[1], named[2] or named[3], out))
+    print(registry.fetch(named[1], named[2] or named[3], out, server))
     return 0
 
 
@@ -39,6 +42,7 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
     made.add_argument("model", help="<name>@<alias> or <name>/<version>, such as expert-c0@champion")
     made.add_argument("--out", type=Path, required=True, help="a new folder for the policy")
     made.add_argument("--workspace", type=Path, default=Path("."), help="folder with .servers (default: this one)")
+    made.add_argument("--server", default="", help="address of MLflow's server, instead of a workspace's store")
     return made.parse_args(argv)
 
 

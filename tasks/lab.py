@@ -12,6 +12,8 @@ With its section `ray`, which may be left out, stages run on several machines.
       address: head.lab:6379
       remote: /shared/bumblebee/dvc        # of DVC; or s3://BUCKET/FOLDER, ssh://HOST/FOLDER
 
+The sections `serve` and `tracking` are read by `tasks/lab_serve.py`; with these alone, all is here, too.
+
 No secret stands in it: PostgreSQL's password comes from `~/.pgpass` (or PGPASSFILE), S3's keys from
 `~/.aws/credentials` (or AWS_SHARED_CREDENTIALS_FILE, AWS_PROFILE), Ray's token from `~/.ray/auth_token` (or
 RAY_AUTH_TOKEN_PATH), as these programs' own clients read them.
@@ -104,10 +106,11 @@ class Lab:
 
 
 KINDS: dict[str, Any] = {"prefect": PrefectLab, "mlflow": MlflowLab, "ray": RayLab}
+ELSEWHERE = ("serve", "tracking")  # sections that tasks/lab_serve.py reads
 
 
 def read_lab(workspace: Path) -> Lab | None:
-    """The workspace's `lab.yaml`; None where there is none.
+    """The workspace's `lab.yaml`; None where there is none, or none that names databases.
 
     Raises:
         BadInput: for an unknown or missing key, an address of another form, or one with a password in it.
@@ -116,13 +119,15 @@ def read_lab(workspace: Path) -> Lab | None:
     if not path.exists():
         return None
     content = read_yaml(path)
+    if isinstance(content, dict) and content and not set(content) - set(ELSEWHERE):
+        return None
     parts: dict[str, Any] = {}
     for name, kind in KINDS.items():
         if name == "ray" and isinstance(content, dict) and name not in content:
             continue
         parts[name] = kind(**_strings(content, name, [own.name for own in fields(kind)], path))
-    if isinstance(content, dict) and (more := sorted(map(str, set(content) - set(parts)))):
-        raise BadInput(f"{path}: {more[0]}", " or ".join(KINDS), "an unknown key")
+    if isinstance(content, dict) and (more := sorted(map(str, set(content) - set(parts) - set(ELSEWHERE)))):
+        raise BadInput(f"{path}: {more[0]}", " or ".join((*KINDS, *ELSEWHERE)), "an unknown key")
     lab = Lab(**parts)
     for where, url in (("prefect", lab.prefect.database), ("mlflow", lab.mlflow.database)):
         _check_database(f"{path}: {where}.database", url)

@@ -2,6 +2,7 @@
 
 Runs and models are written straight into the database and store of the workspace, or of its lab (`lab.yaml`), so that
 plain `dvc repro` and the flow leave the same history; the server only shows it. Why: docs/decisions/mlflow-store.md.
+Where `lab.yaml` names nothing but `tracking`, a lab's server, all goes through that, under the login of who works here.
 """
 
 import fcntl
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from bumblebee.errors import BadInput
 from tasks.lab import MlflowLab, read_lab
 from tasks.lab_checks import one_at_a_time
+from tasks.lab_serve import read_tracking
 from tasks.lineage import git_sha, history, inputs_of_stage, lineage
 from tasks.run_form import card_settings, fitted, flatten, metric_name, read_curve
 
@@ -41,7 +43,7 @@ def prepare() -> "MlflowClient":
 
 @cache
 def _prepared(workspace: Path) -> "MlflowClient":
-    lab = read_lab(workspace)
+    lab, server = read_lab(workspace), read_tracking(workspace)
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     os.environ.setdefault("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT", "1")
@@ -49,6 +51,12 @@ def _prepared(workspace: Path) -> "MlflowClient":
     import mlflow
 
     SERVERS.mkdir(exist_ok=True)
+    if server is not None:
+        with _locked():
+            client = _of_server(server)
+            _make_experiment(client)
+        mlflow.set_experiment(experiment_name())
+        return client
     uri = f"sqlite:///{(SERVERS / 'mlflow.db').resolve()}" if lab is None else lab.mlflow.connection
     logging.getLogger("alembic").setLevel(logging.WARNING)
     with _locked(), nullcontext() if lab is None else one_at_a_time(lab.mlflow.database):
@@ -59,11 +67,36 @@ def _prepared(workspace: Path) -> "MlflowClient":
         else:
             _store_artifacts_in(lab.mlflow)
         client = mlflow.MlflowClient(tracking_uri=uri, registry_uri=uri)
-        name = experiment_name()
-        if client.get_experiment_by_name(name) is None:
-            client.create_experiment(name, f"{SCHEME}:/runs", {"mlflow.experimentKind": "custom_model_development"})
-    mlflow.set_experiment(name)
+        _make_experiment(client)
+    mlflow.set_experiment(experiment_name())
     return client
+
+
+def _of_server(server: str) -> "MlflowClient":
+    """A client of a server of MLflow's, with the login that its own client knows.
+
+    Raises:
+        BadInput: when it does not answer, or not to this login.
+    """
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "3")  # some 15 s, then it is said
+    import mlflow
+    from mlflow.exceptions import MlflowException
+
+    mlflow.set_tracking_uri(server)
+    mlflow.set_registry_uri(server)
+    client = mlflow.MlflowClient(tracking_uri=server, registry_uri=server)
+    try:
+        client.search_registered_models(max_results=1)
+    except MlflowException as error:
+        do = "Set MLFLOW_TRACKING_USERNAME and MLFLOW_TRACKING_PASSWORD, or put them into ~/.mlflow/credentials."
+        raise BadInput(server, "MLflow's server, and a login that it knows", str(error)[:200], do) from None
+    return client
+
+
+def _make_experiment(client: "MlflowClient") -> None:
+    name = experiment_name()
+    if client.get_experiment_by_name(name) is None:
+        client.create_experiment(name, f"{SCHEME}:/runs", {"mlflow.experimentKind": "custom_model_development"})
 
 
 def experiment_name() -> str:
@@ -244,31 +277,34 @@ def describe(name: str, text: str) -> None:
     prepare().update_registered_model(name, fitted(text, LONGEST_DESCRIPTION, CARD))
 
 
-def fetch(name: str, wanted: str, out: Path) -> Path:
-    """Copy a version's files from the store of the workspace in this folder; no server is needed.
+def fetch(name: str, wanted: str, out: Path, server: str = "") -> Path:
+    """Copy a version's files from the store of the workspace in this folder, or from a server.
 
     Args:
         name: the registered model.
         wanted: an alias such as "champion", or a version's number.
         out: a folder that is not there yet.
+        server: its address; without, no server is needed.
 
     Raises:
-        BadInput: where there is no store, no such version, or something at `out`.
+        BadInput: where there is no store or server, no such version, or something at `out`.
     """
     import mlflow
     from mlflow.exceptions import MlflowException
 
-    if read_lab(Path.cwd()) is None and not (SERVERS / "mlflow.db").exists():
+    here = not server and read_lab(Path.cwd()) is None and read_tracking(Path.cwd()) is None
+    if here and not (SERVERS / "mlflow.db").exists():
         raise BadInput(Path.cwd() / SERVERS / "mlflow.db", "a workspace's registry", "no file", "Give its --workspace.")
     if out.exists():
         raise BadInput(out, "a new folder", "one that exists", "Choose another --out.")
-    client = prepare()
+    client = _of_server(server) if server else prepare()
     try:
         numbered = wanted.isdecimal()
         found = client.get_model_version(name, wanted) if numbered else client.get_model_version_by_alias(name, wanted)
     except MlflowException:
         known = ", ".join(model.name for model in client.search_registered_models()) or "none"
-        raise BadInput(f"{name}@{wanted}", "a version in this workspace's registry", f"models: {known}") from None
+        where = server or "this workspace's registry"
+        raise BadInput(f"{name}@{wanted}", f"a version in {where}", f"models: {known}") from None
     out.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=out.parent) as made:
         whole = Path(mlflow.artifacts.download_artifacts(f"models:/{name}/{found.version}", dst_path=made))

@@ -18,7 +18,15 @@ from bumblebee.io.read import file_hash
 from bumblebee.io.write import unwritable
 from bumblebee.measured import gate_record
 from bumblebee.measured import gate_words as words
-from bumblebee.measured.gate_people import AUTOMATIC, ITSELF, Author, is_automatic, require_allowed, unix_user
+from bumblebee.measured.gate_people import (
+    AUTOMATIC,
+    ITSELF,
+    Author,
+    is_automatic,
+    personal,
+    require_allowed,
+    unix_user,
+)
 from bumblebee.measured.gate_table import (
     LONGEST,
     OF_ANSWER,
@@ -50,6 +58,7 @@ __all__ = [
     "answer",
     "decide",
     "is_automatic",
+    "personal",
     "read_approval",
     "request",
     "seen_of",
@@ -74,7 +83,7 @@ class GateConfig(Ranged):
     people: Annotated[int, Range(least=1, most=9)] = 1
     """People who must approve, each under a login of their own; the rejection of one ends it."""
     group: Annotated[str, Text(empty=True)] = ""
-    """Unix group whose members alone may answer; everybody without."""
+    """Unix group whose members alone may answer, and people with this group; everybody without."""
 
     def __post_init__(self) -> None:
         """Refuse gates that answer themselves and ask people."""

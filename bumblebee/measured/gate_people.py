@@ -4,13 +4,14 @@ import grp
 import os
 import pwd
 import socket
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from bumblebee.errors import BadInput
 
 TERMINAL = "Answer in a terminal: `bumblebee gate approve`, `reject` or `more` knows who runs it."
+OWN = ("unix user", "personal login")  # ways to know who answers
 AUTOMATIC = "automatic (gate.mode: auto)"
 
 
@@ -21,7 +22,8 @@ class Author:
     by: str
     """The name that was given: a claim."""
     known_by: dict[str, Any] = field(default_factory=dict)
-    """{"how": "unix user", "user", "uid", "host"}, {"how": "automatic"}, or {"how": what else vouches for it}."""
+    """{"how": "unix user", "user", "uid", "host"}, {"how": "personal login", "user", "groups"}, {"how": "automatic"},
+    or {"how": what else vouches for it}."""
 
 
 ITSELF = Author(AUTOMATIC, {"how": "automatic"})
@@ -37,6 +39,11 @@ def unix_user(by: str) -> Author:
     return Author(by, {"how": "unix user", "user": user, "uid": uid, "host": socket.gethostname()})
 
 
+def personal(user: str, groups: Iterable[str]) -> dict[str, Any]:
+    """How somebody was known who logged in on the servers' page under a name of their own."""
+    return {"how": "personal login", "user": user, "groups": list(groups)}
+
+
 def is_automatic(answer: Mapping[str, Any]) -> bool:
     """Whether the loop gave this answer itself; answers of before `known_by` say so by their name."""
     if "known_by" in answer:
@@ -45,9 +52,12 @@ def is_automatic(answer: Mapping[str, Any]) -> bool:
 
 
 def login_of(answer: Mapping[str, Any]) -> str | None:
-    """The login under which an answer was given; None where nothing but a claim is known of its author."""
+    """The login under which an answer was given; None where nothing but a claim is known of its author.
+
+    A unix user and a personal login of the same name are the same person.
+    """
     facts = answer.get("known_by") or {}
-    return str(facts.get("user")) if facts.get("how") == "unix user" else None
+    return str(facts.get("user")) if facts.get("how") in OWN else None
 
 
 def approvers(table: Mapping[str, Any]) -> list[str]:
@@ -63,7 +73,7 @@ def require_allowed(known_by: Mapping[str, Any], people: int, group: str, sectio
     Args:
         known_by: how the author was known, `gate.Author.known_by`.
         people: how many must approve.
-        group: unix group whose members alone may answer; "" for everybody.
+        group: whose members alone may answer: a unix group, and people with this group; "" for everybody.
         section: of the settings that say so.
 
     Raises:
@@ -75,7 +85,8 @@ def require_allowed(known_by: Mapping[str, Any], people: int, group: str, sectio
     if login is None:
         asked = f"a login of their own, as {section}.people and {section}.group ask"
         raise BadInput("the answer's author", asked, "none", TERMINAL)
-    if group and login not in members(group, section):
+    own = known_by.get("groups", ()) if known_by["how"] == "personal login" else None
+    if group and not (group in own if own is not None else login in members(group, section)):
         raise BadInput("the answer's author", f"a member of the group {group} ({section}.group)", login)
 
 

@@ -87,6 +87,8 @@ def known(table: dict[str, Any]) -> str:
     facts = table.get("known_by") or {}
     if facts.get("how") == "unix user":
         return f"unix user {facts.get('user')}, uid {facts.get('uid')}, on {facts.get('host')}"
+    if facts.get("how") == "personal login":
+        return f"personal login {facts.get('user')}"
     return str(facts.get("how") or "not recorded")
 
 

@@ -74,7 +74,7 @@ def test_processes_are_told_where_things_are(tmp_path: Path) -> None:
         (changed("mlflow", "artifacts", 3), "mlflow.artifacts: expected a text, came int"),
         (changed("mlflow", "database", GOOD["prefect"]["database"]), "another database than Prefect's"),
         ({"prefect": GOOD["prefect"]}, "mlflow: expected a mapping with database, artifacts, s3_endpoint"),
-        ({**GOOD, "slurm": {}}, "slurm: expected prefect or mlflow or ray, came an unknown key"),
+        ({**GOOD, "slurm": {}}, "slurm: expected prefect or mlflow or ray or serve or tracking, came an unknown key"),
         ({**GOOD, "ray": {}}, "ray.address: expected an address, came no such key"),
         (cluster(address="ray://head:6379"), "ray.address: expected HOST:PORT of the cluster's head"),
         (cluster(address="head:99999"), "ray.address: expected HOST:PORT of the cluster's head"),

@@ -3,6 +3,7 @@
 import grp
 import json
 import os
+import pwd
 from pathlib import Path
 from typing import Any
 
@@ -132,3 +133,25 @@ def test_a_broken_record_takes_no_answer(place: gate.Gate) -> None:
     with pytest.raises(BadInput, match="line 1"):
         answer(place, "bob")
     assert place.approval.read_text() == before
+
+
+def test_a_personal_login_answers_for_two_and_is_the_same_person_as_a_unix_user_of_its_name(place: gate.Gate) -> None:
+    seen = gate.request(place)["seen"]["sha256"]
+    page = gate.Author("Ann", gate.personal("ann", ("robotics",)))
+    terminal = gate.Author("ann", {"how": "unix user", "user": "ann", "uid": 7, "host": "lab"})
+    gate.answer(place, True, page, seen, rule=TWO)
+    with pytest.raises(BadInput, match="a second one by ann"):
+        gate.answer(place, True, terminal, seen, rule=TWO)
+    table = gate.answer(place, True, gate.Author("Bob", gate.personal("bob", ())), seen, rule=TWO)
+    assert table["status"] == "approved" and gate.verdict(place, people=2) == "approved"
+    assert "Ann (personal login ann) and Bob (personal login bob)" in words.said(table)
+
+
+def test_of_personal_logins_the_groups_of_their_list_count_and_no_unix_group(place: gate.Gate) -> None:
+    seen, own = gate.request(place)["seen"]["sha256"], grp.getgrgid(os.getgid()).gr_name
+    rule = gate.GateConfig(group=own)
+    stranger = gate.Author("me", gate.personal(pwd.getpwuid(os.getuid()).pw_name, ("robotics",)))
+    with pytest.raises(BadInput, match=f"a member of the group {own}"):
+        gate.answer(place, True, stranger, seen, rule=rule)
+    member = gate.Author("Ann", gate.personal("ann", (own,)))
+    assert gate.answer(place, True, member, seen, rule=rule)["status"] == "approved"
