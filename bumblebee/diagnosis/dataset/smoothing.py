@@ -5,10 +5,8 @@ friction. At a few hundred hertz the positions around a tick say the velocity fa
 Each joint is fitted at each tick by a cubic in time over +-10 ms, positions and velocities weighted by their noise; the
 fit's own covariance is the noise that is left. Slow logs stay as read, and floating bases, whose impacts are shorter.
 
-So does what is no cubic within the noise: a tick beside an impact or a saturation, and every tick of a joint on most of
-which the fit misses readings beyond doubt. There a stiff servo, say, answers each command within the period, and its
-velocities at the ticks are not the slopes of its positions. Readings that agree better than their noise allows have
-the same error, as those within one step of an encoder do: a mean of them is no better than one.
+Readings that agree better than their noise allows have the same error, as those within one step of an encoder do: a
+mean of them is no better than one.
 """
 
 from collections.abc import Sequence
@@ -29,8 +27,6 @@ class _Smoothed:
     """(T, J)."""
     speed: np.ndarray
     """(T, J)."""
-    clear: np.ndarray
-    """(T, J) bool: the fit misses the readings around the tick beyond doubt."""
     variance: tuple[np.ndarray, np.ndarray]
     """(J,) that is left of positions and of velocities."""
 
@@ -39,26 +35,21 @@ def smooth_rollouts(
     rollouts: Sequence[Rollout], layout: Layout, sigma: np.ndarray, rule: Smoothing
 ) -> tuple[list[Rollout], np.ndarray, int]:
     """Smoothed rollouts, the noise (D,) that is left in them, and how many were fast enough to be smoothed."""
+    out, left, count = [], [], 0
     parts = layout.slices["joint_pos"], layout.slices["joint_vel"]
-    found: list[_Smoothed | None] = []
     for rollout in rollouts:
         near = round(rule.half_span / float(np.median(np.diff(rollout.time))))
-        slow = near < rule.neighbours or rollout.frames < rule.spans * near
-        found.append(None if slow else _smooth(rollout, near, sigma[parts[0]], sigma[parts[1]], rule))
-    fast = [one for one in found if one is not None]
-    kept = np.concatenate([one.clear for one in fast]).mean(axis=0) <= rule.missed if fast else np.empty(0, dtype=bool)
-    out, left = [], []
-    for rollout, one in zip(rollouts, found, strict=True):
+        if near < rule.neighbours or rollout.frames < rule.spans * near:
+            out.append(rollout)
+            left.append(sigma**2)
+            continue
+        found = _smooth(rollout, near, sigma[parts[0]], sigma[parts[1]], rule)
+        out.append(replace(rollout, joint_pos=found.place, joint_vel=found.speed))
         mine = sigma**2
-        if one is not None and kept.any():
-            use = kept & ~one.clear
-            place, speed = np.where(use, one.place, rollout.joint_pos), np.where(use, one.speed, rollout.joint_vel)
-            rollout = replace(rollout, joint_pos=place, joint_vel=speed)
-            for part, variance in zip(parts, one.variance, strict=True):
-                mine[part] = np.where(kept, variance, mine[part])
-        out.append(rollout)
+        mine[parts[0]], mine[parts[1]] = found.variance
         left.append(mine)
-    return out, np.sqrt(np.mean(left, axis=0)), len(fast) if kept.any() else 0
+        count += 1
+    return out, np.sqrt(np.mean(left, axis=0)), count
 
 
 def _smooth(rollout: Rollout, near: int, sigma_pos: np.ndarray, sigma_vel: np.ndarray, rule: Smoothing) -> _Smoothed:
@@ -74,7 +65,6 @@ def _smooth(rollout: Rollout, near: int, sigma_pos: np.ndarray, sigma_vel: np.nd
     slopes = np.stack([np.zeros_like(u)] + [k * u ** (k - 1) / span for k in range(1, terms)], axis=-1)
     slopes = slopes * inside[..., None]
     place, speed = np.empty_like(rollout.joint_pos), np.empty_like(rollout.joint_vel)
-    clear = np.zeros(place.shape, dtype=bool)
     variance = np.empty(place.shape[1]), np.empty(place.shape[1])
     for j in range(place.shape[1]):
         noise = max(sigma_pos[j], 1e-12), max(sigma_vel[j], 1e-9)
@@ -84,16 +74,13 @@ def _smooth(rollout: Rollout, near: int, sigma_pos: np.ndarray, sigma_vel: np.nd
         fitted = np.einsum("tab,tb->ta", inverse, sum(fit.right for fit in fits))
         place[:, j] = rollout.joint_pos[:, j] + fitted[:, 0]
         speed[:, j] = fitted[:, 1] / span
-        free = np.maximum(2 * inside.sum(axis=1) - terms, 1)
-        missed = [fit.missed(fitted) for fit in fits]
-        clear[:, j] = sum(missed) > free + rule.clear * np.sqrt(2.0 * free)
-        whole, middle = inside.all(axis=1) & ~clear[:, j], len(inside) // 2
+        whole, middle = inside.all(axis=1), len(inside) // 2
         typical = np.median(inverse, axis=0)
         for k, (fit, unit) in enumerate(zip(fits, (1.0, 1.0 / span), strict=True)):
             left = typical[k, k] * unit**2
-            apart = missed[k][whole].mean() / fit.free(typical, middle) if whole.any() else 1.0
+            apart = fit.missed(fitted)[whole].mean() / fit.free(typical, middle) if whole.any() else 1.0
             variance[k][j] = left if apart > rule.white else max(left, (1.0 - apart) * noise[k] ** 2)
-    return _Smoothed(place, speed, clear, variance)
+    return _Smoothed(place, speed, variance)
 
 
 @dataclass(frozen=True, eq=False)

@@ -115,10 +115,6 @@ class Smoothing:
     """Times the neighbours on one side that a rollout has rows at least."""
     beyond: float = 1.5
     """Half spans within which a neighbour must lie: a gap in the log has no neighbours beyond it."""
-    clear: float = 6.0
-    """Standard errors of a local fit's chi-square beyond which it misses readings without doubt."""
-    missed: float = 0.2
-    """Share of a joint's ticks at which fits may miss: more of them, and the joint's motion is no cubic."""
     white: float = 0.5
     """Share of their noise that readings must be apart, below which they have the same error."""
 
