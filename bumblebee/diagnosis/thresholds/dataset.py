@@ -128,7 +128,7 @@ class VelocityLatency:
     near: float = 0.02
     """Time around its ends from which the positions' velocities are taken [s]."""
     least: float = 1e-3
-    """Age beyond which one must be, without doubt [s]: half a step of a millisecond is none."""
+    """Age beyond which one must be, without doubt [s]: half a step of a simulator is none, and 1 ms is twice that."""
     periods: float = 1.5
     """Periods of the log that an age must exceed where position targets are logged: a servo that answers within a
     period passes for half of one."""
