@@ -129,10 +129,22 @@ def true_model(robot: Robot, sealed: list[Sealed], rng: np.random.Generator) -> 
             model.dof_armature[dof] += one.size
         elif one.effect == "joint_spring":
             model.jnt_stiffness[model.joint(one.where).id] += one.size
+    if robot.drive not in ("position", "general"):
+        _without_feedback(model, robot)
     model.opt.integrator = int(rng.integers(0, 4))
     model.opt.timestep = float(rng.choice([0.0005, 0.001]))
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
+
+
+def _without_feedback(model: mujoco.MjModel, robot: Robot) -> None:
+    """Drives that are told a torque give it: neither back-EMF nor a position servo of their own is felt."""
+    for name in robot.joints:
+        a = _actuator(model, model.joint(name).id)
+        if a >= 0 and (model.actuator_biasprm[a, 1] != 0 or model.actuator_gaintype[a] != mujoco.mjtGain.mjGAIN_FIXED):
+            model.actuator_gaintype[a] = mujoco.mjtGain.mjGAIN_FIXED
+            model.actuator_biastype[a] = mujoco.mjtBias.mjBIAS_NONE
+            model.actuator_gainprm[a], model.actuator_biasprm[a] = 0.0, 0.0
 
 
 @dataclass
@@ -207,10 +219,17 @@ class _Recorder:
                     kp, kd = self.robot.motor_gains
                     value = kp * (value - data.qpos[self.at[j]] - self.offset[j]) - kd * data.qvel[self.dof[j]]
                 data.ctrl[a] = 0.0
-                data.qfrc_applied[self.dof[j]] = self.strength[j] * value
+                data.qfrc_applied[self.dof[j]] = gear * self._within(a, self.strength[j] * value / gear, data)
                 continue
             # A weaker drive: what its force lacks, computed from the last step's.
             data.qfrc_applied[self.dof[j]] = (self.strength[j] - 1) * gear * data.actuator_force[a] * (gain != 0)
+
+    def _within(self, a: int, force: float, data: mujoco.MjData) -> float:
+        """What a drive adds to its own damping for a force beside it: their sum keeps to the drive's limits."""
+        if not self.model.actuator_forcelimited[a]:
+            return force
+        low, high = self.model.actuator_forcerange[a]
+        return float(np.clip(force + data.actuator_force[a], low, high) - data.actuator_force[a])
 
     def _logged(self, name: str, time: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, command: np.ndarray) -> Rollout:
         rng, log, robot = self.rng, self.log, self.robot

@@ -4,16 +4,31 @@ A window starts from a reading, and a velocity read with 0.07 rad/s of noise is 
 friction. At a few hundred hertz the positions around a tick say the velocity far better than its own reading does.
 Each joint is fitted at each tick by a cubic in time over +-10 ms, positions and velocities weighted by their noise; the
 fit's own covariance is the noise that is left. Slow logs stay as read, and floating bases, whose impacts are shorter.
+
+Readings that agree better than their noise allows have the same error, as those within one step of an encoder do: a
+mean of them is no better than one.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bumblebee.diagnosis.simulation import Layout
 from bumblebee.diagnosis.thresholds.dataset import Smoothing
 from bumblebee.measured.rollout import Rollout
+
+
+@dataclass(frozen=True, eq=False)
+class _Smoothed:
+    """A rollout by its local fits; T ticks, J joints."""
+
+    place: np.ndarray
+    """(T, J)."""
+    speed: np.ndarray
+    """(T, J)."""
+    variance: tuple[np.ndarray, np.ndarray]
+    """(J,) that is left of positions and of velocities."""
 
 
 def smooth_rollouts(
@@ -28,19 +43,17 @@ def smooth_rollouts(
             out.append(rollout)
             left.append(sigma**2)
             continue
-        place, speed, variance = _smooth(rollout, near, sigma[parts[0]], sigma[parts[1]], rule)
-        out.append(replace(rollout, joint_pos=place, joint_vel=speed))
+        found = _smooth(rollout, near, sigma[parts[0]], sigma[parts[1]], rule)
+        out.append(replace(rollout, joint_pos=found.place, joint_vel=found.speed))
         mine = sigma**2
-        mine[parts[0]], mine[parts[1]] = variance
+        mine[parts[0]], mine[parts[1]] = found.variance
         left.append(mine)
         count += 1
     return out, np.sqrt(np.mean(left, axis=0)), count
 
 
-def _smooth(
-    rollout: Rollout, near: int, sigma_pos: np.ndarray, sigma_vel: np.ndarray, rule: Smoothing
-) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Positions and velocities (T, J) of the local fits, and the median variances (J,) of both."""
+def _smooth(rollout: Rollout, near: int, sigma_pos: np.ndarray, sigma_vel: np.ndarray, rule: Smoothing) -> _Smoothed:
+    """The local fits over `near` ticks to either side."""
     span, terms = rule.half_span, rule.terms
     rows = np.clip(np.arange(rollout.frames)[:, None] + np.arange(-near, near + 1), 0, rollout.frames - 1)
     shift = rollout.time[rows] - rollout.time[:, None]
@@ -54,15 +67,48 @@ def _smooth(
     place, speed = np.empty_like(rollout.joint_pos), np.empty_like(rollout.joint_vel)
     variance = np.empty(place.shape[1]), np.empty(place.shape[1])
     for j in range(place.shape[1]):
-        rate = max(sigma_vel[j], 1e-9) / max(sigma_pos[j], 1e-12)  # scaled so that a position weighs 1
-        normal = np.einsum("tka,tkb->tab", powers, powers) + np.einsum("tka,tkb->tab", slopes, slopes) / rate**2
-        normal = normal + 1e-9 * np.eye(terms)
-        right = np.einsum("tka,tk->ta", powers, rollout.joint_pos[rows, j] - rollout.joint_pos[:, None, j])
-        right += np.einsum("tka,tk->ta", slopes, rollout.joint_vel[rows, j]) / rate**2
-        inverse = np.linalg.inv(normal)
-        fitted = np.einsum("tab,tb->ta", inverse, right)
+        noise = max(sigma_pos[j], 1e-12), max(sigma_vel[j], 1e-9)
+        read = rollout.joint_pos[rows, j] - rollout.joint_pos[:, None, j], rollout.joint_vel[rows, j]
+        fits = [_Signal(basis, x * inside, s) for basis, x, s in zip((powers, slopes), read, noise, strict=True)]
+        inverse = np.linalg.inv(sum(fit.normal for fit in fits) + 1e-9 / noise[0] ** 2 * np.eye(terms))
+        fitted = np.einsum("tab,tb->ta", inverse, sum(fit.right for fit in fits))
         place[:, j] = rollout.joint_pos[:, j] + fitted[:, 0]
         speed[:, j] = fitted[:, 1] / span
-        variance[0][j] = sigma_pos[j] ** 2 * np.median(inverse[:, 0, 0])
-        variance[1][j] = sigma_pos[j] ** 2 * np.median(inverse[:, 1, 1]) / span**2
-    return place, speed, variance
+        whole, middle = inside.all(axis=1), len(inside) // 2
+        typical = np.median(inverse, axis=0)
+        for k, (fit, unit) in enumerate(zip(fits, (1.0, 1.0 / span), strict=True)):
+            left = typical[k, k] * unit**2
+            apart = fit.missed(fitted)[whole].mean() / fit.free(typical, middle) if whole.any() else 1.0
+            variance[k][j] = left if apart > rule.white else max(left, (1.0 - apart) * noise[k] ** 2)
+    return _Smoothed(place, speed, variance)
+
+
+@dataclass(frozen=True, eq=False)
+class _Signal:
+    """Readings of one kind around each of T ticks, K of them, and the B functions that fit them."""
+
+    basis: np.ndarray
+    """(T, K, B); 0 for what is no neighbour."""
+    read: np.ndarray
+    """(T, K); likewise."""
+    sigma: float
+    """Noise of a reading."""
+
+    @property
+    def normal(self) -> np.ndarray:
+        """(T, B, B)."""
+        return np.einsum("tka,tkb->tab", self.basis, self.basis) / self.sigma**2
+
+    @property
+    def right(self) -> np.ndarray:
+        """(T, B)."""
+        return np.einsum("tka,tk->ta", self.basis, self.read) / self.sigma**2
+
+    def missed(self, fitted: np.ndarray) -> np.ndarray:
+        """Chi-square (T,) of the readings about a fit (T, B)."""
+        return ((self.read - np.einsum("tka,ta->tk", self.basis, fitted)) ** 2).sum(axis=1) / self.sigma**2
+
+    def free(self, covariance: np.ndarray, tick: int) -> float:
+        """Degrees of freedom that a fit of `covariance` (B, B) leaves these readings around a tick."""
+        bent = np.einsum("ka,ab,kb->", self.basis[tick], covariance, self.basis[tick]) / self.sigma**2
+        return max(float((self.basis[tick] != 0).any(axis=1).sum() - bent), 1e-9)

@@ -10,7 +10,7 @@ from bumblebee.diagnosis.candidates import Candidate, possible_beside, rough, wi
 from bumblebee.diagnosis.residuals.imu_tilt import angles, retilted, tilt_columns, tilt_of
 from bumblebee.diagnosis.residuals.initial_state import restarted, start_moves
 from bumblebee.diagnosis.residuals.nuisances import nuisance_columns
-from bumblebee.diagnosis.residuals.whitening import NoisyWindows, Whitener, fit_whitener
+from bumblebee.diagnosis.residuals.whitening import NoisyWindows, Stepped, Whitener, fit_whitener
 from bumblebee.diagnosis.simulation import Layout, Plant, Recall, Windows, residuals, select, vary
 from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.errors import BadInput
@@ -213,7 +213,8 @@ def make_problem(
     move = start_moves(noisy, rng, rules.initial_state)
     windows = restarted(plant, layout, read, move)
     raw = nuisance_columns(plant, layout, windows, variation, fine, rules.nuisances)
-    stepped = raw[0] * (fine / rules.nuisances.unit)
+    left = residuals(plant, layout, windows, [variation], fine)[0]
+    stepped = Stepped(raw[0] * (fine / rules.nuisances.unit), left)
     whitener = fit_whitener(replace(noisy, windows=windows), rng, move, stepped)
     keep = whitener.valid & np.isfinite(raw).all(axis=(0, 2, 3))
     _refuse_divergent(keep, windows.span, rules.outliers.finite)

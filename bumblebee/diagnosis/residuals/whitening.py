@@ -128,6 +128,16 @@ def _balanced_signs(windows: int, count: int, rng: np.random.Generator) -> np.nd
 
 
 @dataclass(frozen=True, eq=False)
+class Stepped:
+    """What the length of its steps makes of W simulated windows; NaN where these diverge."""
+
+    change: np.ndarray
+    """(W, N, D) change of the prediction from steps twice as long."""
+    left: np.ndarray
+    """(W, N, D) residual in the steps that are not longer."""
+
+
+@dataclass(frozen=True, eq=False)
 class Sampled:
     """What noise in the starts of W windows makes of their residuals."""
 
@@ -137,8 +147,6 @@ class Sampled:
     """(K, W, C) by which coordinates were moved, in standard deviations."""
     valid: np.ndarray
     """(W,) windows whose simulations stayed finite."""
-    left: np.ndarray
-    """(W, M) residual from the unperturbed starts."""
 
     @property
     def slopes(self) -> np.ndarray:
@@ -154,12 +162,11 @@ def sample(noisy: NoisyWindows, rng: np.random.Generator) -> Sampled:
     base = noisy.residuals()[0]
     moved = noisy.residuals(starts) - base
     valid = np.isfinite(moved).all(axis=(0, 2, 3)) & np.isfinite(base).all(axis=(1, 2))
-    left = np.nan_to_num(base).reshape(len(windows), -1)
-    return Sampled(np.nan_to_num(moved).reshape(len(moved), len(windows), -1), signs, valid, left)
+    return Sampled(np.nan_to_num(moved).reshape(len(moved), len(windows), -1), signs, valid)
 
 
 def fit_whitener(
-    noisy: NoisyWindows, rng: np.random.Generator, move: np.ndarray | None = None, stepped: np.ndarray | None = None
+    noisy: NoisyWindows, rng: np.random.Generator, move: np.ndarray | None = None, stepped: Stepped | None = None
 ) -> Whitener:
     """The whitener of the windows for their model, their sensors' noise and, if given, the simulation's own error.
 
@@ -167,7 +174,7 @@ def fit_whitener(
         noisy: windows, model and noise.
         rng: of the perturbed starts' signs.
         move: (W, C) by how much the starts have been displaced from the measured ones, if they have.
-        stepped: (W, N, D) change of the prediction from steps twice as long; NaN where these diverge.
+        stepped: what steps twice as long change.
     """
     found = sample(noisy, rng)
     mean = found.moved.mean(axis=0)
@@ -193,19 +200,21 @@ def null_draws(whitener: Whitener, sigma: np.ndarray, rng: np.random.Generator) 
     return starts + np.matmul(whitener.factor, reading.transpose(1, 2, 0)).transpose(2, 0, 1)
 
 
-def factors_of(found: Sampled, sigma: np.ndarray, rule: Whitening, stepped: np.ndarray | None = None) -> np.ndarray:
+def factors_of(found: Sampled, sigma: np.ndarray, rule: Whitening, stepped: Stepped | None = None) -> np.ndarray:
     """Inverse Cholesky factors (W, M, M) of the covariance of what noise in the starts makes plus that of readings.
 
-    And of what steps of a finite length make of a prediction: `stepped` (W, N, D) is what steps of twice the length
-    change. What all windows have of it together is a nuisance (`nuisances`); of a share of it that is each window's
-    own, what exceeds the noise in a signal counts along it and, by its root mean square, in every reading.
+    And of what steps of a finite length make of a prediction: `stepped` is what steps of twice the length change. What
+    all windows have of it together is a nuisance (`nuisances`); of a share of it that is each window's own, what
+    exceeds the noise in a signal counts along it and, by its root mean square, in every reading.
     """
     samples, windows, size = found.moved.shape
-    numeric = _own_numerical_error(np.zeros((windows, size)) if stepped is None else stepped, sigma, rule, found.left)
+    away = found.moved - found.moved.mean(axis=0)
+    numeric = np.zeros((windows, size // len(sigma), len(sigma)))
+    if stepped is not None:
+        numeric = _own_numerical_error(stepped, sigma, rule, away.var(axis=0).reshape(numeric.shape))
     each = np.sqrt((numeric**2).mean(axis=1))
     numeric, each = numeric.reshape(windows, -1), np.tile(each, (1, size // len(sigma)))
     reading = np.tile(sigma**2, size // len(sigma))
-    away = found.moved - found.moved.mean(axis=0)
     # The slopes have bent to all but these of the samples.
     free = samples - 1 - found.signs.shape[2]
     slopes, out = found.slopes, np.empty((windows, size, size))
@@ -223,18 +232,17 @@ def factors_of(found: Sampled, sigma: np.ndarray, rule: Whitening, stepped: np.n
     return out
 
 
-def _own_numerical_error(stepped: np.ndarray, sigma: np.ndarray, rule: Whitening, left: np.ndarray) -> np.ndarray:
+def _own_numerical_error(stepped: Stepped, sigma: np.ndarray, rule: Whitening, started: np.ndarray) -> np.ndarray:
     """A window's own numerical error (W, N, D) as far as it exceeds the noise `sigma` (D,) of a signal.
 
-    None where far more is `left` (W, M) of a signal in most windows: the model lacks something, and numerical error
-    would only take weight off the windows and signals in which most happens.
+    None where far more is left of a signal in most windows than that and noise, its own and what the starts' makes of
+    it, a variance `started` (W, N, D): the model lacks something, and numerical error would only take weight off the
+    windows and signals in which most happens.
     """
-    shape = (len(stepped), -1, len(sigma))
-    changed = np.nan_to_num(stepped).reshape(shape)
+    changed, left = np.nan_to_num(stepped.change), np.nan_to_num(stepped.left)
     own = rule.stepped * changed
-    power = (own**2).mean(axis=1, keepdims=True)
-    remaining = (left.reshape(shape) ** 2).mean(axis=1, keepdims=True)
-    enough = remaining <= rule.explained**2 * (changed**2).mean(axis=1, keepdims=True)
-    explains = (enough.mean(axis=0) >= 0.5).all()
+    power, remaining = ((x**2).mean(axis=1, keepdims=True) for x in (own, left))
+    usual = (changed**2).mean(axis=1, keepdims=True) + sigma**2 + started.mean(axis=1, keepdims=True)
+    explains = ((remaining <= rule.explained**2 * usual).mean(axis=0) >= 0.5).all()
     beyond = np.maximum(power - sigma**2, 0.0) * explains
     return own * np.sqrt(beyond / np.where(power > 0, power, 1.0))

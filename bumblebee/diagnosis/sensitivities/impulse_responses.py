@@ -15,6 +15,7 @@ from bumblebee.diagnosis.simulation import (
     Plant,
     Variation,
     Windows,
+    activations,
     at_ticks,
     difference,
     inputs_of,
@@ -25,6 +26,8 @@ from bumblebee.diagnosis.simulation import (
     without,
 )
 from bumblebee.diagnosis.thresholds.sensitivities import Impulses
+
+_STATE = ("qpos", "qvel", "act")
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +44,8 @@ class Path:
     """(W, K, nu)."""
     edges: np.ndarray
     """(S + 1,) steps at which the segments begin and end."""
+    act: np.ndarray
+    """(W, K + 1, na) activations of drives that have one."""
 
     def mean(self, values: np.ndarray) -> np.ndarray:
         """Means over the segments, (W, S, ...), of values at the steps (W, K, ...)."""
@@ -81,7 +86,8 @@ def answers_of(
         plain, batch = (own_batch(plant, windows, variation, copies) for copies in (1, len(pushed)))
     qpos = windows.qpos.copy()
     qpos[:, plant.qpos] -= variation.offset
-    path = _free_path(plain, qpos, windows.qvel, step, control, edges)
+    act = activations(windows, variation, control[:, 0])
+    path = _free_path(plain, (qpos, windows.qvel, act), step, control, edges)
 
     def readings(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """(copies, W, N, D) from states at all steps (copies * W, K + 1, .)."""
@@ -100,18 +106,19 @@ def answers_of(
 
 
 def _free_path(
-    batch: Batch, qpos: np.ndarray, qvel: np.ndarray, step: float, control: np.ndarray, edges: np.ndarray
+    batch: Batch, start: tuple[np.ndarray, np.ndarray, np.ndarray], step: float, control: np.ndarray, edges: np.ndarray
 ) -> Path:
-    """The windows as they go without a pulse, from `qpos` (W, nq) and `qvel` (W, nv)."""
-    batch.bind("qpos")[:], batch.bind("qvel")[:] = qpos, qvel
-    out = batch.rollout(control.shape[1], control, record=("qpos", "qvel"))
-    return Path(
-        step=step,
-        qpos=np.concatenate((qpos[:, None], out["qpos"]), axis=1),
-        qvel=np.concatenate((qvel[:, None], out["qvel"]), axis=1),
-        control=control,
-        edges=edges,
-    )
+    """The windows as they go without a pulse, from a `start` of qpos (W, nq), qvel (W, nv) and activations (W, na)."""
+    parts = [name for name, values in zip(_STATE, start, strict=True) if values.size]
+    for name, values in zip(_STATE, start, strict=True):
+        if values.size:
+            batch.bind(name)[:] = values
+    out = batch.rollout(control.shape[1], control, record=parts)
+    whole = {
+        name: np.concatenate((values[:, None], out[name]), axis=1) if values.size else values[:, None]
+        for name, values in zip(_STATE, start, strict=True)
+    }
+    return Path(step=step, control=control, edges=edges, **whole)
 
 
 def _pushed_path(batch: Batch, path: Path, torques: np.ndarray, segment: int) -> tuple[np.ndarray, np.ndarray]:
@@ -121,6 +128,8 @@ def _pushed_path(batch: Batch, path: Path, torques: np.ndarray, segment: int) ->
     batch.reset(stage=0)
     batch.bind("qpos")[:] = np.tile(path.qpos[:, first], (many, 1))
     batch.bind("qvel")[:] = np.tile(path.qvel[:, first], (many, 1))
+    if path.act.size:
+        batch.bind("act")[:] = np.tile(path.act[:, first], (many, 1))
     push = np.repeat(torques, size, axis=0)
     q, v = (np.tile(x[:, : first + 1], (many, 1, 1)) for x in (path.qpos, path.qvel))
     for a, b, torque in ((first, last, push), (last, count, np.zeros_like(push))):

@@ -1,5 +1,6 @@
 """What a robot with given effects would have shown: the declared model varied, simulated on windows of the logs."""
 
+from bumblebee.diagnosis.simulation.activations import activations
 from bumblebee.diagnosis.simulation.actuator_history import (
     at_starts,
     bent_before,
@@ -64,6 +65,7 @@ __all__ = [
     "Starts",
     "Variation",
     "Windows",
+    "activations",
     "at_starts",
     "at_ticks",
     "bent_before",

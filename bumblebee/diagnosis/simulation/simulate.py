@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from bumblebee.diagnosis.simulation.activations import activations
 from bumblebee.diagnosis.simulation.actuator_history import read_at, remember
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
 from bumblebee.diagnosis.simulation.failures import REFUSALS
@@ -227,7 +228,11 @@ def _run(chunk: _Chunk, layout: Layout, inputs: list[np.ndarray]) -> np.ndarray:
     batch.bind("qvel")[:] = qvel.reshape(copies * size, -1)
     control = np.stack(inputs).reshape(copies * size, inputs[0].shape[1], -1)
     if own.model.na:
-        batch.bind("act")[:] = _activation(own.model, control[:, 0])
+        batch.bind("act")[:] = np.concatenate(
+            [activations(windows, v, given[:, 0]) for v, given in zip(chunk.chosen, inputs, strict=True)]
+            if chunk.starts is None
+            else [activations(windows, lead, inputs[0][:, 0])] * copies
+        )
     set_plastic(batch, plant, windows, lead, copies)
     path_q, path_v = _roll(batch, plant, windows, lead, control, chunk.step, copies)
     failed = batch.warning.reshape(copies * size, -1).any(axis=1)
@@ -259,6 +264,8 @@ def _led_in(plant: Plant, windows: Windows, lead: Variation, step: float) -> Kno
     batch.bind("qpos")[:], batch.bind("qvel")[:] = qpos, qvel
     set_plastic(batch, plant, early, lead, 1)
     control = inputs_of(early, lead, step, max(1, round(span / step)), {})
+    if lead.model.na:
+        batch.bind("act")[:] = activations(early, lead, control[:, 0])
     path_q, path_v = _roll(batch, plant, early, lead, control, step, 1)
     return path_q[:, -1], path_v[:, -1], whole & ~batch.warning.reshape(len(early), -1).any(axis=1)
 
@@ -333,15 +340,6 @@ def with_step(model: mujoco.MjModel, step: float) -> mujoco.MjModel:
     model.opt.timestep = step
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
     return model
-
-
-def _activation(model: mujoco.MjModel, control: np.ndarray) -> np.ndarray:
-    """Filters start at rest with their input: (n, na) from (n, nu)."""
-    act = np.zeros((len(control), model.na))
-    for a in range(model.nu):
-        if model.actuator_actnum[a]:
-            act[:, model.actuator_actadr[a]] = control[:, a]
-    return act
 
 
 def at_ticks(windows: Windows, start: np.ndarray, path: np.ndarray, step: float, copies: int) -> np.ndarray:

@@ -122,7 +122,7 @@ def cut(
     }
     count = min(outputs, *(max(1, last - k - firsts[i] + 1) for i, k, last in starts))
     cache = {i: measured_readings(rollouts[i], layout) for i in {s[0] for s in starts}}
-    commands = {i: command_inputs(plant, rollouts[i]) for i in cache}
+    commands = {i: _every_command(rollouts[i].time, command_inputs(plant, rollouts[i]), rule) for i in cache}
     heights = stance_heights(plant, rollouts, {s[0] for s in starts}) if _needs_height(plant, layout) else {}
     rows = []
     for i, k, last in starts:
@@ -184,15 +184,16 @@ def _one(
     plant: Plant,
     rollout: Rollout,
     readings: tuple[np.ndarray, np.ndarray | None],
-    command: np.ndarray,
+    commands: tuple[np.ndarray, np.ndarray],
     heights: np.ndarray | None,
     k: int,
     picks: np.ndarray,
 ) -> dict[str, np.ndarray | None]:
     signals, quat = readings
     t0 = rollout.time[k]
-    first = max(0, int(np.searchsorted(rollout.time, t0 - 2 * plant.thresholds.windows.lead)))
-    stop = k + int(picks[-1]) + 1
+    issued, command = commands
+    first = int(np.searchsorted(rollout.time, t0 - 2 * plant.thresholds.windows.lead))
+    first, last = (int(np.searchsorted(issued, rollout.time[tick])) for tick in (first, k + int(picks[-1])))
     qpos, qvel = start_state(plant, rollout, k, None if heights is None else heights[k])
     return {
         "out_time": rollout.time[k + picks] - t0,
@@ -200,9 +201,28 @@ def _one(
         "qvel": qvel,
         "measured": signals[k + picks],
         "quat": None if quat is None else quat[k + picks],
-        "command": command[first:stop],
-        "command_time": rollout.time[first:stop] - t0,
+        "command": command[first : last + 1],
+        "command_time": issued[first : last + 1] - t0,
     }
+
+
+def _every_command(time: np.ndarray, command: np.ndarray, rule: Windowing) -> tuple[np.ndarray, np.ndarray]:
+    """When commands were issued (T',) and which (T', nu), with those of single rows that a log has lost.
+
+    What the drive got there lies, for all that is known, between the commands before and after.
+    """
+    apart = np.diff(time)
+    period = float(np.median(apart))
+    brief = (apart > rule.gap * period) & (apart <= rule.brief)  # a window holds no longer ones
+    lost = np.where(brief, np.round(apart / period) - 1, 0).astype(int)
+    if not lost.any():
+        return time, command
+    after = np.repeat(np.arange(len(lost)), lost)
+    share = np.concatenate([np.arange(1, n + 1) / (n + 1) for n in lost[lost > 0]])
+    ticks = np.arange(len(time))
+    rows = np.sort(np.concatenate((ticks, after + share)))
+    filled = np.stack([np.interp(rows, ticks, column) for column in command.T], axis=1)
+    return np.interp(rows, ticks, time), filled
 
 
 def start_state(plant: Plant, rollout: Rollout, k: int, height: float | None) -> tuple[np.ndarray, np.ndarray]:

@@ -115,6 +115,8 @@ class Smoothing:
     """Times the neighbours on one side that a rollout has rows at least."""
     beyond: float = 1.5
     """Half spans within which a neighbour must lie: a gap in the log has no neighbours beyond it."""
+    white: float = 0.5
+    """Share of their noise that readings must be apart, below which they have the same error."""
 
 
 @dataclass(frozen=True)
@@ -125,8 +127,8 @@ class VelocityLatency:
     """Time over which velocities are integrated [s]."""
     near: float = 0.02
     """Time around its ends from which the positions' velocities are taken [s]."""
-    least: float = 5e-4
-    """Age beyond which one must be, without doubt [s]: half a step of a millisecond is none."""
+    least: float = 1e-3
+    """Age beyond which one must be, without doubt [s]: half a step of a simulator is none, and 1 ms is twice that."""
     periods: float = 1.5
     """Periods of the log that an age must exceed where position targets are logged: a servo that answers within a
     period passes for half of one."""

@@ -15,7 +15,7 @@ class Whitening:
     stepped: float = 0.3
     """Share of what steps of twice the length change that is a window's own numerical error."""
     explained: float = 3.0
-    """Times what such steps change, by root mean square, up to which what is left may be theirs."""
+    """Times what such steps change and noise, by root mean square, up to which what is left may be theirs."""
     height_noise: float = 0.002
     """Noise of a base height that is not measured but taken from stance [m]."""
 
