@@ -1,6 +1,7 @@
 """The lab's standing Ray cluster: reached by its direct address, and checked before any stage starts.
 
 python -m flows.ray_cluster [--workspace FOLDER]     # status 2 and one line for what is wrong
+python -m flows.ray_cluster --wait HOST:PORT N       # until a cluster has N machines
 
 Only this module and flows/away.py import Ray, and only where lab.yaml has a section `ray`.
 """
@@ -11,6 +12,7 @@ import importlib
 import os
 import socket
 import sys
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
@@ -25,6 +27,7 @@ from tasks import params
 from tasks.lab import AUTO, CLUSTER, FILE, RayLab, read_lab
 
 ANSWER = 10  # [s] within which the cluster's head must
+JOIN, LOOK_EVERY = 180.0, 2.0  # [s] within which the machines of an allocation must, and between two looks
 LOOK = 120  # [s] within which every machine must; the first process on one takes some
 PACKAGES = ("dvc", "mlflow", "mujoco", "numpy", "rsl-rl-lib", "scikit-learn", "scipy", "torch", "bumblebee")
 """What decides results. The code of bumblebee travels: a machine may do without it, but have no other version."""
@@ -203,12 +206,40 @@ def _compare(machine: Mapping[str, str], where: str) -> None:
         raise BadInput(f"{where}.remote", f"DVC's remote to be usable on {machine['host']}", machine["fault"])
 
 
+def wait_for(address: str, machines: int) -> None:
+    """Return when so many machines with a CPU slot belong to the cluster.
+
+    Raises:
+        BadInput: when they do not within `JOIN` seconds.
+    """
+    end, up = time.monotonic() + JOIN, 0
+    while up < machines:
+        try:
+            ray = connect(RayLab(address, ""), "ray")
+        except BadInput:
+            if time.monotonic() > end:
+                raise
+        else:
+            up = sum(bool(node["Alive"] and node["Resources"].get("CPU")) for node in ray.nodes())
+            ray.shutdown()
+        if up < machines:
+            if time.monotonic() > end:
+                raise BadInput(address, f"{machines} machines with a CPU slot in the Ray cluster", str(up))
+            time.sleep(LOOK_EVERY)
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Check; returns the exit status."""
+    """Check, or wait; returns the exit status."""
     made = argparse.ArgumentParser(prog="python -m flows.ray_cluster", description="Check the lab's Ray cluster.")
     made.add_argument("--workspace", type=Path, default=Path("."), help="folder with lab.yaml (default: this one)")
-    workspace = made.parse_args(argv).workspace
-    return guarded(lambda: check(workspace))
+    made.add_argument("--wait", nargs=2, metavar=("HOST:PORT", "N"), help="until this cluster has N machines")
+    options = made.parse_args(argv)
+    if options.wait:
+        address, number = options.wait
+        if not CLUSTER.fullmatch(address) or not number.isdigit():
+            made.error(f"--wait: expected HOST:PORT and a number, came {address} {number}")
+        return guarded(lambda: wait_for(address, int(number)))
+    return guarded(lambda: check(options.workspace))
 
 
 if __name__ == "__main__":

@@ -1,15 +1,12 @@
 """A workspace with the smoke profile, on one machine or on a lab's, and what its loop made without the times in it."""
 
 import hashlib
-import io
-import json
-import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
 import yaml
 
 from flows import workspace as workspaces
@@ -76,3 +73,13 @@ def files(folder: Path) -> dict[str, bytes]:
 def timeless(name: str, content: bytes) -> object:
     """A file without the times in it."""
     return hashlib.md5(content).hexdigest()
+
+
+def colleague(folder: Path, made: Path) -> Path:
+    """Another folder with the pipeline and its lock, and `dvc pull` there."""
+    for name in ("dvc.yaml", "dvc.lock", "params.yaml", "lab.yaml", ".dvc/config", ".dvc/config.local"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(made / name, folder / name)
+    pulled = call(folder, "-m", "dvc", "pull", "-q")
+    assert pulled.returncode == 0, pulled.stderr
+    return folder

@@ -4,19 +4,13 @@ The loop is the smoke profile's, all of it, both clusters side by side.
 """
 
 import contextlib
-import os
 import re
-import shutil
 import signal
 import sqlite3
 import subprocess
 import sys
 import tarfile
-import tempfile
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -28,40 +22,11 @@ from flows.checkpoints import FOLDER
 from flows.environment import environment
 from tests.lab import cluster as clusters
 from tests.lab import machines
-from tests.lab.conftest import LabOnThisMachine
-from tests.lab.loops import LIMIT, call, files, locked, timeless, untimed, workspace
+from tests.lab.conftest import LabOnThisMachine, Stand
+from tests.lab.loops import LIMIT, call, colleague, files, locked, timeless, untimed, workspace
 
 LONG = {"experts": {"ppo": {"iterations": 10, "checkpoint_every": 2}}}  # to be killed in the middle
-STEADY = {"diagnose": {"beyond_seconds": 0, "search_seconds": 3600}}  # what it finds depends on no clock
-
-
-@dataclass(frozen=True)
-class Stand:
-    """A cluster that runs, and what a workspace needs to use it."""
-
-    cluster: clusters.Cluster
-    content: dict[str, Any]
-    """Of lab.yaml."""
-
-
-@pytest.fixture(scope="module")
-def stand(lab: LabOnThisMachine) -> Iterator[Stand]:
-    """One cluster for the tests of this module; the last one kills a worker of it."""
-    if find_spec("ray") is None:
-        (pytest.fail if "BUMBLEBEE_LAB_TEST" in os.environ else pytest.skip)("no package ray")
-    patch = pytest.MonkeyPatch()
-    with tempfile.TemporaryDirectory(dir="/tmp", ignore_cleanup_errors=True) as scratch:
-        folder = Path(scratch)
-        (folder / "dvc").mkdir()
-        clusters.new_token(folder / "token")
-        patch.setenv("RAY_AUTH_MODE", "token")
-        patch.setenv("RAY_AUTH_TOKEN_PATH", str(folder / "token"))
-        try:
-            with clusters.cluster(folder, 2) as made:
-                ray = {"address": made.address, "remote": str(folder / "dvc"), "checkpoint_seconds": 1}
-                yield Stand(made, {**lab.content(), "ray": ray})
-        finally:
-            patch.undo()
+STEADY = {"diagnose": {"beyond_seconds": 1e-9, "search_seconds": 3600}}  # what it finds depends on no clock
 
 
 def refused(folder: Path, content: dict[str, Any], **variables: str) -> str:
@@ -167,16 +132,6 @@ def logged_in_lab(lab: LabOnThisMachine) -> list[str]:
     """The same of the lab's database, whichever machine logged them."""
     query = "SELECT runs.name FROM runs JOIN experiments USING (experiment_id) WHERE experiments.name = 'demo'"
     return sorted(lab.postgres.sql(query, "mlflow").split("\n")[:-1])
-
-
-def colleague(folder: Path, made: Path) -> Path:
-    """Another folder with the pipeline and its lock, and `dvc pull` there."""
-    for name in ("dvc.yaml", "dvc.lock", "params.yaml", "lab.yaml", ".dvc/config", ".dvc/config.local"):
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(made / name, folder / name)
-    pulled = call(folder, "-m", "dvc", "pull", "-q")
-    assert pulled.returncode == 0, pulled.stderr
-    return folder
 
 
 def kill_a_worker_with_a_checkpoint(stand: Stand, run: "subprocess.Popen[bytes]") -> str:
