@@ -12,7 +12,7 @@ import yaml
 from flows import workspace as workspaces
 from flows.environment import environment
 
-LIMIT = 1800  # [s]
+LIMIT = 3600  # [s]
 TIMED = (
     "data/rollouts",  # recorded_at of each
     "data/measured",  # the same files, accepted

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tarfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,9 @@ from tests.lab.conftest import LabOnThisMachine, Stand
 from tests.lab.loops import LIMIT, call, colleague, files, locked, timeless, untimed, workspace
 
 LONG = {"experts": {"ppo": {"iterations": 10, "checkpoint_every": 2}}}  # to be killed in the middle
-STEADY = {"diagnose": {"beyond_seconds": 1e-9, "search_seconds": 3600}}  # what it finds depends on no clock
+# What it finds depends on no clock; and few windows, since this is not about what it finds.
+WINDOWS = {"max_windows": 8, "max_holdout_windows": 4, "report_windows": 4}
+STEADY = {"diagnose": {"beyond_seconds": 1e-9, "search_seconds": 3600, **WINDOWS}}
 
 
 def refused(folder: Path, content: dict[str, Any], **variables: str) -> str:
@@ -88,21 +91,12 @@ def test_one_worker_is_killed_and_the_whole_loop_ends_as_on_one_machine(
 ) -> None:
     (tmp_path / "one").mkdir()
     one = workspace(tmp_path / "one", None, **LONG, **STEADY)
-    alone = call(one, "-m", "dvc", "repro", "-q")
-    assert alone.returncode == 0, alone.stdout + alone.stderr
     content = {**stand.content, "ray": {**stand.content["ray"], "memory": {"experts": 1.5, "refine": 1.5}}}
     made = workspace(tmp_path, content, **LONG, **STEADY)
-    command = [sys.executable, "-m", "flows.demo", "--workspace", "."]
-    with (tmp_path / "said").open("w+") as said:
-        run = subprocess.Popen(command, cwd=made, env=environment(made), stdout=said, stderr=said)
-        try:
-            cluster = kill_a_worker_with_a_checkpoint(stand, run)
-            status = run.wait(LIMIT)
-        finally:
-            if run.poll() is None:
-                run.send_signal(signal.SIGTERM)
-                run.wait(60)
-        text = (tmp_path / "said").read_text()
+    with ThreadPoolExecutor(1) as pool:  # both at once: half of the time is waiting
+        alone = pool.submit(call, one, "-m", "dvc", "repro", "-q")
+        cluster, status, text = run_and_kill(stand, made, tmp_path / "said")
+    assert alone.result().returncode == 0, alone.result().stdout + alone.result().stderr
     assert status == 0, text[-3000:]
     lost = f"experts@{cluster}: its machine was lost; another one goes on from its last checkpoint"
     assert text.count(lost) == text.count("its machine was lost") == 1, text
@@ -120,6 +114,21 @@ def test_one_worker_is_killed_and_the_whole_loop_ends_as_on_one_machine(
         assert any((worker.folder / "cache" / "files").rglob("*")), "a worker that had nothing to do"
         if worker.process.returncode is None:
             assert not list((worker.folder / "trees").iterdir())
+
+
+def run_and_kill(stand: Stand, made: Path, said: Path) -> tuple[str, int, str]:
+    """The loop with one worker killed under it: the lost expert's cluster, the loop's status, and what it said."""
+    command = [sys.executable, "-m", "flows.demo", "--workspace", "."]
+    with said.open("w") as out:
+        run = subprocess.Popen(command, cwd=made, env=environment(made), stdout=out, stderr=out)
+        try:
+            lost = kill_a_worker_with_a_checkpoint(stand, run)
+            status = run.wait(LIMIT)
+        finally:
+            if run.poll() is None:
+                run.send_signal(signal.SIGTERM)
+                run.wait(60)
+    return lost, status, said.read_text()
 
 
 def logged_on_one(folder: Path) -> list[str]:
