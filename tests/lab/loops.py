@@ -1,14 +1,19 @@
 """A workspace with the smoke profile, on one machine or on a lab's, and what its loop made without the times in it."""
 
 import hashlib
+import io
+import json
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import yaml
 
+from bumblebee.measured.metadata import METADATA_KEY
 from flows import workspace as workspaces
 from flows.environment import environment
 
@@ -22,6 +27,8 @@ TIMED = (
     "reports/report.html",  # when it was written
 )
 """Paths whose content says when it was made, or what MLflow called it, which no two runs agree on."""
+WHEN = re.compile(rb"20\d\d-\d\d-\d\d[T ]\d\d:\d\d(:\d\d\+00:00| UTC)")
+SHORT = 12  # signs of a hash that a page shows
 
 
 def workspace(folder: Path, content: dict[str, Any] | None, **over: Any) -> Path:
@@ -70,9 +77,26 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(file.relative_to(folder)): file.read_bytes() for file in found}
 
 
-def timeless(name: str, content: bytes) -> object:
-    """A file without the times in it."""
-    return hashlib.md5(content).hexdigest()
+def timeless(made: dict[str, bytes]) -> dict[str, object]:
+    """Files by name without what says when they were made; those outside `TIMED` to the byte.
+
+    A hash of a file of these that stands in another one is replaced by that file's name.
+    """
+    hashes = {hashlib.sha256(content).hexdigest().encode(): f"<{name}>".encode() for name, content in made.items()}
+    return {name: _timeless(name, content, hashes) for name, content in made.items()}
+
+
+def _timeless(name: str, content: bytes, hashes: dict[bytes, bytes]) -> object:
+    if not name.startswith(TIMED):
+        return hashlib.md5(content).hexdigest()
+    if name.endswith(".parquet"):
+        table = pq.read_table(io.BytesIO(content))
+        about = json.loads(table.schema.metadata[METADATA_KEY])
+        assert about.pop("recorded_at")
+        return table.replace_schema_metadata(), about
+    for digest, label in hashes.items():
+        content = content.replace(digest, label).replace(digest[:SHORT], label)
+    return WHEN.sub(b"<time>", content)
 
 
 def colleague(folder: Path, made: Path) -> Path:
