@@ -23,11 +23,10 @@ TIMED = (
     "data/measured",  # the same files, accepted
     "data/approvals",  # when it was answered
     "data/gates",
-    "data/published.json",  # MLflow's names of runs
     "reports/report.html",  # when it was written
 )
-"""Paths whose content says when it was made, or what MLflow called it, which no two runs agree on."""
-WHEN = re.compile(rb"20\d\d-\d\d-\d\d[T ]\d\d:\d\d(:\d\d\+00:00| UTC)")
+"""Paths whose content says when it was made, which no two runs agree on."""
+WHEN = re.compile(rb"20\d\d-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(\+00:00| UTC)")
 SHORT = 12  # signs of a hash that a page shows
 
 
