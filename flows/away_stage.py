@@ -1,16 +1,18 @@
 """One stage in a work tree of its own on a machine of the cluster: `python -m flows.away_stage STAGE [BEFORE ...]`.
 
 Its inputs come from the shared remote, and what it made goes there, at last the entry of the run cache by which the
-head writes it into the only dvc.lock that counts. So an entry that is there has its files.
+head writes it into the only dvc.lock that counts. So an entry that is there has its files. Meanwhile its checkpoints go
+there, and the last one of a machine that was lost comes from there.
 """
 
 import os
 import sys
 from pathlib import Path
 
-from flows import reproduce
+from flows import checkpoints, reproduce
 from flows.environment import environment
 from flows.parcel import REMOTE
+from tasks.lab import read_lab
 from tasks.parent import end_with_parent
 
 
@@ -25,13 +27,27 @@ def main(argv: list[str] | None = None) -> int:
 
     if before and (status := int(dvc(["pull", "--quiet", "--force", "--remote", REMOTE, *before]))):
         return status
-    if status := reproduce.main([name]):
+    lab = read_lab(Path.cwd())
+    assert lab is not None and lab.ray is not None
+    with checkpoints.kept(shelf(name), lab.ray.checkpoint_seconds):
+        status = reproduce.main([name])
+    if status:
         return status
     # Files first: whoever finds the run in the cache finds what it made.
     for words in ([], ["--run-cache"]):
         if status := int(dvc(["push", "--quiet", "--remote", REMOTE, *words, name])):
             return status
     return 0
+
+
+def shelf(name: str) -> checkpoints.Shelf:
+    """The place for the stage's checkpoints; its inputs are here."""
+    from dvc.repo import Repo
+
+    with Repo(_wait_for_lock=True) as repo, repo.lock:
+        (stage,) = repo.stage.collect(name)
+        stage.save_deps()
+        return checkpoints.shelf_of(repo, stage)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """The lab's standing Ray cluster: reached by its direct address, and checked before any stage starts.
 
 python -m flows.ray_cluster [--workspace FOLDER]     # status 2 and one line for what is wrong
+python -m flows.ray_cluster --wait HOST:PORT N       # until a cluster has N machines
 
 Only this module and flows/away.py import Ray, and only where lab.yaml has a section `ray`.
 """
@@ -11,21 +12,26 @@ import importlib
 import os
 import socket
 import sys
+import time
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from bumblebee.errors import BadInput
+from bumblebee.io.read import read_yaml
 from bumblebee.last_line import guarded
 from flows import node
 from tasks import params
-from tasks.lab import FILE, RayLab, read_lab
+from tasks.lab import AUTO, CLUSTER, FILE, RayLab, read_lab
 
 ANSWER = 10  # [s] within which the cluster's head must
+JOIN, LOOK_EVERY = 180.0, 2.0  # [s] within which the machines of an allocation must, and between two looks
 LOOK = 120  # [s] within which every machine must; the first process on one takes some
 PACKAGES = ("dvc", "mlflow", "mujoco", "numpy", "rsl-rl-lib", "scikit-learn", "scipy", "torch", "bumblebee")
 """What decides results. The code of bumblebee travels: a machine may do without it, but have no other version."""
+GIB = 2**30  # [bytes]
 MODULES = {"s3": "dvc_s3", "ssh": "dvc_ssh"}  # of DVC, by the scheme of the remote
 
 
@@ -37,6 +43,7 @@ def connect(own: RayLab, where: str) -> Any:
     """
     if find_spec("ray") is None:
         raise BadInput(where, "the package ray", "none", "pip install 'bumblebee[lab]'")
+    own = replace(own, address=address_of(own, where))
     host, _, port = own.address.rpartition(":")
     try:
         socket.create_connection((host, int(port)), timeout=ANSWER).close()
@@ -52,6 +59,21 @@ def connect(own: RayLab, where: str) -> Any:
     except Exception as error:  # Ray raises RuntimeError, ConnectionError and errors of its own
         raise _refused(own, where, " ".join(str(error).split())) from None
     return ray
+
+
+def address_of(own: RayLab, where: str) -> str:
+    """`HOST:PORT` of the cluster's head.
+
+    Raises:
+        BadInput: for `auto` where the variable RAY_ADDRESS says nothing of that form.
+    """
+    if own.address != AUTO:
+        return own.address
+    found = os.environ.get("RAY_ADDRESS", "")
+    if not CLUSTER.fullmatch(found):
+        do = "Start the loop in the allocation (docs/lab/ray.sbatch), or state the address."
+        raise BadInput(f"{where}.address", "HOST:PORT in the variable RAY_ADDRESS", found[:80] or "none", do)
+    return found
 
 
 @contextlib.contextmanager
@@ -89,21 +111,47 @@ def gpus(content: Mapping[str, Any], sections: Iterable[str]) -> int:
     return max(found)
 
 
-def require_room(ray: Any, wanted: int, name: str) -> None:
-    """Refuse a stage for which no machine that is up has the GPUs, or a free CPU slot at all.
+@dataclass(frozen=True)
+class Need:
+    """What a stage asks of one machine beside a CPU slot."""
+
+    gpus: int = 0
+    memory: float = 0.0
+    """[GiB]"""
+
+    @property
+    def options(self) -> dict[str, float]:
+        """As Ray takes it."""
+        found: dict[str, float] = {"num_cpus": 1, "num_gpus": self.gpus}
+        return found | ({"memory": int(self.memory * GIB)} if self.memory else {})
+
+
+def need(own: RayLab, content: Mapping[str, Any], kind: str, sections: Iterable[str]) -> Need:
+    """What a stage needs, by its name without cluster and round and the sections of `content` that it reads."""
+    return Need(gpus(content, sections), own.memory.get(kind, 0.0))
+
+
+def require_room(ray: Any, wanted: Need, name: str) -> None:
+    """Refuse a stage for which no machine that is up has all that it needs, or a free CPU slot at all.
 
     Args:
         ray: the connected module.
-        wanted: GPUs.
-        name: of the setting that wants them.
+        wanted: by the stage.
+        name: of the setting that wants it.
     """
-    resources = [found["Resources"] for found in ray.nodes() if found["Alive"]]
-    most = max((int(each.get("GPU", 0)) for each in resources if each.get("CPU", 0) >= 1), default=-1)
-    if most < 0:
+    up = [found["Resources"] for found in ray.nodes() if found["Alive"] and found["Resources"].get("CPU", 0) >= 1]
+    if not up:
         raise BadInput(name, "a machine of the Ray cluster with a CPU slot", "none", "ray start --address=... on one")
-    if wanted > most:
-        do = "Add a machine that has them, or ask for fewer."
-        raise BadInput(name, f"at most {most} GPUs, which one machine of the Ray cluster has", str(wanted), do)
+    do = "Add a machine that has them, or ask for fewer."
+    most = max(int(each.get("GPU", 0)) for each in up)
+    if wanted.gpus > most:
+        raise BadInput(name, f"at most {most} GPUs, which one machine of the Ray cluster has", str(wanted.gpus), do)
+    room = max(each.get("memory", 0) for each in up if each.get("GPU", 0) >= wanted.gpus) / GIB
+    if wanted.memory > room:
+        beside = f" beside {wanted.gpus} GPUs" if wanted.gpus else ""
+        expected = f"at most {room:.1f} GiB, which one machine of the Ray cluster gives{beside}"
+        do = "Add a machine that has them, state more at its `ray start --memory=BYTES`, or ask for fewer."
+        raise BadInput(name, expected, f"{wanted.memory:g}", do)
 
 
 def check(workspace: Path) -> None:
@@ -119,7 +167,13 @@ def check(workspace: Path) -> None:
     ray = connect(lab.ray, where)
     content = params.read(workspace / "params.yaml")
     for name in content:
-        require_room(ray, gpus(content, [name]), f"{workspace / 'params.yaml'}: {name}.gpus")
+        require_room(ray, Need(gpus(content, [name])), f"{workspace / 'params.yaml'}: {name}.gpus")
+    stages = read_yaml(workspace / "dvc.yaml")["stages"]
+    for kind in lab.ray.memory:
+        if kind not in stages:
+            raise BadInput(f"{where}.memory", f"stages of dvc.yaml: {', '.join(stages)}", kind)
+        wanted = need(lab.ray, content, kind, stages[kind].get("params", []))
+        require_room(ray, wanted, f"{where}.memory.{kind}")
     for machine in _facts(ray, lab.ray):
         _compare(machine, where)
 
@@ -152,12 +206,40 @@ def _compare(machine: Mapping[str, str], where: str) -> None:
         raise BadInput(f"{where}.remote", f"DVC's remote to be usable on {machine['host']}", machine["fault"])
 
 
+def wait_for(address: str, machines: int) -> None:
+    """Return when so many machines with a CPU slot belong to the cluster.
+
+    Raises:
+        BadInput: when they do not within `JOIN` seconds.
+    """
+    end, up = time.monotonic() + JOIN, 0
+    while up < machines:
+        try:
+            ray = connect(RayLab(address, ""), "ray")
+        except BadInput:
+            if time.monotonic() > end:
+                raise
+        else:
+            up = sum(bool(node["Alive"] and node["Resources"].get("CPU")) for node in ray.nodes())
+            ray.shutdown()
+        if up < machines:
+            if time.monotonic() > end:
+                raise BadInput(address, f"{machines} machines with a CPU slot in the Ray cluster", str(up))
+            time.sleep(LOOK_EVERY)
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Check; returns the exit status."""
+    """Check, or wait; returns the exit status."""
     made = argparse.ArgumentParser(prog="python -m flows.ray_cluster", description="Check the lab's Ray cluster.")
     made.add_argument("--workspace", type=Path, default=Path("."), help="folder with lab.yaml (default: this one)")
-    workspace = made.parse_args(argv).workspace
-    return guarded(lambda: check(workspace))
+    made.add_argument("--wait", nargs=2, metavar=("HOST:PORT", "N"), help="until this cluster has N machines")
+    options = made.parse_args(argv)
+    if options.wait:
+        address, number = options.wait
+        if not CLUSTER.fullmatch(address) or not number.isdigit():
+            made.error(f"--wait: expected HOST:PORT and a number, came {address} {number}")
+        return guarded(lambda: wait_for(address, int(number)))
+    return guarded(lambda: check(options.workspace))
 
 
 if __name__ == "__main__":

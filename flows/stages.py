@@ -37,7 +37,7 @@ class Stage:
     @property
     def kind(self) -> str:
         """The stage's name without cluster and round."""
-        return self.name.partition("@")[0]
+        return kind_of(self.name)
 
     def option(self, name: str) -> str | None:
         """The value of `--name` in the command, or None."""
@@ -50,6 +50,11 @@ class Stage:
         number, cluster = self.option("round"), self.option("cluster")
         parts = [self.kind, f"round {number}" if number else "", cluster or ""]
         return " ".join(part for part in parts if part)
+
+
+def kind_of(name: str) -> str:
+    """A stage's name without cluster and round: `experts` of `experts@c0`."""
+    return name.partition("@")[0]
 
 
 def read_stages(workspace: Path) -> list[Stage]:

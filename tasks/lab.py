@@ -11,6 +11,8 @@ With its section `ray`, which may be left out, stages run on several machines.
     ray:
       address: head.lab:6379
       remote: /shared/bumblebee/dvc        # of DVC; or s3://BUCKET/FOLDER, ssh://HOST/FOLDER
+      memory: {base: 12, distill: 24}      # GiB that a stage needs; may be left out, as the next
+      checkpoint_seconds: 60               # at least, between a running stage's checkpoints on the remote
 
 The sections `serve` and `tracking` are read by `tasks/lab_serve.py`; with these alone, all is here, too.
 
@@ -20,7 +22,8 @@ RAY_AUTH_TOKEN_PATH), as these programs' own clients read them.
 """
 
 import re
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -33,6 +36,8 @@ OF_RAY = {"RAY_AUTH_MODE": "token", "RAY_USAGE_STATS_ENABLED": "0"}
 DATABASE = "postgresql://USER@HOST[:PORT]/DATABASE"
 BUCKET = re.compile(r"s3://[a-z0-9][a-z0-9.-]{1,61}[a-z0-9](/[A-Za-z0-9._/-]+)?")
 
+AUTO = "auto"
+GIB, SECONDS = (0.001, 1e6), (1.0, 86_400.0)
 CLUSTER = re.compile(r"[A-Za-z0-9.-]+:([1-9][0-9]{0,4})")
 REMOTE = re.compile(r"(s3://[a-z0-9.-]+|ssh://([A-Za-z0-9._-]+@)?[A-Za-z0-9.-]+(:\d{1,5})?)?/[A-Za-z0-9._/-]+")
 
@@ -82,9 +87,14 @@ class RayLab:
     """The standing cluster on which stages run, and where its machines exchange what they make."""
 
     address: str
-    """`HOST:PORT` of its head."""
+    """`HOST:PORT` of its head, or `auto`: what the variable RAY_ADDRESS says."""
     remote: str
     """Of DVC: a folder that every machine sees, `s3://BUCKET/FOLDER` or `ssh://HOST/FOLDER`."""
+    memory: Mapping[str, float] = field(default_factory=dict)
+    """What a stage needs, by its name without cluster and round [GiB]; here and not in params.yaml, whose change would
+    make the stage stale. Of a machine Ray gives as much as was stated at `ray start --memory`, most of it without."""
+    checkpoint_seconds: float = 60.0
+    """At least so long between two checkpoints of a running stage that go to the remote [s]."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +135,9 @@ def read_lab(workspace: Path) -> Lab | None:
     for name, kind in KINDS.items():
         if name == "ray" and isinstance(content, dict) and name not in content:
             continue
-        parts[name] = kind(**_strings(content, name, [own.name for own in fields(kind)], path))
+        numbers = _take_numbers(content["ray"], f"{path}: ray") if name == "ray" else {}
+        names = [own.name for own in fields(kind) if own.name not in ("memory", "checkpoint_seconds")]
+        parts[name] = kind(**_strings(content, name, names, path), **numbers)
     if isinstance(content, dict) and (more := sorted(map(str, set(content) - set(parts) - set(ELSEWHERE)))):
         raise BadInput(f"{path}: {more[0]}", " or ".join((*KINDS, *ELSEWHERE)), "an unknown key")
     lab = Lab(**parts)
@@ -164,11 +176,34 @@ def _strings(content: Any, section: str, names: list[str], path: Path) -> dict[s
     return dict(own)
 
 
+def _take_numbers(section: Any, where: str) -> dict[str, Any]:
+    """What the section says in numbers, taken out of it."""
+    found: dict[str, Any] = {}
+    if not isinstance(section, dict):
+        return found
+    if "checkpoint_seconds" in section:
+        seconds = section.pop("checkpoint_seconds")
+        found["checkpoint_seconds"] = _number(seconds, f"{where}.checkpoint_seconds", SECONDS)
+    if "memory" in section:
+        memory = section.pop("memory")
+        if not isinstance(memory, dict):
+            raise BadInput(f"{where}.memory", "GiB by stage, such as {base: 12}", type(memory).__name__)
+        found["memory"] = {str(name): _number(own, f"{where}.memory.{name}", GIB) for name, own in memory.items()}
+    return found
+
+
+def _number(value: Any, where: str, limits: tuple[float, float]) -> float:
+    least, most = limits
+    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
+        raise BadInput(where, f"a number from {least:g} to {most:g}", repr(value)[:80])
+    return float(value)
+
+
 def _check_ray(ray: RayLab, where: str) -> None:
     """Refuse what is no address of a cluster or no place for DVC."""
     port = CLUSTER.fullmatch(ray.address)
-    if not port or int(port[1]) > 65535:
-        raise BadInput(f"{where}.address", "HOST:PORT of the cluster's head", ray.address[:80])
+    if ray.address != AUTO and (not port or int(port[1]) > 65535):
+        raise BadInput(f"{where}.address", f"HOST:PORT of the cluster's head, or {AUTO}", ray.address[:80])
     if not REMOTE.fullmatch(ray.remote):
         expected = "a folder from / on, s3://BUCKET/FOLDER or ssh://HOST/FOLDER"
         raise BadInput(f"{where}.remote", expected, re.sub(r":[^/@]*@", ":...@", ray.remote)[:80])

@@ -69,7 +69,7 @@ def keep(parent: Path, out: Path, round: int) -> None:
     """The parent's policy as this round's; its card says that no step was taken."""
     card = json.loads((parent / "card.json").read_text())
     card |= {"stage": "refine", "round": round, "parent": str(parent), "kept": "parent"}
-    card |= {"iterations": 0, "frames": 0, "seconds": 0.0, "frames_per_second": 0, "before": card["after"]}
+    card |= {"iterations": 0, "frames": 0, "before": card["after"]}
     with output_folder(out) as folder:
         shutil.copytree(parent, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(CURVE, "trials.csv"))
         (folder / "card.json").write_text(json.dumps(card, indent=1) + "\n")

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -121,6 +120,8 @@ def cluster_clips(cluster: str, others: float) -> tuple[list[Clip], ClipShares, 
 def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     """Train, try before and after on the same starts, write the policy's folder; returns its card.
 
+    How long it took stands in MLflow's run alone: the same inputs make the same folder, whichever machine it is.
+
     With several GPUs it starts this stage once for each, of which the first does all but the training alone.
 
     Raises:
@@ -154,24 +155,26 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     policy, kept = trainer.policy(), after
     if job.better_of and job.parent is not None and _score(after) < _score(before):
         policy, kept = load_policy(job.parent), before
+    curve = pd.read_csv(folder / CURVE)
     card = _card(job, config, trainer, before, after) | _outcome(before, kept)
     card["kept"] = "child" if kept is after else "parent"
     with output_folder(job.out) as out:
         policy.save(out)
         export_policy(out, policy, config.env.physics_hz)
-        shutil.copy(folder / CURVE, out / CURVE)
+        curve.drop(columns="seconds").to_csv(out / CURVE, index=False)
         (out / "card.json").write_text(json.dumps(card, indent=1) + "\n")
         after.assign(before=before["success"], key_error_before=before["key_error"]).to_csv(out / "trials.csv")
     _tell(job, card)
     metrics = {f"{when}/{family}": rate for when in ("before", "after") for family, rate in card[when].items()}
-    metrics |= {"frames_per_second": card["frames_per_second"], "unstable_worlds": card["unstable_worlds"]}
+    rate = trainer.frames / max(float(curve["seconds"].iloc[-1]), 1e-9)
+    metrics |= {"frames_per_second": round(rate), "unstable_worlds": card["unstable_worlds"]}
     log_run(
         job.stage,
         cluster=job.cluster,
         round=job.round,
         params=config,
         metrics=metrics,
-        curve=job.out / CURVE,
+        curve=folder / CURVE,
         artifacts=[job.out],
     )
     return card
@@ -199,7 +202,6 @@ def _card(
     job: Job, config: TrainingConfig, trainer: Trainer, before: pd.DataFrame, after: pd.DataFrame
 ) -> dict[str, Any]:
     curve = pd.read_csv(trainer.folder / CURVE)
-    seconds = float(curve["seconds"].iloc[-1])
     return {
         "schema": 1,
         "stage": job.stage,
@@ -208,8 +210,6 @@ def _card(
         "parent": _named(job.parent) if job.parent else None,
         "iterations": trainer.iteration,
         "frames": trainer.frames,
-        "seconds": round(seconds, 1),
-        "frames_per_second": round(trainer.frames / max(seconds, 1e-9)),
         "unstable_worlds": int(curve["unstable"].sum()),
         "training_clips": [clip.name for clip in job.clips],
         "rollouts_a_clip": config.trials.repeats,

@@ -5,7 +5,7 @@ from bumblebee.report.names import everyone, label, pair, reference
 from bumblebee.report.page import Block, Section, heading, image, note, table, text
 from bumblebee.report.results import Json, LoopResults
 from bumblebee.report.success_figure import pick, success_figure
-from bumblebee.report.wording import MEASURES, SAME_FILE, change, duration, number, percent, plural
+from bumblebee.report.wording import MEASURES, SAME_FILE, change, number, percent, plural
 
 NOT_YOURS = (
     "Policies were evaluated in simulation only: on the declared model and on a stand-in robot with made-up effects. "
@@ -41,9 +41,6 @@ def training_section(results: LoopResults) -> Section:
         for measure, picture in curves_figures(curves).items():
             alt = f"Learning curves of {', '.join(curves)}: {measures[measure]} against simulated frames."
             blocks.append(image(picture, f"{name}: {measures[measure]}", caption, alt))
-    seconds = {n: c["seconds"].iloc[-1] for n, c in results.curves.items() if "seconds" in c and len(c)}
-    if seconds:
-        blocks.append(note("Training time: " + ", ".join(f"{n} {duration(s)}" for n, s in seconds.items()) + "."))
     return Section("training", "Learning", tuple(blocks))
 
 

@@ -17,13 +17,6 @@ def signed(value: float, digits: int = 0) -> str:
     return words[1:] if float(words) == 0 else words.replace("-", "\u2212")
 
 
-def duration(seconds: float) -> str:
-    """`0.9 s`, `14 s`, `2.5 min`, `3.1 h`: never a rounded zero."""
-    if seconds < 90:
-        return f"{seconds:.1f} s" if seconds < 10 else f"{seconds:.0f} s"
-    return f"{seconds / 60:.1f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
-
-
 def percent(entry: dict[str, Any]) -> str:
     """`{"value", "ci95"}` of a share as `91 % [84, 95]`."""
     if entry.get("value") is None:

@@ -54,7 +54,7 @@ class Terrain(Ranged):
     """Largest height of rough ground above or below the flat one [m]."""
     cell: Annotated[float, Range(least=0.01, most=10)] = 0.2
     """Distance of the knots, between which the ground is straight [m]."""
-    size: Annotated[float, Range(least=2, most=1000)] = 20.0
+    half_side: Annotated[float, Range(least=2, most=1000)] = 20.0
     """Half the side of the terrain [m]; an episode that comes within 1 m of the edge ends, which is no failure."""
     seed: Seed = 0
     """Of the heights."""
@@ -62,8 +62,8 @@ class Terrain(Ranged):
     def __post_init__(self) -> None:
         """Refuse ground of too few knots to stand on, or too many to hold."""
         super().__post_init__()
-        knots = self.size / self.cell
-        self.require(4 <= knots <= 2000, "cell", "4 to 2,000 cells in half the side, `size`")
+        knots = self.half_side / self.cell
+        self.require(4 <= knots <= 2000, "cell", "4 to 2,000 cells in `half_side`")
 
 
 @dataclass(frozen=True)

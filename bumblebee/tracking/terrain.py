@@ -28,7 +28,7 @@ _AROUND, _NEAR = 1, 3  # cells to each side: for the mean height, and for the hi
 
 def heights(config: Terrain) -> np.ndarray:
     """Heights (N, N) [m] of the knots, rows along y, columns along x, from -size to size."""
-    count = 2 * round(config.size / config.cell) + 1
+    count = 2 * round(config.half_side / config.cell) + 1
     rough = np.random.default_rng(config.seed).uniform(-config.amplitude, config.amplitude, (count, count))
     rough[:, : count // 2 + 1] = 0.0
     return rough
@@ -40,7 +40,7 @@ def add_terrain(spec: mujoco.MjSpec, config: Terrain) -> None:
         return
     grid = heights(config)
     low, high = float(grid.min()), float(grid.max())
-    size = [config.size, config.size, high - low, _DEPTH]
+    size = [config.half_side, config.half_side, high - low, _DEPTH]
     scaled = ((grid - low) / (high - low)).ravel()
     spec.add_hfield(name=FIELD, size=size, nrow=len(grid), ncol=len(grid), userdata=scaled)
     floor = spec.geom(FLOOR)
@@ -77,7 +77,7 @@ class Ground:
         A share `rough` of them starts on the rough half, the others on the flat one.
         """
         draws = torch.rand(len(qpos), 3, generator=generator, device=qpos.device)
-        spread = _SPOTS * self.config.size
+        spread = _SPOTS * self.config.half_side
         x = torch.where(draws[:, 0] < self.config.rough, draws[:, 1], -draws[:, 1]) * spread
         spot = torch.stack((x, (2 * draws[:, 2] - 1) * spread), dim=-1)
         rows.put(self.origin, spot - qpos[:, :2])
@@ -101,13 +101,13 @@ class Ground:
     def beyond(self, state: RobotState) -> Tensor:
         """Robots (B,) bool, seen in their clips' frames, that come too close to the terrain's edge."""
         place = state.root_pos_w[:, :2] + self.origin
-        return place.abs().amax(-1) > self.config.size - _EDGE
+        return place.abs().amax(-1) > self.config.half_side - _EDGE
 
     def _at(self, grid: Tensor, place_w: Tensor) -> Tensor:
         """Bilinear value (n,) of a grid at places (n, 2)."""
         last = len(grid) - 1
         # A world that blew up is nowhere; it still has to be looked up.
-        where = ((place_w + self.config.size) / self.config.cell).nan_to_num(0.0).clamp(0, last)
+        where = ((place_w + self.config.half_side) / self.config.cell).nan_to_num(0.0).clamp(0, last)
         low = where.floor().long().clamp(max=last - 1)
         part = where - low
         x, y = low[:, 0], low[:, 1]

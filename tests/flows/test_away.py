@@ -23,6 +23,16 @@ def lab(remote: str) -> Lab:
     return Lab(PrefectLab("postgresql://u@db/prefect"), store, RayLab("head:6379", remote))
 
 
+class Nodes:
+    """As much of Ray as says what its machines have."""
+
+    def __init__(self, *machines: dict[str, float]) -> None:
+        self.machines = machines
+
+    def nodes(self) -> list[dict[str, object]]:
+        return [{"Alive": True, "Resources": {"CPU": 1.0, **machine}} for machine in self.machines]
+
+
 def test_what_neither_a_stage_makes_nor_is_code_travels():
     deps = [
         "tasks/rollouts.py",
@@ -50,6 +60,43 @@ def test_gpus_are_those_of_the_sections_or_one_for_the_engine_on_a_gpu():
         ray_cluster.gpus(content, names) for names in ([], ["delta", "clusters"], ["refine"], ["refine", "experts"])
     ]
     assert asked == [0, 0, 1, 4]
+
+
+def test_a_stage_asks_for_its_gpus_and_its_memory():
+    own = RayLab("head:6379", "/shared/dvc", {"experts": 1.5})
+    content = {"experts": {"gpus": 2}}
+    asked = ray_cluster.need(own, content, "experts", ["experts"])
+    assert asked.options == {"num_cpus": 1, "num_gpus": 2, "memory": 1.5 * 2**30}
+    assert ray_cluster.need(own, content, "base", ["base"]).options == {"num_cpus": 1, "num_gpus": 0}
+
+
+@pytest.mark.parametrize(
+    ("wanted", "line"),
+    [
+        (ray_cluster.Need(4, 0), "expected at most 2 GPUs, which one machine of the Ray cluster has, came 4"),
+        (ray_cluster.Need(0, 80), "expected at most 64.0 GiB, which one machine of the Ray cluster gives, came 80"),
+        (
+            ray_cluster.Need(1, 32),
+            "expected at most 16.0 GiB, which one machine of the Ray cluster gives beside 1 GPUs, came 32",
+        ),
+    ],
+)
+def test_what_no_single_machine_has_is_one_line(wanted: ray_cluster.Need, line: str):
+    cluster = Nodes({"memory": 64.0 * 2**30}, {"GPU": 2.0, "memory": 16.0 * 2**30})
+    with pytest.raises(BadInput) as caught:
+        ray_cluster.require_room(cluster, wanted, "lab.yaml")
+    assert line in str(caught.value)
+    ray_cluster.require_room(cluster, ray_cluster.Need(2, 16), "lab.yaml")
+    ray_cluster.require_room(cluster, ray_cluster.Need(0, 64), "lab.yaml")
+
+
+def test_the_address_may_come_from_an_allocation(monkeypatch: pytest.MonkeyPatch):
+    own = RayLab("auto", "/shared/dvc")
+    monkeypatch.setenv("RAY_ADDRESS", "node7:6379")
+    assert ray_cluster.address_of(own, "ray") == "node7:6379"
+    monkeypatch.setenv("RAY_ADDRESS", "local")
+    with pytest.raises(BadInput, match="expected HOST:PORT in the variable RAY_ADDRESS, came local"):
+        ray_cluster.address_of(own, "ray")
 
 
 def test_the_remote_of_a_work_tree_has_the_labs_store_only_where_it_is_s3():

@@ -85,7 +85,7 @@ def new_token(path: Path) -> None:
 def _start(folder: Path, words: list[str]) -> Node:
     folder.mkdir(parents=True)
     command = [sys.executable, "-m", "ray.scripts.scripts", "start", *words, f"--node-ip-address={HOST}", "--block"]
-    memory = [f"--object-store-memory={200 * 2**20}", "--num-gpus=0", "--disable-usage-stats"]
+    memory = [f"--memory={2 * 2**30}", f"--object-store-memory={200 * 2**20}", "--num-gpus=0", "--disable-usage-stats"]
     with (folder / "log").open("wb") as log:
         process = subprocess.Popen(
             [*command, *memory],

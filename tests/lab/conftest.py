@@ -4,11 +4,14 @@ import os
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 
+from tests.lab import cluster as clusters
 from tests.lab import machines
 
 
@@ -61,3 +64,32 @@ def workspace(lab: LabOnThisMachine, tmp_path: Path) -> Path:
     (folder / "lab.yaml").write_text(yaml.safe_dump(lab.content()))
     (folder / "params.yaml").write_text("clusters: [c0]\nrounds: []\nfinal_round: 0\n")
     return folder
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A cluster that runs, and what a workspace needs to use it."""
+
+    cluster: clusters.Cluster
+    content: dict[str, Any]
+    """Of lab.yaml."""
+
+
+@pytest.fixture(scope="session")
+def stand(lab: LabOnThisMachine) -> Iterator[Stand]:
+    """One cluster for all tests of a session, two workers at first; a test kills one of them."""
+    if find_spec("ray") is None:
+        (pytest.fail if "BUMBLEBEE_LAB_TEST" in os.environ else pytest.skip)("no package ray")
+    patch = pytest.MonkeyPatch()
+    with tempfile.TemporaryDirectory(dir="/tmp", ignore_cleanup_errors=True) as scratch:
+        folder = Path(scratch)
+        (folder / "dvc").mkdir()
+        clusters.new_token(folder / "token")
+        patch.setenv("RAY_AUTH_MODE", "token")
+        patch.setenv("RAY_AUTH_TOKEN_PATH", str(folder / "token"))
+        try:
+            with clusters.cluster(folder, 2) as made:
+                ray = {"address": made.address, "remote": str(folder / "dvc"), "checkpoint_seconds": 1}
+                yield Stand(made, {**lab.content(), "ray": ray})
+        finally:
+            patch.undo()

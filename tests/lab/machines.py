@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 HOST = "127.0.0.1"
-START = 60.0  # [s]
+START = 180.0  # [s]
 PROGRAMS = sorted(Path("/usr/lib/postgresql").glob("*/bin"))
 WEED = shutil.which("weed", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
 USER = BUCKET = "bumblebee"
@@ -136,7 +136,7 @@ def s3(folder: Path, key: str, secret: str) -> Iterator[Store]:
         process = subprocess.Popen(command, stdout=log, stderr=log)
     made = Store(f"http://{HOST}:{ports['s3']}", BUCKET)
     try:
-        _until(lambda: _bucket(made, "admin", made_by), f"SeaweedFS to answer, see {folder / 'log'}")
+        _until(lambda: _bucket(made, "admin", made_by), "SeaweedFS to answer", folder / "log")
         yield made
     finally:
         process.kill()
@@ -174,10 +174,11 @@ def _listens(port: int) -> bool:
         return asked.connect_ex((HOST, port)) == 0
 
 
-def _until(done: Callable[[], bool], what: str) -> None:
+def _until(done: Callable[[], bool], what: str, log: Path | None = None) -> None:
     end = time.monotonic() + START
     while not done():
-        assert time.monotonic() < end, f"waited {START:.0f} s for {what}"
+        said = "" if log is None else f": {log.read_text(errors='replace')[-3000:]}"
+        assert time.monotonic() < end, f"waited {START:.0f} s for {what}{said}"
         time.sleep(0.2)
 
 

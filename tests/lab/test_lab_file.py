@@ -29,7 +29,7 @@ def changed(section: str, key: str, value: object) -> dict:
     return {**GOOD, section: {**GOOD[section], key: value}}
 
 
-def cluster(**over: str) -> dict:
+def cluster(**over: object) -> dict:
     return {**GOOD, "ray": {"address": "head.lab:6379", "remote": "/shared/dvc", **over}}
 
 
@@ -38,6 +38,15 @@ def test_a_cluster_is_read_and_its_token_demanded(tmp_path: Path, remote: str) -
     lab = read_lab(write(tmp_path, cluster(remote=remote)))
     assert lab is not None and lab.ray is not None and lab.ray.remote == remote
     assert environment(tmp_path)["RAY_AUTH_MODE"] == "token"
+
+
+def test_memory_and_times_of_a_cluster_are_numbers_of_their_units(tmp_path: Path) -> None:
+    lab = read_lab(write(tmp_path, cluster(address="auto", memory={"base": 12, "distill": 0.5}, checkpoint_seconds=5)))
+    assert lab is not None and lab.ray is not None
+    assert (lab.ray.memory, lab.ray.checkpoint_seconds) == ({"base": 12.0, "distill": 0.5}, 5.0)
+    plain = read_lab(write(tmp_path, cluster()))
+    assert plain is not None and plain.ray is not None
+    assert (plain.ray.memory, plain.ray.checkpoint_seconds) == ({}, 60.0)
 
 
 def test_without_a_cluster_no_process_is_told_of_ray(tmp_path: Path) -> None:
@@ -80,6 +89,10 @@ def test_processes_are_told_where_things_are(tmp_path: Path) -> None:
         (cluster(address="head:99999"), "ray.address: expected HOST:PORT of the cluster's head"),
         (cluster(remote="shared/dvc"), "ray.remote: expected a folder from / on"),
         (cluster(remote="ssh://me:secret@host/dvc"), "ray.remote: expected a folder from / on"),
+        (cluster(memory=12), "ray.memory: expected GiB by stage, such as {base: 12}, came int"),
+        (cluster(memory={"base": "12G"}), "ray.memory.base: expected a number from 0.001 to 1e+06, came '12G'"),
+        (cluster(memory={"base": True}), "ray.memory.base: expected a number from 0.001 to 1e+06, came True"),
+        (cluster(checkpoint_seconds=0), "ray.checkpoint_seconds: expected a number from 1 to 86400, came 0"),
         ([1], "prefect: expected a mapping"),
     ],
 )

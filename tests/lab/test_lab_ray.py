@@ -1,26 +1,17 @@
 """Stages on several machines: a Ray head and two workers with work trees of their own give one machine's files.
 
-The stages are the smoke profile's first ones, up to the experts of both clusters side by side: motions (which stays on
-the head), filter, cluster, base, experts@c0, experts@c1.
+The loop is the smoke profile's, all of it, both clusters side by side.
 """
 
 import contextlib
-import csv
-import hashlib
-import io
-import json
-import os
 import re
-import shutil
 import signal
 import sqlite3
 import subprocess
 import sys
-import tempfile
+import tarfile
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
-from importlib.util import find_spec
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -28,66 +19,17 @@ import psutil
 import pytest
 import yaml
 
-from flows import workspace as workspaces
+from flows.checkpoints import FOLDER
 from flows.environment import environment
 from tests.lab import cluster as clusters
 from tests.lab import machines
-from tests.lab.conftest import LabOnThisMachine
+from tests.lab.conftest import LabOnThisMachine, Stand
+from tests.lab.loops import LIMIT, call, colleague, files, locked, timeless, untimed, workspace
 
-STAGES = ("motions", "filter", "cluster", "base", "experts")
-LIMIT = 900  # [s]
-TIMES = ("seconds",)  # columns of a curve
-
-
-@dataclass(frozen=True)
-class Stand:
-    """A cluster that runs, and what a workspace needs to use it."""
-
-    cluster: clusters.Cluster
-    content: dict[str, Any]
-    """Of lab.yaml."""
-
-
-@pytest.fixture(scope="module")
-def stand(lab: LabOnThisMachine) -> Iterator[Stand]:
-    """One cluster for the tests of this module; the last one kills a worker of it."""
-    if find_spec("ray") is None:
-        (pytest.fail if "BUMBLEBEE_LAB_TEST" in os.environ else pytest.skip)("no package ray")
-    patch = pytest.MonkeyPatch()
-    with tempfile.TemporaryDirectory(dir="/tmp", ignore_cleanup_errors=True) as scratch:
-        folder = Path(scratch)
-        (folder / "dvc").mkdir()
-        clusters.new_token(folder / "token")
-        patch.setenv("RAY_AUTH_MODE", "token")
-        patch.setenv("RAY_AUTH_TOKEN_PATH", str(folder / "token"))
-        try:
-            with clusters.cluster(folder, 2) as made:
-                ray = {"address": made.address, "remote": str(folder / "dvc")}
-                yield Stand(made, {**lab.content(), "ray": ray})
-        finally:
-            patch.undo()
-
-
-def workspace(folder: Path, content: dict[str, Any] | None, **over: Any) -> Path:
-    """The smoke profile's first stages."""
-    made = workspaces.create(folder / "demo", "smoke", **over)
-    pipeline = yaml.safe_load((made / "dvc.yaml").read_text())
-    pipeline["stages"] = {name: pipeline["stages"][name] for name in STAGES}
-    (made / "dvc.yaml").write_text(yaml.safe_dump(pipeline, sort_keys=False))
-    if content is not None:
-        (made / "lab.yaml").write_text(yaml.safe_dump(content))
-    return made
-
-
-def call(folder: Path, *words: str, **variables: str) -> subprocess.CompletedProcess[str]:
-    """A program of ours in the workspace, to its end."""
-    settings = {**environment(folder), **variables}
-    command = [sys.executable, *words]
-    return subprocess.run(command, cwd=folder, env=settings, capture_output=True, text=True, check=False, timeout=LIMIT)
-
-
-def locked(folder: Path) -> dict[str, Any]:
-    return yaml.safe_load((folder / "dvc.lock").read_text())["stages"]
+LONG = {"experts": {"ppo": {"iterations": 10, "checkpoint_every": 2}}}  # to be killed in the middle
+# What it finds depends on no clock; and few windows, since this is not about what it finds.
+WINDOWS = {"max_windows": 8, "max_holdout_windows": 8, "report_windows": 8}
+STEADY = {"diagnose": {"beyond_seconds": 1e-9, "search_seconds": 3600, **WINDOWS}}
 
 
 def refused(folder: Path, content: dict[str, Any], **variables: str) -> str:
@@ -118,6 +60,14 @@ def test_a_gpu_that_no_machine_has_is_one_line(stand: Stand, tmp_path: Path) -> 
     assert "experts.gpus: expected at most 0 GPUs, which one machine of the Ray cluster has, came 2" in line
 
 
+def test_memory_that_no_machine_has_is_one_line(stand: Stand, tmp_path: Path) -> None:
+    made = workspace(tmp_path, None)
+    line = refused(made, {**stand.content, "ray": {**stand.content["ray"], "memory": {"base": 500}}})
+    assert "ray.memory.base: expected at most 2.0 GiB, which one machine of the Ray cluster gives, came 500" in line
+    line = refused(made, {**stand.content, "ray": {**stand.content["ray"], "memory": {"expert": 1}}})
+    assert "ray.memory: expected stages of dvc.yaml: motions, filter" in line and "came expert" in line
+
+
 @pytest.mark.parametrize(
     ("change", "line"),
     [
@@ -136,41 +86,47 @@ def test_other_versions_on_the_cluster_are_one_line(stand: Stand, tmp_path: Path
     assert ended.returncode == 2 and line in ended.stderr and len(ended.stderr.splitlines()) == 1, ended.stderr
 
 
-def test_one_worker_is_killed_and_the_files_are_those_of_one_machine(
+def test_one_worker_is_killed_and_the_whole_loop_ends_as_on_one_machine(
     lab: LabOnThisMachine, stand: Stand, tmp_path: Path
 ) -> None:
     (tmp_path / "one").mkdir()
-    one = workspace(tmp_path / "one", None)
-    alone = call(one, "-m", "dvc", "repro", "-q")
-    assert alone.returncode == 0, alone.stdout + alone.stderr
-    made = workspace(tmp_path, stand.content)
-    command = [sys.executable, "-m", "flows.demo", "--workspace", "."]
-    with (tmp_path / "said").open("w+") as said:
-        run = subprocess.Popen(command, cwd=made, env=environment(made), stdout=said, stderr=said)
-        try:
-            killed = kill_a_worker_at_experts(stand.cluster, run)
-            status = run.wait(LIMIT)
-        finally:
-            if run.poll() is None:
-                run.send_signal(signal.SIGTERM)
-                run.wait(60)
-        text = (tmp_path / "said").read_text()
+    one = workspace(tmp_path / "one", None, **LONG, **STEADY)
+    content = {**stand.content, "ray": {**stand.content["ray"], "memory": {"experts": 1.5, "refine": 1.5}}}
+    made = workspace(tmp_path, content, **LONG, **STEADY)
+    with ThreadPoolExecutor(1) as pool:  # both at once: half of the time is waiting
+        alone = pool.submit(call, one, "-m", "dvc", "repro", "-q")
+        cluster, status, text = run_and_kill(stand, made, tmp_path / "said")
+    assert alone.result().returncode == 0, alone.result().stdout + alone.result().stderr
     assert status == 0, text[-3000:]
-    assert text.count(f"{killed}: its machine was lost; the stage starts again on another one") == 1, text
-    assert text.count("its machine was lost") == 1, text
-    assert untrained(locked(made)) == untrained(locked(one))
+    lost = f"experts@{cluster}: its machine was lost; another one goes on from its last checkpoint"
+    assert text.count(lost) == text.count("its machine was lost") == 1, text
+    assert re.findall(r"expert-(c\d)-r0: goes on after iteration [2468] of 10", text) == [cluster], text
+    assert untimed(locked(made)) == untimed(locked(one))
     ours, theirs = files(made), files(one)
-    assert {name: timeless(name, ours[name]) for name in ours} == {
-        name: timeless(name, theirs[name]) for name in theirs
-    }
-    assert sum(name.endswith("policy.onnx") for name in ours) == 3
-    assert set(locked(made)) == {"motions", "filter", "cluster", "base", "experts@c0", "experts@c1"}
+    assert timeless(ours) == timeless(theirs)
+    assert sum(name.endswith("policy.onnx") for name in ours) == 10
+    assert not list((Path(stand.content["ray"]["remote"]) / FOLDER).iterdir())
     assert logged_on_one(one) == logged_in_lab(lab) != []
     assert files(colleague(tmp_path / "other", made)) == ours
     for worker in stand.cluster.workers:
         assert any((worker.folder / "cache" / "files").rglob("*")), "a worker that had nothing to do"
         if worker.process.returncode is None:
             assert not list((worker.folder / "trees").iterdir())
+
+
+def run_and_kill(stand: Stand, made: Path, said: Path) -> tuple[str, int, str]:
+    """The loop with one worker killed under it: the lost expert's cluster, the loop's status, and what it said."""
+    command = [sys.executable, "-m", "flows.demo", "--workspace", "."]
+    with said.open("w") as out:
+        run = subprocess.Popen(command, cwd=made, env=environment(made), stdout=out, stderr=out)
+        try:
+            lost = kill_a_worker_with_a_checkpoint(stand, run)
+            status = run.wait(LIMIT)
+        finally:
+            if run.poll() is None:
+                run.send_signal(signal.SIGTERM)
+                run.wait(60)
+    return lost, status, said.read_text()
 
 
 def logged_on_one(folder: Path) -> list[str]:
@@ -185,61 +141,30 @@ def logged_in_lab(lab: LabOnThisMachine) -> list[str]:
     return sorted(lab.postgres.sql(query, "mlflow").split("\n")[:-1])
 
 
-def colleague(folder: Path, made: Path) -> Path:
-    """Another folder with the pipeline and its lock, and `dvc pull` there."""
-    for name in ("dvc.yaml", "dvc.lock", "params.yaml", "lab.yaml", ".dvc/config", ".dvc/config.local"):
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(made / name, folder / name)
-    pulled = call(folder, "-m", "dvc", "pull", "-q")
-    assert pulled.returncode == 0, pulled.stderr
-    return folder
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    """What stages made."""
-    outs = [out["path"] for stage in locked(folder).values() for out in stage["outs"]]
-    found = [file for out in outs for file in (folder / out).rglob("*") if file.is_file()]
-    return {str(file.relative_to(folder)): file.read_bytes() for file in found}
-
-
-def timeless(name: str, content: bytes) -> object:
-    """A file without how long the training took, which a policy's card and curve say and no two runs agree on."""
-    if name.endswith("/card.json"):
-        card = json.loads(content)
-        assert card.pop("seconds") > 0 and card.pop("frames_per_second") > 0
-        return card
-    if name.endswith("/curve.csv"):
-        return [
-            {key: row[key] for key in row if key not in TIMES} for row in csv.DictReader(io.StringIO(content.decode()))
-        ]
-    return hashlib.md5(content).hexdigest()
-
-
-def untrained(lock: dict[str, Any]) -> dict[str, Any]:
-    """dvc.lock without the hashes of folders that hold a card: those of policies."""
-    return {
-        name: {
-            **stage,
-            **{key: [entry for entry in stage[key] if not policy(entry["path"])] for key in ("deps", "outs")},
-        }
-        for name, stage in lock.items()
-    }
-
-
-def policy(path: str) -> bool:
-    return path.startswith(("models/base", "models/experts"))
-
-
-def kill_a_worker_at_experts(made: clusters.Cluster, run: "subprocess.Popen[bytes]") -> str:
-    """Wait until both workers train an expert, end the first of them with all its processes; that expert's stage."""
+def kill_a_worker_with_a_checkpoint(stand: Stand, run: "subprocess.Popen[bytes]") -> str:
+    """Wait until both workers train an expert and one has a checkpoint in the store; end that one. Its cluster."""
     end = time.monotonic() + LIMIT
     while time.monotonic() < end and run.poll() is None:
-        at = {worker: next(worker.folder.glob("trees/*/demo/.scratch/experts-*"), None) for worker in made.workers}
+        at = {
+            worker: next(worker.folder.glob("trees/*/demo/.scratch/experts-*"), None)
+            for worker in stand.cluster.workers
+        }
         if all(at.values()):
-            worker, place = next(iter(at.items()))
-            assert place is not None and psutil.pid_exists(worker.process.pid)
-            worker.kill()
-            (name,) = re.findall(r"-(c\d+)-", place.name)
-            return f"experts@{name}"
+            stored = experts_stored(Path(stand.content["ray"]["remote"]) / FOLDER)
+            for worker, place in at.items():
+                if place is not None and place.name in stored:
+                    assert psutil.pid_exists(worker.process.pid)
+                    worker.kill()
+                    (name,) = re.findall(r"-(c\d+)-", place.name)
+                    return name
         time.sleep(0.05)
-    raise AssertionError(f"both workers at an expert: never; the run's status is {run.poll()}")
+    raise AssertionError(f"a checkpoint while both workers train an expert: never; the run's status is {run.poll()}")
+
+
+def experts_stored(shelves: Path) -> set[str]:
+    """Names of the folders with checkpoints that the store has, of those that are whole."""
+    found = set()
+    for file in shelves.glob("*/*.tar"):
+        with contextlib.suppress(OSError, tarfile.TarError), tarfile.open(file) as packed:
+            found |= {name.partition("/")[0] for name in packed.getnames() if name.endswith("checkpoint.pt")}
+    return found

@@ -15,7 +15,7 @@ from bumblebee.report.page import image
 from bumblebee.report.policy_sections import training_section
 from bumblebee.report.truth import match
 from bumblebee.report.verdict import PRETRAINED, verdict
-from bumblebee.report.wording import change, duration, effect_line, number, percent, plural, shown, signed
+from bumblebee.report.wording import change, effect_line, number, percent, plural, shown, signed
 from bumblebee.robot.facts import joint_names, stand_pose
 from bumblebee.robot.model import build_spec
 from tests.report.made import TRUTH, estimate, found, loop_results, page
@@ -124,7 +124,6 @@ def test_numbers_that_say_nothing_are_said_in_words() -> None:
     assert number({"value": 0.076, "ci95": [-0.196, 0.347]}) == "0.076 [0.000, 0.347]"
     assert signed(-0.2) == "0" and signed(3.4) == "+3"
     assert (plural(1, "motion"), plural(2, "policy")) == ("1 motion", "2 policies")
-    assert (duration(0.9), duration(14), duration(300)) == ("0.9 s", "14 s", "5.0 min")
 
 
 def test_percent() -> None:

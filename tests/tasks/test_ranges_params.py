@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import yaml
+from dvc_data.hashfile.meta import Meta
 
 from bumblebee.errors import BadInput
 from bumblebee.ranges import Range, Ranged, Text, annotations, fault
@@ -62,6 +63,12 @@ def test_no_number_without_both_ends_of_a_range_and_no_text_without_a_limit(kind
                 assert found.most is not None or found.below is not None
             elif scalar in (str, Path):
                 assert any(isinstance(one, Text) for one in meta)
+
+
+@pytest.mark.parametrize("kind", classes())
+def test_no_setting_has_a_name_that_dvc_leaves_out_of_a_runs_key(kind: type):
+    """By such a name DVC's run cache gives a stage the result of before, as if the setting had not changed."""
+    assert not {Meta.PARAM_SIZE, Meta.PARAM_NFILES} & set(annotations(kind))
 
 
 @pytest.mark.parametrize("kind", classes())

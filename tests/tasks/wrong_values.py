@@ -125,7 +125,7 @@ WRONG: list[tuple[str, Any, str]] = [
     *_same("base.env.terrain.rough", -0.1, 2),
     *_same("base.env.terrain.amplitude", 0, -1),
     *_same("base.env.terrain.cell", 0, 0.001, 9),
-    *_same("base.env.terrain.size", 0, 1),
+    *_same("base.env.terrain.half_side", 0, 1),
     *_same("base.ppo.iterations", 0, -10, 10**18, NAN),
     *_same("base.ppo.steps", 0, -1),
     *_same("base.ppo.epochs", 0),

@@ -15,7 +15,7 @@ from bumblebee.tracking.model import task_model
 from bumblebee.tracking.terrain import Ground, heights
 from tests.tracking.clips import waving
 
-ROUGH = Terrain(rough=1.0, size=6.0)
+ROUGH = Terrain(rough=1.0, half_side=6.0)
 OFF = Randomisation(friction=(1.0, 1.0), gains=0.0, mass=0.0, push=0.0)
 CONFIG = EnvConfig(num_worlds=6, threads=1, terrain=ROUGH, randomisation=OFF, reset_noise=0.0, start_share=1.0)
 
@@ -45,7 +45,7 @@ def test_the_simulated_ground_has_these_heights(model: mujoco.MjModel) -> None:
     """A ray straight down meets the ground where the grid says, at knots and in the middle between two."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    grid, middle = heights(ROUGH), round(ROUGH.size / ROUGH.cell)
+    grid, middle = heights(ROUGH), round(ROUGH.half_side / ROUGH.cell)
     geom = np.zeros(1, dtype=np.int32)
 
     def height(x: float, y: float) -> float:
@@ -64,7 +64,7 @@ def test_the_simulated_ground_has_these_heights(model: mujoco.MjModel) -> None:
 def test_the_lift_is_the_mean_height_around_a_place() -> None:
     """At a knot the mean of it and its eight neighbours; between two knots the mean of theirs; 0 on flat ground."""
     grid, ground = heights(ROUGH), Ground(ROUGH, 1, "cpu")
-    middle = round(ROUGH.size / ROUGH.cell)
+    middle = round(ROUGH.half_side / ROUGH.cell)
     column, row = middle + 8, middle - 3
 
     def mean(c: int) -> float:
@@ -102,7 +102,7 @@ def test_robots_stand_on_it_and_are_seen_as_on_flat_ground(model: mujoco.MjModel
 
 def _height(x: float, y: float) -> float:
     """Height of the surface: the lower of the two ways to cut a cell into triangles."""
-    grid, n = heights(ROUGH), round(ROUGH.size / ROUGH.cell)
+    grid, n = heights(ROUGH), round(ROUGH.half_side / ROUGH.cell)
     column, row = x / ROUGH.cell + n, y / ROUGH.cell + n
     c, r = int(column), int(row)
     u, v = column - c, row - r
@@ -120,15 +120,15 @@ def test_the_share_of_rough_starts_is_kept(model: mujoco.MjModel) -> None:
     every = Rows(torch.ones(4000, dtype=torch.bool), by_mask=True)
     qpos = ground.place(every, torch.zeros(4000, 30), torch.Generator().manual_seed(0))
     assert float((qpos[:, 0] > 0).float().mean()) == pytest.approx(0.25, abs=0.03)
-    assert qpos[:, :2].abs().max() <= 0.4 * ROUGH.size
+    assert qpos[:, :2].abs().max() <= 0.4 * ROUGH.half_side
     assert torch.equal(ground.origin, qpos[:, :2])
 
 
 def test_a_walk_to_the_edge_ends_without_failure(model: mujoco.MjModel) -> None:
     """A robot put near the edge is taken out as by a time-out."""
     env = make(model)
-    env.engine.batch.qpos[3, 0] = ROUGH.size - 0.5
-    env.ground.origin[3, 0] += ROUGH.size - 0.5 - env._state.root_pos_w[3, 0] - env.ground.origin[3, 0]
+    env.engine.batch.qpos[3, 0] = ROUGH.half_side - 0.5
+    env.ground.origin[3, 0] += ROUGH.half_side - 0.5 - env._state.root_pos_w[3, 0] - env.ground.origin[3, 0]
     _, _, done, extras = env.step(torch.zeros(6, 23))
     assert done.tolist() == [world == 3 for world in range(6)]
     assert torch.equal(extras["time_outs"].bool(), done)
