@@ -1,0 +1,143 @@
+"""One loop of the soak: a fresh workspace, `flows.demo` started again until it is done, every stage that ends noted."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from benchmarks.lab_soak import facts, said
+from benchmarks.lab_soak.record import Record
+from flows import workspace as workspaces
+from flows.environment import environment
+from flows.processes import end_tree
+
+SALT = "salt.txt"
+LOOK, PAUSE = 0.5, 5.0  # [s] between looks; before the same command is started again
+HANGS = 600.0  # [s] without a new line and a new stage: it is ended, which the judge counts as a fault of ours
+TRIES = 40
+LEFT_OUT = ("report",)  # reads what all loops before have left in the registry, and makes a page of it
+
+
+@dataclass
+class Running:
+    """What the faults may hit: the loop that is at work."""
+
+    process: subprocess.Popen[bytes] | None = None
+
+
+def create(folder: Path, seed: int, salt: str, lab: dict[str, Any] | None) -> Path:
+    """A workspace: the smoke profile without rounds, its seeds, and a file that makes every stage one of its own.
+
+    Without the file the stages of an earlier loop of the same seed would be found in DVC's cache of runs.
+    """
+    seeds = {name: {"seed": seed} for name in ("seal", "cluster", "base", "experts", "distill")}
+    made = workspaces.create(folder, "smoke", rounds=[], final_round=0, gate={"mode": "auto"}, **seeds)
+    (made / SALT).write_text(f"{salt}\n")
+    pipeline = yaml.safe_load((made / "dvc.yaml").read_text())
+    stages = {name: stage for name, stage in pipeline["stages"].items() if name not in LEFT_OUT}
+    for stage in stages.values():
+        stage["deps"].append(SALT)
+    (made / "dvc.yaml").write_text(yaml.safe_dump({"stages": stages}, sort_keys=False))
+    if lab is not None:
+        (made / "lab.yaml").write_text(yaml.safe_dump(lab))
+    return made
+
+
+def reference(folder: Path, seed: int, record: Record) -> None:
+    """The same seed on this machine alone, without servers and faults."""
+    made = create(folder, seed, "reference", None)
+    command = [sys.executable, "-m", "dvc", "repro", "-q"]
+    began = time.monotonic()
+    done = subprocess.run(command, cwd=made, env=environment(made), capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"the reference of seed {seed} failed: {done.stderr[-2000:]}")
+    seconds = round(time.monotonic() - began, 1)
+    address = f"sqlite:///{made / '.servers' / 'mlflow.db'}"
+    record.write("reference", seed=seed, seconds=seconds, **facts.of(made, address))
+
+
+def loop(folder: Path, number: int, seed: int, record: Record, logs: Path, now: Running, until: float) -> bool:
+    """Start the command again and again until the loop is done; whether it is.
+
+    Args:
+        folder: its workspace.
+        number: of the loop.
+        seed: that it has.
+        record: where stages, starts and ends go.
+        logs: folder for what each start says.
+        now: what the faults look at.
+        until: time (of `time.time`) after which it is given up.
+    """
+    for attempt in range(1, TRIES + 1):
+        record.write("start", loop=number, attempt=attempt)
+        log = logs / f"loop-{number:03d}-{attempt:02d}.log"
+        status = one(folder, number, record, log, now, until)
+        ends = log.read_text(errors="replace")
+        record.write("end", loop=number, attempt=attempt, status=status, said=said.telling(ends))
+        if status == 0:
+            return True
+        if time.time() > until:
+            return False
+        time.sleep(PAUSE)
+    return False
+
+
+def one(folder: Path, number: int, record: Record, log: Path, now: Running, until: float) -> int | str:
+    """One start, to its end; its status, `hung` where it had to be ended, `time` where the soak was over."""
+    command = [sys.executable, "-m", "flows.demo", "--workspace", str(folder)]
+    with log.open("wb") as out:
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=environment(folder),
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=out,
+            start_new_session=True,
+        )
+    now.process, known, moved = process, finished(folder), time.monotonic()
+    size = 0
+    try:
+        while process.poll() is None:
+            time.sleep(LOOK)
+            new = finished(folder) - known
+            for name in sorted(new):
+                record.write("stage", loop=number, name=name)
+            known |= new
+            if new or log.stat().st_size != size:
+                moved, size = time.monotonic(), log.stat().st_size
+            if time.monotonic() - moved > HANGS:
+                return "hung"
+            if time.time() > until:
+                return "time"
+        for name in sorted(finished(folder) - known):
+            record.write("stage", loop=number, name=name)
+        return process.returncode
+    finally:
+        now.process = None
+        end_tree(process.pid)
+
+
+def finished(folder: Path) -> set[str]:
+    """Stages in dvc.lock; none while it is being written."""
+    try:
+        return set((yaml.safe_load((folder / "dvc.lock").read_text()) or {}).get("stages") or {})
+    except (OSError, yaml.YAMLError, AttributeError):
+        return set()
+
+
+def hit(now: Running, find: Callable[[int], Any]) -> bool:
+    """SIGKILL to a process of the loop that is at work; whether there was one."""
+    process = now.process
+    found = None if process is None else find(process.pid)
+    if found is None:
+        return False
+    os.kill(found.pid, signal.SIGKILL)
+    return True
