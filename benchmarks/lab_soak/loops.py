@@ -23,6 +23,17 @@ LOOK, PAUSE = 0.5, 5.0  # [s] between looks; before the same command is started 
 HANGS = 600.0  # [s] without a new line and a new stage: it is ended, which the judge counts as a fault of ours
 TRIES = 40
 LEFT_OUT = ("report",)  # reads what all loops before have left in the registry, and makes a page of it
+SEEDED = ("seal", "cluster", "base", "experts", "distill")
+TRAINING = {"env": {"num_worlds": 8}, "ppo": {"iterations": 2, "steps": 8, "hidden": [32, 32], "checkpoint_every": 1}}
+TINY: dict[str, Any] = {
+    "seal": {"n_effects": 0},
+    "cluster": {"epochs": 1, "audit_seeds": 1, "max_k": 2},
+    "base": TRAINING,
+    "experts": TRAINING,
+    "distill": {"iterations": 1, "env": {"num_worlds": 8}},
+    "evaluate": {"max_motions": 2, "max_seconds": 0.5, "engines": ["stand_in"]},
+}
+"""Of params.yaml, over the smoke profile: what is soaked is the lab, and a stage should be little more than its start."""
 
 
 @dataclass
@@ -33,12 +44,14 @@ class Running:
 
 
 def create(folder: Path, seed: int, salt: str, lab: dict[str, Any] | None) -> Path:
-    """A workspace: the smoke profile without rounds, its seeds, and a file that makes every stage one of its own.
+    """A workspace: the smoke profile without rounds and tinier, its seeds, and a file that makes every stage one of its own.
 
     Without the file the stages of an earlier loop of the same seed would be found in DVC's cache of runs.
     """
-    seeds = {name: {"seed": seed} for name in ("seal", "cluster", "base", "experts", "distill")}
-    made = workspaces.create(folder, "smoke", rounds=[], final_round=0, gate={"mode": "auto"}, **seeds)
+    seeds = {name: {**TINY[name], "seed": seed} for name in SEEDED}
+    made = workspaces.create(folder, "smoke", rounds=[], final_round=0)
+    settings = workspaces.merge(yaml.safe_load((made / "params.yaml").read_text()), {**TINY, **seeds})
+    (made / "params.yaml").write_text(yaml.safe_dump(settings, sort_keys=False))
     (made / SALT).write_text(f"{salt}\n")
     pipeline = yaml.safe_load((made / "dvc.yaml").read_text())
     stages = {name: stage for name, stage in pipeline["stages"].items() if name not in LEFT_OUT}
