@@ -15,6 +15,7 @@ from pathlib import Path
 from benchmarks.lab_soak import facts, faults, judge, loops
 from benchmarks.lab_soak.record import Record, read
 from benchmarks.lab_soak.stand import WORKERS, Stand, clear, stand
+from flows.attend import ended_in_order
 from tasks.lab import read_lab
 from tasks.lineage import git_sha
 from tests.lab import machines
@@ -31,7 +32,8 @@ def main() -> int:
             print(f"not here: {lacks}", file=sys.stderr)
             return 2
         options.out.mkdir(parents=True, exist_ok=False)
-        soak(options, Record(path))
+        with ended_in_order():
+            soak(options, Record(path))
     verdict = judge.judge(read(path))
     print(verdict.table())
     return 1 if verdict.broken else 0
@@ -41,7 +43,11 @@ def soak(options: argparse.Namespace, record: Record) -> None:
     """The references, then loops and faults until the time is over."""
     record.write("begin", minutes=options.minutes, seed=options.seed, git_sha=git_sha())
     with tempfile.TemporaryDirectory(dir="/tmp", prefix="s", ignore_cleanup_errors=True) as scratch:
+        known = {} if options.references is None else loops.references(read(options.references))
         for seed in range(options.seeds):
+            if seed in known:
+                record.write("reference", **known[seed])
+                continue
             folder = Path(scratch) / f"reference{seed}"
             loops.reference(folder, seed, record)
             clear(folder)
@@ -104,6 +110,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--seeds", type=int, default=3, help="different loops, each with a run without faults to compare")
     made.add_argument("--workers-every", type=float, default=300.0, help="seconds between two workers killed")
     made.add_argument("--others-every", type=float, default=200.0, help="seconds between two other faults")
+    made.add_argument("--references", type=Path, help="record.jsonl of an earlier soak of the same code that has them")
     made.add_argument("--judge-only", action="store_true", help="judge what stands in --out already")
     return made
 

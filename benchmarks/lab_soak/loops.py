@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from benchmarks.lab_soak import facts, said
-from benchmarks.lab_soak.record import Record
+from benchmarks.lab_soak.record import Event, Record
 from flows import workspace as workspaces
 from flows.environment import environment
 from flows.processes import end_tree
@@ -74,6 +74,12 @@ def reference(folder: Path, seed: int, record: Record) -> None:
     seconds = round(time.monotonic() - began, 1)
     address = f"sqlite:///{made / '.servers' / 'mlflow.db'}"
     record.write("reference", seed=seed, seconds=seconds, **facts.of(made, address))
+
+
+def references(events: list[Event]) -> dict[int, Event]:
+    """Seed -> what a record knows of the run without faults."""
+    found = (event for event in events if event["what"] == "reference")
+    return {event["seed"]: {key: event[key] for key in event if key not in ("what", "at")} for event in found}
 
 
 def loop(folder: Path, number: int, seed: int, record: Record, logs: Path, now: Running, until: float) -> bool:

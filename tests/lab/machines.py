@@ -130,8 +130,10 @@ def s3(folder: Path, key: str, secret: str) -> Iterator[Store]:
     ]
     command += [f"-{name}.port={port}" for name, port in ports.items()]
     command += [f"-{name}.port.grpc={free_port()}" for name in ("s3", "master", "volume", "filer")]
+    # Its catalogs listen on ports of their own, so that a second server on the machine would end.
+    command += ["-s3.port.iceberg=0", "-s3.port.lance=0", "-master.telemetry=false", "-volume.max=20"]
     with (folder / "log").open("w") as log:
-        process = subprocess.Popen([*command, "-volume.max=20"], stdout=log, stderr=log)
+        process = subprocess.Popen(command, stdout=log, stderr=log)
     made = Store(f"http://{HOST}:{ports['s3']}", BUCKET)
     try:
         _until(lambda: _bucket(made, "admin", made_by), f"SeaweedFS to answer, see {folder / 'log'}")
