@@ -12,8 +12,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from benchmarks.lab_soak import facts, faults, judge, loops
-from benchmarks.lab_soak.record import Record, read
+from benchmarks.lab_soak import facts, faults, judge, loops, said
+from benchmarks.lab_soak.record import Event, Record, read
 from benchmarks.lab_soak.stand import WORKERS, Stand, clear, stand
 from flows.attend import ended_in_order
 from tasks.lab import read_lab
@@ -34,9 +34,17 @@ def main() -> int:
         options.out.mkdir(parents=True, exist_ok=False)
         with ended_in_order():
             soak(options, Record(path))
-    verdict = judge.judge(read(path))
+    verdict = judge.judge(heard(read(path), options.out))
     print(verdict.table())
     return 1 if verdict.broken else 0
+
+
+def heard(events: list[Event], logs: Path) -> list[Event]:
+    """The record with what each start said taken from its log, where that is still there."""
+    for event in events:
+        if event["what"] == "end" and (log := logs / loops.log_name(event["loop"], event["attempt"])).exists():
+            event["said"] = said.telling(log.read_text(errors="replace"))
+    return events
 
 
 def soak(options: argparse.Namespace, record: Record) -> None:

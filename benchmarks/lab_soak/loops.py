@@ -96,7 +96,7 @@ def loop(folder: Path, number: int, seed: int, record: Record, logs: Path, now: 
     """
     for attempt in range(1, TRIES + 1):
         record.write("start", loop=number, attempt=attempt)
-        log = logs / f"loop-{number:03d}-{attempt:02d}.log"
+        log = logs / log_name(number, attempt)
         status = one(folder, number, record, log, now, until)
         ends = log.read_text(errors="replace")
         record.write("end", loop=number, attempt=attempt, status=status, said=said.telling(ends))
@@ -106,6 +106,11 @@ def loop(folder: Path, number: int, seed: int, record: Record, logs: Path, now: 
             return False
         time.sleep(PAUSE)
     return False
+
+
+def log_name(number: int, attempt: int) -> str:
+    """Of the file with what a start says."""
+    return f"loop-{number:03d}-{attempt:02d}.log"
 
 
 def one(folder: Path, number: int, record: Record, log: Path, now: Running, until: float) -> int | str:

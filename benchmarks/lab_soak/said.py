@@ -7,6 +7,7 @@ TELLS = re.compile(
     r"ending|gone|not started|hung|denied|unavailable|retry",
     re.IGNORECASE,
 )
+TRACEBACK = "Traceback (most recent call last)"
 LINES, LENGTH = 200, 400
 
 Named = tuple[re.Pattern[str], tuple[str, ...]]
@@ -15,11 +16,14 @@ NAMED: dict[str, Named] = {}
 
 
 def telling(text: str) -> list[str]:
-    """Lines that tell of a fault, each shape once, without their time."""
+    """Lines that tell of a fault, each shape once, without their time; of a traceback its head and its error."""
     found: dict[str, str] = {}
+    inside = False
     for line in text.splitlines():
-        if TELLS.search(line):
-            plain = re.sub(r"^\d\d:\d\d:\d\d\.\d+ ", "", line.strip())[:LENGTH]
+        plain = re.sub(r"^\d\d:\d\d:\d\d(\.\d+)? ", "", line)
+        inside = (inside and plain.startswith(" ")) or plain.startswith(TRACEBACK)
+        if TELLS.search(plain) and (not inside or plain.startswith(TRACEBACK)):
+            plain = plain.strip()[:LENGTH]
             found.setdefault(re.sub(r"[0-9a-f]{6,}|\d+", "#", plain), plain)
     return list(found.values())[:LINES]
 
