@@ -164,9 +164,9 @@ def summarise(folder: Path) -> None:
     if published.exists():
         models = json.loads(published.read_text())["models"]
         for name, facts in models.items():
-            version = facts["champion"] or "none yet"
-            waits = f"; {facts['proposal']['version']} is proposed: bumblebee gate show {name}"
-            print(f"  models:/{name}@champion  version {version}{waits if 'proposal' in facts else ''}")
+            version, proposal = facts["champion"] or "none yet", facts.get("proposal")
+            waits = f"; {proposal['version']} is proposed: bumblebee gate show {name}" if proposal else ""
+            print(f"  models:/{name}@champion  version {version}{waits}")
     report = folder / paths.REPORT
     if report.exists():
         print(f"report: {shown(report)}")
