@@ -119,6 +119,10 @@ def starts(events: list[Event]) -> list[str]:
             ends[event["loop"]].append(event)
     found = [f"loop {n}, start {e['attempt']}: hung" for n, some in ends.items() for e in some if e["status"] == "hung"]
     last = max(ends, default=0)
+    read = {event["loop"] for event in events if event["what"] == "loop"}
+    found += [
+        f"loop {n}: done, and never read" for n, some in ends.items() if some[-1]["status"] == 0 and n not in read
+    ]
     return found + [f"loop {n}: given up" for n, some in ends.items() if some[-1]["status"] != 0 and n != last]
 
 

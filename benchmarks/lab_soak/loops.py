@@ -43,6 +43,18 @@ class Running:
     process: subprocess.Popen[bytes] | None = None
 
 
+@dataclass(frozen=True)
+class Job:
+    """One loop."""
+
+    number: int
+    seed: int
+    folder: Path
+    """Its workspace."""
+    until: float
+    """Time (of `time.time`) after which it is given up."""
+
+
 def create(folder: Path, seed: int, salt: str, lab: dict[str, Any] | None) -> Path:
     """A workspace: the smoke profile without rounds and tinier, its seeds, and a file that every stage depends on.
 
@@ -82,27 +94,23 @@ def references(events: list[Event]) -> dict[int, Event]:
     return {event["seed"]: {key: event[key] for key in event if key not in ("what", "at")} for event in found}
 
 
-def loop(folder: Path, number: int, seed: int, record: Record, logs: Path, now: Running, until: float) -> bool:
+def loop(job: Job, record: Record, now: Running) -> bool:
     """Start the command again and again until the loop is done; whether it is.
 
     Args:
-        folder: its workspace.
-        number: of the loop.
-        seed: that it has.
-        record: where stages, starts and ends go.
-        logs: folder for what each start says.
+        job: which.
+        record: where stages, starts and ends go, and beside it what each start says.
         now: what the faults look at.
-        until: time (of `time.time`) after which it is given up.
     """
     for attempt in range(1, TRIES + 1):
-        record.write("start", loop=number, attempt=attempt)
-        log = logs / log_name(number, attempt)
-        status = one(folder, number, record, log, now, until)
+        record.write("start", loop=job.number, attempt=attempt)
+        log = record.path.parent / log_name(job.number, attempt)
+        status = one(job, record, log, now)
         ends = log.read_text(errors="replace")
-        record.write("end", loop=number, attempt=attempt, status=status, said=said.telling(ends))
+        record.write("end", loop=job.number, attempt=attempt, status=status, said=said.telling(ends))
         if status == 0:
             return True
-        if time.time() > until:
+        if time.time() > job.until:
             return False
         time.sleep(PAUSE)
     return False
@@ -113,8 +121,9 @@ def log_name(number: int, attempt: int) -> str:
     return f"loop-{number:03d}-{attempt:02d}.log"
 
 
-def one(folder: Path, number: int, record: Record, log: Path, now: Running, until: float) -> int | str:
+def one(job: Job, record: Record, log: Path, now: Running) -> int | str:
     """One start, to its end; its status, `hung` where it had to be ended, `time` where the soak was over."""
+    folder, number = job.folder, job.number
     command = [sys.executable, "-m", "flows.demo", "--workspace", str(folder)]
     with log.open("wb") as out:
         process = subprocess.Popen(
@@ -139,7 +148,7 @@ def one(folder: Path, number: int, record: Record, log: Path, now: Running, unti
                 moved, size = time.monotonic(), log.stat().st_size
             if time.monotonic() - moved > HANGS:
                 return "hung"
-            if time.time() > until:
+            if time.time() > job.until:
                 return "time"
         for name in sorted(finished(folder) - known):
             record.write("stage", loop=number, name=name)

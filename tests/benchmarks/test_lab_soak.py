@@ -141,6 +141,7 @@ def test_a_loop_that_hung_or_was_given_up_breaks_it() -> None:
     assert judge(events).broken == ["loop 1, start 1: hung"]
     events = [e for e in record() if not (e.get("loop") == 1 and e.get("attempt") == 2) and e["what"] != "loop"]
     assert "loop 1: given up" in judge(events).broken
+    assert "loop 2: done, and never read" in judge(record()[:-1]).broken
 
 
 def test_an_error_needs_a_name_and_its_fault(monkeypatch: pytest.MonkeyPatch) -> None:
