@@ -61,6 +61,8 @@ def judge(events: list[Event]) -> Verdict:
         "runs in MLflow of finished loops": sum(len(loop["runs"]) for loop in loops),
         "files compared": sum(len(loop["files"]) for loop in loops),
         "faults": sum(event["what"] == "fault" for event in events),
+        "faults that found nothing to hit": sum(event["what"] == "fault missed" for event in events),
+        "seconds between two stages of a start without a fault between, median": undisturbed(events),
         "starts": sum(event["what"] == "start" for event in events),
     }
     return found
@@ -155,6 +157,19 @@ def active(events: list[Event]) -> list[tuple[str, float, float]]:
             after = (e["at"] for e in events[index:] if e["what"] == "restored" and e["kind"] == event["kind"])
             found.append((event["kind"], event["at"], next(after, end)))
     return found
+
+
+def undisturbed(events: list[Event]) -> float:
+    """How long it takes from the end of a stage to that of the next one where no fault comes between."""
+    found, before, intervals = [], None, active(events)
+    for event in events:
+        if event["what"] == "stage":
+            if before is not None and not any(at <= event["at"] and until >= before for _, at, until in intervals):
+                found.append(event["at"] - before)
+            before = event["at"]
+        elif event["what"] == "start":
+            before = None
+    return round(median(found), 1) if found else 0.0
 
 
 def recovery(events: list[Event]) -> list[list[str]]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.lab_soak import facts, faults, said
-from benchmarks.lab_soak.judge import judge
+from benchmarks.lab_soak.judge import judge, undisturbed
 from benchmarks.lab_soak.record import Event, Record, read
 
 SHA = "0123abc"
@@ -157,6 +157,14 @@ def test_an_error_needs_a_name_and_its_fault(monkeypatch: pytest.MonkeyPatch) ->
     quiet = [event for event in record() if event["what"] not in ("fault", "restored")]
     of(quiet, "end")["said"] = ["base: its machine was lost"]
     assert judge(quiet).broken == ["loop 1, start 1: lost worker, without such a fault: base: its machine was lost"]
+
+
+def test_what_no_fault_disturbed_is_told_apart() -> None:
+    events = record()
+    assert undisturbed(events) == 0.0  # the fault lies between the two stages, and a new start does
+    calm = [event for event in events if event["what"] not in ("fault", "restored")]
+    calm.insert(5, {"what": "stage", "at": 16.0, "loop": 1, "name": "motions"})
+    assert undisturbed(sorted(calm, key=lambda event: event["at"])) == 4.0
 
 
 def test_a_soak_without_a_finished_loop_does_not_hold() -> None:
