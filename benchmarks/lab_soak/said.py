@@ -10,8 +10,35 @@ TELLS = re.compile(
 TRACEBACK = "Traceback (most recent call last)"
 LINES, LENGTH = 200, 400
 
+# Kinds of benchmarks.lab_soak.faults.
+WORKER, DATABASE, STORE = "worker killed", "database killed", ("S3 ended", "S3 answers nothing")
+FLOW, PREFECT, MLFLOW = ("keeper killed", "flow killed"), "Prefect's server killed", "MLflow's server killed"
+FULL = ("worker's disk full", "workspace's disk full")
+
 Named = tuple[re.Pattern[str], tuple[str, ...]]
-NAMED: dict[str, Named] = {}
+NAMED: dict[str, Named] = {
+    "no error: how a policy did": (re.compile(r": success .* key error"), ()),
+    "no error of its own: stages that wait for a failed one": (
+        re.compile(
+            r"Finished in state (Failed|NotReady)|^\d+ stage\(s\) failed, |ERROR: failed to reproduce|"
+            r"^[a-z]+( round \d+)?( c\d+)?: .* / |the same command goes on from there$"
+        ),
+        (),
+    ),
+    "a machine was lost, its stage starts again elsewhere": (
+        re.compile("its machine was lost; the stage starts"),
+        (WORKER,),
+    ),
+    "what Ray says of a machine that was lost": (re.compile(r"\(raylet\) The node with node id"), (WORKER,)),
+    "Prefect's server is gone, the stages go on": (re.compile("^Prefect's server went away"), (PREFECT,)),
+    "Prefect's log finds no server": (
+        re.compile("^--- Error logging to API ---|^All connection attempts failed"),
+        (PREFECT, *FLOW, DATABASE),
+    ),
+    "Prefect's server has no database": (re.compile("500 Internal Server Error.*/api/"), (DATABASE,)),
+    "MLflow's server is gone, its page is closed": (re.compile("^MLflow's server went away"), (MLFLOW,)),
+    "the process that started it is gone": (re.compile("the process that started this one is gone: ending"), FLOW),
+}
 """Name -> the lines that it means, and the faults of which one must have been there; none for what is no error."""
 
 
