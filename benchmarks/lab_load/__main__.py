@@ -22,7 +22,7 @@ import yaml
 
 from benchmarks.lab_load import fill, plain
 from benchmarks.lab_load.table import table
-from benchmarks.lab_load.users import Arm, Known, Sample, drive
+from benchmarks.lab_load.users import Arm, Known, Sample, drive, seen
 from flows import login
 from flows.environment import SERVERS
 from flows.servers import servers
@@ -37,18 +37,19 @@ def main() -> int:
         return 2
     options.out.mkdir(parents=True)
     out = options.out.resolve()
-    place = tempfile.TemporaryDirectory(dir="/tmp", prefix="l", ignore_cleanup_errors=True)
-    with place as scratch, lab(Path(scratch)) as folder:
+    with ExitStack() as stack:
+        folder = options.on.resolve() if options.on else stack.enter_context(lab())
         os.chdir(folder)
         began = time.monotonic()
-        experiment, runs = fill.mlflow(folder, options.loops, options.stages)
-        print(f"{options.loops * options.stages} runs in MLflow after {time.monotonic() - began:.0f} s", flush=True)
-        with ExitStack() as stack:
-            arms = started(folder, options.workers, stack)
-            flow_runs = asyncio.run(fill.prefect(arms[0], options.loops, options.stages))
+        if not options.on:
+            fill.mlflow(folder, options.loops, options.stages)
+            print(f"{options.loops * options.stages} runs in MLflow after {time.monotonic() - began:.0f} s", flush=True)
+        arms = started(folder, options.workers, stack)
+        if not options.on:
+            asyncio.run(fill.prefect(arms[0], options.loops, options.stages))
             print(f"and in Prefect after {time.monotonic() - began:.0f} s", flush=True)
-            known = Known(experiment, runs, fill.POLICY, fill.MODELS, flow_runs)
-            samples = in_turns(arms, known, options, out / "samples.jsonl")
+        known = asyncio.run(seen(arms[0], folder.name, fill.POLICY))
+        samples = in_turns(arms, known, options, out / "samples.jsonl")
     for think in options.think:
         print(f"\n{options.users} users, {think:g} s between look-ups on average\n")
         print(table([sample for sample, at in samples if at == think], [arm.name for arm in arms]))
@@ -83,11 +84,15 @@ def in_turns(arms: list[Arm], known: Known, options: argparse.Namespace, path: P
 
 
 @contextmanager
-def lab(folder: Path) -> Iterator[Path]:
+def lab() -> Iterator[Path]:
     """Databases, a store, and a workspace whose lab.yaml names them."""
-    folder.chmod(0o755)
     password, secret = machines.new_secret(), machines.new_secret()
-    with machines.postgres(folder / "pg", password) as postgres, machines.s3(folder / "s3", "lab", secret) as store:
+    with ExitStack() as stack:
+        place = tempfile.TemporaryDirectory(dir="/tmp", prefix="l", ignore_cleanup_errors=True)
+        folder = Path(stack.enter_context(place))
+        folder.chmod(0o755)  # PostgreSQL is another user
+        postgres = stack.enter_context(machines.postgres(folder / "pg", password))
+        store = stack.enter_context(machines.s3(folder / "s3", "lab", secret))
         for name, text in {
             "PGPASSFILE": f"*:*:*:{machines.USER}:{password}\n",
             "AWS_SHARED_CREDENTIALS_FILE": f"[default]\naws_access_key_id = lab\naws_secret_access_key = {secret}\n",
@@ -108,8 +113,9 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     made = argparse.ArgumentParser(prog="python -m benchmarks.lab_load", description=__doc__)
     made.add_argument("--out", type=Path, required=True, help="new folder for samples.jsonl")
+    made.add_argument("--on", type=Path, help="workspace of a lab that stands and was filled by an earlier start")
     made.add_argument("--users", type=int, default=100)
-    made.add_argument("--think", type=float, nargs="+", default=[10.0, 1.0], help="mean seconds to read")
+    made.add_argument("--think", type=float, nargs="+", default=[30.0, 10.0], help="mean seconds to read")
     made.add_argument("--seconds", type=float, default=60.0, help="of a turn of one pair of servers")
     made.add_argument("--turns", type=int, default=3, help="of each pair, at each --think")
     made.add_argument("--loops", type=int, default=50, help="runs of the loop")

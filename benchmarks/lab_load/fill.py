@@ -20,8 +20,8 @@ AT_ONCE = 8  # requests to Prefect while it is filled
 NOW = {"type": "COMPLETED", "name": "Completed"}
 
 
-def mlflow(folder: Path, loops: int, stages: int) -> tuple[str, list[str]]:
-    """Records by MLflow's client, straight into database and store as stages write them; (experiment, runs with files).
+def mlflow(folder: Path, loops: int, stages: int) -> None:
+    """Records by MLflow's client, straight into database and store as stages write them.
 
     Args:
         folder: the workspace, which must be the current folder.
@@ -36,12 +36,10 @@ def mlflow(folder: Path, loops: int, stages: int) -> tuple[str, list[str]]:
     (policy := folder / "policy").mkdir()
     for name in MODELS:
         client.create_registered_model(name)
-    whole = []
     for loop in range(loops):
         (policy / "policy.onnx").write_bytes(draw.randbytes(BYTES))
         settings, numbers = {f"key{n}": draw.random() for n in range(PARAMS)}, {"success": draw.random()}
         run = registry.log_run("experts", "c0", 1, settings, numbers, None, [policy], {"loop": str(loop)})
-        whole.append(run)
         model = MODELS[loop % len(MODELS)]
         made = client.create_model_version(model, f"{client.get_run(run).info.artifact_uri}/policy", run)
         client.set_registered_model_alias(model, "champion", made.version)
@@ -57,11 +55,10 @@ def mlflow(folder: Path, loops: int, stages: int) -> tuple[str, list[str]]:
                 tags=[RunTag("lineage", draw.randbytes(32).hex())],
             )
             client.set_terminated(record.info.run_id)
-    return experiment.experiment_id, whole
 
 
-async def prefect(arm: Arm, loops: int, stages: int) -> list[str]:
-    """Runs of the flow and of its stages by Prefect's interface; numbers of the flow's runs."""
+async def prefect(arm: Arm, loops: int, stages: int) -> None:
+    """Runs of the flow and of its stages by Prefect's interface."""
     limit = asyncio.Semaphore(AT_ONCE)
     async with aiohttp.ClientSession(headers=arm.headers) as session:
 
@@ -74,7 +71,6 @@ async def prefect(arm: Arm, loops: int, stages: int) -> list[str]:
         made = [await post("flow_runs/", {"flow_id": flow["id"], "state": NOW}) for _ in range(loops)]
         for run in made:
             await asyncio.gather(*(post("task_runs/", stage(run["id"], number)) for number in range(stages)))
-    return [run["id"] for run in made]
 
 
 def stage(run: str, number: int) -> dict[str, Any]:

@@ -83,6 +83,28 @@ def look_ups(known: Known, draw: random.Random) -> dict[str, list[Request]]:
     }
 
 
+async def seen(arm: Arm, experiment: str, file: str) -> Known:
+    """What there is, as the servers themselves say it: runs with files are those that became versions of a model.
+
+    Args:
+        arm: the servers.
+        experiment: name of MLflow's experiment.
+        file: that each of these runs has.
+    """
+    async with aiohttp.ClientSession(headers=arm.headers) as session:
+
+        async def answer(address: str, body: Any = None) -> Any:
+            way = "GET" if body is None else "POST"
+            async with session.request(way, address, json=body, raise_for_status=True) as reply:
+                return await reply.json()
+
+        own = await answer(f"{arm.mlflow}/{API}/experiments/get-by-name?experiment_name={experiment}")
+        versions = (await answer(f"{arm.mlflow}/{API}/model-versions/search?max_results=200"))["model_versions"]
+        flow_runs = (await answer(f"{arm.prefect}/api/flow_runs/paginate", {"limit": 200}))["results"]
+    runs, models = sorted({one["run_id"] for one in versions}), sorted({one["name"] for one in versions})
+    return Known(own["experiment"]["experiment_id"], runs, file, models, [run["id"] for run in flow_runs])
+
+
 async def drive(arm: Arm, known: Known, users: int, think: float, seconds: float, seed: int) -> list[Sample]:
     """Let users look things up for a while; what each look-up took.
 
