@@ -10,6 +10,7 @@ from typing import Any
 import aiohttp
 
 LIMIT = 30.0  # [s] after which an answer counts as none
+IDLE = 2.0  # [s] after which a connection is not used again: the servers close theirs after 5, under a request's feet
 API = "api/2.0/mlflow"
 
 
@@ -119,7 +120,7 @@ async def drive(arm: Arm, known: Known, users: int, think: float, seconds: float
     samples: list[Sample] = []
     end = time.monotonic() + seconds
     limits = aiohttp.ClientTimeout(total=LIMIT)
-    connector = aiohttp.TCPConnector(limit=users)
+    connector = aiohttp.TCPConnector(limit=users, keepalive_timeout=IDLE)
     async with aiohttp.ClientSession(headers=arm.headers, timeout=limits, connector=connector) as session:
         people = [one(arm, session, known, think, end, random.Random(f"{seed} {n}"), samples) for n in range(users)]
         await asyncio.gather(*people)
