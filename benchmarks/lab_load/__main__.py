@@ -24,6 +24,7 @@ from benchmarks.lab_load import fill, plain
 from benchmarks.lab_load.table import table
 from benchmarks.lab_load.users import Arm, Known, Sample, drive, seen
 from flows import login
+from flows.attend import ended_in_order
 from flows.environment import SERVERS
 from flows.servers import servers
 from tests.lab import machines
@@ -37,7 +38,7 @@ def main() -> int:
         return 2
     options.out.mkdir(parents=True)
     out = options.out.resolve()
-    with ExitStack() as stack:
+    with ended_in_order(), ExitStack() as stack:
         folder = options.on.resolve() if options.on else stack.enter_context(lab())
         os.chdir(folder)
         began = time.monotonic()
