@@ -44,7 +44,7 @@ def judge(events: list[Event]) -> Verdict:
         if against is None:
             found.broken.append(f"loop {loop['loop']}: no reference of seed {loop['seed']}")
             continue
-        wrong = [*stages(loop, against), *files(loop, against), *runs(loop, against, sha)]
+        wrong = [*stages(loop, against), *files(loop, against), *runs(loop, against, sha, published(loop, loops))]
         found.broken += [f"loop {loop['loop']}, seed {loop['seed']}: {line}" for line in wrong]
     found.broken += starts(events)
     found.broken += unnamed(events, found.lines)
@@ -82,11 +82,17 @@ def files(loop: Event, against: Event) -> list[str]:
     return found + [f"{name}: another hash" for name in sorted(set(ours) & set(theirs)) if ours[name] != theirs[name]]
 
 
-def runs(loop: Event, against: Event, sha: str | None) -> list[str]:
-    """Records that are lost, doubled, not finished or not whole."""
+def published(loop: Event, loops: list[Event]) -> set[str]:
+    """Runs of the registry by earlier loops of the seed: an equal policy is no new version, and leaves no new run."""
+    earlier = (other for other in loops if other["seed"] == loop["seed"] and other["loop"] < loop["loop"])
+    return {run["name"] for other in earlier for run in other["runs"] if run["versions"]}
+
+
+def runs(loop: Event, against: Event, sha: str | None, known: set[str]) -> list[str]:
+    """Records that are lost, doubled, not finished or not whole; `known` need not be there again."""
     wanted = {run["name"]: run for run in against["runs"]}
     done = Counter(run["name"] for run in loop["runs"] if run["status"] == FINISHED)
-    found = [f"run `{name}` is lost" for name in sorted(set(wanted) - set(done))]
+    found = [f"run `{name}` is lost" for name in sorted(set(wanted) - set(done) - known)]
     found += [f"run `{name}` is there {count} times" for name, count in sorted(done.items()) if count > 1]
     found += [f"run `{name}` is new" for name in sorted(set(done) - set(wanted))]
     for run in loop["runs"]:

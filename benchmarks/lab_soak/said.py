@@ -35,6 +35,15 @@ NAMED: dict[str, Named] = {
         re.compile("^--- Error logging to API ---|^All connection attempts failed"),
         (PREFECT, *FLOW, DATABASE),
     ),
+    "a disk is full": (re.compile("expected a disk that takes the output"), FULL),
+    "a lab's server is away as a stage is recorded": (
+        re.compile("expected the lab's database and store to answer"),
+        (DATABASE, *STORE),
+    ),
+    "a lab's server is away before anything starts": (
+        re.compile(r"lab\.yaml: (prefect|mlflow)\.(database|artifacts): expected"),
+        (DATABASE, *STORE),
+    ),
     "Prefect's server has no database": (re.compile("500 Internal Server Error.*/api/"), (DATABASE,)),
     "MLflow's server is gone, its page is closed": (re.compile("^MLflow's server went away"), (MLFLOW,)),
     "the process that started it is gone": (re.compile("the process that started this one is gone: ending"), FLOW),

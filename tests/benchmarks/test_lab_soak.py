@@ -135,6 +135,20 @@ def test_what_is_lost_doubled_or_changed_breaks_the_verdict(change, line: str) -
     assert judge(events).broken == [f"loop 1, seed 1: {line}"]
 
 
+def test_an_equal_policy_that_was_published_before_needs_no_new_run() -> None:
+    events = record()
+    version = {**run("publish base"), "versions": ["base READY"]}
+    references = [event for event in events if event["what"] == "reference"]
+    loops = [event for event in events if event["what"] == "loop"]
+    for event in (*references, *loops):
+        event["runs"] = [*event["runs"], copy.deepcopy(version)]
+    assert judge(events).broken == []
+    loops[0]["runs"].pop()
+    assert judge(events).broken == ["loop 1, seed 1: run `publish base` is lost"]
+    events.insert(4, {**left(1), "what": "loop", "at": 4.0, "loop": 0, "runs": [run("base"), run("filter"), version]})
+    assert judge(events).broken == []
+
+
 def test_a_loop_that_hung_or_was_given_up_breaks_it() -> None:
     events = record()
     of(events, "end")["status"] = "hung"
