@@ -144,7 +144,8 @@ async def one(
         for request in requests:
             error = error or await ask(arm, session, request)
         samples.append(Sample(arm.name, what, time.monotonic() - began, error))
-        await asyncio.sleep(draw.expovariate(1 / think) if think else 0)
+        reads = draw.expovariate(1 / think) if think else 0.0
+        await asyncio.sleep(max(0.0, min(reads, end - time.monotonic())))
 
 
 async def ask(arm: Arm, session: aiohttp.ClientSession, request: Request) -> str:
