@@ -29,7 +29,7 @@ NAMED: dict[str, Named] = {
         re.compile("its machine was lost; the stage starts"),
         (WORKER,),
     ),
-    "what Ray says of a machine that was lost": (re.compile(r"\(raylet\) The node with node id"), (WORKER,)),
+    "what Ray says of a machine that was lost": (re.compile(r"\(raylet\)"), (WORKER,)),
     "Prefect's server is gone, the stages go on": (re.compile("^Prefect's server went away"), (PREFECT,)),
     "Prefect's log finds no server": (
         re.compile("^--- Error logging to API ---|^All connection attempts failed"),
