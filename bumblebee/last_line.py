@@ -9,6 +9,7 @@ import errno
 import os
 import select
 import signal
+import sqlite3
 import sys
 import tempfile
 import threading
@@ -27,6 +28,8 @@ _DISK = {
     errno.EROFS: "a read-only disk",
     errno.EACCES: "no permission to write",
 }
+_SQLITE = ("database or disk is full", "disk I/O error")
+_DO = "Free some space or choose another folder, then run again."
 
 
 class Stopped(BaseException):
@@ -59,7 +62,7 @@ def guarded(command: Callable[[], int | None]) -> int:
             if isinstance(error, BrokenPipeError):  # `| head`: nobody reads any more
                 return EXIT_UNFORESEEN
             error.filename = error.filename or "the standard output"
-        line = disk_line(error) if isinstance(error, OSError) else None
+        line = disk_line(error) if isinstance(error, OSError) else sqlite_line(error)
         return _say(line, EXIT_BAD_INPUT) if line else _say(unforeseen(error), EXIT_UNFORESEEN)
 
 
@@ -68,8 +71,14 @@ def disk_line(error: OSError) -> str | None:
     if error.errno not in _DISK:
         return None
     place = error.filename or _here()
-    do = "Free some space or choose another folder, then run again."
-    return str(BadInput(place, "a disk that takes the output", _DISK[error.errno], do))
+    return str(BadInput(place, "a disk that takes the output", _DISK[error.errno], _DO))
+
+
+def sqlite_line(error: Exception) -> str | None:
+    """The same for a database of SQLite's that could not be written, such as DVC's; None for any other error."""
+    if not isinstance(error, sqlite3.OperationalError) or str(error) not in _SQLITE:
+        return None
+    return str(BadInput(_here(), "a disk that takes the output", str(error), _DO))
 
 
 def unforeseen(error: BaseException, argv: Sequence[str] | None = None) -> str:

@@ -13,6 +13,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from bumblebee.last_line import unforeseen
 from flows import workspace as workspaces
 from flows.owned import require_own
 from tasks.parent import end_with_parent
@@ -41,11 +42,23 @@ def walk() -> int:
 
     loops.at_end = lambda state: lost.leave(verdict(state, loops.WAITING)) if lost else None
     os.chdir(folder)
-    state = loops.loop.with_options(task_runner=loops.runner(folder))(return_state=True)
+    try:
+        state = loops.loop.with_options(task_runner=loops.runner(folder))(return_state=True)
+    except Exception as error:  # of Prefect's own: what a stage or the flow raises is a state
+        print(without_server(error, bool(lost)), file=sys.stderr)
+        return EXIT_FAILED
     for logger in ("prefect", "prefect.flow_runs", "prefect.task_runs"):
         for handler in logging.getLogger(logger).handlers:
             handler.flush()  # what is on its way to the server must arrive before that ends
     return verdict(state, loops.WAITING)
+
+
+def without_server(error: Exception, lost: bool) -> str:
+    """One line for a run that Prefect could not begin or end."""
+    again = "what completed is kept: the same command goes on from there"
+    if lost or "Failed to reach API" in str(error):
+        return f"Prefect's server went away before the run had begun or ended; {again}"
+    return f"{unforeseen(error)}; {again}"
 
 
 def verdict(state: Any, waiting: str) -> int:

@@ -4,14 +4,22 @@ MLflow takes seconds to import; here it does so on another core while the stage 
 """
 
 import json
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+from bumblebee.errors import BadInput
 from tasks import registry
 
+# How drivers and clients say that a lab's PostgreSQL or S3 does not answer, under whatever MLflow makes of it.
+AWAY = re.compile(
+    r"EndpointConnectionError|ConnectTimeoutError|ReadTimeoutError|ConnectionClosedError|psycopg2\.OperationalError|"
+    r"Could not connect to the endpoint|Connection refused|server closed the connection|"
+    r"the database system is (starting up|shutting down)"
+)
 _started: list[subprocess.Popen[str]] = []
 
 
@@ -29,6 +37,7 @@ def record(run: dict[str, Any]) -> None:
         run: the arguments of `registry.log_run`.
 
     Raises:
+        BadInput: where a lab's database or store does not answer.
         OSError: where a file could not be read or written, as it came up there.
         RuntimeError: with MLflow's words, where the run could not be written for another reason.
     """
@@ -57,7 +66,11 @@ def heard(said: str) -> Exception:
         return RuntimeError(last)
     if facts["errno"] is not None:
         return OSError(facts["errno"], facts["text"], facts["file"] or None)
-    return RuntimeError(f"{facts['type']}: {facts['text']}")
+    text = f"{facts['type']}: {facts['text']}"
+    if AWAY.search(text):
+        do = "What the stage made is not kept without it: start again when they answer."
+        return BadInput("MLflow's record of the stage", "the lab's database and store to answer", text[:300], do)
+    return RuntimeError(text)
 
 
 def _plain(run: dict[str, Any]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import os
 import pickle
 import signal
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -27,6 +28,9 @@ def raising(error: BaseException):
         (BadInput("a", "b", "c"), 2),
         (OSError(28, "No space left on device", "x"), 2),
         (OSError(5, "Input/output error"), 1),
+        (sqlite3.OperationalError("disk I/O error"), 2),
+        (sqlite3.OperationalError("database or disk is full"), 2),
+        (sqlite3.OperationalError("no such table: x"), 1),
         (RuntimeError("two\nlines"), 1),
         (RecursionError("deep"), 1),
         (KeyboardInterrupt(), 130),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from bumblebee.errors import BadInput
 from tasks import recorder, registry
 from tasks.stage import disk_line
 
@@ -50,6 +51,19 @@ def test_a_full_disk_is_still_known_as_one_on_the_other_side() -> None:
     database = recorder.heard(recorder.told(ValueError("database or disk is full\n[SQL: INSERT]\n(Background: ...)")))
     assert isinstance(database, RuntimeError) and "database or disk is full" in str(database)
     assert "Killed" in str(recorder.heard("Killed\n")) and str(recorder.heard(""))
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [
+        ("EndpointConnectionError", 'Could not connect to the endpoint URL: "http://s3.lab/bumblebee/x"'),
+        ("ReadTimeoutError", 'Read timeout on endpoint URL: "http://s3.lab/bumblebee/x"'),
+        ("MlflowException", "(psycopg2.OperationalError) server closed the connection unexpectedly"),
+    ],
+)
+def test_a_labs_servers_that_are_away_are_one_line_and_no_error_of_ours(kind: str, text: str) -> None:
+    away = recorder.heard(recorder.told(type(kind, (Exception,), {})(text)))
+    assert isinstance(away, BadInput) and text in str(away) and "start again when they answer" in str(away)
 
 
 def test_a_stage_that_ends_without_a_run_leaves_none(workspace: Path) -> None:
