@@ -29,6 +29,10 @@ NAMED: dict[str, Named] = {
         re.compile("its machine was lost; the stage starts"),
         (WORKER,),
     ),
+    "a machine was lost while a start looked at all of them": (
+        re.compile("expected every machine of the Ray cluster to answer"),
+        (WORKER,),
+    ),
     "what Ray says of a machine that was lost": (re.compile(r"\(raylet\)"), (WORKER,)),
     "Prefect's server is gone, the stages go on": (re.compile("^Prefect's server went away"), (PREFECT,)),
     "Prefect's log finds no server": (
