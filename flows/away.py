@@ -120,7 +120,7 @@ def send(ray: Any, what: Errand, lab: Lab, wanted: ray_cluster.Need) -> int | No
     with Repo(_wait_for_lock=True) as repo, repo.lock:
         packed = parcel.pack(Path.cwd(), what.inputs, parcel.dvc_settings(lab))
     words = ["flows.away_stage", what.name, *what.before]
-    variables = {lineage.COMMIT: lineage.git_sha()}
+    variables = {lineage.COMMIT: lineage.git_sha(), lineage.PLACE: lineage.place()}
     importlib.import_module("ray.cloudpickle").register_pickle_by_value(node)
     task = ray.remote(**wanted.options, max_retries=0, scheduling_strategy="SPREAD")(node.run)
     errors = ray.exceptions
@@ -137,7 +137,15 @@ def send(ray: Any, what: Errand, lab: Lab, wanted: ray_cluster.Need) -> int | No
     except errors.OutOfMemoryError:
         print(f"{what.name}: {OUT_OF_MEMORY.format(kind=kind_of(what.name))}", file=sys.stderr)
         return EXIT_LOST
+    except errors.RayTaskError as error:
+        raise of_the_machine(error) from None
     return status
+
+
+def of_the_machine(error: Exception) -> Exception:
+    """What the other machine's disk said, which the last line knows by its number; any other error as Ray tells it."""
+    cause = getattr(error, "cause", None)
+    return cause if isinstance(cause, OSError) else error
 
 
 def bring(name: str) -> int:

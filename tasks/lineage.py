@@ -5,6 +5,7 @@ import importlib.metadata
 import json
 import os
 import platform
+import socket
 import subprocess
 from collections.abc import Mapping
 from functools import cache
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 COMMIT = "BUMBLEBEE_COMMIT"  # variable
+PLACE = "BUMBLEBEE_PLACE"  # variable
 
 
 def path_hash(path: Path) -> str:
@@ -150,6 +152,11 @@ def versions() -> dict[str, str]:
         except importlib.metadata.PackageNotFoundError:
             found[name] = "not installed"
     return found
+
+
+def place() -> str:
+    """The workspace and machine that a stage belongs to; one that came to another machine is told it by `PLACE`."""
+    return os.environ.get(PLACE) or f"{socket.gethostname()}:{Path.cwd()}"
 
 
 @cache

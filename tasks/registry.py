@@ -21,7 +21,7 @@ from bumblebee.errors import BadInput
 from tasks.lab import MlflowLab, read_lab
 from tasks.lab_checks import one_at_a_time
 from tasks.lab_serve import read_tracking
-from tasks.lineage import git_sha, history, inputs_of_stage, lineage
+from tasks.lineage import git_sha, history, inputs_of_stage, lineage, place
 from tasks.run_form import card_settings, fitted, flatten, metric_name, read_curve
 
 if TYPE_CHECKING:
@@ -153,17 +153,24 @@ def log_run(
     artifacts: list[Path],
     tags: dict[str, str],
 ) -> str:
-    """Write one finished run; returns its id."""
+    """Write one finished run; returns its id.
+
+    A stage that DVC runs again with equal inputs, as after a kill, takes the place of what it has written before.
+    """
     from mlflow.entities import Metric, Param, RunTag
 
     client = prepare()
     experiment = client.get_experiment_by_name(experiment_name())
     assert experiment is not None
     title = " ".join(str(part) for part in (stage, cluster, f"r{round}" if round is not None else None) if part)
-    run = client.create_run(experiment.experiment_id, run_name=title)
-    run_id, now = run.info.run_id, run.info.start_time
     settings_of = flatten(params)
     origin = _text(lineage(inputs_of_stage(), settings_of, settings_of.get("seed")))
+    record = hashlib.sha256(f"{place()} {title} {origin}".encode()).hexdigest()
+    if "DVC_STAGE" in os.environ:
+        for earlier in client.search_runs([experiment.experiment_id], f"tags.record = '{record}'"):
+            client.delete_run(earlier.info.run_id)
+    run = client.create_run(experiment.experiment_id, run_name=title, tags={"record": record})
+    run_id, now = run.info.run_id, run.info.start_time
     labels = {"stage": stage, **_origin_tags(origin), **tags}
     labels |= {key: str(value) for key, value in (("cluster", cluster), ("round", round)) if value is not None}
     points = [Metric(metric_name(name), float(value), now, 0) for name, value in metrics.items()]

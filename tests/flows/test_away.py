@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from bumblebee.errors import BadInput
+from bumblebee.last_line import disk_line
 from flows import away, node, parcel, ray_cluster
 from flows.stages import Stage
 from tasks.lab import Lab, MlflowLab, PrefectLab, RayLab
@@ -164,6 +165,15 @@ def test_what_a_machine_lacks_is_said(tmp_path: Path):
     assert found["no-such-package"] == "" and found["dvc"] and "nowhere that may be written" in found["fault"]
     assert node.facts((), str(tmp_path), "")["fault"] == ""
     assert node.facts((), "", "no_such_module")["fault"] == "no package no-such-module"
+
+
+def test_a_full_disk_of_another_machine_is_the_disks_line() -> None:
+    exceptions = pytest.importorskip("ray.exceptions")
+    told = exceptions.RayTaskError("run", "a traceback", OSError(28, "No space left on device", "/node/trees/x"))
+    found = away.of_the_machine(told.as_instanceof_cause())
+    assert isinstance(found, OSError) and "/node/trees/x: expected a disk" in (disk_line(found) or "")
+    other = exceptions.RayTaskError("run", "a traceback", ValueError("x")).as_instanceof_cause()
+    assert away.of_the_machine(other) is other
 
 
 def test_without_a_cluster_nothing_of_ray_is_imported():

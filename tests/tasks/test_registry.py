@@ -99,7 +99,7 @@ def test_runs_and_models_can_be_found_again_even_when_the_workspace_has_moved(
     assert run.data.params["ppo.clip"] == "0.2"
     assert [point.value for point in client.get_metric_history(run_id, "loss")] == [2.0, 1.0]
     own = {name for name in run.data.tags if not name.startswith("mlflow.")}
-    assert own == {"stage", "round", "note", "git_sha", "dvc_stage", "lineage"}, "a few that help, not one an input"
+    assert own == {"stage", "round", "note", "git_sha", "dvc_stage", "lineage", "record"}, "a few that help"
     whole = Path(".servers/artifacts/runs", run_id, "artifacts/lineage.json").read_bytes()
     assert hashlib.sha256(whole).hexdigest() == run.data.tags["lineage"]
     assert json.loads(whole)["settings"] == {"steps": "4", "ppo.clip": "0.2"}
@@ -113,6 +113,35 @@ def test_runs_and_models_can_be_found_again_even_when_the_workspace_has_moved(
     assert np.allclose(loaded.predict({"obs": np.ones((1, 5), np.float32)})["actions"], 10.0)
     with pytest.raises(mlflow.exceptions.MlflowException, match="shape"):
         loaded.predict({"obs": np.ones((1, 4), np.float32)})
+
+
+def test_a_stage_that_dvc_repeats_with_equal_inputs_has_one_record(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed after its record was written, or amid it; other inputs and another workspace have their own."""
+    from dvc.repo import Repo
+
+    Repo.init(str(workspace), no_scm=True).close()
+    (workspace / "dvc.yaml").write_text("stages: {base: {cmd: 'true', deps: [data]}}\n")
+    (workspace / "data").write_text("1")
+    monkeypatch.setenv("DVC_STAGE", "base")
+    client, known = registry.prepare(), set()
+
+    def log(curve: Path | None = None) -> set[str]:
+        lineage.current_inputs.cache_clear()
+        registry.log_run("base", None, 0, Config(), {"success": 0.5}, curve, [], {})
+        experiment = client.get_experiment_by_name(workspace.name)
+        return {run.info.run_id for run in client.search_runs([experiment.experiment_id])}
+
+    first, again = log(), log()
+    assert len(first) == len(again) == 1 and first != again
+    with pytest.raises(FileNotFoundError):
+        log(workspace / "no-curve.csv")
+    assert len(known := log()) == 1
+    (workspace / "data").write_text("2")
+    assert len(changed := log()) == 2 and known < changed
+    monkeypatch.setenv(lineage.PLACE, "another")
+    assert changed < log()
 
 
 def test_upstream_is_everything_back_to_the_first_stage(tmp_path: Path) -> None:
