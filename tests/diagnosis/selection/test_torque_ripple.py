@@ -14,7 +14,7 @@ from tests.diagnosis import arm
 from tests.diagnosis.selection.test_swap import begun
 from tests.diagnosis.strange_arm import simulate
 
-GEAR, SLOTS, SIZE, PHASE = 30.25, 7, 0.1, 0.6  # ratio, periods in a turn of the motor, [N m] and [rad] at the joint
+GEAR, SLOTS, SIZE, PHASE = 30.25, 7, 0.2, 0.6  # ratio, periods in a turn of the motor, [N m] and [rad] at the joint
 INERTIA, KP, KD = 0.05, 20.0, 1.0  # [kg m^2, N m/rad, N m s/rad]
 XML = f"""<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body name="wheel">
 <joint name="wheel" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia=".03 .03 {INERTIA}"/></body></worldbody>
