@@ -22,7 +22,8 @@ LINEAGE = "lineage.json"
 RUNS = """SELECT r.run_uuid, r.name, r.status, r.artifact_uri,
  (SELECT count(*) FROM params p WHERE p.run_uuid = r.run_uuid),
  (SELECT count(*) FROM metrics m WHERE m.run_uuid = r.run_uuid)
- FROM runs r JOIN experiments e ON e.experiment_id = r.experiment_id WHERE e.name = :name ORDER BY r.start_time"""
+ FROM runs r JOIN experiments e ON e.experiment_id = r.experiment_id WHERE e.name = :name
+ AND r.lifecycle_stage = 'active' ORDER BY r.start_time"""
 TAGS = "SELECT key, value FROM tags WHERE run_uuid = :run AND key IN ('stage', 'dvc_stage', 'git_sha', 'lineage')"
 VERSIONS = "SELECT name, version, status FROM model_versions WHERE run_id = :run"
 

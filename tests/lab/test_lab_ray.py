@@ -132,12 +132,13 @@ def run_and_kill(stand: Stand, made: Path, said: Path) -> tuple[str, int, str]:
 def logged_on_one(folder: Path) -> list[str]:
     """Names of the runs that MLflow has of a workspace without a lab."""
     with contextlib.closing(sqlite3.connect(folder / ".servers" / "mlflow.db")) as history:
-        return sorted(name for (name,) in history.execute("SELECT name FROM runs"))
+        return sorted(name for (name,) in history.execute("SELECT name FROM runs WHERE lifecycle_stage = 'active'"))
 
 
 def logged_in_lab(lab: LabOnThisMachine) -> list[str]:
     """The same of the lab's database, whichever machine logged them."""
-    query = "SELECT runs.name FROM runs JOIN experiments USING (experiment_id) WHERE experiments.name = 'demo'"
+    query = "SELECT runs.name FROM runs JOIN experiments USING (experiment_id)"
+    query += " WHERE experiments.name = 'demo' AND runs.lifecycle_stage = 'active'"
     return sorted(lab.postgres.sql(query, "mlflow").split("\n")[:-1])
 
 
