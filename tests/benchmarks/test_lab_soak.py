@@ -1,8 +1,10 @@
 """The soak's judge: what it lets pass, and that each way in which a lab can lose something breaks its verdict."""
 
+import contextlib
 import copy
 import json
 import re
+import sqlite3
 from pathlib import Path
 
 import pytest
@@ -219,3 +221,17 @@ def test_a_record_that_was_cut_is_read_to_its_last_whole_line(tmp_path: Path) ->
     with kept.path.open("a") as file:
         file.write('{"what": "en')
     assert [event["what"] for event in read(kept.path)] == ["begin", "start"]
+
+
+def test_the_judge_is_shown_active_runs_alone() -> None:
+    """A repeated stage deletes what its earlier start has written, and MLflow's tables keep it, marked."""
+    with contextlib.closing(sqlite3.connect(":memory:")) as tables:
+        tables.executescript(
+            "CREATE TABLE experiments (experiment_id, name); CREATE TABLE params (run_uuid);"
+            "CREATE TABLE metrics (run_uuid);"
+            "CREATE TABLE runs (run_uuid, name, status, artifact_uri, experiment_id, start_time, lifecycle_stage);"
+            "INSERT INTO experiments VALUES (1, 'soak');"
+            "INSERT INTO runs VALUES ('a', 'base', 'RUNNING', '', 1, 1, 'deleted'),"
+            "('b', 'base', 'FINISHED', '', 1, 2, 'active');"
+        )
+        assert [row[0] for row in tables.execute(facts.RUNS, {"name": "soak"})] == ["b"]
