@@ -57,7 +57,7 @@ def delta_alone(round: int, cluster: str, target: Path) -> Adapter | None:
         print(f"round {round}, {cluster}: no rollout is long enough for a delta action: this control has none")
         return None
     with output_folder(target) as folder:
-        save_delta(folder, trained.delta, config.hidden, card(trained, round, cluster, config))
+        save_delta(folder, trained.delta, card(trained, round, cluster, config))
     return action_adapter(trained.delta, action_scale())
 
 

@@ -13,23 +13,23 @@ import torch
 from bumblebee.learning.delta import (
     DeltaAction,
     DeltaConfig,
-    DeltaEnv,
     Gain,
     Recordings,
     compare,
+    learn_delta,
     magnitudes,
     make_network,
+    recorded_state,
     replay_error,
     save_delta,
     stack,
-    train_delta,
+    total_frames,
 )
 from bumblebee.measured.rollout import read_dataset
 from bumblebee.progress import progress
 from bumblebee.sim.effects import RuntimeHooks, read_effects, runtime_hooks
-from bumblebee.sim.engine import Engine, RobotState
+from bumblebee.sim.engine import Engine
 from bumblebee.sim.engine_choice import make_engine
-from bumblebee.sim.rotations import rotate_inverse
 from bumblebee.sim.sensors import load_model
 from tasks import paths
 from tasks.diagnosis_split import split
@@ -71,7 +71,7 @@ def main(round: int, cluster: str) -> None:
         return
     target = paths.delta(round, cluster)
     with output_folder(target) as folder:
-        save_delta(folder, trained.delta, config.hidden, card(trained, round, cluster, config))
+        save_delta(folder, trained.delta, card(trained, round, cluster, config))
         trained.curve.to_csv(folder / "curve.csv", index=False)
     gain = trained.gain
     print(verdict(round, cluster, gain))
@@ -103,10 +103,8 @@ def train(simulator: Simulator, round: int, cluster: str, config: DeltaConfig) -
     steps = int(config.episode_seconds / engine.control_dt + 0.5)
     if train is None or len(train.windows(steps, 1)) == 0:
         return None
-    env = DeltaEnv(engine, train, config, offset)
-    total = config.iterations * config.steps_per_iteration * config.num_envs
-    with progress(total, f"delta action, round {round}, {cluster}", "frames") as bar:
-        delta, curve = train_delta(env, config, bar.update)
+    with progress(total_frames(config), f"delta action, round {round}, {cluster}", "frames") as bar:
+        delta, curve = learn_delta(engine, train, config, offset, bar.update)
     judge = make_engine("mujoco", simulator.model, _WORLDS_TO_JUDGE, config.threads, simulator.hooks)
     nothing = Gain(0, {}, False, "no held-out rollouts")
     gain = judged(judge, held_out, offset, delta) if held_out is not None else nothing
@@ -129,10 +127,10 @@ def card(trained: Trained, round: int, cluster: str, config: DeltaConfig) -> dic
 def leave_out(round: int, cluster: str, config: DeltaConfig, reason: str) -> None:
     """A cluster without usable rollouts gets an untrained delta that is not kept; the other clusters go on."""
     gain = Gain(0, {}, False, reason)
-    delta = DeltaAction(make_network(config.hidden, len(config.joints)), config.joints, config.limit)
+    delta = DeltaAction(make_network((), len(config.joints)), config.joints, config.limit)
     card = {"round": round, "cluster": cluster, "promoted": False, "held_out": asdict(gain), "train_rollouts": []}
     with output_folder(paths.delta(round, cluster)) as folder:
-        save_delta(folder, delta, config.hidden, {**card, "magnitude_rad": {}, "config": asdict(config)})
+        save_delta(folder, delta, {**card, "magnitude_rad": {}, "config": asdict(config)})
     print(verdict(round, cluster, gain))
     log_run("delta", cluster=cluster, round=round, params=config, tags={"promoted": "false"})
 
@@ -158,20 +156,6 @@ def judged(engine: Engine, held_out: Recordings, offset: torch.Tensor, delta: De
     """The held-out comparison with and without the delta."""
     without = replay_error(engine, held_out, offset, None)
     return compare(without, replay_error(engine, held_out, offset, delta))
-
-
-def recorded_state(recordings: Recordings) -> RobotState:
-    """Every recorded row as a state; the key bodies, which a delta does not see, are left at zero."""
-    qpos, qvel = recordings.qpos, recordings.qvel
-    return RobotState(
-        root_pos_w=qpos[:, :3],
-        root_quat_w=qpos[:, 3:7],
-        root_lin_vel_b=rotate_inverse(qpos[:, 3:7], qvel[:, :3]),
-        root_ang_vel_b=qvel[:, 3:6],
-        joint_pos=qpos[:, 7:],
-        joint_vel=qvel[:, 6:],
-        key_pos_w=torch.zeros(len(qpos), 14, 3),
-    )
 
 
 def verdict(round: int, cluster: str, gain: Gain) -> str:

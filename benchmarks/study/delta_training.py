@@ -12,22 +12,21 @@ from benchmarks.study.correction import Correction
 from bumblebee.io.write import new_folder
 from bumblebee.learning.delta import (
     DeltaConfig,
-    DeltaEnv,
     Recordings,
+    learn_delta,
     load_delta,
     magnitudes,
+    recorded_state,
     replay_error,
     save_delta,
     stack,
-    train_delta,
 )
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
-from tasks.delta import recorded_state
 
 
-def learn_delta(
+def write_delta(
     rollouts: Sequence[Rollout], engine: str, config: DeltaConfig, correction: Correction, folder: Path
 ) -> None:
     """Write a delta action on what a correction leaves of the rollouts, with its card and curve, into a new folder.
@@ -42,11 +41,11 @@ def learn_delta(
     model = load_model(correction.model)
     learned = stack(rollouts, load_model())
     simulator = make_engine(engine, model, config.num_envs, 1, correction.hooks(model))
-    trained, curve = train_delta(DeltaEnv(simulator, learned, config, encoder_offset(correction, model)), config)
+    trained, curve = learn_delta(simulator, learned, config, encoder_offset(correction, model))
     sizes = magnitudes(trained, recorded_state(learned), learned.targets)
     card = {"promoted": False, "magnitude_rad": sizes, "rollouts": len(learned.ids), "config": asdict(config)}
     with new_folder(folder) as new:
-        save_delta(new, trained, config.hidden, card)
+        save_delta(new, trained, card)
         curve.to_csv(new / "curve.csv", index=False)
 
 

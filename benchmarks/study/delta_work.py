@@ -12,7 +12,7 @@ import pandas as pd
 import torch
 
 from benchmarks.study.correction import DECLARED, Correction
-from benchmarks.study.delta_training import learn_delta, replayed
+from benchmarks.study.delta_training import replayed, write_delta
 from benchmarks.study.deltas import ARMS, GENERAL, SMALL_DELTAS, DeltasConfig, delta_folder
 from benchmarks.study.jobs import Job
 from benchmarks.study.motions import read_motions
@@ -63,7 +63,7 @@ def delta(work: Work) -> None:
     """A cluster's own delta action, or the general one."""
     cluster = None if work.what == GENERAL else work.what
     rollouts = work.rollouts(True, cluster)
-    learn_delta(rollouts, work.study.env.engine, work.config.delta, DECLARED, work.out / f"delta-{work.what}")
+    write_delta(rollouts, work.study.env.engine, work.config.delta, DECLARED, work.out / f"delta-{work.what}")
 
 
 def errors(work: Work) -> None:

@@ -36,7 +36,9 @@ class DeltasConfig:
     """What is fixed beforehand."""
 
     delta: DeltaConfig = field(
-        default_factory=lambda: DeltaConfig(iterations=1000, num_envs=1024, steps_per_iteration=16)
+        default_factory=lambda: DeltaConfig(
+            method="ppo", limit=0.2, iterations=1000, num_envs=1024, steps_per_iteration=16
+        )
     )
     """The same for a cluster's own and the general one, which thus sees a cluster a fifth as often."""
     steps: float = 5e6

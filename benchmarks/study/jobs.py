@@ -73,6 +73,20 @@ PAPER_ARMS = {
     "kernels": "and kernels as ours",
     "ours": "all three, our rewards",
     "ours-reference": "all three, our rewards, action around the reference",
+    "task": "our task, first deviation .2, learning rate by KL",
+    "algorithm": "our rewards and algorithm",
+    "algorithm-flat": "our rewards and algorithm, flat ground",
+    "algorithm-reference": "our rewards and algorithm, action around the reference",
+    "algorithm-seen": "our rewards and algorithm, our observation",
+    "algorithm-ends": "our rewards and algorithm, our ends of episodes",
+    "task-algorithm": "our task and algorithm",
+    "floor-algorithm": "our algorithm, penalties from .05 up, a step earns at least 0",
+    "actions-algorithm": "our algorithm, penalties from .05 up, action terms a hundredth",
+    "limits-algorithm": "and limits as ours, our algorithm",
+    "feet-algorithm": "and feet as ours, our algorithm",
+    "kernels-algorithm": "and kernels as ours, our algorithm",
+    "algorithm-std": "our rewards and algorithm, first deviation .2",
+    "ours-wide": "our rewards, learning rate by KL, first deviation .8",
 }
 """Arms of the part `paper-task`, by name of their settings; `settings.PAPER_CHANGES` has what they change."""
 

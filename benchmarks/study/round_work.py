@@ -14,7 +14,7 @@ import pandas as pd
 import torch
 
 from benchmarks.study.correction import DECLARED, Correction
-from benchmarks.study.delta_training import learn_delta, replayed
+from benchmarks.study.delta_training import replayed, write_delta
 from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.on_robot import KEY, exported, judged_rows, read_recordings, run_on_robot, write_csv
@@ -120,7 +120,7 @@ def delta(work: Work) -> None:
     """A delta action on what the arm's diagnosis leaves, if it has one; on a GPU in one go."""
     parts = [part for part in ARMS[work.place.arm] if part != "delta"]
     correction, engine = work.correction(parts, work.place.arm), work.study.env.engine
-    learn_delta(work.rollouts(learned=True), engine, work.config.delta, correction, work.folder / "delta")
+    write_delta(work.rollouts(learned=True), engine, work.config.delta, correction, work.folder / "delta")
 
 
 def errors(work: Work) -> None:

@@ -62,7 +62,9 @@ class RoundsConfig:
     """Of start states and sensor noise; a round has seeds of its own, and so have trials."""
     try_seed: int = 18_900
     delta: DeltaConfig = field(
-        default_factory=lambda: DeltaConfig(iterations=300, num_envs=1024, steps_per_iteration=16)
+        default_factory=lambda: DeltaConfig(
+            method="ppo", limit=0.2, iterations=300, num_envs=1024, steps_per_iteration=16
+        )
     )
     diagnosis: DiagnosisConfig = field(default_factory=DiagnosisConfig)
     """Of the first round, before a GPU is there."""
@@ -82,7 +84,7 @@ SMALL_CONFIG = RoundsConfig(
     tries=1,
     shards=1,
     steps=512,
-    delta=DeltaConfig(iterations=1, num_envs=8, steps_per_iteration=4, episode_seconds=0.4),
+    delta=DeltaConfig(method="ppo", limit=0.2, iterations=1, num_envs=8, steps_per_iteration=4, episode_seconds=0.4),
     diagnosis=_HASTY,
     later=_HASTY,
 )

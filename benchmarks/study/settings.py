@@ -97,8 +97,31 @@ PAPER_CHANGES: dict[str, tuple[str, ...]] = {
     "kernels": ("std", "ramp", "adaptive", "kernels"),
     "ours": ("std", "ramp", "adaptive", "ours"),
     "ours-reference": ("std", "ramp", "adaptive", "ours", "reference"),
+    "task": ("std", "adaptive", "task"),
+    "algorithm": ("ours", "algorithm"),
+    "algorithm-flat": ("ours", "algorithm", "flat"),
+    "algorithm-reference": ("ours", "algorithm", "reference"),
+    "algorithm-seen": ("ours", "algorithm", "seen"),
+    "algorithm-ends": ("ours", "algorithm", "ends"),
+    "task-algorithm": ("task", "algorithm"),
+    "floor-algorithm": ("ramp", "floor", "algorithm"),
+    "actions-algorithm": ("actions", "algorithm"),
+    "limits-algorithm": ("limits", "algorithm"),
+    "feet-algorithm": ("feet", "algorithm"),
+    "kernels-algorithm": ("kernels", "algorithm"),
+    "algorithm-std": ("ours", "algorithm", "std"),
+    "ours-wide": ("adaptive", "ours", "wide"),
 }
 """What each arm of the part `paper-task` changes of the printed task; rewards are in `benchmarks/reward_arms.py`."""
+
+
+TASK_PARTS: dict[str, tuple[str, ...]] = {
+    "reference": ("action",),
+    "seen": ("observation", "observation_noise", "ahead"),
+    "flat": ("terrain",),
+    "ends": ("threshold_start", "threshold_end", "threshold_share"),
+}
+"""Fields of the printed task that a change takes from our own."""
 
 
 PROPRIOCEPTION = ("gravity_b", "root_ang_vel_b", "joint_pos", "joint_vel", "last_action")
@@ -172,8 +195,14 @@ def _deviated(env: EnvConfig, ppo: PpoConfig, change: str) -> tuple[EnvConfig, P
     if change == "adaptive":
         rates = {"learning_rate": 3e-4, "learning_rate_range": (1e-5, 1e-3)}
         return env, replace(ppo, schedule="adaptive", desired_kl=0.015, desired_kl_end=0.01, **rates)
-    if change == "reference":
-        return replace(env, action="reference"), ppo
+    if change == "wide":
+        return env, replace(ppo, initial_std=OURS.initial_std)
+    if change == "algorithm":
+        return env, OURS
+    if change == "task":
+        return replace(TASK, engine=env.engine, num_worlds=env.num_worlds, physics_hz=env.physics_hz), ppo
+    if change in TASK_PARTS:
+        return replace(env, **{name: getattr(TASK, name) for name in TASK_PARTS[change]}), ppo
     if change not in ("ramp", "floor"):
         return replace(env, reward=arms()[change].rewards), ppo
     ramp = {"ramp_start": 0.05, "ramp_share": 0.5} if change == "ramp" else {"floor": 0.0}

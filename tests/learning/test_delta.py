@@ -17,41 +17,14 @@ from bumblebee.learning.delta.action import (
     make_network,
     save_delta,
 )
-from bumblebee.measured.rollout import Rollout
-from bumblebee.robot.facts import ANKLE_JOINTS, joint_names, stand_pose
+from bumblebee.robot.facts import ANKLE_JOINTS, joint_names
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
+from tests.learning.swaying import record
 
 NO_OFFSET = torch.zeros(23)
-
-
-def record(worlds: int = 3, ticks: int = 70, weak: float = 1.0) -> list[Rollout]:
-    """Rollouts of a G1 that moves its arms while it stands (and slowly falls), `weak` scaling every gain."""
-    model = load_model()
-    model.actuator_gainprm[:, 0] *= weak
-    model.actuator_biasprm[:, 1:3] *= weak
-    engine = MujocoCpu(model, worlds, threads=1)
-    qpos = torch.as_tensor(model.key_qpos[:1], dtype=torch.float32).repeat(worlds, 1)
-    pose = torch.as_tensor(stand_pose(), dtype=torch.float32).repeat(worlds, 1)
-    engine.reset(torch.arange(worlds), qpos, torch.zeros(worlds, 29), pose)
-    rng = np.random.default_rng(0)
-    phase = torch.as_tensor(rng.uniform(0, 6, (worlds, 1)), dtype=torch.float32)
-    rows: list[list[torch.Tensor]] = []
-    for k in range(ticks):
-        target = pose + 0.15 * torch.sin(0.1 * k + phase) * (torch.arange(23) > 14)
-        state = engine.state()
-        rows.append([state.root_pos_w, state.root_quat_w, state.root_lin_vel_b, state.root_ang_vel_b,
-                     state.joint_pos, state.joint_vel, target])  # fmt: skip
-        engine.step(target)
-    columns = [torch.stack(c, dim=1).numpy() for c in zip(*rows, strict=True)]
-    names = ("base_pos", "base_quat", "base_lin_vel", "base_ang_vel", "joint_pos", "joint_vel", "joint_target")
-    time = np.arange(ticks) / 50
-    return [
-        Rollout(f"r{i}", joint_names(), 50, time, **{n: c[i] for n, c in zip(names, columns, strict=True)})
-        for i in range(worlds)
-    ]
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +142,7 @@ def test_saved_and_loaded_alike_and_withheld_unless_promoted(tmp_path: Path) -> 
     network = make_network((16, 8), 4)
     torch.nn.init.normal_(network[-1].weight)
     delta = DeltaAction(network, ANKLE_JOINTS, 0.1)
-    save_delta(tmp_path, delta, (16, 8), {"promoted": False})
+    save_delta(tmp_path, delta, {"promoted": False})
     assert load_delta(tmp_path) is None
     loaded = load_delta(tmp_path, promoted_only=False)
     seen = torch.randn(3, sum(n for _, n in layout()))

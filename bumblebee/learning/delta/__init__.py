@@ -12,7 +12,9 @@ from bumblebee.learning.delta.action import (
 )
 from bumblebee.learning.delta.env import DeltaEnv
 from bumblebee.learning.delta.gain import Gain, compare, replay_error
-from bumblebee.learning.delta.recordings import Recordings, stack
+from bumblebee.learning.delta.learn import learn_delta, total_frames
+from bumblebee.learning.delta.recordings import Recordings, recorded_state, stack
+from bumblebee.learning.delta.regression import fit_delta
 from bumblebee.learning.delta.train import train_delta
 
 __all__ = [
@@ -24,11 +26,15 @@ __all__ = [
     "Recordings",
     "action_adapter",
     "compare",
+    "fit_delta",
+    "learn_delta",
     "load_delta",
     "magnitudes",
     "make_network",
+    "recorded_state",
     "replay_error",
     "save_delta",
     "stack",
+    "total_frames",
     "train_delta",
 ]

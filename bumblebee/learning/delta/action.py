@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import torch
@@ -28,9 +28,32 @@ WEIGHTS, CARD = "delta.pt", "card.json"
 
 
 @dataclass(frozen=True)
+class RegressionConfig(Ranged):
+    """The fit of a delta action by regression; see `learning.delta.regression`."""
+
+    windows: Annotated[int, Range(least=100, most=1_000_000)] = 6000
+    """Short replays that are fitted at most, drawn from all that the recordings hold."""
+    steps: Annotated[int, Range(least=1, most=100)] = 3
+    """Control steps of a replay."""
+    passes: Annotated[int, Range(least=1, most=100)] = 5
+    """Fits, each but the first around the one before."""
+    ridges: Annotated[tuple[Positive, ...], Size()] = (0.001, 0.01, 0.1, 1.0)
+    """Strengths of regularisation that are tried, by the fit's own diagonal."""
+    folds: Annotated[int, Range(least=2, most=100)] = 10
+    """Parts of the recordings that are left out in turn."""
+    evidence: Annotated[float, Range(least=0, most=100)] = 2.0
+    """Standard errors by which the misfit must fall on what was left out; else nothing is corrected."""
+
+
+@dataclass(frozen=True)
 class DeltaConfig(Ranged):
     """Training of one cluster's delta action."""
 
+    method: Literal["regression", "ppo"] = "regression"
+    """How the correction is learnt: by regression on short replays, or by PPO as in the paper, which every field but
+    `joints`, `limit`, `seed`, `num_envs`, `threads` and `episode_seconds` is about."""
+    regression: RegressionConfig = field(default_factory=RegressionConfig)
+    """The regression."""
     iterations: Count = 60
     """PPO iterations."""
     num_envs: Annotated[int, Range(least=1, most=1000000)] = 256
@@ -43,7 +66,7 @@ class DeltaConfig(Ranged):
     """Seed of starts, exploration and network."""
     joints: Annotated[tuple[Name, ...], Size()] = ANKLE_JOINTS
     """Joints that the correction acts on (paper: the four ankle joints)."""
-    limit: Annotated[float, Range(above=0, most=3.2)] = 0.2
+    limit: Annotated[float, Range(above=0, most=3.2)] = 0.6
     """Largest correction of a target [rad]."""
     hidden: Widths = (128, 64)
     """Units of the hidden layers."""
@@ -106,6 +129,12 @@ class DeltaAction:
         self.network, self.joints, self.limit = network.eval(), tuple(joints), float(limit)
         self._placement = placement(self.joints)
 
+    @property
+    def hidden(self) -> tuple[int, ...]:
+        """Units of the network's hidden layers; none where it is linear."""
+        layers = [layer for layer in self.network.modules() if isinstance(layer, torch.nn.Linear)]
+        return tuple(layer.out_features for layer in layers[:-1])
+
     def __call__(self, state: RobotState, targets: Tensor) -> Tensor:
         """Targets (B, J) [rad] with the correction added."""
         with torch.no_grad():
@@ -124,10 +153,10 @@ def correction(raw: Tensor, limit: float) -> Tensor:
     return limit * torch.tanh(raw / limit)
 
 
-def save_delta(folder: Path, delta: DeltaAction, hidden: tuple[int, ...], card: dict[str, object]) -> None:
+def save_delta(folder: Path, delta: DeltaAction, card: dict[str, object]) -> None:
     """Write weights (tensors only) and card into an existing folder."""
     save_tensors(Path(folder) / WEIGHTS, delta.network.state_dict())
-    shape = {"joints": list(delta.joints), "limit": delta.limit, "hidden": list(hidden)}
+    shape = {"joints": list(delta.joints), "limit": delta.limit, "hidden": list(delta.hidden)}
     (Path(folder) / CARD).write_text(json.dumps({"schema": 1, "network": shape, **card}, indent=2))
 
 

@@ -16,6 +16,8 @@ from torch import Tensor
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
 from bumblebee.robot.facts import FEET, joint_names
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.rotations import rotate_inverse
 
 _NEEDED = ("joint_target", "base_quat", "base_ang_vel", "base_lin_vel")
 
@@ -52,6 +54,20 @@ class Recordings:
     def owner(self, rows: Tensor) -> Tensor:
         """Index of the rollout that each row belongs to."""
         return torch.bucketize(rows, self.start, right=True) - 1
+
+
+def recorded_state(recordings: Recordings, rows: Tensor | slice = slice(None)) -> RobotState:
+    """Recorded rows, all or some, as states; the key bodies, which a delta action does not see, are left at zero."""
+    qpos, qvel = recordings.qpos[rows], recordings.qvel[rows]
+    return RobotState(
+        root_pos_w=qpos[:, :3],
+        root_quat_w=qpos[:, 3:7],
+        root_lin_vel_b=rotate_inverse(qpos[:, 3:7], qvel[:, :3]),
+        root_ang_vel_b=qvel[:, 3:6],
+        joint_pos=qpos[:, 7:],
+        joint_vel=qvel[:, 6:],
+        key_pos_w=torch.zeros(len(qpos), 14, 3),
+    )
 
 
 def stack(rollouts: Sequence[Rollout], model: mujoco.MjModel) -> Recordings:

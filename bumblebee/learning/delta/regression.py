@@ -1,0 +1,293 @@
+"""Fits a delta action by regression: which correction makes the simulator end a few control steps where the robot did?
+
+The paper trains the correction by PPO on rewards of a whole replayed episode (section 3.3.2). What one correction does
+to the next few steps is known better from the simulator itself: it is stepped from recorded states with none and with
+each joint's target moved a little. The correction, linear in what the delta action sees, then follows from weighted
+least squares, and again around itself. Reasons and measurements: docs/decisions/delta-action.md.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+import torch
+from torch import Tensor
+
+from bumblebee.learning.delta.action import (
+    DeltaAction,
+    DeltaConfig,
+    RegressionConfig,
+    correction,
+    make_network,
+    observe,
+    placement,
+)
+from bumblebee.learning.delta.env import restart
+from bumblebee.learning.delta.recordings import Recordings, recorded_state
+from bumblebee.sim.engine import Engine, RobotState
+from bumblebee.sim.rotations import conjugate, multiply, rotate_inverse
+
+NUDGE = 0.03
+"""Change of a target by which its influence is found [rad]."""
+FINEST = (1e-3, 2e-2)
+"""Misfits of positions [m, rad] and velocities [m/s, rad/s] below which none counts more than another."""
+_COMMON = 1.5
+"""Multiple of the median misfit of a window beyond which it counts less (Huber)."""
+_LEAST_DEVIATION = 0.05
+"""As in `Normaliser.fit`."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """N short replays from recorded states; M quantities of the robot's state at their end, A corrected joints."""
+
+    seen: Tensor
+    """(N, D) what the delta action saw, mean over the window."""
+    before: Tensor
+    """(N, D) the same as it was recorded a control step earlier, but for the targets; see `_system`."""
+    missed: Tensor
+    """(N, M) recording less simulator, see `off`."""
+    effect: Tensor
+    """(N, M, A) change of the simulator's end for each radian of correction, held throughout the window."""
+    owner: Tensor
+    """(N,) index of the rollout."""
+
+    def __getitem__(self, which: Tensor) -> "Windows":
+        """Some of them."""
+        rest = (self.missed[which], self.effect[which], self.owner[which])
+        return Windows(self.seen[which], self.before[which], *rest)
+
+
+def fit_delta(
+    engine: Engine,
+    recordings: Recordings,
+    config: DeltaConfig,
+    encoder_offset: Tensor,
+    report: Callable[[int, str], None] = lambda frames, note: None,
+) -> tuple[DeltaAction, pd.DataFrame]:
+    """Fit the correction; none at all where rollouts that took no part do not bear it out.
+
+    Args:
+        engine: the simulator that is corrected.
+        recordings: training rollouts only.
+        config: see `DeltaConfig.regression`.
+        encoder_offset: (J,) [rad] what the encoders add, taken off a recording before it becomes a state.
+        report: called with control steps of all robots since the last call, and a short note.
+
+    Returns:
+        The delta action and a row for each pass: pass, left (share of the squared misfit at the windows' ends that is
+        left on the rollouts fitted, before the pass), and of the first pass' correction on rollouts that took no part
+        held_out (the same), held_out_se (its standard error over folds) and ridge.
+    """
+    own = config.regression
+    recordings = recordings.to(engine.device)
+    rows = _drawn(recordings, own, config.seed)
+    delta = DeltaAction(make_network((), len(config.joints)), config.joints, config.limit)
+    first = _kept(replay(engine, recordings, rows, config, encoder_offset, None, report))
+    scale = torch.maximum(first.missed.abs().median(dim=0).values, _finest(len(recordings.qvel[0]) - 6))
+    _normalise(delta, first.seen)
+    system = _system(delta, first, scale)
+    held_out, error, ridge = _cross_validated(system, own)
+    told = {"held_out": held_out, "held_out_se": error, "ridge": ridge}
+    table = [{"pass": 1, "left": 1.0, **told}]
+    if 1.0 - held_out <= own.evidence * error:
+        return delta, pd.DataFrame(table)
+    _put(delta, solve(system, ridge))
+    before = float((system.weight * system.missed.square().mean(dim=1)).mean())
+    for number in range(2, own.passes + 1):
+        windows = _kept(replay(engine, recordings, rows, config, encoder_offset, delta, report))
+        system = _system(delta, windows, scale)
+        left = float((system.weight * system.missed.square().mean(dim=1)).mean()) / before
+        table.append({"pass": number, "left": left, **told})
+        _put(delta, solve(_added(delta, system, windows.seen), ridge))
+    return delta, pd.DataFrame(table)
+
+
+def frames(config: DeltaConfig) -> int:
+    """Control steps that `fit_delta` takes at most, of all robots."""
+    own = config.regression
+    return own.passes * own.windows * own.steps * (1 + len(config.joints))
+
+
+def off(state: RobotState, qpos: Tensor, qvel: Tensor) -> Tensor:
+    """(B, M) recording less simulator: the base's position [m], rotation [rad] and velocities in its own frame, joints.
+
+    Args:
+        state: of the simulator.
+        qpos: (B, 7 + J) recorded position [m, rad].
+        qvel: (B, 6 + J) recorded velocity [m/s in the world, rad/s in the base, rad/s].
+    """
+    quat = qpos[:, 3:7]
+    turn = multiply(conjugate(state.root_quat_w), quat)
+    turn = torch.where(turn[:, :1] < 0, -turn, turn)
+    parts = (
+        rotate_inverse(quat, qpos[:, :3] - state.root_pos_w),
+        2.0 * turn[:, 1:],
+        rotate_inverse(quat, qvel[:, :3]) - state.root_lin_vel_b,
+        qvel[:, 3:6] - state.root_ang_vel_b,
+        qpos[:, 7:] - state.joint_pos,
+        qvel[:, 6:] - state.joint_vel,
+    )
+    return torch.cat(parts, dim=-1)
+
+
+def replay(
+    engine: Engine,
+    recordings: Recordings,
+    rows: Tensor,
+    config: DeltaConfig,
+    encoder_offset: Tensor,
+    delta: DeltaAction | None,
+    report: Callable[[int, str], None] = lambda frames, note: None,
+) -> Windows:
+    """Step the simulator from each of the rows (N,), as it is with `delta`, and with each joint's correction nudged."""
+    device, steps = engine.device, config.regression.steps
+    place, offset = placement(config.joints).to(device), encoder_offset.to(device)
+    there = None if delta is None else delta.on(device)
+    parts: list[tuple[Tensor, Tensor, Tensor, Tensor]] = []
+    for begin in range(0, len(rows), engine.num_worlds):
+        own = rows[begin : begin + engine.num_worlds]
+        filled = torch.cat([own, own[-1:].expand(engine.num_worlds - len(own))])
+        ends = []
+        for joint in range(-1, len(config.joints)):
+            nudge = NUDGE * place[joint] if joint >= 0 else torch.zeros_like(place[0])
+            restart(engine, recordings, torch.arange(engine.num_worlds, device=device), filled, offset)
+            seen = []
+            for k in range(steps):
+                targets, state = recordings.targets[filled + k], engine.state()
+                if joint < 0:
+                    seen.append(observe(state, targets))
+                engine.step((targets if there is None else there(state, targets)) + nudge)
+            last = filled + steps
+            ends.append(off(engine.state(), recordings.qpos[last], recordings.qvel[last])[: len(own)].cpu())
+            if joint < 0:
+                mean = torch.stack(seen).mean(dim=0)[: len(own)].cpu()
+            report(len(own) * steps, "")
+        effect = torch.stack([(ends[0] - end) / NUDGE for end in ends[1:]], dim=-1)
+        targets = torch.stack([recordings.targets[own + k] for k in range(steps)]).mean(dim=0)
+        before = observe(recorded_state(recordings, own - 1), targets).cpu()
+        parts.append((mean, before, ends[0], effect))
+    columns = (torch.cat(own).double() for own in zip(*parts, strict=True))
+    return Windows(*columns, recordings.owner(rows).cpu())
+
+
+@dataclass(frozen=True)
+class System:
+    """A weighted linear problem: missed (N, M) = effect (N, M, A) @ (features (N, F) @ coefficients (F, A))."""
+
+    features: Tensor
+    missed: Tensor
+    effect: Tensor
+    weight: Tensor
+    """(N,) of each window, at most 1."""
+    owner: Tensor
+
+    def __getitem__(self, which: Tensor) -> "System":
+        """Some of the windows."""
+        rest = (self.missed[which], self.effect[which], self.weight[which], self.owner[which])
+        return System(self.features[which], *rest)
+
+
+def solve(system: System, ridge: float) -> Tensor:
+    """Coefficients (F, A) of the least weighted squares, with `ridge` times the mean diagonal added to it."""
+    features, joints = system.features.shape[1], system.effect.shape[2]
+    gram = torch.einsum("nma,nmb->nab", system.effect, system.effect) * system.weight[:, None, None]
+    pull = torch.einsum("nma,nm->na", system.effect, system.missed) * system.weight[:, None]
+    left = torch.zeros(features, joints, features, joints, dtype=gram.dtype)
+    for a in range(joints):
+        for b in range(a + 1):
+            block = (system.features * gram[:, a, b, None]).T @ system.features
+            left[:, a, :, b] = block
+            left[:, b, :, a] = block
+    matrix = left.reshape(features * joints, features * joints)
+    damping = ridge * torch.diagonal(matrix).mean()
+    right = (system.features.T @ pull).reshape(-1)
+    return torch.linalg.solve(matrix + damping * torch.eye(len(matrix), dtype=matrix.dtype), right).reshape(
+        features, joints
+    )
+
+
+def misfit(system: System, coefficients: Tensor) -> float:
+    """Mean weighted squared misfit that the coefficients leave."""
+    made = torch.einsum("nma,na->nm", system.effect, system.features @ coefficients)
+    return float((system.weight * (system.missed - made).square().mean(dim=1)).mean())
+
+
+def _cross_validated(system: System, own: RegressionConfig) -> tuple[float, float, float]:
+    """Share of the misfit left on rollouts that took no part, its standard error over folds, and the ridge for it.
+
+    A fold is a run of rollouts that follow each other: repeats of a motion stay together.
+    """
+    fold = system.owner * own.folds // (int(system.owner.max()) + 1)
+    present = [k for k in range(own.folds) if 0 < int((fold == k).sum()) < len(fold)]
+    if len(present) < 2:
+        return 1.0, 0.0, own.ridges[-1]
+    found = []
+    for ridge in own.ridges:
+        shares = []
+        for k in present:
+            learnt = solve(system[fold != k], ridge)
+            shares.append(misfit(system[fold == k], learnt) / misfit(system[fold == k], torch.zeros_like(learnt)))
+        found.append((float(np.mean(shares)), float(np.std(shares, ddof=1) / np.sqrt(len(shares))), ridge))
+    return min(found)
+
+
+def _drawn(recordings: Recordings, own: RegressionConfig, seed: int) -> Tensor:
+    """First rows of the windows, all or as many as are drawn, in their order."""
+    rows = recordings.windows(own.steps, stride=1)
+    rows = rows[rows > recordings.start[recordings.owner(rows)]]
+    order = torch.randperm(len(rows), generator=torch.Generator().manual_seed(seed))[: own.windows]
+    return rows[order.sort().values.to(rows.device)]
+
+
+def _finest(joints: int) -> Tensor:
+    """(M,) the smallest scale of each quantity in `off`."""
+    position, velocity = FINEST
+    return torch.tensor([position] * 6 + [velocity] * 6 + [position] * joints + [velocity] * joints).double()
+
+
+def _kept(windows: Windows) -> Windows:
+    """Those in which nothing blew up."""
+    return windows[torch.isfinite(windows.missed).all(dim=1) & torch.isfinite(windows.effect).all(dim=(1, 2))]
+
+
+def _normalise(delta: DeltaAction, seen: Tensor) -> None:
+    normaliser = delta.network[0]
+    normaliser.mean.copy_(seen.mean(dim=0))
+    normaliser.std.copy_(seen.std(dim=0).clamp(min=_LEAST_DEVIATION))
+
+
+def _system(delta: DeltaAction, windows: Windows, scale: Tensor) -> System:
+    """The windows in units of `scale` (M,), those that miss by far more than most with less weight.
+
+    Features are the readings of a control step before: what noise there is in those that a window starts from, the
+    simulator carries to its end, and a correction learnt from them would be one of the noise.
+    """
+    features = _features(delta, windows.before)
+    missed = windows.missed / scale
+    size = missed.square().mean(dim=1).sqrt()
+    weight = (_COMMON * size.median() / size.clamp(min=1e-12)).clamp(max=1.0)
+    return System(features, missed, windows.effect / scale[:, None], weight, windows.owner)
+
+
+def _features(delta: DeltaAction, seen: Tensor) -> Tensor:
+    """(N, D + 1) normalised, and 1."""
+    normaliser = delta.network[0]
+    scaled = (seen - normaliser.mean.double()) / normaliser.std.double()
+    return torch.cat([scaled, torch.ones(len(seen), 1, dtype=scaled.dtype)], dim=1)
+
+
+def _added(delta: DeltaAction, system: System, seen: Tensor) -> System:
+    """The problem whose answer is the whole correction, from one around what `delta` corrects already."""
+    layer = delta.network[1]
+    made = _features(delta, seen) @ torch.cat([layer.weight, layer.bias[:, None]], dim=1).double().T
+    made = correction(made, delta.limit)
+    return replace(system, missed=system.missed + torch.einsum("nma,na->nm", system.effect, made))
+
+
+def _put(delta: DeltaAction, coefficients: Tensor) -> None:
+    layer = delta.network[1]
+    with torch.no_grad():
+        layer.weight.copy_(coefficients[:-1].T)
+        layer.bias.copy_(coefficients[-1])

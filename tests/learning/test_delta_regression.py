@@ -1,0 +1,99 @@
+"""The delta action by regression: what it finds, and that it finds nothing where nothing is missing."""
+
+import numpy as np
+import pytest
+import torch
+
+from bumblebee.learning.delta import Recordings, compare, learn_delta, replay_error, stack, total_frames
+from bumblebee.learning.delta.action import DeltaConfig, RegressionConfig
+from bumblebee.learning.delta.regression import System, misfit, off, replay, solve
+from bumblebee.robot.facts import ANKLE_JOINTS
+from bumblebee.sim.engine_choice import make_engine
+from bumblebee.sim.sensors import load_model
+from tests.learning.swaying import ANKLES, record, weakened
+
+NO_OFFSET = torch.zeros(23)
+CONFIG = DeltaConfig(num_envs=60, regression=RegressionConfig(windows=600, passes=3, folds=6))
+
+
+def recordings(share: float, seed: int = 0, noise: float = 0.0) -> Recordings:
+    """Of a robot whose ankle pitch motors have that share of their gains; `noise` [rad, rad/s] of encoders."""
+    rollouts = record(24, 30, weakened(share, ANKLES), ANKLES, seed)
+    rng = np.random.default_rng(seed)
+    for rollout in rollouts:
+        for column in (rollout.joint_pos, rollout.joint_vel):
+            column += noise * rng.normal(size=column.shape).astype(column.dtype)
+    return stack(rollouts, load_model())
+
+
+@pytest.fixture(scope="module")
+def weak() -> Recordings:
+    return recordings(0.6)
+
+
+def test_the_correction_of_weak_ankles_is_found_and_holds_on_other_rollouts(weak: Recordings) -> None:
+    steps = []
+    engine = make_engine("mujoco", load_model(), CONFIG.num_envs, 1)
+    delta, table = learn_delta(engine, weak, CONFIG, NO_OFFSET, lambda frames, note: steps.append(frames))
+    assert sum(steps) == total_frames(CONFIG) == 3 * 600 * 3 * 5
+    assert list(table["pass"]) == [1, 2, 3]
+    assert (table["held_out"] < 0.6).all()
+    assert table["left"].iloc[-1] < 0.3
+    assert delta.hidden == ()
+    judge, other = make_engine("mujoco", load_model(), 12, 1), recordings(0.6, seed=1)
+    gain = compare(replay_error(judge, other, NO_OFFSET, None), replay_error(judge, other, NO_OFFSET, delta))
+    assert gain.change["0.2"]["with"] < 0.5 * gain.change["0.2"]["without"]
+
+
+def test_a_robot_as_declared_is_not_corrected() -> None:
+    engine = make_engine("mujoco", load_model(), CONFIG.num_envs, 1)
+    delta, table = learn_delta(engine, recordings(1.0, noise=0.001), CONFIG, NO_OFFSET)
+    assert len(table) == 1
+    assert table["held_out"].iloc[0] > 1.0 - 2.0 * table["held_out_se"].iloc[0]
+    assert all(float(own.detach().abs().max()) == 0.0 for own in delta.network[1].parameters())
+
+
+def test_one_rollout_alone_leaves_nothing_to_judge_by(weak: Recordings) -> None:
+    one = Recordings(weak.qpos[:30], weak.qvel[:30], weak.targets[:30], weak.start[:1], weak.length[:1], weak.ids[:1])
+    _, table = learn_delta(make_engine("mujoco", load_model(), 60, 1), one, CONFIG, NO_OFFSET)
+    assert table["held_out"].tolist() == [1.0]
+
+
+def test_influence_is_the_change_for_a_radian(weak: Recordings) -> None:
+    rows = weak.windows(3, stride=20)
+    engine = make_engine("mujoco", load_model(), 16, 1)  # other than the windows' number: the last batch is filled up
+    windows = replay(engine, weak, rows, CONFIG, NO_OFFSET, None)
+    assert windows.effect.shape == (len(rows), 58, len(ANKLE_JOINTS))
+    pitch = ANKLE_JOINTS.index("left_ankle_pitch_joint")
+    moved = windows.effect[:, 12 + ANKLES[0], pitch]
+    assert (moved > 0).all()
+    assert (windows.effect[:, 12 + ANKLES[1], pitch].abs() < moved).float().mean() > 0.9
+    assert windows.owner.tolist() == weak.owner(rows).tolist()
+
+
+def test_nothing_is_missed_where_the_recording_is_the_simulators_own() -> None:
+    own = stack(record(2, 10), load_model())
+    engine = make_engine("mujoco", load_model(), 2, 1)
+    engine.reset(torch.arange(2), own.qpos[[3, 13]], own.qvel[[3, 13]], own.targets[[2, 12]])
+    assert float(off(engine.state(), own.qpos[[3, 13]], own.qvel[[3, 13]]).abs().max()) < 1e-5
+    turned = own.qpos[[3, 13]].clone()
+    turned[:, 0] += 0.1
+    missed = off(engine.state(), turned, own.qvel[[3, 13]])
+    torch.testing.assert_close(missed[:, :3].norm(dim=1), torch.full((2,), 0.1))
+
+
+def test_the_solution_is_that_of_weighted_least_squares() -> None:
+    generator = torch.Generator().manual_seed(0)
+    features = torch.randn(80, 3, generator=generator, dtype=torch.float64)
+    effect = torch.randn(80, 5, 2, generator=generator, dtype=torch.float64)
+    weight = torch.rand(80, generator=generator, dtype=torch.float64)
+    true = torch.randn(3, 2, generator=generator, dtype=torch.float64)
+    missed = torch.einsum("nma,na->nm", effect, features @ true)
+    system = System(features, missed, effect, weight, torch.zeros(80))
+    torch.testing.assert_close(solve(system, 1e-12), true)
+    assert misfit(system, true) < 1e-20
+    noisy = System(features, missed + torch.randn(80, 5, generator=generator, dtype=torch.float64), effect, weight,
+                   torch.zeros(80))  # fmt: skip
+    best = solve(noisy, 1e-12)
+    assert misfit(noisy, best) < min(misfit(noisy, best + 0.01), misfit(noisy, best - 0.01), misfit(noisy, true))
+    assert float(solve(noisy, 100.0).norm()) < 0.1 * float(best.norm())
