@@ -62,8 +62,13 @@ def guarded(command: Callable[[], int | None]) -> int:
             if isinstance(error, BrokenPipeError):  # `| head`: nobody reads any more
                 return EXIT_UNFORESEEN
             error.filename = error.filename or "the standard output"
-        line = disk_line(error) if isinstance(error, OSError) else sqlite_line(error)
+        line = full_disk(error)
         return _say(line, EXIT_BAD_INPUT) if line else _say(unforeseen(error), EXIT_UNFORESEEN)
+
+
+def full_disk(error: Exception) -> str | None:
+    """The one line for a disk that takes nothing, whoever met it; None for any other error."""
+    return disk_line(error) if isinstance(error, OSError) else sqlite_line(error)
 
 
 def disk_line(error: OSError) -> str | None:

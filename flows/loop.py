@@ -20,6 +20,7 @@ from prefect.states import Cancelled, Completed, Failed, State
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from bumblebee.errors import BadInput
+from bumblebee.last_line import full_disk
 from flows import gate_question, progress
 from flows.environment import SERVERS, environment, without_login
 from flows.owned import require_own
@@ -108,8 +109,11 @@ def loop(workspace: str = "") -> State[Any]:
     except BadInput as error:
         state = Failed(message=str(error))
     except Exception as error:
-        at_end(Failed(message=f"{type(error).__name__}: {error}"))
-        raise
+        if line := full_disk(error):
+            state = Failed(message=line)
+        else:
+            at_end(Failed(message=f"{type(error).__name__}: {error}"))
+            raise
     at_end(state)
     return state
 

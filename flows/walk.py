@@ -42,6 +42,7 @@ def walk() -> int:
 
     loops.at_end = lambda state: lost.leave(verdict(state, loops.WAITING)) if lost else None
     os.chdir(folder)
+    logging.getLogger("prefect.flow_runs").addFilter(without_trace)
     try:
         state = loops.loop.with_options(task_runner=loops.runner(folder))(return_state=True)
     except Exception as error:  # of Prefect's own: what a stage or the flow raises is a state
@@ -58,6 +59,8 @@ def without_server(error: Exception, lost: bool) -> str:
     again = "what completed is kept: the same command goes on from there"
     if lost or "Failed to reach API" in str(error):
         return f"Prefect's server went away before the run had begun or ended; {again}"
+    if "500 Internal Server Error" in str(error):
+        return f"Prefect's server could not keep how the run began or ended (its database is away?); {again}"
     return f"{unforeseen(error)}; {again}"
 
 
@@ -105,6 +108,14 @@ class Lost:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)
+
+
+def without_trace(record: logging.LogRecord) -> bool:
+    """Take the traceback off a line about Prefect's own server: `without_server` says what it means."""
+    error = record.exc_info[1] if record.exc_info else None
+    if type(error).__name__ == "PrefectHTTPStatusError":
+        record.exc_info = record.exc_text = None
+    return True
 
 
 def of_a_stage(record: logging.LogRecord) -> bool:

@@ -67,10 +67,15 @@ def heard(said: str) -> Exception:
     if facts["errno"] is not None:
         return OSError(facts["errno"], facts["text"], facts["file"] or None)
     text = f"{facts['type']}: {facts['text']}"
-    if AWAY.search(text):
-        do = "What the stage made is not kept without it: start again when they answer."
-        return BadInput("MLflow's record of the stage", "the lab's database and store to answer", text[:300], do)
-    return RuntimeError(text)
+    return away(text) or RuntimeError(text)
+
+
+def away(text: str) -> BadInput | None:
+    """The one line for a lab's database or store that does not answer; None where the text tells of another error."""
+    if not AWAY.search(text):
+        return None
+    do = "What the stage made is not kept without it: start again when they answer."
+    return BadInput("MLflow's record of the stage", "the lab's database and store to answer", text[:300], do)
 
 
 def _plain(run: dict[str, Any]) -> dict[str, Any]:

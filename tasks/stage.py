@@ -23,8 +23,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from bumblebee.errors import BadInput
 from bumblebee.last_line import disk_line, guarded
 from tasks import paths, recorder
+from tasks.lab import read_lab
 from tasks.params import load
 from tasks.parent import end_with_parent
 from tasks.sections import check_once
@@ -63,6 +65,9 @@ def _run(main: Callable[..., object], options: dict[str, object]) -> None:
     except Exception as error:
         if "database or disk is full" in str(error):  # how SQLite says it, through whichever library
             raise OSError(errno.ENOSPC, "", ".servers") from error
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        if not isinstance(error, BadInput) and read_lab(Path.cwd()) is not None and (lab := recorder.away(said)):
+            raise lab from error  # a stage that asks the registry itself, as publish does
         raise
 
 

@@ -3,10 +3,11 @@
 import re
 
 TELLS = re.compile(
-    r"error|exception|traceback|failed|expected|lost|went away|refused|no space|disk|crash|timed out|cannot|could not|"
-    r"ending|gone|not started|hung|denied|unavailable|retry",
+    r"error|exceptions?\b|traceback|failed|expected|lost|went away|refused|no space|disk|crash|timed out|cannot|"
+    r"could not|ending|gone|not started|hung|denied|unavailable|retry",
     re.IGNORECASE,
 )
+UNFORESEEN = "an error that should not happen"
 TRACEBACK = "Traceback (most recent call last)"
 LINES, LENGTH = 200, 400
 
@@ -26,7 +27,7 @@ NAMED: dict[str, Named] = {
         (),
     ),
     "a machine was lost, its stage starts again elsewhere": (
-        re.compile("its machine was lost; the stage starts"),
+        re.compile("its machine was lost; (the stage starts|another one goes on from its last checkpoint)"),
         (WORKER,),
     ),
     "a machine was lost while a start looked at all of them": (
@@ -48,7 +49,13 @@ NAMED: dict[str, Named] = {
         re.compile(r"lab\.yaml: (prefect|mlflow)\.(database|artifacts): expected"),
         (DATABASE, *STORE),
     ),
-    "Prefect's server has no database": (re.compile("500 Internal Server Error.*/api/"), (DATABASE,)),
+    "Prefect's server has no database": (
+        re.compile(
+            r"^Server error '500 Internal Server Error'.*/api/|the progress on Prefect's page stands still|"
+            r"^Prefect's server could not keep how the run"
+        ),
+        (DATABASE,),
+    ),
     "MLflow's server is gone, its page is closed": (re.compile("^MLflow's server went away"), (MLFLOW,)),
     "the process that started it is gone": (re.compile("the process that started this one is gone: ending"), FLOW),
 }
@@ -69,5 +76,7 @@ def telling(text: str) -> list[str]:
 
 
 def name_of(line: str) -> str | None:
-    """What the line is called; None for one that nobody has named."""
+    """What the line is called; None for one that nobody has named, and for what the code itself did not foresee."""
+    if UNFORESEEN in line:
+        return None
     return next((name for name, (pattern, _) in NAMED.items() if pattern.search(line)), None)

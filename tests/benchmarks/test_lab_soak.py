@@ -199,6 +199,16 @@ def test_lines_that_tell_are_kept_once_for_each_shape() -> None:
     lines = ["23:00:01.123 base | trained 4 iterations", "23:00:02.1 base | Error: run 17 lost"]
     text = "\n".join([*lines, "Error: run 18 lost", "base | Error: run 3 lost"])
     assert said.telling(text) == ["base | Error: run 17 lost", "Error: run 18 lost"]
+    assert said.telling("12:00:01 exceptional-alpaca | 10 of 10 stages have work to do") == []
+    assert said.telling("ValueException: 3") == ["ValueException: 3"]
+
+
+def test_what_nobody_foresaw_has_no_name_wherever_it_is_said() -> None:
+    line = "publish | Finished in state Failed('publish: this machine / {} OperationalError: connection refused')"
+    assert said.name_of(line.format("expected the lab's")) is not None
+    assert said.name_of(line.format("an error that should not happen:")) is None
+    kept = "base | base: its machine was lost; another one goes on from its last checkpoint"
+    assert said.name_of(kept) == said.name_of("base: its machine was lost; the stage starts again on another one")
 
 
 def test_how_long_a_training_took_is_no_difference_and_all_else_is() -> None:

@@ -120,6 +120,25 @@ def test_a_full_database_is_a_full_disk(capsys: pytest.CaptureFixture[str]):
     assert ended.value.code == 2 and "no space left" in capsys.readouterr().err
 
 
+def test_a_labs_database_that_is_away_is_one_line_from_whatever_the_stage_asked(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    def main() -> None:
+        raise RuntimeError('connection to server at "127.0.0.1", port 1 failed: Connection refused')
+
+    for lab, status, said in (
+        (object(), 2, "expected the lab's database and store to answer"),
+        (None, 1, "RuntimeError"),
+    ):
+        monkeypatch.setattr("tasks.stage.read_lab", lambda folder, lab=lab: lab)
+        with pytest.raises(SystemExit) as ended:
+            run_stage(main, [])
+        line = capsys.readouterr().err
+        assert ended.value.code == status and said in line and line.count("\n") == 1
+        if lab is None:
+            Path(line.split("with ")[-1].strip()).unlink()
+
+
 def test_scratch_survives_a_run_that_did_not_complete_and_goes_with_one_that_did(workspace: Path):
     (scratch("base") / "checkpoint.pt").touch()
     assert (scratch("base") / "checkpoint.pt").exists()
