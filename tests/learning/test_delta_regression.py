@@ -6,7 +6,8 @@ import torch
 
 from bumblebee.learning.delta import Recordings, compare, learn_delta, replay_error, stack, total_frames
 from bumblebee.learning.delta.action import DeltaConfig, RegressionConfig
-from bumblebee.learning.delta.regression import System, misfit, off, replay, solve
+from bumblebee.learning.delta.least_squares import System, misfit, solve
+from bumblebee.learning.delta.regression import off, replay
 from bumblebee.robot.facts import ANKLE_JOINTS
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
@@ -57,6 +58,15 @@ def test_one_rollout_alone_leaves_nothing_to_judge_by(weak: Recordings) -> None:
     one = Recordings(weak.qpos[:30], weak.qvel[:30], weak.targets[:30], weak.start[:1], weak.length[:1], weak.ids[:1])
     _, table = learn_delta(make_engine("mujoco", load_model(), 60, 1), one, CONFIG, NO_OFFSET)
     assert table["held_out"].tolist() == [1.0]
+
+
+def test_where_every_replay_blows_up_nothing_is_corrected(weak: Recordings) -> None:
+    broken = Recordings(
+        weak.qpos, torch.full_like(weak.qvel, torch.nan), weak.targets, weak.start, weak.length, weak.ids
+    )
+    delta, table = learn_delta(make_engine("mujoco", load_model(), 60, 1), broken, CONFIG, NO_OFFSET)
+    assert table["held_out"].tolist() == [1.0]
+    assert float(delta.network[1].weight.detach().abs().max()) == 0.0
 
 
 def test_influence_is_the_change_for_a_radian(weak: Recordings) -> None:

@@ -24,6 +24,7 @@ from bumblebee.learning.delta.action import (
     placement,
 )
 from bumblebee.learning.delta.env import restart
+from bumblebee.learning.delta.least_squares import System, misfit, solve
 from bumblebee.learning.delta.recordings import Recordings, recorded_state
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.sim.rotations import conjugate, multiply, rotate_inverse
@@ -34,8 +35,6 @@ FINEST = (1e-3, 2e-2)
 """Misfits of positions [m, rad] and velocities [m/s, rad/s] below which none counts more than another."""
 _COMMON = 1.5
 """Multiple of the median misfit of a window beyond which it counts less (Huber)."""
-_LEAST_DEVIATION = 0.05
-"""As in `Normaliser.fit`."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +84,10 @@ def fit_delta(
     rows = _drawn(recordings, own, config.seed)
     delta = DeltaAction(make_network((), len(config.joints)), config.joints, config.limit)
     first = _kept(replay(engine, recordings, rows, config, encoder_offset, None, report))
+    if not len(first.seen):
+        return delta, pd.DataFrame([{"pass": 1, "left": 1.0, "held_out": 1.0, "held_out_se": 0.0, "ridge": 0.0}])
     scale = torch.maximum(first.missed.abs().median(dim=0).values, _finest(len(recordings.qvel[0]) - 6))
-    _normalise(delta, first.seen)
+    delta.network[0].fit(first.seen)
     system = _system(delta, first, scale)
     held_out, error, ridge = _cross_validated(system, own)
     told = {"held_out": held_out, "held_out_se": error, "ridge": ridge}
@@ -172,48 +173,6 @@ def replay(
     return Windows(*columns, recordings.owner(rows).cpu())
 
 
-@dataclass(frozen=True)
-class System:
-    """A weighted linear problem: missed (N, M) = effect (N, M, A) @ (features (N, F) @ coefficients (F, A))."""
-
-    features: Tensor
-    missed: Tensor
-    effect: Tensor
-    weight: Tensor
-    """(N,) of each window, at most 1."""
-    owner: Tensor
-
-    def __getitem__(self, which: Tensor) -> "System":
-        """Some of the windows."""
-        rest = (self.missed[which], self.effect[which], self.weight[which], self.owner[which])
-        return System(self.features[which], *rest)
-
-
-def solve(system: System, ridge: float) -> Tensor:
-    """Coefficients (F, A) of the least weighted squares, with `ridge` times the mean diagonal added to it."""
-    features, joints = system.features.shape[1], system.effect.shape[2]
-    gram = torch.einsum("nma,nmb->nab", system.effect, system.effect) * system.weight[:, None, None]
-    pull = torch.einsum("nma,nm->na", system.effect, system.missed) * system.weight[:, None]
-    left = torch.zeros(features, joints, features, joints, dtype=gram.dtype)
-    for a in range(joints):
-        for b in range(a + 1):
-            block = (system.features * gram[:, a, b, None]).T @ system.features
-            left[:, a, :, b] = block
-            left[:, b, :, a] = block
-    matrix = left.reshape(features * joints, features * joints)
-    damping = ridge * torch.diagonal(matrix).mean()
-    right = (system.features.T @ pull).reshape(-1)
-    return torch.linalg.solve(matrix + damping * torch.eye(len(matrix), dtype=matrix.dtype), right).reshape(
-        features, joints
-    )
-
-
-def misfit(system: System, coefficients: Tensor) -> float:
-    """Mean weighted squared misfit that the coefficients leave."""
-    made = torch.einsum("nma,na->nm", system.effect, system.features @ coefficients)
-    return float((system.weight * (system.missed - made).square().mean(dim=1)).mean())
-
-
 def _cross_validated(system: System, own: RegressionConfig) -> tuple[float, float, float]:
     """Share of the misfit left on rollouts that took no part, its standard error over folds, and the ridge for it.
 
@@ -250,12 +209,6 @@ def _finest(joints: int) -> Tensor:
 def _kept(windows: Windows) -> Windows:
     """Those in which nothing blew up."""
     return windows[torch.isfinite(windows.missed).all(dim=1) & torch.isfinite(windows.effect).all(dim=(1, 2))]
-
-
-def _normalise(delta: DeltaAction, seen: Tensor) -> None:
-    normaliser = delta.network[0]
-    normaliser.mean.copy_(seen.mean(dim=0))
-    normaliser.std.copy_(seen.std(dim=0).clamp(min=_LEAST_DEVIATION))
 
 
 def _system(delta: DeltaAction, windows: Windows, scale: Tensor) -> System:
