@@ -109,11 +109,11 @@ def loop(workspace: str = "") -> State[Any]:
     except BadInput as error:
         state = Failed(message=str(error))
     except Exception as error:
-        if line := full_disk(error):
-            state = Failed(message=line)
-        else:
+        line = full_disk(error)
+        if line is None:
             at_end(Failed(message=f"{type(error).__name__}: {error}"))
             raise
+        state = Failed(message=line)
     at_end(state)
     return state
 

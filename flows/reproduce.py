@@ -3,10 +3,12 @@
 import signal
 import sys
 import time
+from pathlib import Path
 
 if __name__ == "__main__" and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # while DVC is imported, Ctrl-C ends it without a word
 
+from flows.rwlock import clear_cut_off
 from tasks.parent import end_with_parent
 
 _TRIES, _PAUSE = 20, 0.1  # s: a lock file of 10,000 stages is written in less than one
@@ -38,6 +40,7 @@ def main(argv: list[str] | None = None) -> int:
     if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     wait_for_whole_lockfile()
+    clear_cut_off(Path.cwd())
     names = sys.argv[1:] if argv is None else argv
     # Waiting for the lock matters: of stages that run side by side one would otherwise lose its finished work.
     return int(dvc(["--wait-for-lock", "repro", "--single-item", *names]))

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
+from flows.rwlock import clear_cut_off
 
 WIDTH = 100
 STALE, AFTER, LACKS, DONE = "stale", "after a stale one", "waits for", "up to date"
@@ -115,6 +116,7 @@ def changed_stages(workspace: Path) -> set[str]:
     from dvc.lock import LockError
     from dvc.repo import Repo
 
+    clear_cut_off(workspace)
     try:
         with Repo(str(workspace)) as repo:
             return {_name(address, workspace) for address in repo.status()}

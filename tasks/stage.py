@@ -27,6 +27,7 @@ from bumblebee.errors import BadInput
 from bumblebee.last_line import disk_line, guarded
 from tasks import paths, recorder
 from tasks.lab import read_lab
+from tasks.lab_serve import read_tracking
 from tasks.params import load
 from tasks.parent import end_with_parent
 from tasks.sections import check_once
@@ -65,10 +66,16 @@ def _run(main: Callable[..., object], options: dict[str, object]) -> None:
     except Exception as error:
         if "database or disk is full" in str(error):  # how SQLite says it, through whichever library
             raise OSError(errno.ENOSPC, "", ".servers") from error
-        said = " ".join(f"{type(error).__name__}: {error}".split())
-        if not isinstance(error, BadInput) and read_lab(Path.cwd()) is not None and (lab := recorder.away(said)):
-            raise lab from error  # a stage that asks the registry itself, as publish does
+        if not isinstance(error, BadInput) and (away := _labs_servers_away(error)):
+            raise away from error
         raise
+
+
+def _labs_servers_away(error: Exception) -> BadInput | None:
+    """The one line for a stage that asks the registry itself, as publish does, of a lab that does not answer."""
+    away = recorder.away(" ".join(f"{type(error).__name__}: {error}".split()))
+    shared = away and (read_lab(Path.cwd()) is not None or read_tracking(Path.cwd()) is not None)
+    return away if shared else None
 
 
 def _parser(main: Callable[..., object]) -> argparse.ArgumentParser:

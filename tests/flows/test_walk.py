@@ -6,8 +6,11 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from uuid import uuid4
 
 import pytest
+from prefect.client.schemas import FlowRun
+from prefect.logging.loggers import flow_run_logger
 
 from flows import loop as loops
 from flows.environment import SERVERS, environment
@@ -34,10 +37,13 @@ def test_a_server_without_its_database_is_one_line_and_no_traceback(caplog: pyte
     )
     assert without_server(error, False).startswith("Prefect's server could not keep how the run began or ended")
 
+    run = FlowRun(id=uuid4(), flow_id=uuid4(), name="x")
+    assert flow_run_logger(run).logger is logging.getLogger("prefect.flow_runs")  # which `walk` filters
+
     class PrefectHTTPStatusError(Exception):
         """As Prefect calls it."""
 
-    log = logging.getLogger("prefect.flow_runs.test")
+    log = logging.getLogger("test.flow_runs")
     log.addFilter(without_trace)
     for kind, shown in ((PrefectHTTPStatusError, False), (KeyError, True)):
         caplog.clear()

@@ -1,13 +1,16 @@
 """The delta action by regression: what it finds, and that it finds nothing where nothing is missing."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 import torch
 
-from bumblebee.learning.delta import Recordings, compare, learn_delta, replay_error, stack, total_frames
+from bumblebee.learning.delta import Recordings, compare, learn_delta, regression, replay_error, stack, total_frames
 from bumblebee.learning.delta.action import DeltaConfig, RegressionConfig
 from bumblebee.learning.delta.least_squares import System, misfit, solve
-from bumblebee.learning.delta.regression import off, replay
+from bumblebee.learning.delta.regression import Windows, off, replay
 from bumblebee.robot.facts import ANKLE_JOINTS
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
@@ -66,6 +69,33 @@ def test_where_every_replay_blows_up_nothing_is_corrected(weak: Recordings) -> N
     )
     delta, table = learn_delta(make_engine("mujoco", load_model(), 60, 1), broken, CONFIG, NO_OFFSET)
     assert table["held_out"].tolist() == [1.0]
+    assert float(delta.network[1].weight.detach().abs().max()) == 0.0
+
+
+def test_where_nothing_is_missed_or_no_target_matters_nothing_is_corrected(
+    weak: Recordings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def exact(*arguments: object, missed: float, effect: float) -> Windows:
+        windows = replay(*arguments)
+        return replace(windows, missed=missed * windows.missed, effect=effect * windows.effect)
+
+    for missed, effect in ((0.0, 1.0), (1.0, 0.0)):
+        monkeypatch.setattr(regression, "replay", partial(exact, missed=missed, effect=effect))
+        delta, table = learn_delta(make_engine("mujoco", load_model(), 60, 1), weak, CONFIG, NO_OFFSET)
+        assert len(table) == 1
+        assert float(delta.network[1].weight.detach().abs().max()) == 0.0
+
+
+def test_a_correction_under_which_every_replay_blows_up_is_taken_back(
+    weak: Recordings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unstable(*arguments: object) -> Windows:
+        windows = replay(*arguments)
+        return windows if arguments[5] is None else replace(windows, missed=torch.nan * windows.missed)
+
+    monkeypatch.setattr(regression, "replay", unstable)
+    delta, table = learn_delta(make_engine("mujoco", load_model(), 60, 1), weak, CONFIG, NO_OFFSET)
+    assert len(table) == 1 and table["held_out"].iloc[0] < 0.6
     assert float(delta.network[1].weight.detach().abs().max()) == 0.0
 
 

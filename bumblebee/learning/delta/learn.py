@@ -20,14 +20,7 @@ def learn_delta(
     encoder_offset: Tensor,
     report: Callable[[int, str], None] = lambda frames, note: None,
 ) -> tuple[DeltaAction, pd.DataFrame]:
-    """A delta action and how it was learnt, a row a pass or an iteration; see `fit_delta` and `train_delta`.
-
-    Args:
-        engine: the simulator that is corrected, of `config.num_envs` worlds.
-        recordings: training rollouts only.
-        config: see `DeltaConfig`.
-        encoder_offset: (J,) [rad] what the encoders add, taken off a recording before it becomes a state.
-        report: called with control steps of all robots since the last call, and a short note.
+    """A delta action and how it was learnt, a row a pass or an iteration; see `fit_delta`, for the arguments too.
 
     Raises:
         BadInput: if PPO learns it and no recording is as long as an episode.

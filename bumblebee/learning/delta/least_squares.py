@@ -5,6 +5,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+LEAST = 1e-12
+"""Damping where no correction has any influence: the answer is then none."""
+
 
 @dataclass(frozen=True)
 class System:
@@ -35,7 +38,7 @@ def solve(system: System, ridge: float) -> Tensor:
             left[:, a, :, b] = block
             left[:, b, :, a] = block
     matrix = left.reshape(features * joints, features * joints)
-    damping = ridge * torch.diagonal(matrix).mean()
+    damping = (ridge * torch.diagonal(matrix).mean()).clamp(min=LEAST)
     right = (system.features.T @ pull).reshape(-1)
     return torch.linalg.solve(matrix + damping * torch.eye(len(matrix), dtype=matrix.dtype), right).reshape(
         features, joints

@@ -33,6 +33,7 @@ NUDGE = 0.03
 """Change of a target by which its influence is found [rad]."""
 FINEST = (1e-3, 2e-2)
 """Misfits of positions [m, rad] and velocities [m/s, rad/s] below which none counts more than another."""
+_NO_MISFIT = 1e-12
 _COMMON = 1.5
 """Multiple of the median misfit of a window beyond which it counts less (Huber)."""
 
@@ -98,6 +99,8 @@ def fit_delta(
     before = float((system.weight * system.missed.square().mean(dim=1)).mean())
     for number in range(2, own.passes + 1):
         windows = _kept(replay(engine, recordings, rows, config, encoder_offset, delta, report))
+        if not len(windows.seen):
+            return DeltaAction(make_network((), len(config.joints)), config.joints, config.limit), pd.DataFrame(table)
         system = _system(delta, windows, scale)
         left = float((system.weight * system.missed.square().mean(dim=1)).mean()) / before
         table.append({"pass": number, "left": left, **told})
@@ -187,7 +190,8 @@ def _cross_validated(system: System, own: RegressionConfig) -> tuple[float, floa
         shares = []
         for k in present:
             learnt = solve(system[fold != k], ridge)
-            shares.append(misfit(system[fold == k], learnt) / misfit(system[fold == k], torch.zeros_like(learnt)))
+            after, before = (misfit(system[fold == k], theirs) for theirs in (learnt, torch.zeros_like(learnt)))
+            shares.append(after / before if before > 0.0 else 1.0)
         found.append((float(np.mean(shares)), float(np.std(shares, ddof=1) / np.sqrt(len(shares))), ridge))
     return min(found)
 
@@ -220,7 +224,7 @@ def _system(delta: DeltaAction, windows: Windows, scale: Tensor) -> System:
     features = _features(delta, windows.before)
     missed = windows.missed / scale
     size = missed.square().mean(dim=1).sqrt()
-    weight = (_COMMON * size.median() / size.clamp(min=1e-12)).clamp(max=1.0)
+    weight = (_COMMON * size.median().clamp(min=_NO_MISFIT) / size.clamp(min=_NO_MISFIT)).clamp(max=1.0)
     return System(features, missed, windows.effect / scale[:, None], weight, windows.owner)
 
 
