@@ -144,7 +144,8 @@ def _deltas(cards: dict[str, Json]) -> list[Block]:
         held = card["held_out"]
         for horizon, c in held["change"].items():
             verdict = Cell("kept", "found") if card["promoted"] else "not kept"
-            rows.append((cluster, f"{horizon} s", f"{c['without']:.4f}", f"{c['with']:.4f}", _change(c), verdict))
+            changed = "nothing corrected" if c["with"] == c["without"] else _change(c)
+            rows.append((cluster, f"{horizon} s", f"{c['without']:.4f}", f"{c['with']:.4f}", changed, verdict))
         if not held["change"]:
             lines.append(f"{cluster}: no held-out rollouts, so nothing was kept.")
     header = ("cluster", "after", "without delta [rad]", "with delta [rad]", "change [95 %]", "delta")

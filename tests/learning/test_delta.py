@@ -173,6 +173,7 @@ def test_promotion_needs_an_interval_below_zero() -> None:
     assert compare(base, scaled(0.8 + 0.02 * rng.normal(size=12))).promoted
     assert not compare(base, scaled(1.0 + 0.05 * rng.normal(size=12))).promoted
     assert not compare(base, scaled(1.3 + 0.02 * rng.normal(size=12))).promoted
+    assert compare(base, base).reason == "nothing was found that it should correct"
     worse_soon = {"0.2": before * 1.2, "1.0": before * 1.5}
     assert not compare(base, worse_soon).promoted
     few = {h: v[:3] for h, v in base.items()}

@@ -76,7 +76,9 @@ def compare(without: dict[str, np.ndarray], with_delta: dict[str, np.ndarray]) -
         change[horizon] = {"without": values[0], "with": values[1], "relative": mean, "low": low, "high": high}
     longest = change[str(max(HORIZONS))]
     worse = any(c["low"] > 0 for c in change.values())
-    if count < MIN_ROLLOUTS:
+    if change and all(c["with"] == c["without"] for c in change.values()):
+        reason = "nothing was found that it should correct"
+    elif count < MIN_ROLLOUTS:
         reason = f"too few held-out rollouts to judge ({count}, {MIN_ROLLOUTS} are needed)"
     elif worse:
         reason = "it makes the error worse at some horizon"
