@@ -87,14 +87,18 @@ PAPER_ARMS = {
     "kernels-algorithm": "and kernels as ours, our algorithm",
     "algorithm-std": "our rewards and algorithm, first deviation .2",
     "ours-wide": "our rewards, learning rate by KL, first deviation .8",
+    "actions-seen": "our algorithm and observation, action terms a hundredth",
 }
 """Arms of the part `paper-task`, by name of their settings; `settings.PAPER_CHANGES` has what they change."""
+PAPER_LONGER = ("algorithm-seen", "actions-seen")
+"""Arms that are also trained by as many steps as a base policy."""
 
 
 def paper_jobs(study: Study, motions: Motions) -> list[Job]:
-    """The paper's teacher from nothing, a policy for each arm, all of equal steps."""
+    """The paper's teacher from nothing, a policy for each arm, all of equal steps; then some with more."""
     seed = study.seeds[0]
-    return [Job(paper_of(seed, arm), study.paper_steps, seed, settings=f"paper-{arm}") for arm in PAPER_ARMS]
+    jobs = [Job(paper_of(seed, arm), study.paper_steps, seed, settings=f"paper-{arm}") for arm in PAPER_ARMS]
+    return jobs + [Job(longer_of(seed, arm), study.base_steps, seed, settings=f"paper-{arm}") for arm in PAPER_LONGER]
 
 
 SURVIVORS = {
@@ -198,6 +202,11 @@ def teacher_of(seed: int, method: str) -> str:
 def paper_of(seed: int, arm: str) -> str:
     """Name of an arm's policy."""
     return f"s{seed}-paper-{arm}"
+
+
+def longer_of(seed: int, arm: str) -> str:
+    """Name of an arm's policy that was trained by as many steps as a base policy."""
+    return f"{paper_of(seed, arm)}-longer"
 
 
 def base_of(seed: int) -> str:

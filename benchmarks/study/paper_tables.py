@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from benchmarks.study.jobs import PAPER_ARMS, paper_of
+from benchmarks.study.jobs import PAPER_ARMS, PAPER_LONGER, longer_of, paper_of
 from benchmarks.study.motions import Motions
 from benchmarks.study.settings import Study
 from benchmarks.study.tables import SPLITS, cell, estimate, head, line, rate, read_trials
@@ -19,10 +19,11 @@ def paper_tables(out: Path, study: Study, motions: Motions) -> str:
         BadInput: if none was.
     """
     lines = head(["arm", "motions", "n", "success", "pelvis rule", "MPKPE [mm]", "reward", "deviation", "episode [s]"])
-    named = {arm: paper_of(study.seeds[0], arm) for arm in PAPER_ARMS}
-    tried = {arm: name for arm, name in named.items() if (out / name / TRIALS).exists()}
-    for arm, name in (tried or named).items():
-        told = PAPER_ARMS[arm]
+    seed = study.seeds[0]
+    named = {PAPER_ARMS[arm]: paper_of(seed, arm) for arm in PAPER_ARMS}
+    named |= {f"{PAPER_ARMS[arm]}, {study.base_steps / 1e6:g} M": longer_of(seed, arm) for arm in PAPER_LONGER}
+    tried = {told: name for told, name in named.items() if (out / name / TRIALS).exists()}
+    for told, name in (tried or named).items():
         rows = read_trials(out / name, motions)
         rows = rows[rows["robot"] == "declared"]
         last = pd.read_csv(out / name / CURVE).tail(10).mean()

@@ -9,6 +9,8 @@ from drifting odometry. The motions of a trial are training motions that it foll
 manner and from the same starts; there the declared robot, the control, therefore has success 1. The rounds use other
 seeds: what they say of the declared robot is the measure of how much of the loss is the choice of these motions.
 
+`--ankles` seals robots that differ at the ankles alone: what a delta action, which acts there, can correct.
+
 Writes robot-0.json ..., sealed as `tasks.seal` seals, and declared.json, without effects; nothing printed names an
 effect. Only processors are used; onnxruntime is needed. Each try is kept: the same command goes on. Twice
 `motions` are tried on the declared robot, since a base policy of success well below 1 does not follow all; a try of 24
@@ -20,7 +22,7 @@ import json
 import os
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +34,7 @@ from benchmarks.study.settings import SMALL, Study, freeze, sha256
 from bumblebee.deploy.episodes import Episode
 from bumblebee.deploy.stand_in import BASES
 from bumblebee.deploy.stand_in_effects import SCHEMA, entry, read_sealed, seal
-from bumblebee.deploy.undeclared.kinds import Kind, Place
+from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.thinning import thin
 from bumblebee.motion.clip import Clip
@@ -48,8 +50,12 @@ GROUND = ("ground_compliance", "ground_friction")
 class RobotsConfig:
     """What is drawn, and when a robot is taken."""
 
+    name: str = "robot"
+    """Of each robot, with its number."""
     seeds: tuple[int, ...] = (1801, 1802, 1803)
     """One for each robot."""
+    fixed: tuple[tuple[tuple[str, str, str], ...], ...] = ()
+    """Of each robot the effects that are not drawn: kind, joint and, for a law of two joints, the other; else ()."""
     inside: int = 3
     """Effects of the catalogue beside the one of the ground."""
     outside: int = 1
@@ -77,6 +83,11 @@ class RobotsConfig:
     """Of start states and sensor noise; the rounds use others."""
 
 
+_PITCH, _KNEE = "{}_ankle_pitch_joint", "{}_knee_joint"
+_WEAK = tuple(("motor_strength", _PITCH.format(side), "") for side in ("left", "right"))
+_CABLES = tuple(("cross_coupling", _PITCH.format(side), _KNEE.format(side)) for side in ("left", "right"))
+ANKLES = RobotsConfig(name="ankles", seeds=(1811, 1812), fixed=(_WEAK, _CABLES), draws=1)
+"""Weak ankles, which the diagnosis has a name for, and a cable over knee and ankle, for which it has none."""
 SMALL_CONFIG = RobotsConfig(seeds=(1801,), motions=2, max_seconds=0.6, stands=0.0, tries=2, draws=1)
 """For tests: it shows that every step runs, and nothing else."""
 
@@ -96,6 +107,8 @@ Try = Callable[[int, float], Outcome]
 
 def drawn(config: RobotsConfig, seed: int, attempt: int) -> list[tuple[Kind, Place]]:
     """Kinds and places of a robot's effects, no two at one place; the same seed and attempt give the same."""
+    if config.fixed:
+        return _not_drawn(config.fixed[config.seeds.index(seed)], np.random.default_rng([seed, attempt]))
     rng, spots = np.random.default_rng([seed, attempt]), SealConfig()
     inside = [kind for kind in SealConfig.of(OF_G1, outside=False) if kind.group != "contact"]
     outside = SealConfig.of(OF_G1, outside=True)
@@ -113,6 +126,14 @@ def drawn(config: RobotsConfig, seed: int, attempt: int) -> list[tuple[Kind, Pla
             taken.add((kind.on, place.name))
             effects.append((kind, place))
     return effects
+
+
+def _not_drawn(effects: Sequence[tuple[str, str, str]], rng: np.random.Generator) -> list[tuple[Kind, Place]]:
+    found = []
+    for kind, joint, other in effects:
+        place = drawn_place(joint, rng)
+        found.append((KINDS[kind], replace(place, draw=place.draw | ({"other": other} if other else {}))))
+    return found
 
 
 def sized(config: RobotsConfig, seed: int, attempt: int, factor: float) -> list[dict[str, Any]]:
@@ -167,7 +188,7 @@ def seal_robots(
     """
     used = sha256(policy / "policy.pt")
     freeze(out, study, robots=asdict(config), policy=used, motions=motions.hash)
-    paths = [out / DECLARED, *(out / f"robot-{i}.json" for i in range(len(config.seeds)))]
+    paths = [out / DECLARED, *(out / f"{config.name}-{i}.json" for i in range(len(config.seeds)))]
     if not paths[0].exists():
         _write(paths[0], _content([]))
     if all(path.exists() for path in paths):
@@ -263,9 +284,10 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--motions", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--ankles", action="store_true", help="robots that differ at the ankles alone")
     parser.add_argument("--small", action="store_true", help="the same in seconds: shows that it runs")
     options = parser.parse_args(arguments)
-    study, config = (SMALL, SMALL_CONFIG) if options.small else (Study(), RobotsConfig())
+    study, config = (SMALL, SMALL_CONFIG) if options.small else (Study(), ANKLES if options.ankles else RobotsConfig())
     try:
         if not (options.policy / "policy.pt").exists():
             raise BadInput(options.policy, "the folder of a trained policy", "no policy.pt in it")

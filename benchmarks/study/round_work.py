@@ -18,8 +18,8 @@ from benchmarks.study.delta_training import replayed, write_delta
 from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.on_robot import KEY, exported, judged_rows, read_recordings, run_on_robot, write_csv
-from benchmarks.study.rounds import ARMS, SMALL_CONFIG, Place, RoundsConfig, learned_from
-from benchmarks.study.settings import FROZEN, SMALL, Study
+from benchmarks.study.rounds import ARMS, Place, RoundsConfig, add_settings, learned_from, settings
+from benchmarks.study.settings import FROZEN, Study
 from benchmarks.study.steps import GOES_ON
 from benchmarks.study.training import deadline, train
 from bumblebee.deploy.episodes import Episode
@@ -117,9 +117,12 @@ def diagnosis(work: Work) -> None:
 
 
 def delta(work: Work) -> None:
-    """A delta action on what the arm's diagnosis leaves, if it has one; on a GPU in one go."""
+    """A delta action on what the arm's diagnosis leaves, if it has one; in one go, on a GPU where PPO learns it."""
     parts = [part for part in ARMS[work.place.arm] if part != "delta"]
     correction, engine = work.correction(parts, work.place.arm), work.study.env.engine
+    if work.config.delta.method == "regression":
+        torch.set_num_threads(1)
+        engine = "mujoco"
     write_delta(work.rollouts(learned=True), engine, work.config.delta, correction, work.folder / "delta")
 
 
@@ -167,11 +170,10 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--shard", type=int, default=0)
     parser.add_argument("--seconds", type=float)
-    parser.add_argument("--small", action="store_true")
+    add_settings(parser)
     options = parser.parse_args()
-    settings = (SMALL, SMALL_CONFIG) if options.small else (Study(), RoundsConfig())
     try:
-        DO[options.kind](Work(options, *settings))
+        DO[options.kind](Work(options, *settings(options)))
     except BadInput as error:
         print(error)
         raise SystemExit(EXIT_BAD_INPUT) from None

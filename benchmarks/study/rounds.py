@@ -77,6 +77,8 @@ class RoundsConfig:
 _HASTY = DiagnosisConfig(
     max_windows=12, max_holdout_windows=8, report_windows=8, search_seconds=1.0, beyond_seconds=1.0
 )
+REGRESSION = RoundsConfig(rounds=1, delta=DeltaConfig(), diagnosis=RoundsConfig().later)
+"""One round with delta actions by regression, on the processor; its diagnosis takes no longer than a later one."""
 SMALL_CONFIG = RoundsConfig(
     motions=4,
     repeats=1,
@@ -195,7 +197,8 @@ def plan(out: Path, robots: Sequence[str], config: RoundsConfig, shared: tuple[s
             if "diagnosis" in ARMS[place.arm]:
                 needs.append(diagnosed[place.recorded])
             if "delta" in ARMS[place.arm]:
-                needs = [add(place, "delta", [*needs, *recorded[place.recorded]], gpu=True)]
+                by_ppo = config.delta.method == "ppo"
+                needs = [add(place, "delta", [*needs, *recorded[place.recorded]], gpu=by_ppo)]
                 if round_ == 1:
                     deltas[place.robot].append(needs[0])
             trained[place] = add(place, "policy", needs, gpu=True)
@@ -229,16 +232,30 @@ def begin(options: argparse.Namespace, study: Study, config: RoundsConfig, motio
     return robots
 
 
+def settings(options: argparse.Namespace) -> tuple[Study, RoundsConfig]:
+    """Of the study and of its rounds, by the command line."""
+    if options.small:
+        return SMALL, SMALL_CONFIG
+    return Study(), REGRESSION if options.regression else RoundsConfig()
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """The options that `settings` reads."""
+    parser.add_argument("--small", action="store_true", help="the same in seconds on two cores: shows that it runs")
+    parser.add_argument("--regression", action="store_true", help="one round, with delta actions by regression")
+
+
 def run(options: argparse.Namespace) -> None:
     """Do the steps, or as many as the time goes."""
-    study, config = (SMALL, SMALL_CONFIG) if options.small else (Study(), RoundsConfig())
+    study, config = settings(options)
     gpus = options.gpus if study.env.engine == "mujoco_warp" else 0
     if gpus > torch.cuda.device_count() and not options.only:
         raise BadInput("--gpus", f"at most {torch.cuda.device_count()} GPUs of this machine", str(gpus))
     motions = read_motions(options.motions)
     robots = begin(options, study, config, motions)
     shared = ("--motions", str(options.motions), "--robots", str(options.robots), "--out", str(options.out))
-    steps = plan(options.out, robots, config, (*shared, *(("--small",) if options.small else ())))
+    chosen = [f"--{name}" for name in ("small", "regression") if getattr(options, name)]
+    steps = plan(options.out, robots, config, (*shared, *chosen))
     kinds = options.only or KINDS
     wanted = [step for step in steps if step.name.rsplit("/", 1)[1].split("-")[0] in kinds]
     seconds = None if options.minutes is None else 60 * options.minutes
@@ -253,7 +270,7 @@ def write_table(options: argparse.Namespace) -> None:
     """Write the tables of a run that is done."""
     from benchmarks.study.round_tables import rounds_tables
 
-    config = SMALL_CONFIG if options.small else RoundsConfig()
+    config = settings(options)[1]
     text = rounds_tables(options.run, options.robots, config)
     stamp = sha256(options.run / FROZEN)[:12]
     options.out.write_text(f"<!-- rounds {stamp} -->\n\n{text}")
@@ -280,7 +297,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     table.set_defaults(work=write_table)
     for part in (own, table):
         part.add_argument("--robots", type=Path, required=True, help="folder of `benchmarks.study.robots`")
-        part.add_argument("--small", action="store_true", help="the same in seconds on two cores: shows that it runs")
+        add_settings(part)
     return parser.parse_args(arguments)
 
 

@@ -111,6 +111,7 @@ PAPER_CHANGES: dict[str, tuple[str, ...]] = {
     "kernels-algorithm": ("kernels", "algorithm"),
     "algorithm-std": ("ours", "algorithm", "std"),
     "ours-wide": ("adaptive", "ours", "wide"),
+    "actions-seen": ("actions", "algorithm", "seen"),
 }
 """What each arm of the part `paper-task` changes of the printed task; rewards are in `benchmarks/reward_arms.py`."""
 

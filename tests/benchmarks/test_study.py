@@ -13,6 +13,7 @@ from benchmarks.motion_pack import Packed, write_pack
 from benchmarks.study.__main__ import main
 from benchmarks.study.jobs import (
     PAPER_ARMS,
+    PAPER_LONGER,
     SURVIVORS,
     base_of,
     even_of,
@@ -241,6 +242,8 @@ def test_each_arm_of_the_papers_task_differs_by_what_it_says_and_is_tried(folder
     assert len({repr(own) for own in settings.values()}) == len(PAPER_ARMS)
     motions = read_motions(folder)
     jobs = paper_jobs(SMALL, motions)
+    longer = [job for job in jobs if job.steps == SMALL.base_steps]
+    assert [job.settings for job in longer] == [f"paper-{arm}" for arm in PAPER_LONGER]
     for job in jobs:
         if job.settings in ("paper-printed", "paper-floor"):
             assert train(job, motions, SMALL, tmp_path)
@@ -253,7 +256,7 @@ def test_each_arm_of_the_papers_task_differs_by_what_it_says_and_is_tried(folder
         if not (tmp_path / job.name).exists():
             shutil.copytree(tmp_path / jobs[0].name, tmp_path / job.name)
     lines = paper_tables(tmp_path, SMALL, motions).splitlines()
-    assert len(lines) == 2 + 2 * len(PAPER_ARMS)
+    assert len(lines) == 2 + 2 * (len(PAPER_ARMS) + len(PAPER_LONGER))
     assert lines[2].startswith("| as printed | trained | 6 | ")
 
 

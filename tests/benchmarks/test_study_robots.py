@@ -12,7 +12,7 @@ from benchmarks.motion_pack import Packed, write_pack
 from benchmarks.study import robots
 from benchmarks.study.jobs import base_of, experts_jobs
 from benchmarks.study.motions import LABELS, MOTIONS, read_motions
-from benchmarks.study.robots import GROUND, SMALL_CONFIG, Outcome, RobotsConfig, drawn, main, search, sized
+from benchmarks.study.robots import ANKLES, GROUND, SMALL_CONFIG, Outcome, RobotsConfig, drawn, main, search, sized
 from benchmarks.study.settings import SMALL
 from benchmarks.study.training import train
 from bumblebee.deploy.stand_in_effects import read_sealed
@@ -43,6 +43,16 @@ def test_a_robot_has_effects_of_the_ground_and_outside_the_catalogue_each_at_a_p
     assert sum(kind.outside for kind, _ in effects) == CONFIG.outside
     assert len(effects) == 1 + CONFIG.inside + CONFIG.outside
     assert len({(kind.on, place.name) for kind, place in effects}) == len(effects)
+
+
+def test_robots_that_differ_at_the_ankles_alone_grow_with_the_factor_and_a_cable_runs_over_ankle_and_knee() -> None:
+    weak, cables = ([sized(ANKLES, seed, 0, factor) for factor in (0.3, 2.5)] for seed in ANKLES.seeds)
+    for small, large in (weak, cables):
+        assert [own["where"] for own in small] == [["left_ankle_pitch_joint"], ["right_ankle_pitch_joint"]]
+        assert all(a["size"] < b["size"] for a, b in zip(small, large, strict=True))
+    assert {own["effect"] for own in weak[0]} == {"motor_strength"}
+    assert all(own["parameters"]["factor"] < 1 for own in weak[0])
+    assert [own["draw"]["other"] for own in cables[0]] == ["left_knee_joint", "right_knee_joint"]
 
 
 def test_a_draw_is_the_same_again_and_grows_with_its_factor() -> None:

@@ -18,6 +18,8 @@ from benchmarks.study.round_tables import paired, rounds_tables
 from benchmarks.study.rounds import ARMS, BASE, SMALL_CONFIG, Place, RoundsConfig, learned_from, plan, recorded_motions
 from benchmarks.study.settings import SMALL
 from benchmarks.study.training import train
+from bumblebee.learning.delta import DeltaConfig
+from bumblebee.learning.delta.action import RegressionConfig
 from tests.benchmarks import study_folder
 
 ROBOTS = ["declared", "robot-0"]
@@ -57,6 +59,15 @@ def test_a_step_waits_for_all_that_it_reads() -> None:
     assert len({step.done for step in steps.values()}) == len(steps)
 
 
+def test_a_delta_action_by_regression_needs_no_gpu() -> None:
+    options = rounds.parse(["table", "run", "--robots", "robots", "--out", "rounds.md", "--regression"])
+    config = rounds.settings(options)[1]
+    assert config.delta.method == "regression"
+    steps = plan(Path("out"), ROBOTS, config, ())
+    assert {step.name.rsplit("/", 1)[1] for step in steps if step.gpu} == {"policy"}
+    assert not any("/r2/" in step.name for step in steps)
+
+
 def test_motions_that_the_policy_follows_are_recorded_first_and_half_of_each_cluster_judges(folder: Path) -> None:
     motions = read_motions(folder)
     followed = json.loads((folder / "robots" / "followed.json").read_text())["names"]
@@ -79,11 +90,14 @@ def test_a_difference_is_paired_by_motion_and_seed() -> None:
     assert p < 0.01
 
 
-def _work(folder: Path, kind: str, place: Place) -> None:
-    options = argparse.Namespace(
+def _options(folder: Path, place: Place) -> argparse.Namespace:
+    return argparse.Namespace(
         place=place.name, motions=folder, robots=folder / "robots", out=folder / "out", shard=0, seconds=None
     )
-    round_work.DO[kind](round_work.Work(options, SMALL, replace(SMALL_CONFIG, rounds=1)))
+
+
+def _work(folder: Path, kind: str, place: Place) -> None:
+    round_work.DO[kind](round_work.Work(_options(folder, place), SMALL, replace(SMALL_CONFIG, rounds=1)))
 
 
 @pytest.mark.slow
@@ -108,4 +122,10 @@ def test_every_step_of_a_round_runs_and_is_made_into_tables(folder: Path) -> Non
     errors = pd.read_csv(out / "declared" / BASE / "r1" / "errors.csv")
     assert set(errors["correction"]) == set(round_work.CORRECTIONS)
     assert np.isfinite(errors["error"]).any()
+    kept = out / "declared" / "delta" / "r1" / "delta"
+    shutil.rmtree(kept)
+    by_regression = replace(config, delta=DeltaConfig(num_envs=8, regression=RegressionConfig(windows=100)))
+    round_work.delta(round_work.Work(_options(folder, Place("declared", "delta", 1)), SMALL, by_regression))
+    assert json.loads((kept / "card.json").read_text())["config"]["method"] == "regression"
+    assert "held_out" in pd.read_csv(kept / "curve.csv")
     shutil.rmtree(out)
