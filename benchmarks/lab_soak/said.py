@@ -18,7 +18,7 @@ FULL = ("worker's disk full", "workspace's disk full")
 
 Named = tuple[re.Pattern[str], tuple[str, ...]]
 NAMED: dict[str, Named] = {
-    "no error: how a policy did": (re.compile(r": success .* key error"), ()),
+    "no error: how a policy did": (re.compile(r"[:,] success .* key error"), ()),
     "no error of its own: stages that wait for a failed one": (
         re.compile(
             r"Finished in state (Failed|NotReady)|^\d+ stage\(s\) failed, |ERROR: failed to reproduce|"

@@ -245,3 +245,10 @@ def test_the_judge_is_shown_active_runs_alone() -> None:
             "('b', 'base', 'FINISHED', '', 1, 2, 'active');"
         )
         assert [row[0] for row in tables.execute(facts.RUNS, {"name": "soak"})] == ["b"]
+
+
+def test_a_line_of_training_progress_is_no_error_though_it_says_key_error() -> None:
+    line = "base | train base: 128/128 frames (100 %), 12.3 frames/s, 0:00 left, success nan, key error 0.047 m"
+    assert said.telling(f"11:02:28 {line}") == [line]
+    assert said.name_of(line) == "no error: how a policy did"
+    assert said.name_of("base: key error in the settings") != "no error: how a policy did"
