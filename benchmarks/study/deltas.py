@@ -16,8 +16,9 @@ import torch
 
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.on_robot import read_recordings
-from benchmarks.study.rounds import BASE, SMALL_CONFIG, Place, learned_from
-from benchmarks.study.rounds import RoundsConfig as Rounds
+from benchmarks.study.round_settings import SMALL_CONFIG
+from benchmarks.study.round_settings import RoundsConfig as Rounds
+from benchmarks.study.rounds import BASE, Place, learned_from
 from benchmarks.study.settings import FROZEN, SMALL, Study, freeze, frozen, sha256, take_in
 from benchmarks.study.steps import Places, Runner, Step
 from bumblebee.deploy.stand_in import BASES

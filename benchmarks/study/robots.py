@@ -19,7 +19,6 @@ motions then simulates at most 192 s. Three robots took 8 tries, less than 7 min
 
 import argparse
 import json
-import os
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -37,6 +36,7 @@ from bumblebee.deploy.stand_in_effects import SCHEMA, entry, read_sealed, seal
 from bumblebee.deploy.undeclared.kinds import KINDS, Kind, Place
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.thinning import thin
+from bumblebee.io.write import write_file
 from bumblebee.motion.clip import Clip
 from tasks.seal import OF_G1, SealConfig, drawn_place, size, somewhere
 from tasks.seal_trial import episodes, to_the_end
@@ -55,7 +55,7 @@ class RobotsConfig:
     seeds: tuple[int, ...] = (1801, 1802, 1803)
     """One for each robot."""
     fixed: tuple[tuple[tuple[str, str, str], ...], ...] = ()
-    """Of each robot the effects that are not drawn: kind, joint and, for a law of two joints, the other; else ()."""
+    """Effects of each robot: kind, joint and, for a law of two joints, the other, else ""; (): they are drawn."""
     inside: int = 3
     """Effects of the catalogue beside the one of the ground."""
     outside: int = 1
@@ -190,7 +190,7 @@ def seal_robots(
     freeze(out, study, robots=asdict(config), policy=used, motions=motions.hash)
     paths = [out / DECLARED, *(out / f"{config.name}-{i}.json" for i in range(len(config.seeds)))]
     if not paths[0].exists():
-        _write(paths[0], _content([]))
+        write_file(paths[0], _plain(_content([])))
     if all(path.exists() for path in paths):
         for path in paths:
             read_sealed(path)
@@ -215,7 +215,7 @@ def _followed(policy: Path, motions: Motions, config: RobotsConfig, out: Path, t
         ends, _ = trial(policy, [], asked, config, threads)
         names = [clip.name for clip, end in zip(asked, ends, strict=True) if end]
         print(f"declared robot: the policy follows {len(names)} of {len(asked)} motions", flush=True)
-        _write(kept, {"asked": len(asked), "names": thin(own[own["name"].isin(names)], config.motions)})
+        write_file(kept, _plain({"asked": len(asked), "names": thin(own[own["name"].isin(names)], config.motions)}))
     names = json.loads(kept.read_text())["names"]
     if len(names) < max(2, config.motions // 2):
         raise BadInput(
@@ -249,7 +249,7 @@ def _seal_one(path: Path, policy: Path, clips: Sequence[Clip], config: RobotsCon
         raise BadInput(tries, wanted, f"none in {config.draws} draws", "Take another seed.")
     attempt, factor, outcome = found
     about = {"seed": seed, "attempt": attempt, "factor": factor, "trial": {**asdict(outcome), "motions": len(clips)}}
-    _write(path, _content(sized(config, seed, attempt, factor)) | about)
+    write_file(path, _plain(_content(sized(config, seed, attempt, factor)) | about))
 
 
 def _content(effects: list[dict[str, Any]]) -> dict[str, Any]:
@@ -257,11 +257,8 @@ def _content(effects: list[dict[str, Any]]) -> dict[str, Any]:
     return {"schema": SCHEMA, "sealed": told, "effects": effects, "sha256": seal(effects)}
 
 
-def _write(path: Path, content: dict[str, Any]) -> None:
-    """Whole or not at all."""
-    fresh = path.with_name(f".{path.name}.part")
-    fresh.write_text(json.dumps(content, indent=1) + "\n")
-    os.replace(fresh, path)
+def _plain(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=1) + "\n"
 
 
 def _lines(path: Path) -> list[dict[str, Any]]:

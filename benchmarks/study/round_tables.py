@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.study.rounds import ARMS, BASE, Place, RoundsConfig
+from benchmarks.study.round_settings import RoundsConfig
+from benchmarks.study.rounds import ARMS, BASE, Place
 from benchmarks.study.tables import cell, head, line, rate, relative, signed
 from bumblebee.deploy.stand_in_effects import read_sealed
 from bumblebee.errors import BadInput

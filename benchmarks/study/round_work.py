@@ -18,7 +18,8 @@ from benchmarks.study.delta_training import replayed, write_delta
 from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, read_motions
 from benchmarks.study.on_robot import KEY, exported, judged_rows, read_recordings, run_on_robot, write_csv
-from benchmarks.study.rounds import ARMS, Place, RoundsConfig, add_settings, learned_from, settings
+from benchmarks.study.round_settings import RoundsConfig, add_settings, settings
+from benchmarks.study.rounds import ARMS, Place, learned_from
 from benchmarks.study.settings import FROZEN, Study
 from benchmarks.study.steps import GOES_ON
 from benchmarks.study.training import deadline, train

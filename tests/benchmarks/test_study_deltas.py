@@ -15,7 +15,8 @@ from benchmarks.study.delta_tables import deltas_tables
 from benchmarks.study.deltas import ARMS, GENERAL, SMALL_DELTAS, delta_folder, plan
 from benchmarks.study.jobs import base_of, experts_jobs
 from benchmarks.study.motions import read_motions
-from benchmarks.study.rounds import SMALL_CONFIG, Place
+from benchmarks.study.round_settings import SMALL_CONFIG
+from benchmarks.study.rounds import Place
 from benchmarks.study.settings import SMALL
 from benchmarks.study.training import train
 from bumblebee.errors import BadInput

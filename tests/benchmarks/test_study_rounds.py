@@ -14,8 +14,9 @@ from benchmarks.study import round_work, rounds
 from benchmarks.study.correction import DECLARED
 from benchmarks.study.jobs import base_of, experts_jobs
 from benchmarks.study.motions import read_motions
+from benchmarks.study.round_settings import SMALL_CONFIG, RoundsConfig, settings
 from benchmarks.study.round_tables import paired, rounds_tables
-from benchmarks.study.rounds import ARMS, BASE, SMALL_CONFIG, Place, RoundsConfig, learned_from, plan, recorded_motions
+from benchmarks.study.rounds import ARMS, BASE, Place, learned_from, plan, recorded_motions
 from benchmarks.study.settings import SMALL
 from benchmarks.study.training import train
 from bumblebee.learning.delta import DeltaConfig
@@ -61,7 +62,7 @@ def test_a_step_waits_for_all_that_it_reads() -> None:
 
 def test_a_delta_action_by_regression_needs_no_gpu() -> None:
     options = rounds.parse(["table", "run", "--robots", "robots", "--out", "rounds.md", "--regression"])
-    config = rounds.settings(options)[1]
+    config = settings(options)[1]
     assert config.delta.method == "regression"
     steps = plan(Path("out"), ROBOTS, config, ())
     assert {step.name.rsplit("/", 1)[1] for step in steps if step.gpu} == {"policy"}

@@ -130,9 +130,7 @@ def loop_results(
     library = library.assign(source="made", licence="Apache-2.0", duration=4.0)
     labels = pd.DataFrame({"name": names, "cluster": ["c0", "c1", "c0"], "x": [0.0, 1, 2], "y": [1.0, 0, 2]})
     labels = labels.assign(split=library["split"], family=library["family"])
-    curve = pd.DataFrame(
-        {"frames": [1e5, 2e5, 3e5], "success": [0.1, 0.4, 0.8], "key_error": [0.3, 0.2, 0.1]}
-    )
+    curve = pd.DataFrame({"frames": [1e5, 2e5, 3e5], "success": [0.1, 0.4, 0.8], "key_error": [0.3, 0.2, 0.1]})
     return LoopResults(
         library=library,
         skipped=pd.DataFrame({"file": ["a.npz"], "reason": ["SMPL motions cannot be read yet"]}),
