@@ -25,9 +25,14 @@ def weakened(share: float, joints: Sequence[int]) -> mujoco.MjModel:
 
 
 def record(
-    worlds: int = 3, ticks: int = 70, model: mujoco.MjModel | None = None, moved: Sequence[int] = ARMS, seed: int = 0
+    worlds: int = 3,
+    ticks: int = 70,
+    model: mujoco.MjModel | None = None,
+    moved: Sequence[int] = ARMS,
+    seed: int = 0,
+    sway: float = 0.15,
 ) -> list[Rollout]:
-    """A rollout for each world, whose `moved` joints' targets sway by .15 rad, each at a phase of its own."""
+    """A rollout for each world, whose `moved` joints' targets sway by `sway` [rad], each at a phase of its own."""
     model = load_model() if model is None else model
     engine = MujocoCpu(model, worlds, threads=1)
     qpos = torch.as_tensor(model.key_qpos[:1], dtype=torch.float32).repeat(worlds, 1)
@@ -35,7 +40,7 @@ def record(
     engine.reset(torch.arange(worlds), qpos, torch.zeros(worlds, 29), pose)
     phase = torch.as_tensor(np.random.default_rng(seed).uniform(0, 6, (worlds, 1)), dtype=torch.float32)
     sways = torch.zeros(23)
-    sways[list(moved)] = 0.15
+    sways[list(moved)] = sway
     rows: list[list[torch.Tensor]] = []
     for k in range(ticks):
         target = pose + sways * torch.sin(0.1 * k + phase)

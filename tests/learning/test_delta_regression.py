@@ -17,7 +17,7 @@ from bumblebee.sim.sensors import load_model
 from tests.learning.swaying import ANKLES, record, weakened
 
 NO_OFFSET = torch.zeros(23)
-CONFIG = DeltaConfig(num_envs=60, regression=RegressionConfig(windows=600, passes=3, folds=6))
+CONFIG = DeltaConfig(num_envs=60, regression=RegressionConfig(windows=300, passes=3, nudges=(0.1,), folds=6))
 
 
 def recordings(share: float, seed: int = 0, noise: float = 0.0) -> Recordings:
@@ -39,7 +39,7 @@ def test_the_correction_of_weak_ankles_is_found_and_holds_on_other_rollouts(weak
     steps = []
     engine = make_engine("mujoco", load_model(), CONFIG.num_envs, 1)
     delta, table = learn_delta(engine, weak, CONFIG, NO_OFFSET, lambda frames, note: steps.append(frames))
-    assert sum(steps) == total_frames(CONFIG) == 3 * 600 * 3 * 5
+    assert sum(steps) == total_frames(CONFIG) == 3 * 300 * 3 * 9
     assert list(table["pass"]) == [1, 2, 3]
     assert (table["held_out"] < 0.6).all()
     assert table["left"].iloc[-1] < 0.3
@@ -49,9 +49,22 @@ def test_the_correction_of_weak_ankles_is_found_and_holds_on_other_rollouts(weak
     assert gain.change["0.2"]["with"] < 0.5 * gain.change["0.2"]["without"]
 
 
+def test_corrections_that_are_large_come_from_changes_as_large() -> None:
+    # Ankles that push against the floor: a small change of their targets says little of what a large one does.
+    pushing = stack(record(24, 30, weakened(0.6, ANKLES), ANKLES, sway=1.5), load_model())
+    engine, tables = make_engine("mujoco", load_model(), CONFIG.num_envs, 1), []
+    for nudges in ((0.03,), RegressionConfig().nudges):
+        config = replace(CONFIG, regression=replace(CONFIG.regression, nudges=nudges))
+        tables.append(learn_delta(engine, pushing, config, NO_OFFSET)[1])
+    small, chosen = tables
+    assert chosen["nudge"].unique().tolist() == [0.4]
+    assert chosen["held_out"].iloc[0] < 0.8 * small["held_out"].iloc[0]
+
+
 def test_a_robot_as_declared_is_not_corrected() -> None:
     engine = make_engine("mujoco", load_model(), CONFIG.num_envs, 1)
-    delta, table = learn_delta(engine, recordings(1.0, noise=0.001), CONFIG, NO_OFFSET)
+    config = replace(CONFIG, regression=replace(CONFIG.regression, nudges=RegressionConfig().nudges))
+    delta, table = learn_delta(engine, recordings(1.0, noise=0.001), config, NO_OFFSET)
     assert len(table) == 1
     assert table["held_out"].iloc[0] > 1.0 - 2.0 * table["held_out_se"].iloc[0]
     assert all(float(own.detach().abs().max()) == 0.0 for own in delta.network[1].parameters())
@@ -102,7 +115,7 @@ def test_a_correction_under_which_every_replay_blows_up_is_taken_back(
 def test_influence_is_the_change_for_a_radian(weak: Recordings) -> None:
     rows = weak.windows(3, stride=20)
     engine = make_engine("mujoco", load_model(), 16, 1)  # other than the windows' number: the last batch is filled up
-    windows = replay(engine, weak, rows, CONFIG, NO_OFFSET, None)
+    windows = replay(engine, weak, rows, CONFIG, NO_OFFSET, None, 0.05)
     assert windows.effect.shape == (len(rows), 58, len(ANKLE_JOINTS))
     pitch = ANKLE_JOINTS.index("left_ankle_pitch_joint")
     moved = windows.effect[:, 12 + ANKLES[0], pitch]

@@ -37,6 +37,8 @@ class RegressionConfig(Ranged):
     """Control steps of a replay."""
     passes: Annotated[int, Range(least=1, most=100)] = 5
     """Fits, each but the first around the one before."""
+    nudges: Annotated[tuple[Positive, ...], Size()] = (0.1, 0.4)
+    """Changes of a target, up and down, by which its influence is found [rad]: the one that explains more is taken."""
     ridges: Annotated[tuple[Positive, ...], Size()] = (0.001, 0.01, 0.1, 1.0)
     """Strengths of regularisation that are tried, by the fit's own diagonal."""
     folds: Annotated[int, Range(least=2, most=100)] = 10
@@ -66,7 +68,7 @@ class DeltaConfig(Ranged):
     """Seed of starts, exploration and network."""
     joints: Annotated[tuple[Name, ...], Size()] = ANKLE_JOINTS
     """Joints that the correction acts on (paper: the four ankle joints)."""
-    limit: Annotated[float, Range(above=0, most=3.2)] = 0.6
+    limit: Annotated[float, Range(above=0, most=3.2)] = 1.2
     """Largest correction of a target [rad]."""
     hidden: Widths = (128, 64)
     """Units of the hidden layers."""

@@ -2,10 +2,11 @@
 
 The paper trains the correction by PPO on rewards of a whole replayed episode (section 3.3.2). What one correction does
 to the next few steps is known better from the simulator itself: it is stepped from recorded states with none and with
-each joint's target moved a little. The correction, linear in what the delta action sees, then follows from weighted
-least squares, and again around itself. Reasons and measurements: docs/decisions/delta-action.md.
+each joint's target moved up and down, about as far as a correction may have to move it. The correction, linear in what
+the delta action sees, follows from weighted least squares, and again around itself: docs/decisions/delta-action.md.
 """
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -29,8 +30,6 @@ from bumblebee.learning.delta.recordings import Recordings, recorded_state
 from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.sim.rotations import conjugate, multiply, rotate_inverse
 
-NUDGE = 0.03
-"""Change of a target by which its influence is found [rad]."""
 FINEST = (1e-3, 2e-2)
 """Misfits of positions [m, rad] and velocities [m/s, rad/s] below which none counts more than another."""
 _NO_MISFIT = 1e-12
@@ -49,7 +48,7 @@ class Windows:
     missed: Tensor
     """(N, M) recording less simulator, see `off`."""
     effect: Tensor
-    """(N, M, A) change of the simulator's end for each radian of correction, held throughout the window."""
+    """(N, M, A) change of the simulator's end for each radian of correction, held throughout the window: a secant."""
     owner: Tensor
     """(N,) index of the rollout."""
 
@@ -78,32 +77,38 @@ def fit_delta(
     Returns:
         The delta action and a row for each pass: pass, left (share of the squared misfit at the windows' ends that is
         left on the rollouts fitted, before the pass), and of the first pass' correction on rollouts that took no part
-        held_out (the same), held_out_se (its standard error over folds) and ridge.
+        held_out (the same), held_out_se (its standard error over folds), ridge and nudge.
     """
     own = config.regression
     recordings = recordings.to(engine.device)
     rows = _drawn(recordings, own, config.seed)
-    delta = DeltaAction(make_network((), len(config.joints)), config.joints, config.limit)
-    first = _kept(replay(engine, recordings, rows, config, encoder_offset, None, report))
-    if not len(first.seen):
-        return delta, pd.DataFrame([{"pass": 1, "left": 1.0, "held_out": 1.0, "held_out_se": 0.0, "ridge": 0.0}])
+    nothing = DeltaAction(make_network((), len(config.joints)), config.joints, config.limit)
+
+    def replayed(delta: DeltaAction | None, nudge: float) -> Windows:
+        return _kept(replay(engine, recordings, rows, config, encoder_offset, delta, nudge, report))
+
+    tried = {nudge: replayed(None, nudge) for nudge in own.nudges}
+    if not all(len(windows.seen) for windows in tried.values()):
+        told = {"held_out": 1.0, "held_out_se": 0.0, "ridge": 0.0, "nudge": own.nudges[0]}
+        return nothing, pd.DataFrame([{"pass": 1, "left": 1.0, **told}])
+    first = tried[own.nudges[0]]
     scale = torch.maximum(first.missed.abs().median(dim=0).values, _finest(len(recordings.qvel[0]) - 6))
+    delta = copy.deepcopy(nothing)
     delta.network[0].fit(first.seen)
-    system = _system(delta, first, scale)
-    held_out, error, ridge = _cross_validated(system, own)
-    told = {"held_out": held_out, "held_out_se": error, "ridge": ridge}
+    systems = {nudge: _system(delta, windows, scale) for nudge, windows in tried.items()}
+    (held_out, error, ridge), nudge = min((_cross_validated(system, own), n) for n, system in systems.items())
+    system, told = systems[nudge], {"held_out": held_out, "held_out_se": error, "ridge": ridge, "nudge": nudge}
     table = [{"pass": 1, "left": 1.0, **told}]
     if 1.0 - held_out <= own.evidence * error:
         return delta, pd.DataFrame(table)
     _put(delta, solve(system, ridge))
-    before = float((system.weight * system.missed.square().mean(dim=1)).mean())
+    before = _size(system)
     for number in range(2, own.passes + 1):
-        windows = _kept(replay(engine, recordings, rows, config, encoder_offset, delta, report))
+        windows = replayed(delta, nudge)
         if not len(windows.seen):
-            return DeltaAction(make_network((), len(config.joints)), config.joints, config.limit), pd.DataFrame(table)
+            return nothing, pd.DataFrame(table)
         system = _system(delta, windows, scale)
-        left = float((system.weight * system.missed.square().mean(dim=1)).mean()) / before
-        table.append({"pass": number, "left": left, **told})
+        table.append({"pass": number, "left": _size(system) / before, **told})
         _put(delta, solve(_added(delta, system, windows.seen), ridge))
     return delta, pd.DataFrame(table)
 
@@ -111,7 +116,7 @@ def fit_delta(
 def frames(config: DeltaConfig) -> int:
     """Control steps that `fit_delta` takes at most, of all robots."""
     own = config.regression
-    return own.passes * own.windows * own.steps * (1 + len(config.joints))
+    return (own.passes - 1 + len(own.nudges)) * own.windows * own.steps * (1 + 2 * len(config.joints))
 
 
 def off(state: RobotState, qpos: Tensor, qvel: Tensor) -> Tensor:
@@ -143,32 +148,33 @@ def replay(
     config: DeltaConfig,
     encoder_offset: Tensor,
     delta: DeltaAction | None,
+    nudge: float,
     report: Callable[[int, str], None] = lambda frames, note: None,
 ) -> Windows:
-    """Step the simulator from each of the rows (N,), as it is with `delta`, and with each joint's correction nudged."""
+    """Step the simulator from each of the rows (N,), with `delta` and each correction `nudge` [rad] up and down."""
     device, steps = engine.device, config.regression.steps
     place, offset = placement(config.joints).to(device), encoder_offset.to(device)
     there = None if delta is None else delta.on(device)
+    moves = torch.cat([torch.zeros_like(place[:1]), nudge * place, -nudge * place])
     parts: list[tuple[Tensor, Tensor, Tensor, Tensor]] = []
     for begin in range(0, len(rows), engine.num_worlds):
         own = rows[begin : begin + engine.num_worlds]
         filled = torch.cat([own, own[-1:].expand(engine.num_worlds - len(own))])
-        ends = []
-        for joint in range(-1, len(config.joints)):
-            nudge = NUDGE * place[joint] if joint >= 0 else torch.zeros_like(place[0])
+        ends: list[Tensor] = []
+        seen: list[Tensor] = []
+        for moved in moves:
             restart(engine, recordings, torch.arange(engine.num_worlds, device=device), filled, offset)
-            seen = []
             for k in range(steps):
                 targets, state = recordings.targets[filled + k], engine.state()
-                if joint < 0:
+                if not ends:
                     seen.append(observe(state, targets))
-                engine.step((targets if there is None else there(state, targets)) + nudge)
+                engine.step((targets if there is None else there(state, targets)) + moved)
             last = filled + steps
             ends.append(off(engine.state(), recordings.qpos[last], recordings.qvel[last])[: len(own)].cpu())
-            if joint < 0:
-                mean = torch.stack(seen).mean(dim=0)[: len(own)].cpu()
             report(len(own) * steps, "")
-        effect = torch.stack([(ends[0] - end) / NUDGE for end in ends[1:]], dim=-1)
+        mean = torch.stack(seen).mean(dim=0)[: len(own)].cpu()
+        up, down = ends[1 : len(place) + 1], ends[len(place) + 1 :]
+        effect = torch.stack([(low - high) / (2.0 * nudge) for high, low in zip(up, down, strict=True)], dim=-1)
         targets = torch.stack([recordings.targets[own + k] for k in range(steps)]).mean(dim=0)
         before = observe(recorded_state(recordings, own - 1), targets).cpu()
         parts.append((mean, before, ends[0], effect))
@@ -226,6 +232,11 @@ def _system(delta: DeltaAction, windows: Windows, scale: Tensor) -> System:
     size = missed.square().mean(dim=1).sqrt()
     weight = (_COMMON * size.median().clamp(min=_NO_MISFIT) / size.clamp(min=_NO_MISFIT)).clamp(max=1.0)
     return System(features, missed, windows.effect / scale[:, None], weight, windows.owner)
+
+
+def _size(system: System) -> float:
+    """Mean weighted squared misfit."""
+    return float((system.weight * system.missed.square().mean(dim=1)).mean())
 
 
 def _features(delta: DeltaAction, seen: Tensor) -> Tensor:
