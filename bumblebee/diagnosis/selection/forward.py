@@ -18,8 +18,9 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
 from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
 from bumblebee.diagnosis.selection.proposals.declared_scale import keep_declared_scale
+from bumblebee.diagnosis.selection.proposals.drive_grid import drive_trials
 from bumblebee.diagnosis.selection.proposals.friction_family import complete_frictions
-from bumblebee.diagnosis.selection.proposals.gain_grid import gain_trials, start_with_gain_grid
+from bumblebee.diagnosis.selection.proposals.gain_grid import start_with_gain_grid
 from bumblebee.diagnosis.selection.proposals.gain_parameters import merge_gain_parameters
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import joint_elasticity_trials
 from bumblebee.diagnosis.selection.proposals.packet_loss import find_packet_loss
@@ -29,7 +30,7 @@ from bumblebee.diagnosis.selection.proposals.stribeck import add_dry_friction, a
 from bumblebee.diagnosis.selection.proposals.torque_ripple import ripple_trials
 from bumblebee.diagnosis.selection.score_tests import Scores
 from bumblebee.diagnosis.selection.state import Loss, SearchState
-from bumblebee.diagnosis.selection.swap import swap
+from bumblebee.diagnosis.selection.swap import swap, swap_limits
 from bumblebee.diagnosis.selection.trial import Trial, simplest
 from bumblebee.diagnosis.sensitivities import Columns
 from bumblebee.sim.effects import Effect
@@ -123,15 +124,17 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         if not budget.has_time_for("more effects"):
             break
         tried, looked = [], []
-        attempt("the usual effects of all joints", partial(start_with_all_joints, run), _no)
         if not run.given:
-            tried = attempt("gains far from the declared ones", partial(_gains, run), list)
+            tried = attempt("drives far from the declared ones", partial(_drives, run), list)
             tried = [t for t in tried if t.candidate not in run.closed]
         if not tried:
             tried, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
+        many = not _explains_much(tried, run)
+        if many and attempt("the usual effects of all joints", partial(start_with_all_joints, run), _no):
+            continue
         late = attempt("drives that follow their targets late", partial(setpoint_trials, run, tried), list)
         tried += [t for t in late if t.candidate not in run.closed]
-        tried += attempt("torque ripple", partial(ripple_trials, run), list)
+        tried += attempt("torque ripple", partial(ripple_trials, run, tried), list)
         some = _where_limits_matter(tried, run)
         if judged != (run.fit, some):
             judged = (run.fit, some)
@@ -155,11 +158,12 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         accepted = attempt(name, partial(run.accept, best.candidate, best.values), partial(run.refuse, best.candidate))
         vain = 0 if accepted else vain + 1
         if accepted:
+            attempt("a torque limit in the place of a weak drive", partial(swap_limits, run), _no)
             run.hopeless = {(kind, where) for kind, where in run.hopeless if place and where != place}
 
 
-def _gains(run: SearchState) -> list[Trial]:
-    return gain_trials(run.problem, run.fit, run.candidates, run.weights, run.config.far)
+def _drives(run: SearchState) -> list[Trial]:
+    return drive_trials(run.problem, run.fit, run.candidates, run.weights, run.config.far)
 
 
 def _limits(run: SearchState, some: Sequence[Candidate]) -> list[Trial]:
@@ -179,13 +183,18 @@ def _no() -> bool:
     return False
 
 
+def _explains_much(tried: Sequence[Trial], run: SearchState) -> bool:
+    """Whether one trial takes away much of the cost: then effects are found one after the other."""
+    return min((t.cost for t in tried), default=np.inf) <= (1 - run.rule.most_of_it) * run.fit.cost
+
+
 def _where_limits_matter(tried: Sequence[Trial], run: SearchState) -> tuple[Candidate, ...]:
     """The candidates among which limits are tried: all, or while one trial explains much the places of these trials.
 
     What a limit does may pass for weakness or friction of its joint, and then the two are compared; a limit elsewhere
     is judged when the large effects are known.
     """
-    if min((t.cost for t in tried), default=np.inf) > (1 - run.rule.most_of_it) * run.fit.cost:
+    if not _explains_much(tried, run):
         return tuple(run.candidates)
     places = {t.candidate.where for t in tried}
     return tuple(c for c in run.candidates if c.where in places)

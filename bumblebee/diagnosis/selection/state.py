@@ -52,7 +52,7 @@ class SearchState:
         self.loss: Loss | None = None
         self.given = 0
         self.tried_many, self.patience = False, config.patience
-        self.fall = 1.0
+        self.fall, self.whitened_at = 1.0, self.power()
         self.candidates, _ = remake([])
 
     def open(self) -> None:

@@ -6,7 +6,8 @@ two, is taken out and everything is tested in their place; what promises as much
 It takes the place if the fitted windows are clearly better with it for its parameters and those that judge no worse.
 The search then goes on, since what a wrong name had hidden can now be seen.
 
-Hysteresis by one law is tried against the other (`proposals/hysteresis_law.py`).
+Hysteresis by one law is tried against the other (`proposals/hysteresis_law.py`), a torque limit against a drive that
+came out far weaker than declared (`proposals/drive_grid.py`).
 
 What a shaft's swing passes for (a lag, an old reading, a rotor) is tried against shafts of many stiffnesses, which no
 test at one of them would show (`proposals/joint_elasticity.py`).
@@ -17,7 +18,7 @@ first it takes the level that it sits on for its own: stiction of 0.40 N m came 
 further name but a parameter of the same, it needs three standard errors and not the bound of all candidates.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, combinations
 
 import numpy as np
@@ -30,6 +31,7 @@ from bumblebee.diagnosis.comparison import (
 )
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.selection.moves import Move, Terms, by_loss, by_slopes, refitted
+from bumblebee.diagnosis.selection.proposals.drive_grid import limit_swaps
 from bumblebee.diagnosis.selection.proposals.hysteresis_law import law_swaps
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import KIND as SHAFT
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import LIKE as SHAFT_LIKE
@@ -43,14 +45,29 @@ from bumblebee.diagnosis.sensitivities import Columns
 
 def swap(run: SearchState) -> bool:
     """Put one better name in the place of one or two of the search's; whether there was one."""
-    rule, rules = run.problem.thresholds.selection.swap, run.problem.thresholds.comparison
-    free = [c for c in run.fit.chosen[run.given :] if c.effect not in SATURATIONS]
+    rule, free = run.problem.thresholds.selection.swap, _free(run)
     taken = [(c,) for c in free] + (list(combinations(free, 2)) if len(free) <= rule.few else [])
+    return _best_taken(run, chain(*(_tried(run, gone) for gone in taken), _twisted(run, free), _shaped(run, free)))
+
+
+def swap_limits(run: SearchState) -> bool:
+    """Put a torque limit in the place of a drive that came out far weaker than declared; whether one was better."""
+    return _best_taken(run, _limited(run, _free(run)))
+
+
+def _free(run: SearchState) -> list[Candidate]:
+    """Names that may go."""
+    return [c for c in run.fit.chosen[run.given :] if c.effect not in SATURATIONS]
+
+
+def _best_taken(run: SearchState, moves: Iterable[Move]) -> bool:
+    """Make the move that gains most, if any is clearly better than none."""
+    rule, parameter = run.problem.thresholds.selection.swap, run.problem.thresholds.comparison.criterion.parameter
     best: tuple[float, Move] | None = None
     start = criterion(run.problem, run.fit)
-    for move in chain(*(_tried(run, gone) for gone in taken), _twisted(run, free), _shaped(run, free)):
+    for move in moves:
         gain = criterion(run.problem, move.after) - start
-        margin = rule.clearly * rules.criterion.parameter if len(move.gone) == 1 else 0.0
+        margin = rule.clearly * parameter if len(move.gone) == 1 else 0.0
         if gain > max(margin, best[0] if best else margin) and move.passes():
             best = gain, move
     if best is None:
@@ -98,8 +115,14 @@ def _twisted(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
 
 
 def _shaped(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
-    """Fits with a drive's own set-points in the place of what they pass for, or with the other law of a hysteresis."""
+    """Fits with a drive's own set-points or limit in the place of what they pass for, or a hysteresis' other law."""
     moves = (_refitted(run, rest, trial) for rest, trial in chain(setpoint_swaps(run, free), law_swaps(run, free)))
+    return chain((move for move in moves if move), _limited(run, free))
+
+
+def _limited(run: SearchState, free: Sequence[Candidate]) -> Iterator[Move]:
+    """Fits with a torque limit in the place of a weak drive."""
+    moves = (_refitted(run, rest, trial) for rest, trial in limit_swaps(run, free))
     return (move for move in moves if move)
 
 

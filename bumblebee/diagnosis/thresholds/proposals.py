@@ -21,6 +21,8 @@ class Saturation:
     """Of that, what is enough where changes of an earlier fit were taken for this one's, and for trying further."""
     reached: tuple[int, ...] = (1, 2, 4, 7, 12, 24, 50, 100, 200)
     """Windows that the sizes tried reach."""
+    below: tuple[float, ...] = (0.7, 0.5, 0.35, 0.25, 0.15, 0.1)
+    """Then shares of what the least driven window asks for: a joint that carries a load always asks for some torque."""
     harm: float = 1.5
     """Rise of log(1 + power / s), summed, by each of two sizes from which on no more are tried."""
     enough_windows: int = 12
@@ -167,12 +169,34 @@ class GainGrid:
     """Factor by which a kp is wrong that counts as far off."""
     wrong_servos: float = 0.5
     """Share of servos that must be: else one effect may have carried the residuals away."""
+    decided_after: int = 2
+    """Sweeps after which too few servos that are nearly so wrong end the search."""
+    nearly_wrong: float = 1.5
+    """Factor on kp that counts as nearly wrong then."""
+    nearly: float = 0.5
+    """Share of `wrong_servos` that must be nearly wrong then."""
     step: float = 0.1
     """Share of a value that matters: at a hundredth of the declared gain a tenth of that is no small change."""
-    single: tuple[float, ...] = (0.5, 0.2, 0.1, 0.03, 0.01, 2.0, 5.0)
-    """Factors on one servo's gains that are tried in a large-residual regime: a saturated servo has no slope."""
-    single_share: float = 0.9
-    """Share of the cost that such a factor must leave less of."""
+
+
+@dataclass(frozen=True)
+class DriveGrid:
+    """Of one drive's strength, gain or torque limit by factors, in a large-residual regime."""
+
+    factors: tuple[float, ...] = (0.01, 0.03, 0.1, 0.2, 0.5, 2.0, 5.0)
+    """Factors on strength and gain that are tried."""
+    limits: tuple[float, ...] = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1, 0.2, 0.4, 0.7)
+    """Limits that are tried, as shares of the largest torque that was asked for."""
+    weak: float = 0.5
+    """Factor from which on a drive is weak enough for a limit to be tried in its place."""
+    share: float = 0.9
+    """Share of the cost that a factor must leave less of."""
+    windows: int = 30
+    """Windows that all drives are tried on."""
+    most: int = 4
+    """Parameters that are tried on all windows then."""
+    halvings: int = 4
+    """Of the way to the neighbouring factors, to a limit's own size: a coarse one errs by more than the limit does."""
 
 
 @dataclass(frozen=True)
@@ -380,6 +404,7 @@ class ProposalThresholds:
     joint_elasticity: JointElasticity = field(default_factory=JointElasticity)
     setpoints: SetPoints = field(default_factory=SetPoints)
     gain_grid: GainGrid = field(default_factory=GainGrid)
+    drive_grid: DriveGrid = field(default_factory=DriveGrid)
     all_joints: AllJoints = field(default_factory=AllJoints)
     packet_loss: PacketLoss = field(default_factory=PacketLoss)
     stribeck: Stribeck = field(default_factory=Stribeck)

@@ -23,6 +23,8 @@ class Forward:
     """Effects after which a model that is still far off is taken to lack many."""
     many_at_once: float = 300.0
     """Median chi-square by value, from which on one effect is enough for that."""
+    whiten_anew: float = 0.1
+    """Share of the median chi-square left, below which windows are whitened anew before many are fitted together."""
     many_little: float = 0.5
     """Share of the reduced chi-square that the last of them took at most."""
     many_patience: int = 2

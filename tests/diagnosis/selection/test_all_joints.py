@@ -1,6 +1,7 @@
 """Parameters that are wrong on all joints at once are found together and by name."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -98,14 +99,10 @@ def test_an_effect_taken_out_by_slopes_leaves_what_a_refit_in_the_simulator_leav
     assert moved_without(problem, full, weights, three).cost == pytest.approx(declared.cost, rel=0.05)
 
 
-@pytest.mark.parametrize(("power", "begins"), [(100.0, False), (400.0, True)])
-def test_one_effect_is_enough_to_begin_where_residuals_are_hundreds_of_times_the_noise(
-    monkeypatch: pytest.MonkeyPatch, power: float, begins: bool
-) -> None:
-    tried: list[float] = []
-    monkeypatch.setattr(all_joints, "fit_all_joints", lambda *_: tried.append(power))
+def _run_with_one_effect(power: float, whitened_at: float) -> Any:
+    """A search that has found one effect and is `power` off; its windows were whitened where that was `whitened_at`."""
     thresholds = Thresholds()
-    run = SimpleNamespace(
+    return SimpleNamespace(
         tried_many=False,
         given=0,
         fall=0.9,
@@ -113,9 +110,33 @@ def test_one_effect_is_enough_to_begin_where_residuals_are_hundreds_of_times_the
         rule=thresholds.selection.forward,
         config=SearchConfig(),
         problem=SimpleNamespace(thresholds=thresholds),
+        holdout=None,
         candidates=[],
-        say=None,
+        say=lambda text: None,
         power=lambda: power,
+        whitened_at=whitened_at,
     )
-    assert not all_joints.start_with_all_joints(run)  # nothing came of it
+
+
+@pytest.mark.parametrize(("power", "begins"), [(100.0, False), (400.0, True)])
+def test_one_effect_is_enough_to_begin_where_residuals_are_hundreds_of_times_the_noise(
+    monkeypatch: pytest.MonkeyPatch, power: float, begins: bool
+) -> None:
+    tried: list[float] = []
+    monkeypatch.setattr(all_joints, "fit_all_joints", lambda *_: tried.append(power))
+    assert not all_joints.start_with_all_joints(_run_with_one_effect(power, power))  # nothing came of it
     assert bool(tried) is begins
+
+
+@pytest.mark.parametrize(("left", "begins"), [(0.9, False), (350.0, True)])
+def test_windows_that_were_whitened_far_from_here_are_whitened_anew_first(
+    monkeypatch: pytest.MonkeyPatch, left: float, begins: bool
+) -> None:
+    tried: list[float] = []
+    monkeypatch.setattr(all_joints, "fit_all_joints", lambda *_: tried.append(left))
+    monkeypatch.setattr(all_joints, "whitened_anew", lambda *_: (None, None, None))
+    monkeypatch.setattr(all_joints, "_start_anew", lambda run, *_: setattr(run, "power", lambda: left))
+    run = _run_with_one_effect(400.0, 5000.0)
+    assert not all_joints.start_with_all_joints(run)
+    assert bool(tried) is begins
+    assert run.tried_many is begins

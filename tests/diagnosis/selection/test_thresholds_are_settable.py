@@ -13,8 +13,8 @@ from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.prepare import gather
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem
 from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
+from bumblebee.diagnosis.selection.proposals.drive_grid import drive_trials
 from bumblebee.diagnosis.selection.proposals.encoder_resolution import grids
-from bumblebee.diagnosis.selection.proposals.gain_grid import gain_trials
 from bumblebee.diagnosis.selection.proposals.joint_elasticity import is_of_series, series
 from bumblebee.diagnosis.selection.proposals.joint_misfit import odd_joints
 from bumblebee.diagnosis.selection.proposals.packet_loss import loss_likelihoods
@@ -23,8 +23,8 @@ from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.diagnosis.thresholds.proposals import (
     Backlash,
+    DriveGrid,
     EncoderResolution,
-    GainGrid,
     JointElasticity,
     JointMisfit,
     PacketLoss,
@@ -93,9 +93,9 @@ def test_gains_are_tried_at_the_factors_that_are_set(session: Session) -> None:
     candidates = [c for c in all_candidates(session.plant, session.rollouts, []) if c.where == "j2"]
     found = {}
     for factors in ((0.6,), (1.7,)):
-        problem = _problem(session, ProposalThresholds(gain_grid=GainGrid(single=factors)))
+        problem = _problem(session, ProposalThresholds(drive_grid=DriveGrid(factors=factors, halvings=0)))
         fit, weights = gauss_newton(problem, (), (), np.ones(WINDOWS)), np.ones(WINDOWS)
-        found[factors] = [float(t.values[0]) for t in gain_trials(problem, fit, candidates, weights, 0.0)]
+        found[factors] = [float(t.values[0]) for t in drive_trials(problem, fit, candidates, weights, 0.0)]
     assert found[0.6,] and set(found[0.6,]) == {0.6}
     assert found[1.7,] == []
 

@@ -65,7 +65,7 @@ def test_a_geared_motor_that_does_not_cog_lacks_nothing() -> None:
 def test_the_highest_peak_of_the_joint_that_cogs_is_there_and_no_other_joint_has_one(periods: float) -> None:
     run = begun(arm.XML, simulate({("cogging", "j1"): (0.3, 0.2, periods)}, seed=5), {})
     like = {c.where: c for c in run.candidates if c.effect == KIND}
-    (best, steps), *_ = promising(run, like["j1"])
+    (best, steps, _), *_ = promising(run, like["j1"])
     assert best.step[2] == pytest.approx(periods, abs=0.5)
     assert steps * best.step[:2] == pytest.approx([0.3, 0.2], rel=0.3)
     assert promising(run, like["j2"]) == []

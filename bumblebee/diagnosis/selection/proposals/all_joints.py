@@ -200,20 +200,30 @@ def start_with_all_joints(run: SearchState) -> bool:
         return False
     if run.fall >= run.rule.many_little and power < run.config.far:
         return False
+    if run.power() < run.rule.whiten_anew * run.whitened_at:
+        _start_anew(run, *whitened_anew(run.problem, run.holdout, run.fit))
+        run.say(f"whitened anew around what was found: chi-square {run.power():.3g}")
+        if run.power() < run.config.many:
+            return False
     run.tried_many = True
     fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
     rule = run.problem.thresholds.comparison.together
     if fit is None or not compare(run.problem, run.holdout, run.fit, fit).passes(rule):
         return False
-    run.problem, run.holdout, fit = whitened_anew(run.problem, run.holdout, fit)
-    run.keep = screening_windows(run.problem, run.config.screen_windows)
-    weights = window_weights(fit.clean(run.problem))
-    z = certainty(run.problem, fit, weights)
-    run.steps = [evidence(c, float(least), len(run.candidates)) for c, least in zip(fit.chosen, z, strict=True)]
-    run.say(f"begun anew with {len(fit.chosen)} effects together: chi-square {fit.power(run.problem):.3g}")
+    _start_anew(run, *whitened_anew(run.problem, run.holdout, fit))
+    z = certainty(run.problem, run.fit, run.weights)
+    run.steps = [evidence(c, float(least), len(run.candidates)) for c, least in zip(run.fit.chosen, z, strict=True)]
+    run.say(f"begun anew with {len(run.fit.chosen)} effects together: chi-square {run.power():.3g}")
+    run.given, run.patience = len(run.fit.chosen), min(run.patience, run.rule.many_patience)
+    return True
+
+
+def _start_anew(run: SearchState, problem: Problem, holdout: Holdout, fit: Fit) -> None:
+    """Go on from a fit to windows that were whitened around it; what was tried in vain before may be tried again."""
+    run.problem, run.holdout, run.fit = problem, holdout, fit
+    run.keep = screening_windows(problem, run.config.screen_windows)
+    run.weights = window_weights(fit.clean(problem))
+    run.whitened_at = run.power()
     run.closed.clear()
     run.hopeless.clear()
-    run.given, run.patience = len(fit.chosen), min(run.patience, run.rule.many_patience)
-    run.weights, run.fit = weights, fit
     run.rescreen()
-    return True

@@ -20,11 +20,9 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, effects_at
 from bumblebee.diagnosis.comparison import compare, evidence, wald
-from bumblebee.diagnosis.estimation import Fit, LeftOver, gauss_newton, typical_power
+from bumblebee.diagnosis.estimation import gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
-from bumblebee.diagnosis.selection.profile import Profile
 from bumblebee.diagnosis.selection.state import SearchState
-from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.diagnosis.simulation import Windows, choose_starts, cut, residuals, vary
 from bumblebee.diagnosis.thresholds.proposals import GainGrid
 from bumblebee.sim.effects import Effect, single
@@ -79,8 +77,10 @@ def gains_by_grid(problem: Problem, candidates: Sequence[Candidate]) -> list[tup
     rule = course.rule
     declared: list[Servo] = [(1.0, 1.0, table["coulomb_friction", where].nominal[0]) for where in names]
     servos = _shared(course, declared)
-    for factors in rule.sweeps:
+    for number, factors in enumerate(rule.sweeps, start=1):
         servos = _swept(course, servos, factors)
+        if number == rule.decided_after and _share_wrong(servos, rule.nearly_wrong) < rule.nearly * rule.wrong_servos:
+            return []
     before, after = course.scores([declared, servos]).mean(axis=1)
     if before - after < rule.least_fall or not _mostly_wrong(servos, rule):
         return []
@@ -98,8 +98,12 @@ def _mostly_wrong(servos: Sequence[Servo], rule: GainGrid) -> bool:
 
     Else one effect may have carried the residuals that far away, and the search finds it better alone.
     """
-    wrong = [abs(np.log(max(kp, rule.least_factor))) >= np.log(rule.wrong_factor) for kp, _, _ in servos]
-    return float(np.mean(wrong)) >= rule.wrong_servos
+    return _share_wrong(servos, rule.wrong_factor) >= rule.wrong_servos
+
+
+def _share_wrong(servos: Sequence[Servo], factor: float) -> float:
+    """Share of the servos whose kp is wrong by a factor or more."""
+    return float(np.mean([abs(np.log(max(kp, 1e-12))) >= np.log(factor) for kp, _, _ in servos]))
 
 
 def _course(problem: Problem, names: tuple[str, ...]) -> _Course | None:
@@ -171,30 +175,3 @@ def start_with_gain_grid(run: SearchState) -> bool:
     run.renew(fit)
     run.given = len(fit.chosen)
     return True
-
-
-def gain_trials(
-    problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, large_residual: float
-) -> list[Trial]:
-    """Servo gains by factors far from one, where residuals are so large that slopes say nothing.
-
-    That is from the median chi-square `large_residual` on. A saturated servo has no slope in its gain: only trying
-    tells.
-    """
-    power = float(np.median((fit.residual**2).mean(axis=1)))
-    if power < large_residual:
-        return []
-    rule = problem.thresholds.selection.proposals.gain_grid
-    chosen = {(c.effect, c.where) for c in fit.chosen}
-    kinds = [c for c in candidates if c.effect in ("motor_strength", "kp") and (c.effect, c.where) not in chosen]
-    left_over = LeftOver(problem, fit, weights)
-    start = left_over.cost(fit.residual)
-    declared = problem.residual([fit.effects], coarse=True)[0]
-    found = []
-    for c in kinds:
-        moved = problem.residual([[*fit.effects, c.at([f])] for f in rule.single], coarse=True)
-        series = Profile(rule.single, [-left_over.cost(fit.residual - (declared - m)) for m in moved])
-        if -series.gain < rule.single_share * start:
-            change = left_over.left(declared - moved[series.best])
-            found.append(Trial(c, np.array([series.size]), -series.gain, change))
-    return found

@@ -33,10 +33,10 @@ from bumblebee.diagnosis.thresholds.proposals import TorqueRipple
 KIND = "cogging"
 
 
-def ripple_trials(run: SearchState) -> list[Trial]:
+def ripple_trials(run: SearchState, tried: Sequence[Trial] = ()) -> list[Trial]:
     """The ripple that explains most on each of the joints that lack most torque; none where none is beyond chance.
 
-    Each joint is asked once, and again when something was found on it.
+    Each joint is asked once, and again when something was found on it. What is faint beside what was `tried` waits.
     """
     rule = run.problem.thresholds.selection.proposals.torque_ripple
     open_ = {c.where: c for c in run.candidates if c.effect == KIND and not is_chosen(c, run.fit.chosen)}
@@ -45,18 +45,24 @@ def ripple_trials(run: SearchState) -> list[Trial]:
         return []
     left, joints = run.small_fit().clean(run.small), len(run.problem.plant.joints)
     poor = [where for where in restless(run.small, run.answers.white, left, joints) if where in open_]
+    best_so_far = run.fit.cost - min((t.cost for t in tried), default=run.fit.cost)
+    faint = run.rule.faint * best_so_far * len(run.keep) / len(run.problem.windows)
     found = []
     for like in (open_[where] for where in poor[: rule.joints]):
+        peaks = promising(run, like)
+        clear = [(candidate, steps) for candidate, steps, gain in peaks if gain >= faint]
+        if peaks and not clear:
+            continue
         run.hopeless.add((KIND, like.where))
-        trials = [_tried(run, candidate, steps) for candidate, steps in promising(run, like)]
+        trials = [_tried(run, candidate, steps) for candidate, steps in clear]
         best = min((t for t in trials if t is not None), key=lambda t: t.cost, default=None)
         if best is not None and best.cost < run.fit.cost - run.bound**2 / 2:
             found.append(best)
     return found
 
 
-def promising(run: SearchState, like: Candidate) -> list[tuple[Candidate, np.ndarray]]:
-    """The highest peaks of a joint's periodogram that noise does not make, and the steps (2,) that they suggest.
+def promising(run: SearchState, like: Candidate) -> list[tuple[Candidate, np.ndarray, float]]:
+    """The highest peaks of a joint's periodogram that noise does not make, steps (2,) and gains that they suggest.
 
     Args:
         run: the search, whose screening windows are asked.
@@ -71,7 +77,7 @@ def promising(run: SearchState, like: Candidate) -> list[tuple[Candidate, np.nda
     least = power * chi2.isf(run.config.level / count, len(like.free))
     around = np.concatenate(([-np.inf], gain, [-np.inf]))
     peaks = np.flatnonzero((gain >= around[:-2]) & (gain >= around[2:]) & (gain > least))
-    return [(every[k], steps[k]) for k in peaks[np.argsort(-gain[peaks])][: rule.tried]]
+    return [(every[k], steps[k], float(gain[k])) for k in peaks[np.argsort(-gain[peaks])][: rule.tried]]
 
 
 def _tried(run: SearchState, candidate: Candidate, steps: np.ndarray) -> Trial | None:
