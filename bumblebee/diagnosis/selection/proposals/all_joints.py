@@ -190,9 +190,10 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
 
 
 def start_with_all_joints(run: SearchState) -> bool:
-    """Begin anew with the usual effects of all joints, where some effects leave large residuals.
+    """Begin anew with the usual effects of all joints, where some effects leave large residuals; whether it did.
 
-    Only if the last of these explained little, or they are very large: else the next may explain the rest.
+    Only if the last of these explained little, or they are very large: else the next may explain the rest. Where the
+    windows were whitened far from here they are whitened anew first, and that may be all there is to it.
     """
     power = run.power()
     enough = 1 if power >= run.rule.many_at_once else run.rule.many_after
@@ -204,7 +205,7 @@ def start_with_all_joints(run: SearchState) -> bool:
         _start_anew(run, *whitened_anew(run.problem, run.holdout, run.fit))
         run.say(f"whitened anew around what was found: chi-square {run.power():.3g}")
         if run.power() < run.config.many:
-            return False
+            return True
     run.tried_many = True
     fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
     rule = run.problem.thresholds.comparison.together
