@@ -127,8 +127,9 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         if not run.given:
             tried = attempt("drives far from the declared ones", partial(_drives, run), list)
             tried = [t for t in tried if t.candidate not in run.closed]
-        if not tried:
-            tried, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
+        if all(t.candidate.effect in SATURATIONS for t in tried):  # a limit alone does not say that slopes are none
+            more, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
+            tried += more
         many = not _explains_much(tried, run)
         if many and attempt("the usual effects of all joints", partial(start_with_all_joints, run), _no):
             continue
