@@ -93,7 +93,9 @@ def test_gains_are_tried_at_the_factors_that_are_set(session: Session) -> None:
     candidates = [c for c in all_candidates(session.plant, session.rollouts, []) if c.where == "j2"]
     found = {}
     for factors in ((0.6,), (1.7,)):
-        problem = _problem(session, ProposalThresholds(drive_grid=DriveGrid(factors=factors, limits=(2.0,), halvings=0)))
+        problem = _problem(
+            session, ProposalThresholds(drive_grid=DriveGrid(factors=factors, limits=(2.0,), halvings=0))
+        )
         fit, weights = gauss_newton(problem, (), (), np.ones(WINDOWS)), np.ones(WINDOWS)
         found[factors] = [float(t.values[0]) for t in drive_trials(problem, fit, candidates, weights, 0.0)]
     assert found[0.6,] and set(found[0.6,]) == {0.6}

@@ -76,3 +76,12 @@ def test_a_joint_is_asked_once_and_one_that_is_not_off_never() -> None:
     assert [t.candidate.where for t in ripple_trials(run)] == ["j1"]
     assert ripple_trials(run) == []
     assert ripple_trials(begun(arm.XML, simulate({}, seed=5), {})) == []
+
+
+def test_a_ripple_that_is_faint_beside_what_was_tried_waits() -> None:
+    run = begun(arm.XML, simulate({("cogging", "j1"): (0.3, 0.2, 151.3)}, seed=5), {})
+    (trial,) = ripple_trials(run)
+    run.hopeless.clear()
+    much = replace(trial, cost=run.fit.cost - 100.0 * (run.fit.cost - trial.cost))
+    assert ripple_trials(run, [much]) == [] and not run.hopeless
+    assert [t.candidate.where for t in ripple_trials(run, [trial])] == ["j1"]
