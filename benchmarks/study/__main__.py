@@ -8,6 +8,7 @@ import torch
 
 import benchmarks.study
 from benchmarks.study.curves import draw
+from benchmarks.study.generalist_tables import generalist_tables
 from benchmarks.study.jobs import Job
 from benchmarks.study.motions import Motions, prepare, read_motions
 from benchmarks.study.parts import PARTS
@@ -106,7 +107,10 @@ def run_table(options: argparse.Namespace) -> None:
     study, motions = study_of(options), read_motions(options.motions)
     stamp = freeze(options.run, study, motions=motions.hash)
     study = of_seeds(study, options.seeds)
-    text = PARTS[options.part].tables(options.run, study, motions)
+    tables = PARTS[options.part].tables
+    if options.arms and tables is not generalist_tables:
+        raise BadInput("--arms", "the part generalist", options.part)
+    text = tables(options.run, study, motions, options.arms) if options.arms else tables(options.run, study, motions)
     options.out.write_text(f"<!-- study {stamp}, motions {motions.hash} -->\n\n{text}")
     print(text, end="")
     if options.curves:
@@ -143,6 +147,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     table.add_argument("part", choices=PARTS)
     table.add_argument("run", type=Path)
     table.add_argument("--out", type=Path, required=True, help="Markdown file")
+    table.add_argument("--arms", nargs="+", metavar="ARM", help="of the part generalist, where not all were run")
     table.add_argument("--curves", type=Path, help="also draw the learning curves into this .svg")
     table.set_defaults(work=run_table)
     for part in (own, table):

@@ -102,6 +102,12 @@ def test_the_tables_pair_each_generalist_with_the_expert_of_the_motions_cluster(
     assert "| transformer, of the experts | trained | 4 | 0.50" in text
     assert "| transformer, of the experts | 1.500 |" in text
     assert text.count("### ") == 3
+    (tmp_path / "s0-mlp" / TRIALS).unlink()
+    some = generalist_tables(tmp_path, SMALL, motions, ["transformer", "experts"])
+    assert "| transformer, of the experts less experts, each on its cluster | trained |" in some
+    assert "base policy" not in some and "MLP" not in some
+    with pytest.raises(BadInput, match=r"--arms: expected some of base, .*, came one more"):
+        generalist_tables(tmp_path, SMALL, motions, ["experts", "one more"])
 
 
 @pytest.mark.slow
