@@ -4,7 +4,7 @@
 
 A policy (the shipped one, or `--policy`) is recorded on each robot, with sensor noise and an odometry that drifts. Of
 its motions every other one is learnt from, the rest judge, as the pipeline's gate does. A line of JSON a robot; robots
-that stand in the file are not run again. Processors alone, seconds for recording and half a minute to two for a fit.
+that stand in the file are not run again. Processors alone, seconds for recording and minutes for a fit.
 """
 
 import argparse

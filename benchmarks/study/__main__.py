@@ -2,6 +2,7 @@
 
 import argparse
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import torch
@@ -104,13 +105,13 @@ def run_prepare(options: argparse.Namespace) -> None:
 
 def run_table(options: argparse.Namespace) -> None:
     """Write the tables of a finished run."""
+    if options.arms and options.part != "generalist":
+        raise BadInput("--arms", "the part generalist", options.part)
     study, motions = study_of(options), read_motions(options.motions)
     stamp = freeze(options.run, study, motions=motions.hash)
     study = of_seeds(study, options.seeds)
-    tables = PARTS[options.part].tables
-    if options.arms and tables is not generalist_tables:
-        raise BadInput("--arms", "the part generalist", options.part)
-    text = tables(options.run, study, motions, options.arms) if options.arms else tables(options.run, study, motions)
+    tables = partial(generalist_tables, arms=options.arms) if options.arms else PARTS[options.part].tables
+    text = tables(options.run, study, motions)
     options.out.write_text(f"<!-- study {stamp}, motions {motions.hash} -->\n\n{text}")
     print(text, end="")
     if options.curves:

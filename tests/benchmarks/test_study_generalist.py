@@ -110,6 +110,24 @@ def test_the_tables_pair_each_generalist_with_the_expert_of_the_motions_cluster(
         generalist_tables(tmp_path, SMALL, motions, ["experts", "one more"])
 
 
+def test_arms_are_the_generalists_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    own = [
+        "table",
+        "experts",
+        str(tmp_path),
+        "--arms",
+        "one",
+        "--motions",
+        str(tmp_path),
+        "--out",
+        str(tmp_path / "x.md"),
+    ]
+    with pytest.raises(SystemExit):
+        main(own)
+    assert capsys.readouterr().out.startswith("--arms: expected the part generalist, came experts")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.slow
 def test_the_part_runs_to_its_tables(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shared = ["--motions", str(folder), "--small"]
