@@ -21,6 +21,8 @@ class Saturation:
     """Of that, what is enough where changes of an earlier fit were taken for this one's, and for trying further."""
     reached: tuple[int, ...] = (1, 2, 4, 7, 12, 24, 50, 100, 200)
     """Windows that the sizes tried reach."""
+    below: tuple[float, ...] = (0.7, 0.5, 0.35, 0.25, 0.15, 0.1)
+    """Then shares of what the least driven window asks for: a joint that carries a load always asks for some torque."""
     harm: float = 1.5
     """Rise of log(1 + power / s), summed, by each of two sizes from which on no more are tried."""
     enough_windows: int = 12

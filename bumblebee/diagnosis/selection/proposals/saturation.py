@@ -3,7 +3,8 @@
 A limit acts in few windows: there it decides everything, elsewhere nothing. It has no slope where it does not reach,
 the windows that it spoils weigh little in a fit, and they are too few for a variance between windows to call them
 significant. So every limit is simulated at sizes that reach the hardest driven window, the next one, and so on, in fine
-steps, for a servo that hits its limit a coarse step late errs by more than the limit does. Its gain is the fall of the
+steps, for a servo that hits its limit a coarse step late errs by more than the limit does. Where the joint always
+carries a load, torque limits below what any window asks for follow. Its gain is the fall of the
 fit's robust cost, 2 s M log(1 + power / s) summed over windows with s their median power, of which
 `problem.window_weights` are the weights.
 """
@@ -166,13 +167,15 @@ def _sought(limit: _Limit, fresh: bool = False) -> tuple[float, float] | None:
     if not counts:
         return None
     sizes = [float(0.5 * (felt[n - 1] + felt[n])) for n in counts]
+    if limit.candidate.effect == "torque_limit":
+        sizes += [float(share * felt[-1]) for share in rule.below if felt[-1] < 0]
 
     def harmful(gains: Sequence[float]) -> bool:
         return len(gains) > 1 and max(gains[-2:]) < -2.0 * limit.usual * limit.clean.shape[1] * rule.harm
 
     def ends(gains: Sequence[float]) -> bool:
         """Smaller limits would spoil these windows further, and others."""
-        enough = counts[len(gains) - 1] >= rule.enough_windows
+        enough = counts[min(len(gains), len(counts)) - 1] >= rule.enough_windows
         return harmful(gains) or (enough and max(gains) < rule.earlier_share * rule.promising_share * cost)
 
     series = profile(lambda sizes: [gain(s) for s in sizes], sizes, ends)
