@@ -3,7 +3,7 @@
 from bumblebee.diagnosis.estimation.covariance import expected_covariance, interval, standard_covariance
 from bumblebee.diagnosis.estimation.fit import Fit, typical_power
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton, resolved
-from bumblebee.diagnosis.estimation.integrator_error import beyond_numerics, moves
+from bumblebee.diagnosis.estimation.integrator_error import beyond_numerics, explained_share, moves
 from bumblebee.diagnosis.estimation.jacobian import columns_at
 from bumblebee.diagnosis.estimation.least_squares import LeftOver, cost_of, project, solve
 from bumblebee.diagnosis.estimation.response_surface import last_step
@@ -15,6 +15,7 @@ __all__ = [
     "columns_at",
     "cost_of",
     "expected_covariance",
+    "explained_share",
     "gauss_newton",
     "interval",
     "last_step",

@@ -1,6 +1,6 @@
 """Effects that these data cannot tell apart, what would separate them, and the smallest that they could have shown."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from bumblebee.diagnosis.comparison import Holdout, compare, linearly_without
 from bumblebee.diagnosis.estimation import Fit, gauss_newton, project, solve
 from bumblebee.diagnosis.selection.forward import Search
 from bumblebee.diagnosis.selection.score_tests import score_tests
+from bumblebee.diagnosis.selection.told_apart import told_apart
 from bumblebee.diagnosis.selection.trial import Trial, try_one
 from bumblebee.diagnosis.sensitivities import Columns
 from bumblebee.diagnosis.simulation import unit_on
@@ -68,34 +69,56 @@ def _keys(problem: Any) -> np.ndarray:
 
 
 def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, float]]]) -> list[list[Candidate]]:
-    """For each chosen effect those that fit the held-out windows no worse in its place.
+    """For each chosen effect those that these data cannot tell from it.
 
-    Sensitivities that agree (> 0.95) are the same to these data. Of the next of kin the nearest are put in the effect's
-    place in the simulator; one stays a rival unless it is worse by two standard errors on the windows held out from the
-    fit (on the fitted ones where nothing is held out), or fits the fitted ones better. Not simulated are those that by
-    their slopes are worse by six on the windows of the screening.
+    Sensitivities that agree (> 0.95) are the same, unless the effect is so plain that a refit tells them apart
+    (`told_apart`). Of the next of kin the nearest are put in the effect's place in the simulator; one stays a rival
+    unless it is worse by two standard errors on the windows held out from the fit (on the fitted ones where nothing is
+    held out), or fits the fitted ones better. Not simulated are those that by their slopes on the windows of the
+    screening are worse by six, or no worse where the sensitivities agree.
     """
     fit, problem = found.fit, found.problem
     rule, judge = problem.thresholds.selection.confounding, problem.thresholds.comparison.no_worse_within_errors
-    most = min(rule.rivals, max(1, rule.all_rivals // max(1, len(fit.chosen))))
+    count = max(1, len(fit.chosen))
+    most = min(rule.rivals, max(1, rule.all_rivals // count))
+    most_same = min(rule.told_apart.rivals, max(1, rule.told_apart.all_rivals // count))
     out = []
     for i, kin in enumerate(ranked):
         same = [c for c, share in kin if share > rule.same]
         rest = linearly_without(fit, fit.chosen[i])
-        near = [c for c, share in kin if rule.kin < share <= rule.same and not is_chosen(c, rest.chosen)][:most]
-        for rival in near:
-            steps = _direction(found, rival, rest)
-            if steps is None:
+        free = [(c, share) for c, share in kin if share > rule.kin and not is_chosen(c, rest.chosen)]
+        slopes = [_by_slopes(found, c, rest) for c, share in free if share > rule.same]
+        differ = [own for own in reversed(slopes) if own.worse > rule.told_apart.chi_square][:most_same]
+        for own in differ:
+            trial = try_one(problem, rest, own.rival, own.steps, found.weights)
+            if trial is not None and told_apart(problem, holdout, fit, rest, trial, found.weights):
+                same.remove(own.rival)
+        for rival in [c for c, share in free if share <= rule.same][:most]:
+            own = _by_slopes(found, rival, rest)
+            if own.hopeless:
                 continue
-            trial = try_one(problem, rest, rival, steps, found.weights)
+            trial = try_one(problem, rest, rival, own.steps, found.weights)
             if trial is not None and compare(problem, holdout, fit, _in_place(found, rest, trial)).passes(judge):
                 same.append(rival)
         out.append(same)
     return out
 
 
-def _direction(found: Search, rival: Candidate, rest: Fit) -> np.ndarray | None:
-    """The steps (F,) that the screened windows suggest for a rival beside `rest`; None where it is far worse there."""
+@dataclass(frozen=True, eq=False)
+class _Slopes:
+    """What the screened windows' sensitivities suggest of a rival in an effect's place."""
+
+    rival: Candidate
+    steps: np.ndarray
+    """(F,) at which it fits best."""
+    worse: float
+    """Chi-square on all fitted windows by which it fits worse than the effect."""
+    hopeless: bool
+    """Whether it is far worse from window to window."""
+
+
+def _by_slopes(found: Search, rival: Candidate, rest: Fit) -> _Slopes:
+    """A rival beside `rest`, linearly."""
     rule = found.problem.thresholds.selection.confounding
     small, keep = found.screened, np.isin(_keys(found.problem), _keys(found.screened))
     weights = found.weights[keep]
@@ -105,9 +128,9 @@ def _direction(found: Search, rival: Candidate, rest: Fit) -> np.ndarray | None:
     swapped = beside.residual - np.tensordot(solve(basis, inverse, beside.residual, weights), basis, axes=1)
     ours = found.fit.clean(found.problem)[keep]
     loss = np.log1p((swapped**2).mean(axis=1)) - np.log1p((ours**2).mean(axis=1))
-    if len(loss) > rule.enough and loss.mean() > rule.far_worse * loss.std(ddof=1) / np.sqrt(len(loss)):
-        return None
-    return score_tests(small, columns, beside, weights).steps[0]
+    worse = float((weights[:, None] * (swapped**2 - ours**2)).sum()) * len(keep) / max(keep.sum(), 1)
+    sure = rule.far_worse * loss.std(ddof=1) / np.sqrt(len(loss)) if len(loss) > rule.enough else np.inf
+    return _Slopes(rival, score_tests(small, columns, beside, weights).steps[0], worse, bool(loss.mean() > sure))
 
 
 def _in_place(found: Search, rest: Fit, trial: Trial) -> Fit:

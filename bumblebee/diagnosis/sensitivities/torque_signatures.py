@@ -128,19 +128,22 @@ class Signatures:
         """Delayed and lost commands of one joint, alone or with the others."""
         effect = c.at(np.array(c.nominal) + np.array(c.step))
         if c.effect in ("command_delay", "dropped_commands", *SETPOINTS):
-            return self.servos.gain[..., j] * (self._moved_control(effect)[..., j] - self.u[..., j])
+            return self.servos.gain[..., j] * (self._moved_control(effect) - self._moved_control())[..., j]
         raise ValueError(_NO_SIGNATURE.format(c.effect))
 
-    def _moved_control(self, effect: Effect) -> np.ndarray:
-        """Controls (W, K, J) with delayed or lost commands on all joints, or with the effect's own set-points."""
-        kind, value = effect.effect, effect.value()
+    def _moved_control(self, effect: Effect | None = None) -> np.ndarray:
+        """Controls (W, K, J) with delayed or lost commands on all joints, or with the effect's own set-points.
+
+        Without an effect those of the declared robot: the model's own may be late already by an effect that was found.
+        """
+        kind, value = (effect.effect, effect.value()) if effect else ("declared", 0.0)
         key = (kind, round(1e9 * value))
-        shaped = setpoints_of(self.plant, [effect])
+        shaped = setpoints_of(self.plant, [effect]) if effect else ()
         if key not in self._inverse or shaped:
             delay, dropped = self.plant.delay, None
             if kind == "dropped_commands":
                 dropped = np.full(self.plant.model.nu, value)
-            elif not shaped:
+            elif kind == "command_delay":
                 delay = np.full(self.plant.model.nu, value)
             moved = Variation(self.plant.model, delay, self.plant.offset, setpoints=shaped, dropped=dropped)
             control = inputs_of(self.windows, moved, self.path.step, self.path.control.shape[1], {})

@@ -177,9 +177,9 @@ class Choice:
     enough: float = 100.0
     """Chi-square that tells two effects apart in practice, ten standard errors: the diagnosis asks for about six, on
     validation windows, which are a part of the data."""
-    cosine: float = 0.94
-    """Cosine between what is there and the best that a rival can do, below which two effects count as told apart too:
-    the diagnosis calls effects equivalent whose sensitivities agree to 0.95, however much is left in chi-square."""
+    cosine: float = 0.99
+    """Cosine between what is there and the best that a rival can do, below which two effects count as told apart:
+    what is left of nearer ones may be what an integrator makes of them, as with viscous friction and kd at one gain."""
     classes: float = 1.0
     """Weight of a class of effects that the data cannot tell apart; a class that is told apart counts as 1."""
     intervals: float = 0.3

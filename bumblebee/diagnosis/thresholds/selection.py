@@ -124,11 +124,31 @@ class SimulationError:
 
 
 @dataclass(frozen=True)
+class ToldApart:
+    """Of effects whose sensitivities are nearly the same, and which plain data tell apart all the same."""
+
+    chi_square: float = 25.0
+    """By which a rival must be worse on fitted and validation windows together, and by slopes: five standard errors."""
+    z: float = 3.0
+    """Standard errors over windows by which it must be worse."""
+    numerics: float = 0.25
+    """Share of what sets them apart that another integrator may make: up to 0.1 where effects differ, 0.7 and more
+    where they are one."""
+    iterations: int = 3
+    """Gauss-Newton's steps at most for the rival."""
+    rivals: int = 6
+    """Rivals tried in an effect's place, those whose sensitivities differ most first."""
+    all_rivals: int = 24
+    """Rivals tried in all effects' places together, but one each."""
+
+
+@dataclass(frozen=True)
 class Confounding:
     """Of effects that these data cannot tell apart."""
 
     same: float = 0.95
-    """Cosine of whitened sensitivities from which on two effects are the same to these data."""
+    """Cosine of whitened sensitivities from which on two effects are the same unless a refit tells them apart."""
+    told_apart: ToldApart = field(default_factory=ToldApart)
     kin: float = 0.7
     """Cosine from which on they are worth trying in each other's place."""
     rivals: int = 4
