@@ -67,3 +67,17 @@ def test_columns_beside_what_was_found_elsewhere_hardly_change(
 def test_what_is_near(made: tuple[Session, Problem], before: list[Effect], now: list[Effect], near: list[int]) -> None:
     """Everything for an effect on the whole robot, and where nothing has changed: then something else has."""
     assert screening._near(made[1].plant, before, now).tolist() == near
+
+
+@pytest.mark.parametrize("kind", ["command_filter", "dropped_commands"])
+def test_what_makes_commands_later_acts_the_same_way_where_they_are_late_already(
+    made: tuple[Session, Problem], kind: str
+) -> None:
+    session, problem = made
+    later = [c for c in all_candidates(session.plant, session.rollouts, []) if (c.effect, c.where) == (kind, "j2")][:1]
+    sizes = pulse_sizes(problem, scales_of(session.plant, session.rollouts).torque)
+    punctual, late = (
+        screen(problem, later, effects, sizes)[0].values[0].ravel().astype(float)
+        for effects in ([], [single("command_delay", "j2", 0.015)])
+    )
+    assert punctual @ late > 0.8 * np.linalg.norm(punctual) * np.linalg.norm(late)
