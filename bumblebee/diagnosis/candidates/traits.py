@@ -37,8 +37,8 @@ class Traits:
     usual: Literal["", "position", "joint", "torque", "robot", "body"] = ""
     """Whether every robot has it: every joint (`position`: only where drives are told positions, `torque`: only where
     they are told torques), the whole robot, or every link. PACE's set (Bjelonic et al. 2025: armature, damping,
-    friction, offset, delay) and the drive's strength. Of a drive that is told its torque gears rub with it, and an
-    offset shows as a centre of mass does."""
+    friction, offset, delay), the drive's strength and the servo's damping, which can be less than declared, as friction
+    cannot. Of a drive that is told its torque gears rub with it, and an offset shows as a centre of mass does."""
     not_beside: tuple[str, ...] = ()
     """Effects that a joint cannot have as well: MJCF has one spring a joint, and one second hinge. Said on one side."""
     named_first: int = 0
@@ -60,7 +60,7 @@ TRAITS: dict[str, Traits] = {
     ),
     "motor_strength": Traits("hold a known load at rest, and vary kp and kd together", usual="joint", named_first=4),
     "kp": Traits("vary kp and hold a known load"),
-    "kd": Traits("vary kd: an error of the gain grows with it, friction does not"),
+    "kd": Traits("vary kd: an error of the gain grows with it, friction does not", usual="position"),
     "torque_limit": Traits("hold a growing load", fine_steps=True, saturation=True),
     "torque_speed_limit": Traits(
         "move fast without load and slowly under load", fine_steps=True, saturation=True, inverse=True

@@ -72,7 +72,8 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
     """For each chosen effect those that these data cannot tell from it.
 
     Sensitivities that agree (> 0.95) are the same, unless the effect is so plain that a refit tells them apart
-    (`told_apart`). Of the next of kin the nearest are put in the effect's place in the simulator; one stays a rival
+    (`told_apart`), or the other would have to be what it cannot: a friction below none in the place of a servo that
+    damps too little. Of the next of kin the nearest are put in the effect's place in the simulator; one stays a rival
     unless it is worse by two standard errors on the windows held out from the fit (on the fitted ones where nothing is
     held out), or fits the fitted ones better. Not simulated are those that by their slopes on the windows of the
     screening are worse by six, or no worse where the sensitivities agree.
@@ -88,8 +89,10 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
         rest = linearly_without(fit, fit.chosen[i])
         free = [(c, share) for c, share in kin if share > rule.kin and not is_chosen(c, rest.chosen)]
         slopes = [_by_slopes(found, c, rest) for c, share in free if share > rule.same]
-        differ = [own for own in reversed(slopes) if own.worse > rule.told_apart.chi_square][:most_same]
-        for own in differ:
+        for own in [own for own in slopes if own.beyond_bounds]:
+            same.remove(own.rival)
+        differ = [own for own in slopes if not own.beyond_bounds and own.worse > rule.told_apart.chi_square]
+        for own in differ[::-1][:most_same]:
             trial = try_one(problem, rest, own.rival, own.steps, found.weights)
             if trial is not None and told_apart(problem, holdout, fit, rest, trial, found.weights):
                 same.remove(own.rival)
@@ -115,6 +118,14 @@ class _Slopes:
     """Chi-square on all fitted windows by which it fits worse than the effect."""
     hopeless: bool
     """Whether it is far worse from window to window."""
+
+    @property
+    def beyond_bounds(self) -> bool:
+        """Whether it would have to go where it cannot, so that it stays where it is absent."""
+        free, nominal = list(self.rival.free), np.array(self.rival.nominal)
+        values = nominal.copy()
+        values[free] += self.steps * np.array(self.rival.step)[free]
+        return bool((self.rival.clip(values) == self.rival.clip(nominal)).all())
 
 
 def _by_slopes(found: Search, rival: Candidate, rest: Fit) -> _Slopes:

@@ -35,6 +35,8 @@ from bumblebee.diagnosis.selection.trial import Trial, simplest
 from bumblebee.diagnosis.sensitivities import Columns
 from bumblebee.sim.effects import Effect
 
+_ALL_JOINTS = "the usual effects of all joints"
+
 
 @dataclass(eq=False)
 class Search:
@@ -118,6 +120,17 @@ def begin(
 
 
 def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
+    """Forward selection, and once more from the usual effects of all joints where it stays far from the data.
+
+    Where all servos damp too little, no single one of them brings the robot nearer.
+    """
+    _one_by_one(run, config, budget)
+    together = partial(start_with_all_joints, run, stuck=True)
+    if budget.has_time_for("all joints at once") and run.problem.plant.failures.attempt(_ALL_JOINTS, together, _no):
+        _one_by_one(run, config, budget)
+
+
+def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
     """Forward selection until nothing is worth a trial, too many in a row were in vain, or the time is over."""
     vain, judged, limits, attempt = 0, None, [], run.problem.plant.failures.attempt
     while len(run.fit.chosen) < config.most + run.given and vain < run.patience:
@@ -131,7 +144,7 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
             more, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
             tried += more
         many = not _explains_much(tried, run)
-        if many and attempt("the usual effects of all joints", partial(start_with_all_joints, run), _no):
+        if many and attempt(_ALL_JOINTS, partial(start_with_all_joints, run), _no):
             continue
         late = attempt("drives that follow their targets late", partial(setpoint_trials, run, tried), list)
         tried += [t for t in late if t.candidate not in run.closed]

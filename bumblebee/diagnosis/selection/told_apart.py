@@ -13,7 +13,7 @@ import numpy as np
 
 from bumblebee.diagnosis.comparison import Holdout, compare
 from bumblebee.diagnosis.comparison.paired_tests import logs, margin
-from bumblebee.diagnosis.estimation import Fit, explained_share, gauss_newton
+from bumblebee.diagnosis.estimation import Fit, LeftOver, explained_share, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.trial import Trial
 
@@ -30,9 +30,12 @@ def told_apart(problem: Problem, holdout: Holdout, fit: Fit, rest: Fit, trial: T
         weights: (W,) of the fitted windows.
     """
     rule = problem.thresholds.selection.confounding.told_apart
+    if trial.cost < fit.cost + rule.chi_square:
+        return False
     start = np.concatenate((rest.values, trial.values))
-    other = gauss_newton(problem, (*rest.chosen, trial.candidate), start, weights, rule.iterations, True, known=fit)
-    if other.cost < fit.cost:
+    other = gauss_newton(problem, (*rest.chosen, trial.candidate), start, weights, rule.iterations, known=fit)
+    nearest = min(other.cost, LeftOver(problem, other, weights).cost(other.residual))  # where steps would still lead
+    if nearest < fit.cost + rule.chi_square:
         return False
     against = compare(problem, holdout, fit, other)
     sides = [against.fitted, *([against.validation] if against.validation else [])]

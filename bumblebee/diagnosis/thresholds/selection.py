@@ -134,7 +134,7 @@ class ToldApart:
     numerics: float = 0.25
     """Share of what sets them apart that another integrator may make: up to 0.1 where effects differ, 0.7 and more
     where they are one."""
-    iterations: int = 3
+    iterations: int = 6
     """Gauss-Newton's steps at most for the rival."""
     rivals: int = 6
     """Rivals tried in an effect's place, those whose sensitivities differ most first."""

@@ -50,3 +50,31 @@ def test_a_repeat_stays_on_its_side() -> None:
     rollouts.append(replace(rollouts[aside], rollout_id="r99"))
     moved = informative(_session(rollouts), 0.2)
     assert (aside in moved.train) == (4 in moved.train)
+
+
+def _at(rollouts: list[Rollout], gains: list[float]) -> Session:
+    """The rollouts, as if the second joint's servo had had these times its declared damping."""
+    kp, kd = [40.0, 60.0, 30.0], [3.0, 4.0, 2.0]
+    return _session(
+        [
+            replace(r, meta=r.meta | {"kp": kp, "kd": [kd[0], g * kd[1], kd[2]]})
+            for r, g in zip(rollouts, gains, strict=True)
+        ]
+    )
+
+
+def test_a_rollout_that_alone_has_a_condition_is_fitted_and_stays_so() -> None:
+    (aside,) = _session(_four(False)).holdout
+    gains = [0.97 if i == aside else 1.0 for i in range(4)]
+    moved = informative(_at(_four(False), gains), 0.2)
+    assert aside in moved.train and aside not in moved.accept
+    assert len(moved.holdout) == 1 and "under a condition that no fitted rollout has" in moved.notes[-1]
+    # One that shows more than all takes another's place, not the condition's.
+    other = next(i for i in range(4) if i != aside)
+    both = informative(_at(_mixed(other), gains), 0.2)
+    assert {aside, other} <= set(both.train) - set(both.accept)
+
+
+def test_rollouts_keep_their_places_where_each_has_a_condition_of_its_own() -> None:
+    session = _at(_four(False), [0.96, 0.97, 0.98, 0.99])
+    assert informative(session, 0.2) is session

@@ -59,3 +59,12 @@ def test_none_is_refuted_by_an_integrator_by_little_or_by_few_windows(
     rules = replace(confounding, told_apart=replace(confounding.told_apart, **{name: value}))
     thresholds = replace(problem.thresholds, selection=replace(problem.thresholds.selection, confounding=rules))
     assert not refuted(replace(problem, thresholds=thresholds), candidates, fit, "command_filter")
+
+
+def test_a_servo_that_damps_too_little_is_no_friction_below_none() -> None:
+    """At one gain viscous friction is the servo's damping, but for its sign."""
+    rollouts = arm.simulate({}, count=4, seconds=3.0, seed=4, gains=(1.0, 0.5))
+    unaware = arm.session_of([replace(r, meta={}) for r in rollouts])
+    found = diagnose(unaware, CONFIG).document["effects"]
+    assert {(e["effect"], *e["where"]) for e in found} == {("kd", joint) for joint in arm.JOINTS}
+    assert not {o["effect"] for e in found for o in e["equivalent"]} & {"viscous_friction", "command_delay"}

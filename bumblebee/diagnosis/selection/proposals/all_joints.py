@@ -189,17 +189,17 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
     return replace(made, between=problem.between)
 
 
-def start_with_all_joints(run: SearchState) -> bool:
+def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
     """Begin anew with the usual effects of all joints, where some effects leave large residuals; whether it did.
 
     Only if the last of these explained little, or they are very large: else the next may explain the rest. Where the
-    windows were whitened far from here they are whitened anew first, and that may be all there is to it.
+    windows were whitened far from here they are whitened anew first, and that may be all there is to it. If no effect
+    helps any more (`stuck`), very large residuals are enough.
     """
     power = run.power()
     enough = 1 if power >= run.rule.many_at_once else run.rule.many_after
-    if run.tried_many or run.given or len(run.fit.chosen) < enough or power < run.config.many:
-        return False
-    if run.fall >= run.rule.many_little and power < run.config.far:
+    early = len(run.fit.chosen) < enough or (run.fall >= run.rule.many_little and power < run.config.far)
+    if run.tried_many or run.given or power < run.config.many or (power < run.config.far if stuck else early):
         return False
     if run.power() < run.rule.whiten_anew * run.whitened_at:
         _start_anew(run, *whitened_anew(run.problem, run.holdout, run.fit))
