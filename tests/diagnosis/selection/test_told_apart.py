@@ -61,10 +61,13 @@ def test_none_is_refuted_by_an_integrator_by_little_or_by_few_windows(
     assert not refuted(replace(problem, thresholds=thresholds), candidates, fit, "command_filter")
 
 
-def test_a_servo_that_damps_too_little_is_no_friction_below_none() -> None:
-    """At one gain viscous friction is the servo's damping, but for its sign."""
+def test_servos_that_all_damp_too_little_are_found_and_are_no_friction_below_none() -> None:
+    """No single one brings the arm nearer; at one gain viscous friction is a servo's damping, but for its sign."""
     rollouts = arm.simulate({}, count=4, seconds=3.0, seed=4, gains=(1.0, 0.5))
     unaware = arm.session_of([replace(r, meta={}) for r in rollouts])
-    found = diagnose(unaware, CONFIG).document["effects"]
+    found = diagnose(unaware, replace(CONFIG, max_windows=60)).document["effects"]
     assert {(e["effect"], *e["where"]) for e in found} == {("kd", joint) for joint in arm.JOINTS}
     assert not {o["effect"] for e in found for o in e["equivalent"]} & {"viscous_friction", "command_delay"}
+    for effect in found:
+        low, high = effect["parameters"]["factor"]["ci95"]
+        assert low < 0.5 < high and high - low < 0.05
