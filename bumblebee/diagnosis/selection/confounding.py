@@ -1,6 +1,7 @@
 """Effects that these data cannot tell apart, what would separate them, and the smallest that they could have shown."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -93,8 +94,8 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
             same.remove(own.rival)
         differ = [own for own in slopes if not own.beyond_bounds and own.worse > rule.told_apart.chi_square]
         for own in differ[::-1][:most_same]:
-            trial = try_one(problem, rest, own.rival, own.steps, found.weights)
-            if trial is not None and told_apart(problem, holdout, fit, rest, trial, found.weights):
+            name = f"{own.rival.effect} on {own.rival.where} in the place of {fit.chosen[i].effect}"
+            if problem.plant.failures.attempt(name, partial(_refuted, found, holdout, rest, own), lambda: False):
                 same.remove(own.rival)
         for rival in [c for c, share in free if share <= rule.same][:most]:
             own = _by_slopes(found, rival, rest)
@@ -142,6 +143,12 @@ def _by_slopes(found: Search, rival: Candidate, rest: Fit) -> _Slopes:
     worse = float((weights[:, None] * (swapped**2 - ours**2)).sum()) * len(keep) / max(keep.sum(), 1)
     sure = rule.far_worse * loss.std(ddof=1) / np.sqrt(len(loss)) if len(loss) > rule.enough else np.inf
     return _Slopes(rival, score_tests(small, columns, beside, weights).steps[0], worse, bool(loss.mean() > sure))
+
+
+def _refuted(found: Search, holdout: Holdout, rest: Fit, own: _Slopes) -> bool:
+    """Whether the simulator tells a rival from the effect that `rest` lacks."""
+    trial = try_one(found.problem, rest, own.rival, own.steps, found.weights)
+    return trial is not None and told_apart(found.problem, holdout, found.fit, rest, trial, found.weights)
 
 
 def _in_place(found: Search, rest: Fit, trial: Trial) -> Fit:

@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from bumblebee.diagnosis.comparison import Holdout, compare
-from bumblebee.diagnosis.comparison.paired_tests import logs, margin
 from bumblebee.diagnosis.estimation import Fit, LeftOver, explained_share, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.trial import Trial
@@ -39,9 +38,8 @@ def told_apart(problem: Problem, holdout: Holdout, fit: Fit, rest: Fit, trial: T
         return False
     against = compare(problem, holdout, fit, other)
     sides = [against.fitted, *([against.validation] if against.validation else [])]
-    loss = np.concatenate([logs(new) - logs(old) for old, new in sides])
     worse = [_chi_square(old, new) for old, new in sides]
-    if sum(worse) < rule.chi_square or loss.mean() < margin(loss, rule.z):
+    if sum(worse) < rule.chi_square or against.passes(rule.windows):
         return False
     most = int(np.argmax(worse))
     share = _held_out_share(holdout.problem, other, fit) if most else explained_share(problem, other, fit, weights)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from bumblebee.diagnosis.thresholds.comparison import NotRefuted
 from bumblebee.diagnosis.thresholds.proposals import ProposalThresholds
 
 
@@ -129,8 +130,8 @@ class ToldApart:
 
     chi_square: float = 25.0
     """By which a rival must be worse on fitted and validation windows together, and by slopes: five standard errors."""
-    z: float = 3.0
-    """Standard errors over windows by which it must be worse."""
+    windows: NotRefuted = field(default_factory=lambda: NotRefuted(z=3.0))
+    """By how many standard errors over windows it must be worse."""
     numerics: float = 0.25
     """Share of what sets them apart that another integrator may make: up to 0.1 where effects differ, 0.7 and more
     where they are one."""

@@ -21,7 +21,7 @@ from bumblebee.diagnosis.thresholds.report import (
     ReportThresholds,
     Verdicts,
 )
-from bumblebee.diagnosis.thresholds.selection import Forward, SelectionThresholds
+from bumblebee.diagnosis.thresholds.selection import Confounding, Forward, SelectionThresholds, ToldApart
 from tests.diagnosis import arm
 
 TRUTH = {("spring", "j2"): 1.5, ("command_delay", "j1"): 0.01}
@@ -35,9 +35,10 @@ RULES = ReportThresholds(
 
 
 def config(**rooms: object) -> DiagnosisConfig:
-    """Two effects and no look at their rivals, which the report has no part in."""
-    forward = SelectionThresholds(forward=Forward(swaps=0))
-    return replace(arm.SMALL, beyond=False, thresholds=Thresholds(selection=forward, **rooms))
+    """Two effects, no look at their rivals, which the report has no part in, and classes by sensitivities alone."""
+    classes = Confounding(told_apart=ToldApart(chi_square=1e9))
+    selection = SelectionThresholds(forward=Forward(swaps=0), confounding=classes)
+    return replace(arm.SMALL, beyond=False, thresholds=Thresholds(selection=selection, **rooms))
 
 
 @pytest.fixture(scope="module")
