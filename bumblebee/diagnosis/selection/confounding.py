@@ -76,7 +76,7 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
     (`told_apart`), or the other would have to be what it cannot: a friction below none in the place of a servo that
     damps too little. Of the next of kin the nearest are put in the effect's place in the simulator; one stays a rival
     unless it is worse by two standard errors on the windows held out from the fit (on the fitted ones where nothing is
-    held out), or fits the fitted ones better. Not simulated are those that by their slopes on the windows of the
+    held out), or is told apart on all windows. Not simulated are those that by their slopes on the windows of the
     screening are worse by six, or no worse where the sensitivities agree.
     """
     fit, problem = found.fit, found.problem
@@ -93,16 +93,18 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
         for own in [own for own in slopes if own.beyond_bounds]:
             same.remove(own.rival)
         differ = [own for own in slopes if not own.beyond_bounds and own.worse > rule.told_apart.chi_square]
+        refuted = partial(_refuted, found, holdout, rest)
         for own in differ[::-1][:most_same]:
-            name = f"{own.rival.effect} on {own.rival.where} in the place of {fit.chosen[i].effect}"
-            if problem.plant.failures.attempt(name, partial(_refuted, found, holdout, rest, own), lambda: False):
+            if refuted(own):
                 same.remove(own.rival)
         for rival in [c for c, share in free if share <= rule.same][:most]:
             own = _by_slopes(found, rival, rest)
             if own.hopeless:
                 continue
             trial = try_one(problem, rest, rival, own.steps, found.weights)
-            if trial is not None and compare(problem, holdout, fit, _in_place(found, rest, trial)).passes(judge):
+            if trial is None or not compare(problem, holdout, fit, _in_place(found, rest, trial)).passes(judge):
+                continue
+            if own.worse < rule.told_apart.chi_square or not refuted(own):
                 same.append(rival)
         out.append(same)
     return out
@@ -146,9 +148,15 @@ def _by_slopes(found: Search, rival: Candidate, rest: Fit) -> _Slopes:
 
 
 def _refuted(found: Search, holdout: Holdout, rest: Fit, own: _Slopes) -> bool:
-    """Whether the simulator tells a rival from the effect that `rest` lacks."""
-    trial = try_one(found.problem, rest, own.rival, own.steps, found.weights)
-    return trial is not None and told_apart(found.problem, holdout, found.fit, rest, trial, found.weights)
+    """Whether the simulator tells a rival from the effect that `rest` lacks; one that cannot be had is not refuted."""
+    problem, weights = found.problem, found.weights
+
+    def decide() -> bool:
+        trial = try_one(problem, rest, own.rival, own.steps, weights)
+        return trial is not None and told_apart(problem, holdout, found.fit, rest, trial, weights)
+
+    name = f"{own.rival.effect} on {own.rival.where} in another's place"
+    return problem.plant.failures.attempt(name, decide, lambda: False)
 
 
 def _in_place(found: Search, rest: Fit, trial: Trial) -> Fit:

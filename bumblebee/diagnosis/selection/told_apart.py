@@ -29,12 +29,10 @@ def told_apart(problem: Problem, holdout: Holdout, fit: Fit, rest: Fit, trial: T
         weights: (W,) of the fitted windows.
     """
     rule = problem.thresholds.selection.confounding.told_apart
-    if trial.cost < fit.cost + rule.chi_square:
-        return False
     start = np.concatenate((rest.values, trial.values))
     other = gauss_newton(problem, (*rest.chosen, trial.candidate), start, weights, rule.iterations, known=fit)
-    nearest = min(other.cost, LeftOver(problem, other, weights).cost(other.residual))  # where steps would still lead
-    if nearest < fit.cost + rule.chi_square:
+    further = LeftOver(problem, other, weights).cost(other.residual)  # where more steps would lead
+    if further - fit.cost < rule.settled * max(other.cost - fit.cost, 0.0) or other.cost < fit.cost:
         return False
     against = compare(problem, holdout, fit, other)
     sides = [against.fitted, *([against.validation] if against.validation else [])]

@@ -137,6 +137,8 @@ class ToldApart:
     where they are one."""
     iterations: int = 6
     """Gauss-Newton's steps at most for the rival."""
+    settled: float = 0.5
+    """Share of what it is worse by that must be left where further steps would lead."""
     rivals: int = 6
     """Rivals tried in an effect's place, those whose sensitivities differ most first."""
     all_rivals: int = 24
