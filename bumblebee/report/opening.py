@@ -12,7 +12,7 @@ from bumblebee.report.results import Json, LoopResults, RoundResults
 from bumblebee.report.success_figure import pick
 from bumblebee.report.success_steps import ROBOT, Step, names, step_differences, success_steps
 from bumblebee.report.truth import Match, hits, match
-from bumblebee.report.wording import percent, plural, signed
+from bumblebee.report.wording import percent, plural
 
 _BRACKETS = "Motions followed to the end. Square brackets: 95 % interval."
 _ON_ROBOT, _ON_DECLARED = ("on the robot", "on the declared model")
@@ -164,12 +164,7 @@ def _found(row: Match, diagnosis: Json) -> Cell:
         return Cell(f"{named(row.found)}: {size}", "found")
     if row.through == "class":
         return Cell(f"its class: {named(row.found)}: {size}", "found")
-    off = "" if row.relative_error is None else f" ({signed(100 * row.relative_error, 1)} %{_covers(row)})"
-    return Cell(f"{size}{off}", "found")
-
-
-def _covers(row: Match) -> str:
-    return {True: ", interval holds it", False: ", outside the interval", None: ""}[row.covered]
+    return Cell(f"{size}{row.told}", "found")
 
 
 def _flagged(row: Match, diagnosis: Json) -> bool:

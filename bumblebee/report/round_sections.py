@@ -88,9 +88,7 @@ def _truth_row(pair: Match) -> tuple[str | Cell, ...]:
     if pair.found is None:
         return truth, value, Cell("not found", "missed"), "–", "–"
     name, estimate, _ = effect_line(pair.found)
-    if pair.relative_error is not None:
-        inside = {True: ", interval holds it", False: ", outside the interval", None: ""}[pair.covered]
-        estimate += f" ({signed(100 * pair.relative_error, 1)} %{inside})"
+    estimate += pair.told
     if pair.sealed is None:
         return truth, value, Cell(f"{name} (not sealed)", "missed"), estimate, _share(pair.found)
     how = {"exact": "found", "class": f"its class: {name}", "form": f"as a law without a name: {name}"}

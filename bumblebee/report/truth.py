@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+from bumblebee.report.wording import signed
+
 Json = dict[str, Any]
 
 
@@ -26,13 +28,25 @@ class Match:
         return None if parameter is None or truth == 0 else float(parameter["value"]) / float(truth) - 1.0
 
     @property
-    def covered(self) -> bool | None:
-        """Whether the 95 % interval holds the sealed value."""
+    def covered(self) -> dict[str, bool]:
+        """By parameter whether the 95 % interval holds the sealed value, where it has two ends."""
         if self.sealed is None or self.found is None or self.relative_error is None:
-            return None
-        name, truth = next(iter(self.sealed["parameters"].items()))
-        low, high = self.found["parameters"][name].get("ci95") or (None, None)
-        return None if low is None or high is None else bool(low <= truth <= high)
+            return {}
+        sealed, found = self.sealed["parameters"], self.found["parameters"]
+        ends = {name: found[name].get("ci95") or (None, None) for name in sealed if name in found}
+        return {
+            name: bool(low <= sealed[name] <= high) for name, (low, high) in ends.items() if None not in (low, high)
+        }
+
+    @property
+    def told(self) -> str:
+        """By how much the first parameter is off, and what the intervals hold; empty where the truth is not known."""
+        if self.relative_error is None:
+            return ""
+        outside = [name for name, holds in self.covered.items() if not holds]
+        held = ", interval holds it" if self.covered else ""
+        missed = ", outside the interval" if len(self.covered) == 1 else f", {', '.join(outside)} outside the interval"
+        return f" ({signed(100 * self.relative_error, 1)} %{missed if outside else held})"
 
 
 def match(sealed: list[Json], found: list[Json]) -> list[Match]:

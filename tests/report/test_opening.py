@@ -11,6 +11,7 @@ from bumblebee.report.opening import headline, opening, opening_lines
 from bumblebee.report.page import Block
 from bumblebee.report.results import LoopResults
 from bumblebee.report.success_steps import step_differences, success_steps
+from bumblebee.report.truth import match
 from tests.report.made import LAW, PLAN, TRUTH, difference, found, page_of, won_back
 
 
@@ -170,3 +171,14 @@ def test_each_parameter_of_a_sealed_effect_has_its_own_unit() -> None:
     assert plain(sealed_size(beyond)) == "torque 2 N m, width 0.1 rad"
     alone = {"effect": "sticky_gear", "where": [], "parameters": {"torque": 2, "teeth": 9}, "unit": "N m"}
     assert plain(sealed_size(alone)) == "torque 2 N m, teeth 9"
+
+
+@pytest.mark.parametrize(
+    ("zz", "told"),
+    [([0.037, 0.041], "(+2.0 %, interval holds it)"), ([0.037, 0.039], "(+2.0 %, zz outside the interval)")],
+)
+def test_every_parameter_is_held_against_its_own_interval(zz: list[float], told: str) -> None:
+    place = {"effect": "link_inertia", "where": ["pelvis"]}
+    found = {"xx": {"value": 0.051, "ci95": [0.04, 0.06]}, "zz": {"value": 0.038, "ci95": zz}}
+    (row,) = match([place | {"parameters": {"xx": 0.05, "zz": 0.0396}}], [place | {"parameters": found}])
+    assert row.told.strip() == told
