@@ -95,7 +95,8 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
         differ = [own for own in slopes if not own.beyond_bounds and own.worse > rule.told_apart.chi_square]
         refuted = partial(_refuted, found, holdout, rest)
         for own in differ[::-1][:most_same]:
-            if refuted(own):
+            trial = try_one(problem, rest, own.rival, own.steps, found.weights)
+            if trial is not None and refuted(trial):
                 same.remove(own.rival)
         for rival in [c for c, share in free if share <= rule.same][:most]:
             own = _by_slopes(found, rival, rest)
@@ -104,7 +105,7 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
             trial = try_one(problem, rest, rival, own.steps, found.weights)
             if trial is None or not compare(problem, holdout, fit, _in_place(found, rest, trial)).passes(judge):
                 continue
-            if own.worse < rule.told_apart.chi_square or not refuted(own):
+            if own.worse < rule.told_apart.chi_square or not refuted(trial):
                 same.append(rival)
         out.append(same)
     return out
@@ -147,16 +148,11 @@ def _by_slopes(found: Search, rival: Candidate, rest: Fit) -> _Slopes:
     return _Slopes(rival, score_tests(small, columns, beside, weights).steps[0], worse, bool(loss.mean() > sure))
 
 
-def _refuted(found: Search, holdout: Holdout, rest: Fit, own: _Slopes) -> bool:
-    """Whether the simulator tells a rival from the effect that `rest` lacks; one that cannot be had is not refuted."""
-    problem, weights = found.problem, found.weights
-
-    def decide() -> bool:
-        trial = try_one(problem, rest, own.rival, own.steps, weights)
-        return trial is not None and told_apart(problem, holdout, found.fit, rest, trial, weights)
-
-    name = f"{own.rival.effect} on {own.rival.where} in another's place"
-    return problem.plant.failures.attempt(name, decide, lambda: False)
+def _refuted(found: Search, holdout: Holdout, rest: Fit, trial: Trial) -> bool:
+    """Whether a refit tells a rival from the effect that `rest` lacks; one that cannot be fitted is not refuted."""
+    decide = partial(told_apart, found.problem, holdout, found.fit, rest, trial, found.weights)
+    name = f"{trial.candidate.effect} on {trial.candidate.where} in another's place"
+    return found.problem.plant.failures.attempt(name, decide, lambda: False)
 
 
 def _in_place(found: Search, rest: Fit, trial: Trial) -> Fit:
