@@ -77,8 +77,8 @@ class Late:
         """By how much joints [rad] and speeds [rad/s] are ahead of `delay` [s] old readings at starts, (2, W, J)."""
         if ("start", delay) not in self._known:
             every = range(len(self._plant.joints))
-            late, none = np.full(len(every), delay), np.zeros(len(every))
-            ahead, read = (read_at(self._windows, 0.0, d, every) for d in (late, none))
+            late, none, rule = np.full(len(every), delay), np.zeros(len(every)), self._plant.thresholds.path
+            ahead, read = (read_at(self._windows, 0.0, d, every, rule) for d in (late, none))
             self._known["start", delay] = np.stack([a - b for a, b in zip(ahead, read, strict=True)])
         return self._known["start", delay]
 

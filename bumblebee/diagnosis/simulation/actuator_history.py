@@ -11,7 +11,7 @@ from functools import lru_cache
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.simulation.joint_path import joint_path
+from bumblebee.diagnosis.simulation.joint_path import joint_path, joint_states
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.windows import Windows, command_inputs
 from bumblebee.diagnosis.thresholds.simulation import ActuatorHistory, JointPath
@@ -86,7 +86,7 @@ def remember(plant: Plant, windows: Windows, hooks: RuntimeHooks, step: float) -
 
     back = history_length(hooks, step)
     late = bool(hooks.torque_lag.any())
-    past = _past(windows, back, step, hooks.encoder_delay, order) if back else None
+    past = _past(plant, windows, back, step, hooks.encoder_delay, order) if back else None
     return Memory(
         time=at_starts(windows, lambda r: r.time - r.time[0]),
         heat=at_starts(windows, heat)[:, order],
@@ -195,31 +195,38 @@ def lagged(plant: Plant, rollout: Rollout, order: Sequence[int], time: np.ndarra
 
 
 def _past(
-    windows: Windows, back: int, step: float, delay: np.ndarray, order: Sequence[int]
+    plant: Plant, windows: Windows, back: int, step: float, delay: np.ndarray, order: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (W, back, J) at the `back` steps before each start, the newest last."""
-    parts = [read_at(windows, -step * k, delay, order) for k in range(back, 0, -1)]
+    rule = plant.thresholds.path
+    parts = [read_at(windows, -step * k, delay, order, rule) for k in range(back, 0, -1)]
     return np.stack([p for p, _ in parts], axis=1), np.stack([v for _, v in parts], axis=1)
 
 
-def read_at(windows: Windows, shift: float, delay: np.ndarray, order: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def read_at(
+    windows: Windows, shift: float, delay: np.ndarray, order: Sequence[int], rule: JointPath
+) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (W, J) that the joints `order` had `shift` s after the starts, by their late readings.
 
-    What an encoder reads `delay` (J,) s later is where the joint is now. Between ticks a position is on the cubic that
-    has the readings' positions and speeds, a speed on a line: the cubic's would have three times the noise.
+    What an encoder reads `delay` (J,) s later is where the joint is now. Readings count without their noise, for a later
+    one is also one that the window is compared with: half of a tick later, a start would have the mean noise of both
+    ticks and thus half of its variance, and a joint at rest would gain by an encoder that is late. Between ticks a
+    position is on the cubic that has the positions and speeds of both, a speed on a line.
     """
+    some = np.unique(windows.rollout)
+    states = {i: np.stack([joint_states(windows.source[i], j, rule) for j in order], axis=1) for i in some}
     place, speed = np.empty((len(windows), len(order))), np.empty((len(windows), len(order)))
     for w, (i, k) in enumerate(zip(windows.rollout, windows.start, strict=True)):
-        rollout = windows.source[i]
-        at = np.clip(rollout.time[k] + shift + delay, rollout.time[0], rollout.time[-1])
-        high = np.clip(np.searchsorted(rollout.time, at), 1, len(rollout.time) - 1)
-        dt = rollout.time[high] - rollout.time[high - 1]
-        share = (at - rollout.time[high - 1]) / dt
-        first, gone = rollout.joint_pos[high - 1, order], np.subtract(*rollout.joint_pos[[high, high - 1], order])
-        speeds = rollout.joint_vel[[high - 1, high], order]
-        bow = (1 - share) * (dt * speeds[0] - gone) + share * (gone - dt * speeds[1])
+        time = windows.source[i].time
+        at = np.clip(time[k] + shift + delay, time[0], time[-1])
+        high = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
+        dt, each = time[high] - time[high - 1], np.arange(len(order))
+        share, (first, speed_before) = (at - time[high - 1]) / dt, states[i][high - 1, each].T
+        last, speed_after = states[i][high, each].T
+        gone = last - first
+        bow = (1 - share) * (dt * speed_before - gone) + share * (gone - dt * speed_after)
         place[w] = first + share * gone + share * (1 - share) * bow
-        speed[w] = speeds[0] + share * (speeds[1] - speeds[0])
+        speed[w] = speed_before + share * (speed_after - speed_before)
     return place, speed
 
 

@@ -1,4 +1,4 @@
-"""The path of a joint without its sensor's noise, for what remembers a path: hysteresis.
+"""The path of a joint without its sensor's noise, for what remembers a path or is where a later reading puts it.
 
 Every reversal counts for a friction that remembers, so noise that is read as motion winds its state back, and a mean
 over some ticks leaves out the reversals of the motion itself. Positions and velocities are taken together instead, by
@@ -18,22 +18,29 @@ from bumblebee.measured.rollout import Rollout
 _FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # passes no cubic
 
 
-@lru_cache(maxsize=4096)  # a robot's joints in some hundred rollouts
 def joint_path(rollout: Rollout, column: int, rule: JointPath) -> np.ndarray:
-    """Positions (T,) [rad, m] of one joint (a column of the log) at the ticks, without the noise of the readings.
+    """Positions (T,) [rad, m] of one joint (a column of the log) at the ticks; see `joint_states`."""
+    return joint_states(rollout, column, rule)[:, 0]
+
+
+@lru_cache(maxsize=4096)  # a robot's joints in some hundred rollouts
+def joint_states(rollout: Rollout, column: int, rule: JointPath) -> np.ndarray:
+    """Positions [rad, m] and velocities (T, 2) of one joint (a column of the log), without the noise of the readings.
 
     As read where there are too few rows, or steps and sizes too far apart for floating point.
     """
     place, speed = rollout.joint_pos[:, column], rollout.joint_vel[:, column]
+    as_read = np.stack((place, speed), axis=1)
     if len(place) < rule.least_rows:
-        return place
+        return as_read
     period = float(np.median(np.diff(rollout.time)))
     read = np.stack((place - place[0], speed * period), axis=1)
     noise = np.maximum(white_noise(read), np.array([rule.least_place, rule.least_speed * period]))
     try:
-        return place[0] + _smoothed(np.diff(rollout.time) / period, read, noise, rule)[:, 0]
+        states = _smoothed(np.diff(rollout.time) / period, read, noise, rule)
     except np.linalg.LinAlgError:
-        return place
+        return as_read
+    return np.stack((place[0] + states[:, 0], states[:, 1] / period), axis=1)
 
 
 def white_noise(signals: np.ndarray) -> np.ndarray:

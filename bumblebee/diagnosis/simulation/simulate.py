@@ -282,11 +282,11 @@ def _caught_up(
     plant: Plant, windows: Windows, qpos: np.ndarray, qvel: np.ndarray, late: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Starts in which joints with late encoders are where a later reading puts them."""
-    every = range(len(plant.joints))
-    moved, still = read_at(windows, 0.0, late, every), read_at(windows, 0.0, 0.0 * late, every)
+    some, rule = np.flatnonzero(late), plant.thresholds.path
+    moved, still = (read_at(windows, 0.0, delay, some, rule) for delay in (late[some], 0.0 * late[some]))
     qpos, qvel = qpos.copy(), qvel.copy()
-    qpos[..., plant.qpos] += moved[0] - still[0]
-    qvel[..., plant.dof] += moved[1] - still[1]
+    qpos[..., plant.qpos[some]] += moved[0] - still[0]
+    qvel[..., plant.dof[some]] += moved[1] - still[1]
     return qpos, qvel
 
 

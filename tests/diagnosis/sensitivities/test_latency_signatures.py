@@ -25,11 +25,23 @@ def test_a_late_joint_is_where_the_cubic_through_its_readings_puts_it(session: S
     moved = replace(first, joint_pos=place(first.time), joint_vel=speed(first.time))
     windows = cut(session.plant, session.layout, [moved], choose_starts([moved], [0], 0.2, 6))
     delay = np.array([0.004, 0.013, 0.031])
-    q, v = read_at(windows, 0.002, delay, range(3))
+    q, v = read_at(windows, 0.002, delay, range(3), session.plant.thresholds.path)
     at = first.time[windows.start]
     for j in range(3):
-        assert q[:, j] == pytest.approx(place(at + 0.002 + delay[j])[:, j], abs=1e-9)
+        assert q[:, j] == pytest.approx(place(at + 0.002 + delay[j])[:, j], abs=1e-6)
         assert v[:, j] == pytest.approx(speed(at + 0.002 + delay[j])[:, j], abs=3e-4)  # on a line between ticks
+
+
+def test_a_late_joint_at_rest_starts_no_nearer_to_the_readings_after_it(session: Session) -> None:
+    """Half of a tick later lies the mean of two readings, with half of the noise, which no encoder's age made."""
+    first, rng = session.rollouts[0], np.random.default_rng(4)
+    place, speed = 0.002 * rng.standard_normal(first.joint_pos.shape), 0.05 * rng.standard_normal(first.joint_pos.shape)
+    noisy = replace(first, joint_pos=place, joint_vel=speed)
+    windows = cut(session.plant, session.layout, [noisy], choose_starts([noisy], [0], 0.05, 12))
+    rule, half = session.plant.thresholds.path, 0.5 * float(np.median(np.diff(first.time)))
+    (q, v), (q_read, v_read) = (read_at(windows, 0.0, np.full(3, late), range(3), rule) for late in (half, 0.0))
+    assert np.std(v - v_read) < 0.1 * 0.05
+    assert np.std(q - q_read) < 0.1 * 0.002
 
 
 def test_squares_of_torques_between_ticks_are_those_of_the_course_between_them(session: Session) -> None:
