@@ -1,5 +1,7 @@
 """Grids of readings: found where the joint crosses some steps, and not where there is none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,3 +35,16 @@ def test_of_a_grid_of_few_steps_no_overtone_is_taken_for_it(cells: float):
 
 def test_a_smooth_motion_of_the_same_reach_shows_none():
     assert all(grids([_rollout(0.0, 18, seed)], [NOISE]) == [] for seed in range(20))
+
+
+def test_the_error_of_a_step_is_that_of_the_readings_that_count():
+    """Half of the log rests at one place, whose many readings weigh little: the step errs as its interval says."""
+    step, away = 0.02, []
+    for seed in range(40):
+        rollout = _rollout(step, 25, seed)
+        still = rollout.joint_pos.copy()
+        place = np.round(np.random.default_rng(seed).uniform(-0.2, 0.2) / step) * step
+        still[:750] = place + NOISE * np.random.default_rng(seed + 99).standard_normal((750, 1))
+        (found,) = grids([replace(rollout, joint_pos=still)], [NOISE])
+        away.append((found.step - step) / found.error)
+    assert 0.7 < np.sqrt(np.mean(np.square(away))) < 1.3

@@ -115,17 +115,25 @@ def _grid(joint: str, x: np.ndarray, noise: float, rule: EncoderResolution) -> G
     if p > rule.chance or top < rule.on_grid * _left_of(value, noise):
         return None
     value, top = _undertone(x, weights, (value, top), width, rule)
-    # Phase noise of each reading, and how well a slope of phase over x is known from them.
-    spread = np.sqrt(-2.0 * np.log(min(top, 1 - 1e-6)))
-    error = spread / (2 * np.pi * np.sqrt(len(x)) * x.std())
-    return Grid(joint, 1.0 / value, float(error / value**2), min(1.0, p))
+    return Grid(joint, 1.0 / value, _error(x, weights, top) / value**2, min(1.0, p))
+
+
+def _error(x: np.ndarray, weights: np.ndarray, resultant: float) -> float:
+    """Standard error of a frequency [1/rad]: how well a slope of phase over `x` (N,) is known by readings so weighed.
+
+    Their phase noise is what leaves the resultant.
+    """
+    noise, away = np.sqrt(-2.0 * np.log(min(resultant, 1 - 1e-6))), x - weights @ x
+    return float(noise / (2 * np.pi) * np.sqrt((weights**2 * away**2).sum()) / (weights @ away**2))
 
 
 def _peak(x: np.ndarray, weights: np.ndarray, frequency: float, width: float) -> tuple[float, float]:
     """The frequency within `width` at which readings (N,) are most in phase, and their resultant there."""
-    near = np.linspace(frequency - width, frequency + width, 41)
-    fine = np.abs(np.exp(2j * np.pi * np.outer(near, x)) @ weights)
-    return float(near[np.argmax(fine)]), float(fine.max())
+    for span in (width, width / 20):  # of the second round a step is 1/400 of the width
+        near = np.linspace(frequency - span, frequency + span, 41)
+        fine = np.abs(np.exp(2j * np.pi * np.outer(near, x)) @ weights)
+        frequency = float(near[np.argmax(fine)])
+    return frequency, float(fine.max())
 
 
 def _undertone(
