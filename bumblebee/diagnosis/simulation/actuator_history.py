@@ -208,10 +208,10 @@ def read_at(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (W, J) that the joints `order` had `shift` s after the starts, by their late readings.
 
-    What an encoder reads `delay` (J,) s later is where the joint is now. Readings count without their noise, for a later
-    one is also one that the window is compared with: half of a tick later, a start would have the mean noise of both
-    ticks and thus half of its variance, and a joint at rest would gain by an encoder that is late. Between ticks a
-    position is on the cubic that has the positions and speeds of both, a speed on a line.
+    What an encoder reads `delay` (J,) s later is where the joint is now. Readings count without their noise
+    (`joint_path`), for a later one is also one that the window is compared with: half of a tick later a start would
+    have the mean noise of both ticks and thus half of its variance, and a joint at rest would gain by a late encoder.
+    Between ticks a position is on the cubic that has the positions and speeds of both, a speed on a line.
     """
     some = np.unique(windows.rollout)
     states = {i: np.stack([joint_states(windows.source[i], j, rule) for j in order], axis=1) for i in some}

@@ -1,14 +1,18 @@
 """The last fit is whitened anew as long as its model changes what a window shows, and not once more."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
+from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection import final_fit as refining
 from bumblebee.diagnosis.selection.final_fit import refine
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
+from bumblebee.diagnosis.thresholds import Thresholds
 from tests.diagnosis import arm
 
 LIMIT = 4.0
@@ -55,6 +59,33 @@ def test_a_limit_whose_interval_holds_the_declared_one_is_not_named(
         last = refine(problem, begun, np.random.default_rng(0))
         assert [c.effect for c in last.fit.chosen] == (["torque_limit"] if named else [])
         assert len(last.half) == len(last.fit.chosen)
+
+
+def test_of_two_whose_intervals_hold_the_declared_values_the_less_sure_one_goes_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    session = arm.session_of(arm.simulate({("coulomb_friction", "j2"): 0.6}, count=2, seconds=4.0, seed=100))
+    problem = arm.problem_of(session, [0, 1], 24)
+    every = all_candidates(session.plant, session.rollouts, [])
+    names = (("coulomb_friction", "j2"), ("armature", "j3"))
+    chosen = [next(c for c in every if (c.effect, c.where) == name) for name in names]
+    begun = gauss_newton(problem, chosen, [0.6, 0.012], window_weights(problem.residual([[]])[0]), iterations=0)
+
+    def half(_: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
+        """By which both hold the declared values together, and the friction alone does not."""
+        away = np.abs(fit.values - [c.nominal[0] for c in fit.chosen])
+        return away * ([1.1, 1.3] if len(fit.chosen) == 2 else [0.5])
+
+    monkeypatch.setattr(refining, "half_widths", half)
+    last = refine(replace(problem, thresholds=_sure_of_all(problem)), begun, np.random.default_rng(0))
+    assert [c.effect for c in last.fit.chosen] == ["coulomb_friction"]
+    assert last.fit.values == pytest.approx([0.6], rel=0.1)
+
+
+def _sure_of_all(problem: Problem) -> Thresholds:
+    """Thresholds by which no effect is insignificant, whatever it is."""
+    selection = problem.thresholds.selection
+    return replace(problem.thresholds, selection=replace(selection, final_fit=replace(selection.final_fit, sure=-1.0)))
 
 
 def test_where_nothing_is_significant_in_the_end_nothing_is_named(
