@@ -126,32 +126,37 @@ def drop_beside(problem: Problem, fit: Fit, new: Candidate) -> Fit:
 def drop_redundant(problem: Problem, holdout: Holdout, fit: Fit) -> Fit:
     """Less what takes nothing off the validation windows' mean square, the worst first; no worse after 1 s.
 
-    A robot that is still far from its model is left alone: there a few windows make up the mean square. Saturations are
-    asked by `drop_unpaid_saturations`: of the validation windows perhaps none feels them, and no slope leads back from
-    one that nothing reaches.
+    A robot that is still far from its model is left alone: there a few windows make up the mean square. So is an effect
+    that the validation windows hardly feel: where a joint rests, what its rotor's inertia adds is less than the noise,
+    whatever the fitted windows say of it. Saturations are asked by `drop_unpaid_saturations`: of the validation windows
+    perhaps none feels them, and no slope leads back from one that nothing reaches.
     """
-    near = problem.thresholds.comparison.elimination.near
-    if holdout.problem is None or typical_power(holdout.left([fit])[0]) > near:
+    rule = problem.thresholds.comparison.elimination
+    if holdout.problem is None or typical_power(holdout.left([fit])[0]) > rule.near:
         return fit
 
     def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
         if kept or not fit.chosen:  # one that must stay ends it
             return None
-        growth = _growth(holdout.problem, fit)
+        growth, felt = _growth(holdout.problem, fit)
         growth[[c.effect in SATURATIONS for c in fit.chosen]] = np.inf
+        growth[felt < rule.felt] = np.inf
         k = int(np.argmin(growth))
         return None if growth[k] > 0 else fit.chosen[k]
 
     return eliminate(fit, worst, lambda fit, gone: refitted_without(problem, fit, [gone], fit), holdout.worse_later)
 
 
-def _growth(judge: Problem, fit: Fit) -> np.ndarray:
-    """(F,) by how much the mean square of the validation windows grows without each effect, the others as they are."""
+def _growth(judge: Problem, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """By how much (F,) the mean square of the validation windows grows without each effect, the others as they are.
+
+    And the chi-square (F,) of what each changes there, by which a complete model's would grow.
+    """
     effects = fit.effects
     sets = [effects, *([e for k, e in enumerate(effects) if k != i] for i in range(len(effects)))]
     left = judge.residual(sets) - np.tensordot(fit.nuisance, judge.nuisance, axes=1)
     power = (left**2).mean(axis=(1, 2))
-    return power[1:] - power[0]
+    return power[1:] - power[0], ((left[1:] - left[0]) ** 2).sum(axis=(1, 2))
 
 
 def drop_unpaid_saturations(problem: Problem, holdout: Holdout, fit: Fit) -> Fit:

@@ -175,6 +175,8 @@ class Elimination:
     """Share of a change that matters, below which a value is a trifle."""
     near: float = 4.0
     """Reduced chi-square of the validation windows up to which their mean square tells."""
+    felt: float = 25.0
+    """Chi-square of what an effect changes on the validation windows, below which these say nothing of it."""
     small_share: float = 0.05
     """Share of what all effects gain, above which an effect need not be asked whether it pays."""
     few: int = 4

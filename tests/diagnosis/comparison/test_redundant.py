@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates.candidate import Candidate
-from bumblebee.diagnosis.comparison.backward_elimination import drop_redundant, drop_unpaid_saturations
+from bumblebee.diagnosis.comparison.backward_elimination import (
+    _growth,
+    drop_redundant,
+    drop_unpaid_saturations,
+)
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.estimation.fit import typical_power
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
@@ -22,6 +26,18 @@ def test_an_effect_that_only_spoils_the_judging_windows_is_dropped_and_the_rest_
     assert kept.chosen == (COULOMB,)
     assert kept.values[0] == pytest.approx(0.05, rel=0.05)
     assert drop_redundant(problem, Holdout(), fit) is fit
+
+
+def test_of_an_effect_that_they_hardly_feel_the_judging_windows_say_nothing() -> None:
+    """Of a small share of that spring they change by less than what could be detected: it is chance how they err."""
+    _, problem, judge = prepared(friction=(0.0, 0.05))
+    ones = np.ones(len(problem.windows))
+    for share, stays in ((1.0, False), (0.03, True)):
+        fit = gauss_newton(problem, (COULOMB, SPRING), np.array([0.05, share * 0.003, 0.0]), ones, 0)
+        growth, felt = _growth(judge, fit)
+        assert growth[1] <= 0
+        assert (felt[1] < problem.thresholds.comparison.elimination.felt) == stays
+        assert (drop_redundant(problem, Holdout(judge), fit) is fit) == stays
 
 
 def test_a_limit_that_no_judging_window_feels_stays() -> None:
