@@ -1,6 +1,6 @@
 """The last fit: everything whitened and linearised around what was found."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -112,13 +112,9 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
     found = fit
     problem, fit, weights = _settled(problem, fit, rng)
     whole = last_step(problem, fit.chosen, fit.values, weights)
-
-    def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
-        return gauss_newton(problem, chosen, values, weights, iterations=1, coarse=True, known=whole)
-
-    fit = drop_insignificant(problem, whole, weights, problem.thresholds.selection.final_fit.sure, refit)
+    fit = _significant(problem, whole, weights)
     if holdout is not None:
-        fit = drop_unpaid(fit, refit, holdout, problem)
+        fit = drop_unpaid(fit, _refit_near(problem, whole, weights), holdout, problem)
     if fit.chosen != whole.chosen:
         fit = last_step(problem, fit.chosen, fit.values, weights)
     if holdout is not None and holdout.worse_later(_with_nuisance(problem, found, weights), fit):
@@ -127,23 +123,45 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
     return _sure_of(problem, fit, weights)
 
 
+def _refit_near(problem: Problem, known: Fit, weights: np.ndarray) -> Callable[[Sequence[Candidate], np.ndarray], Fit]:
+    """Fits of some effects from their values (P,), by the sensitivities of a `known` fit of more."""
+
+    def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
+        return gauss_newton(problem, chosen, values, weights, iterations=1, coarse=True, known=known)
+
+    return refit
+
+
+def _significant(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
+    """The fit less what the others make insignificant."""
+    sure = problem.thresholds.selection.final_fit.sure
+    return drop_insignificant(problem, fit, weights, sure, _refit_near(problem, fit, weights))
+
+
 def _sure_of(problem: Problem, fit: Fit, weights: np.ndarray) -> Refined:
-    """The fit with its intervals, less what not even these say that there is: limits and gaps at once, then one by one.
+    """The fit with its intervals, less what these do not bear out: limits and gaps at once, then one by one.
 
     A single odd window may find a limit or a gap that explains it: a torque limit of 39 N m in the place of 50, with an
-    interval from none to 5e8. Of many effects that were fitted together some are what another integrator would have
-    found: an implicit servo damps as a rotor does, and armatures of a third less than declared had intervals that held
-    the declared ones.
+    interval from none to 5e8. Other effects go where the windows alone are sure of them and another integrator would
+    have found as much: an implicit servo damps as a rotor does, and beside six gains three armatures were named a third
+    below the declared ones. What the windows themselves leave open was fitted together with others and stays.
     """
+    alone = interval(problem, fit, weights) if fit.chosen else np.empty(0)
     half = half_widths(problem, fit, weights) if fit.chosen else np.empty(0)
-    doubtful = [c for c in fit.chosen if _sureness(fit, half, c) < 1.0]
-    if not doubtful:
+    rare = [c for c in fit.chosen if c.effect in (*SATURATIONS, *ABRUPT)]
+    gone = [c for c in rare if _sureness(fit, half, c) < 1.0]
+    if not gone:
+        feigned = [c for c in fit.chosen if _sureness(fit, half, c) < 1.0 <= _sureness(fit, alone, c)]
+        gone = [min(feigned, key=lambda c: _sureness(fit, half, c))] if feigned else []
+    if not gone:
         return Refined(problem, fit, weights, half)
-    gone = [c for c in doubtful if c.effect in (*SATURATIONS, *ABRUPT)]
-    gone = gone or [min(doubtful, key=lambda c: _sureness(fit, half, c))]
     kept = [c for c in fit.chosen if c not in gone]
     values = np.concatenate([np.empty(0), *(fit.of(c) for c in kept)])
-    return _sure_of(problem, last_step(problem, kept, values, weights), weights)
+    whole = last_step(problem, kept, values, weights)
+    less = _significant(problem, whole, weights)
+    if less.chosen != whole.chosen:
+        whole = last_step(problem, less.chosen, less.values, weights)
+    return _sure_of(problem, whole, weights)
 
 
 def _sureness(fit: Fit, half: np.ndarray, candidate: Candidate) -> float:

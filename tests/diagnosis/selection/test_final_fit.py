@@ -1,5 +1,6 @@
 """The last fit is whitened anew as long as its model changes what a window shows, and not once more."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -61,9 +62,11 @@ def test_a_limit_whose_interval_holds_the_declared_one_is_not_named(
         assert len(last.half) == len(last.fit.chosen)
 
 
-def test_of_two_whose_intervals_hold_the_declared_values_the_less_sure_one_goes_first(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(("alone", "left"), [(0.5, ["coulomb_friction"]), (1.1, ["coulomb_friction", "armature"])])
+def test_what_another_integrator_would_have_found_goes_but_not_what_the_windows_leave_open(
+    monkeypatch: pytest.MonkeyPatch, alone: float, left: list[str]
 ) -> None:
+    """Of two whose intervals hold the declared values, an integrator's share included, the less sure one goes first."""
     session = arm.session_of(arm.simulate({("coulomb_friction", "j2"): 0.6}, count=2, seconds=4.0, seed=100))
     problem = arm.problem_of(session, [0, 1], 24)
     every = all_candidates(session.plant, session.rollouts, [])
@@ -71,15 +74,18 @@ def test_of_two_whose_intervals_hold_the_declared_values_the_less_sure_one_goes_
     chosen = [next(c for c in every if (c.effect, c.where) == name) for name in names]
     begun = gauss_newton(problem, chosen, [0.6, 0.012], window_weights(problem.residual([[]])[0]), iterations=0)
 
-    def half(_: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
-        """By which both hold the declared values together, and the friction alone does not."""
-        away = np.abs(fit.values - [c.nominal[0] for c in fit.chosen])
-        return away * ([1.1, 1.3] if len(fit.chosen) == 2 else [0.5])
+    def half(share: float) -> Callable[[Problem, Fit, np.ndarray], np.ndarray]:
+        """Half-widths in shares of what is between the values and the declared ones; the friction alone is sure."""
+        both = [share, share + 0.2 * (share > 1)]
+        return lambda _, fit, weights: (
+            np.abs(fit.values - [c.nominal[0] for c in fit.chosen]) * (both if len(fit.chosen) == 2 else [0.5])
+        )
 
-    monkeypatch.setattr(refining, "half_widths", half)
+    monkeypatch.setattr(refining, "half_widths", half(1.1))
+    monkeypatch.setattr(refining, "interval", half(alone))
     last = refine(replace(problem, thresholds=_sure_of_all(problem)), begun, np.random.default_rng(0))
-    assert [c.effect for c in last.fit.chosen] == ["coulomb_friction"]
-    assert last.fit.values == pytest.approx([0.6], rel=0.1)
+    assert [c.effect for c in last.fit.chosen] == left
+    assert last.fit.values[0] == pytest.approx(0.6, rel=0.1)
 
 
 def _sure_of_all(problem: Problem) -> Thresholds:
