@@ -9,8 +9,8 @@ from bumblebee.diagnosis.candidates import Candidate, is_simulated, shortlisted
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.sensitivities.impulse_responses import Answers, answers_of
 from bumblebee.diagnosis.sensitivities.torque_signatures import Signatures
-from bumblebee.diagnosis.simulation import Plant, vary
-from bumblebee.sim.effects import Effect
+from bumblebee.diagnosis.simulation import Plant, begin_setpoints, setpoints_of, vary
+from bumblebee.sim.effects import SETPOINTS, Effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +72,8 @@ def screen(
     fresh = _whitened(problem, answers, only)
     white = fresh if before is None else before.white.copy()
     white[:, only] = fresh
+    shaped = [c.at(c.start) for c in kept if c.effect in SETPOINTS]
+    begin_setpoints(problem.windows, setpoints_of(problem.plant, shaped))
     signatures = Signatures(problem.plant, problem.windows, around, answers.path, rules.signatures)
     ends = np.cumsum([len(c.free) for c in kept]).tolist()
     values = np.empty((ends[-1] if ends else 0, *problem.nuisance.shape[1:]), dtype=np.float32)

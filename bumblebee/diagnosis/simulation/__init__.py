@@ -28,7 +28,7 @@ from bumblebee.diagnosis.simulation.readings import (
     measured_readings,
     simulated_readings,
 )
-from bumblebee.diagnosis.simulation.setpoints import setpoints_of
+from bumblebee.diagnosis.simulation.setpoints import begin_setpoints, setpoints_of
 from bumblebee.diagnosis.simulation.simulate import (
     Starts,
     at_ticks,
@@ -68,6 +68,7 @@ __all__ = [
     "activations",
     "at_starts",
     "at_ticks",
+    "begin_setpoints",
     "bent_before",
     "choose_starts",
     "command_inputs",

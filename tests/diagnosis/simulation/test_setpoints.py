@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.simulation.setpoints import _paths, setpoints_of
+from bumblebee.diagnosis.simulation.setpoints import _at_first_command, _paths, begin_setpoints, setpoints_of
 from bumblebee.diagnosis.simulation.simulate import inputs_of
 from bumblebee.diagnosis.simulation.variation import vary
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
@@ -74,7 +74,27 @@ def test_a_long_rollout_followed_in_parts_is_the_same(effect: Effect, drive: Dri
     """Parts of 10 s, each begun 10 s earlier, to 10 mrad where the drive lags behind nearly all the time."""
     session = arm.session_of(simulate(drive, count=2, seconds=24.0))
     (point,) = setpoints_of(session.plant, [effect])
-    whole = _paths(tuple(session.rollouts), replace(point, memory=100.0))
-    parts = _paths(tuple(session.rollouts), replace(point, memory=10.0))
+    whole = _paths(session.rollouts, [replace(point, memory=100.0)])
+    parts = _paths(session.rollouts, [replace(point, memory=10.0)])
     for one, other in zip(whole, parts, strict=True):
         np.testing.assert_allclose(one, other, atol=0.01)
+
+
+@pytest.mark.parametrize(("effect", "drive"), KINDS)
+def test_many_set_points_at_once_begin_where_each_does(effect: Effect, drive: Drive) -> None:
+    session = arm.session_of(simulate(drive, count=2, seconds=4.0))
+    windows = cut(session.plant, session.layout, session.rollouts, choose_starts(session.rollouts, [0, 1], 0.2, 8))
+    (name, *rest), (size, *others) = effect.parameters, effect.values()
+    sizes = [{name: share * size, **dict(zip(rest, others, strict=True))} for share in (0.5, 1.0, 2.0)]
+    points = [
+        p
+        for joint, own in zip(arm.JOINTS, sizes, strict=True)
+        for p in setpoints_of(session.plant, [replace(effect, where=(joint,), parameters=own)])
+    ]
+    begin_setpoints(windows, points)
+    for point in points:
+        alone = replace(windows, span=windows.span)  # others by name, so that nothing is known of them
+        for together, by_itself in zip(_at_first_command(windows, point), _at_first_command(alone, point), strict=True):
+            np.testing.assert_allclose(together, by_itself, rtol=0, atol=1e-12)
+    moved = np.stack([_at_first_command(windows, point)[0] for point in points])
+    assert np.abs(moved - [windows.command[:, 0, p.actuator] / p.scale for p in points]).max() > 1e-3
