@@ -13,6 +13,7 @@ from scipy.stats import norm
 
 from bumblebee.diagnosis.candidates import Formula
 from bumblebee.diagnosis.discrepancy import BasisFunction, Discovery, JointLackOfFit, quantities_of
+from bumblebee.diagnosis.report.what_matters import LEFT
 from bumblebee.diagnosis.simulation import joint_units
 from bumblebee.diagnosis.thresholds.report import MeasuredCurve, ReportThresholds
 
@@ -69,7 +70,7 @@ def _depends_on(left: JointLackOfFit, forms: Mapping[str, Mapping[str, float]]) 
 
 
 def _described(left: Sequence[JointLackOfFit], found: Discovery, rules: ReportThresholds) -> str:
-    """One sentence a joint: its share of what is left, on what it depends, and a form that was not kept.
+    """One sentence a joint: its share of the chi-square that is left, on what it depends, and a form that was not kept.
 
     Of `Unexplained.joints` joints that explain enough to be proclaimed; the others are listed.
     """
@@ -89,11 +90,11 @@ def _described(left: Sequence[JointLackOfFit], found: Discovery, rules: ReportTh
             terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in forms[j.joint].items())
             terms = _TABLE.sub(r"\1(\2, ...)", terms)
             line += f"; approximately {terms}, not confirmed on validation windows"
-        lines.append(f"{line}; {100 * shares[j.joint]:.0f} % of what is left")
+        lines.append(f"{line}; {100 * shares[j.joint]:.0f} % of {LEFT}")
     if more := len(left) - len(told) - slight:
         lines.append(f"and {more} joints more")
     if slight:
-        below = f"each less than {100 * rules.matters.structure:.0f} % of what is left"
+        below = f"each less than {100 * rules.matters.structure:.0f} % of {LEFT}"
         lines.append(f"{slight} {'joint' if slight == 1 else 'joints'}{' more' if lines else ''} with {below}")
     return "; ".join(lines)
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from bumblebee.diagnosis.report.html import number
-from bumblebee.diagnosis.report.what_matters import BESIDE, CARRY, WIDE
+from bumblebee.diagnosis.report.what_matters import BESIDE, CARRY, LEFT, WIDE
 from bumblebee.diagnosis.thresholds.report import Matters, ReportThresholds
 
 GROUPS = {
@@ -89,7 +89,7 @@ def _left(told: Mapping[str, Any], rule: Matters) -> str:
 
 
 def _structure(told: Mapping[str, Any], rule: Matters) -> str:
-    """What tests of what is left saw, as a share of it; what explains next to nothing is only listed."""
+    """What tests of what is left saw, as a share of its chi-square; what explains next to nothing is only listed."""
     said = [entry for entry in told["structure"] if entry["proclaimed"]]
     slight = [entry["where"] for entry in told["structure"] if not entry["proclaimed"]]
     parts = [
@@ -99,13 +99,13 @@ def _structure(told: Mapping[str, Any], rule: Matters) -> str:
     ]
     text = f"Part of it has structure: {'; '.join(parts)}." if parts else ""
     if slight:
-        below = f"below {100 * rule.structure:.0f} % of what is left"
+        below = f"below {100 * rule.structure:.0f} % of {LEFT}"
         text += f"{' ' if text else ''}Significant, but {below}: {', '.join(slight)}."
     return text
 
 
 def _of_left(entry: Mapping[str, Any]) -> str:
-    return "" if entry["explains"] is None else f"{100 * entry['explains']:.0f} % of what is left, "
+    return "" if entry["explains"] is None else f"{100 * entry['explains']:.0f} % of {LEFT}, "
 
 
 def _on(entry: Mapping[str, Any]) -> str:

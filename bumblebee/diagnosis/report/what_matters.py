@@ -16,6 +16,9 @@ from bumblebee.diagnosis.thresholds.report import Matters
 
 CARRY, BESIDE, WIDE = "carry", "beside", "wide"
 """Groups of effects: what carries the gain; what costs little to remove alone, its size known; its size not known."""
+LEFT = "the remaining chi-square"
+"""What structure explains a share of. Every reading counts by its noise there, so that a joint that errs by little may
+be most of it; what is left in a joint's own units is another share."""
 
 
 def what_matters(document: Mapping[str, Any], ends: Ends, rule: Matters, seed: int = 0) -> dict[str, Any]:
@@ -71,7 +74,7 @@ def _left(what: str, where: str, after: Mapping[str, Any], floor: Mapping[str, A
 
 
 def structure(document: Mapping[str, Any], rule: Matters) -> list[dict[str, Any]]:
-    """Joints whose missing torque has significant structure, by the share of what is left that it explains.
+    """Joints whose missing torque has significant structure, by the share of the chi-square left that it explains.
 
     `proclaimed`: whether that is enough to speak of it; `depends_on` is cut to what explains most of it.
     """

@@ -64,8 +64,10 @@ def test_the_first_sentence_is_the_share_that_is_gone_in_degrees_with_its_interv
     assert first.startswith("After 0.2 s on 2 held-out rollouts, 78 % [70, 81] of the removable error")
     assert "5.7° to 1.4° RMS, noise 0.11°" in first
     assert left == "What is left after 0.2 s: b 2.3° (94 %), hand 12.3 mm off (declared 50 mm)."
-    assert structured.startswith("Part of it has structure: 40 % of what is left, a missing torque at b (0.3 N m RMS")
-    assert structured.endswith("Significant, but below 5 % of what is left: a.")
+    assert structured.startswith(
+        "Part of it has structure: 40 % of the remaining chi-square, a missing torque at b (0.3 N m RMS"
+    )
+    assert structured.endswith("Significant, but below 5 % of the remaining chi-square: a.")
     assert "its gain comes from kp on a, kd on a; read as sizes by themselves kp on a; take the other 3 only" in trusted
     assert "(2 have intervals wider than 3-fold" in trusted
 
