@@ -41,7 +41,8 @@ def what_is_left_table(document: Mapping[str, Any]) -> str:
     text = (
         "<p class='note'>RMS error of windows that start from measured states. Share: of the squared error above the "
         "noise, over all joints. (end): where the joints' errors put the last body of a chain, the base as measured. "
-        "Grey: significant, but next to nothing of what is left.</p>"
+        "Chi-square: the remaining one, in which every reading counts by its noise. Grey: significant, but next to "
+        "nothing of it.</p>"
     )
     return "<h2>What is left</h2>" + table(head, rows, (1, 2, 3, 4)) + text
 
@@ -58,7 +59,7 @@ def _sizes(first: float | None, entry: Mapping[str, Any]) -> list[str]:
 def _missing(entry: Mapping[str, Any] | None) -> str:
     if entry is None:
         return ""
-    share = "" if entry["explains"] is None else f": {100 * entry['explains']:.0f} % of what is left"
+    share = "" if entry["explains"] is None else f": {100 * entry['explains']:.0f} % of chi-square"
     on = f" on {', '.join(entry['depends_on'])}" if entry["depends_on"] else ""
     text = escape(f"{number(entry['torque'], 2)} {entry['unit']} RMS{on}{share}")
     return text if entry["proclaimed"] else f"<span class='note'>{text}</span>"
