@@ -28,7 +28,7 @@ def test_a_late_joint_is_where_the_cubic_through_its_readings_puts_it(session: S
     q, v = read_at(windows, 0.002, delay, range(3), session.plant.thresholds.path)
     at = first.time[windows.start]
     for j in range(3):
-        assert q[:, j] == pytest.approx(place(at + 0.002 + delay[j])[:, j], abs=1e-6)
+        assert q[:, j] == pytest.approx(place(at + 0.002 + delay[j])[:, j], abs=1e-7)
         assert v[:, j] == pytest.approx(speed(at + 0.002 + delay[j])[:, j], abs=3e-4)  # on a line between ticks
 
 
