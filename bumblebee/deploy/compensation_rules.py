@@ -34,6 +34,7 @@ NOT_UNDONE = {
     "ground_friction": "it is in the floor, not in a joint",
     "ground_compliance": "it is in the floor, not in a joint",
     "ground_slope": "it is in the floor or the mount, not in a joint",
+    "surface_contact": "it is in what the robot touches, not in a joint",
     "thermal_fade": "it depends on the motor's heat, which is not measured",
     "strength_drift": "it depends on how long the robot has run since it was measured",
     "external_wrench": "it acts on a body of a floating robot: only the feet could answer it",

@@ -45,9 +45,9 @@ class DiagnosisConfig:
     report_windows: int = 80
     """Windows for each horizon of the error block."""
     max_long_windows: int = 20
-    """Windows of 1 s on which an accepted effect must not be worse."""
+    """Windows of 1 s on which an accepted effect must not be worse, of fitted rollouts and of others each."""
     grow: bool = True
-    """Whether models of few degrees of freedom, which are cheap, get more windows."""
+    """Whether models that are cheap to simulate get more windows."""
     seed: int = 0
     beyond: bool = True
     """Whether to look for structure that no effect of the catalogue explains, and for its form."""

@@ -21,7 +21,15 @@ from bumblebee.diagnosis.discrepancy import (
 )
 from bumblebee.diagnosis.estimation import gauss_newton
 from bumblebee.diagnosis.prepare import Material, gather
-from bumblebee.diagnosis.report import Findings, document, effect_entries, law_notes, loss_entries, unseen_notes
+from bumblebee.diagnosis.report import (
+    Findings,
+    document,
+    effect_entries,
+    law_notes,
+    loss_entries,
+    surface_notes,
+    unseen_notes,
+)
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection import (
     Refined,
@@ -104,6 +112,7 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
         *notes,
         *law_notes(found.last),
         *(n for b in found.budgets for n in b.notes()),
+        *surface_notes(material.session, effects, config.thresholds.report.verdicts),
         *unseen_notes(material.session, effects, config.horizon, config.thresholds.report.verdicts),
     ]
     told = document(material, config, found.search, found.last, found.beyond, Findings(effects, entries, notes))

@@ -56,7 +56,7 @@ def gather(session: Session, config: DiagnosisConfig, rng: np.random.Generator, 
     more = float(np.clip(extent.cheap_model / session.plant.model.nv, 1.0, extent.more)) if config.grow else 1.0
     say("what noise in the starts becomes, by simulation")
     problem = _problem(session, fitted, round(more * config.max_windows), config, rng)
-    holdout = _holdout(session, config, more, rng)
+    holdout = _holdout(session, fitted, config, more, rng)
     say(f"{len(problem.windows)} windows of {config.horizon:g} s")
     typical = scales_of(session.plant, session.rollouts, rules.scales).torque
     return Material(session, still, candidates, typical, problem, holdout)
@@ -68,15 +68,35 @@ def _by(session: Session, thresholds: Thresholds) -> Session:
     return replace(session, plant=plant, thresholds=thresholds.dataset)
 
 
-def _holdout(session: Session, config: DiagnosisConfig, more: float, rng: np.random.Generator) -> Holdout:
-    """Windows of 0.2 s and of 1 s of the rollouts that acceptance is decided on."""
+def _holdout(
+    session: Session, fitted: Sequence[int], config: DiagnosisConfig, more: float, rng: np.random.Generator
+) -> Holdout:
+    """Windows of 0.2 s of the rollouts that acceptance is decided on; of 1 s of these and of the `fitted` ones.
+
+    What goes wrong within the second of one fitted window in a hundred is no less wrong for having been fitted until
+    0.2 s.
+    """
     if not session.accept:
         return Holdout()
     problem = _problem(session, session.accept, round(more * config.max_holdout_windows), config, rng)
     length, rule = session.thresholds.extent.long_window, session.plant.thresholds.windows
-    starts = choose_starts(session.rollouts, session.accept, length, config.max_long_windows, rule)
-    long = cut(session.plant, session.layout, session.rollouts, starts, outputs=1) if starts else None
-    return Holdout(problem, long)
+    some, many = (
+        [s for ids in (session.accept, fitted) for s in choose_starts(session.rollouts, ids, length, count, rule)]
+        for count in (config.max_long_windows, _last_windows(session, config))
+    )
+    if not some:
+        return Holdout(problem)
+    long, last = (cut(session.plant, session.layout, session.rollouts, starts, outputs=1) for starts in (some, many))
+    return Holdout(problem, long, last)
+
+
+def _last_windows(session: Session, config: DiagnosisConfig) -> int:
+    """How many windows of 1 s judge the last fit, of fitted and other rollouts each: more where they cost little."""
+    extent = session.thresholds.extent
+    if not config.grow:
+        return config.max_long_windows
+    work = session.plant.model.nv * extent.long_window / session.steps[0]
+    return round(float(np.clip(extent.last_work / work, 1.0, extent.more_last)) * config.max_long_windows)
 
 
 def _problem(

@@ -62,13 +62,15 @@ def simulate(
     seed: int = 0,
     still: int | None = None,
     gains: tuple[float, float] | None = None,
+    xml: str = XML,
 ) -> list[Rollout]:
     """Rollouts at 50 Hz of the arm with `effects` {(id, place): value}; joint `still` is neither moved nor free.
 
+    `xml` is the true arm where it is not the declared one.
     With `gains`, factors of kp and kd, the servos have these times their declared ones, and the metadata say so.
     """
     rng = np.random.default_rng(seed)
-    model = mujoco.MjModel.from_xml_string(XML)
+    model = mujoco.MjModel.from_xml_string(xml)
     kp, kd = model.actuator_gainprm[:, 0].copy(), -model.actuator_biasprm[:, 2]
     kp, kd = (kp, kd) if gains is None else (gains[0] * kp, gains[1] * kd)
     limit = model.actuator_forcerange[:, 1].copy()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from bumblebee.sim.effects import single
-from tests.sim.hinge import ARM, FINE, INERTIA, MASS, both, check, model_with, path, reference, servo, swing
+from bumblebee.sim.effects.native import NO_SURFACE, POINT_RADIUS
+from tests.sim.hinge import ARM, FINE, INERTIA, MASS, TOTAL, both, check, model_with, path, reference, servo, swing
 
 
 def test_hysteresis_is_a_spring_that_yields() -> None:
@@ -81,3 +82,33 @@ def test_a_backlash_of_no_width_is_a_model_all_the_same() -> None:
     model = model_with(single("backlash", "j", 0.0))
     low, high = model.joint("j_play").range
     assert low < high and high - low < 1e-6
+
+
+def test_a_surface_stops_the_point_that_touches_it() -> None:
+    """The point is at the end of the arm; where it would sink in, the hinge stands instead, and loses its speed."""
+    height, friction = -0.06, 0.0
+    most = np.arcsin((-height - POINT_RADIUS) / ARM)
+    q, v, out = 0.0, 0.0, []
+    for k in range(round(0.4 / FINE)):
+        v += FINE * servo(k * FINE, q, v) / TOTAL
+        q += FINE * v
+        if q > most:
+            q, v = most, min(v, 0.0)
+        if (k + 1) % round(0.001 / FINE) == 0:
+            out.append((q, v))
+    assert (np.array(out)[:, 0] == most).sum() > 30  # ms that it stands
+    effect = single("surface_contact", "link", height, ARM, 0.0, 0.0, friction)
+    mine, (plain, without) = path([effect], swing), both()
+    assert np.abs(np.array(out) - without).max(axis=0)[0] > 0.1
+    away = np.abs(mine[:, 0] - np.array(out)[:, 0])  # a contact of MuJoCo's gives way by millimetres
+    assert away.mean() < 0.012 and away.max() < 0.03
+    assert np.abs(plain - mine)[:, 0].max() > 0.1
+
+
+def test_a_surface_touches_nothing_but_its_point_and_a_low_one_nothing() -> None:
+    effect = single("surface_contact", "link", NO_SURFACE, ARM, 0.0, 0.0, 1.0)
+    np.testing.assert_array_equal(path([effect], swing), both()[0])
+    model = model_with(single("surface_contact", "link", 0.0, ARM, 0.0, 0.0, 0.4))
+    assert model.geom_contype.tolist() == model.geom_conaffinity.tolist() == [0, 0]
+    assert model.npair == 1 and model.pair_friction[0, 0] == 0.4
+    assert model.body("link").mass == model_with().body("link").mass

@@ -8,6 +8,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates.candidate import Candidate
 from bumblebee.diagnosis.candidates.signal_scales import Scales, scales_of
+from bumblebee.diagnosis.candidates.surfaces import surface_candidates
 from bumblebee.diagnosis.simulation import Plant, declared_values, touching
 from bumblebee.diagnosis.thresholds.candidates import BodySteps, CandidateThresholds, StillJoints
 from bumblebee.measured.rollout import Rollout
@@ -49,6 +50,7 @@ def all_candidates(
     for body in _carried(plant, still):
         found += _on_body(plant, body, total, rules.body)
     found += _under_floating_base(plant, rules.body)
+    found += surface_candidates(plant, rollouts, _carried(plant, still), rules.surface)
     return [replace(c, limits=rules.limits) for c in found]
 
 

@@ -112,6 +112,11 @@ TRAITS: dict[str, Traits] = {
         "turn the robot by 180 degrees on the spot",
         on_fixed_base="put a level on the mount, or bolt it down turned by 180 degrees",
     ),
+    "surface_contact": Traits(
+        "repeat the motion with the robot lifted off what it may touch, or with that taken away",
+        column="simulated",
+        abrupt=True,
+    ),
     "thermal_fade": Traits("repeat the motion after a pause"),
     "strength_drift": Traits("repeat the motion after a pause, without one"),
     "external_wrench": Traits("unplug what is tethered, and repeat in another heading"),

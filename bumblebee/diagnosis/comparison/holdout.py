@@ -26,7 +26,9 @@ class Holdout:
 
     problem: Problem | None = None
     long: Windows | None = None
-    """Windows of 1 s, their last tick compared."""
+    """Windows of 1 s of these and of the fitted rollouts, their last tick compared."""
+    last: Windows | None = None
+    """More of these, on which the last fit must not be worse: one window in a hundred may be where it goes wrong."""
     recall: Recall = field(default_factory=Recall, repr=False)
 
     def relinearised(self, effects: Sequence[Effect]) -> "Holdout":
@@ -34,8 +36,10 @@ class Holdout:
         return self if self.problem is None else self._with(self.problem.relinearised(effects))
 
     def finely(self) -> "Holdout":
-        """The same in the steps of the last fit."""
-        return self if self.problem is None else self._with(self.problem.finely())
+        """The same in the steps of the last fit, and judged by the windows that there are for it."""
+        if self.problem is None:
+            return self
+        return Holdout(self.problem.finely(), self.last or self.long, self.last)
 
     def _with(self, problem: Problem) -> "Holdout":
         """The same on another problem; what is known of the declared model after 1 s stays known."""
@@ -91,10 +95,21 @@ class Holdout:
 
 
 def _grown(error: np.ndarray, rule: Later) -> bool:
-    """Whether errors (2, L, J), in the noise's standard deviations, are larger in the second, beyond doubt."""
-    growth = np.diff(np.log1p((error**2).mean(axis=2)), axis=0)[0]
-    if len(growth) < rule.windows:
+    """Whether errors (2, L, J), in the noise's standard deviations, are larger in the second, beyond doubt.
+
+    By the logarithm of a window's mean square, or by the mean square itself.
+    """
+    power = (error**2).mean(axis=2)
+    if power.shape[1] < rule.windows:
         return False
+    least = (rule.growth, rule.growth_of_square * float(power[0].mean()))
+    return any(
+        _beyond(change[1] - change[0], none, rule) for change, none in zip((np.log1p(power), power), least, strict=True)
+    )
+
+
+def _beyond(growth: np.ndarray, none: float, rule: Later) -> bool:
+    """Whether the mean growth (L,) is more than `none` and more than its error."""
     # Of four windows, two standard errors are one chance in fourteen: a true armature was refused by them.
     doubt = student.ppf(norm.cdf(rule.z), len(growth) - 1) * growth.std(ddof=1) / np.sqrt(len(growth))
-    return bool(growth.mean() > max(rule.growth, doubt))
+    return bool(growth.mean() > max(none, doubt))

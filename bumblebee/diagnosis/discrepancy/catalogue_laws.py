@@ -108,6 +108,7 @@ NO_LAW = {
     "ground_friction": _JOINTS,
     "ground_compliance": _JOINTS,
     "ground_slope": _JOINTS,
+    "surface_contact": "where it acts depends on all joints",
     "thermal_fade": "no term has the motor's heat",
     "external_wrench": _JOINTS,
     "discovered": "it is made of terms",

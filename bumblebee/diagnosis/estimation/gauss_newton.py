@@ -1,6 +1,6 @@
 """The joint refit of all chosen effects by Gauss-Newton's steps on whitened residuals."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,11 +27,13 @@ def gauss_newton(
     coarse: bool = False,
     damping: float = 1e-9,
     known: Fit | None = None,
+    held: Collection[Candidate] = (),
 ) -> Fit:
     """Refit all chosen effects jointly, from `values` (P,); `coarse` takes the sensitivities from coarse steps.
 
     With `damping` (Marquardt's) what the data hardly tell stays where it is. Sensitivities of a fit that is `known` of
-    the same windows are taken over where nothing near has changed, and simulated again where something near has moved.
+    the same windows are taken over where nothing near has changed, and simulated again where something near has moved,
+    but for those of effects that are `held`: they are simulated once.
     """
     values = clipped(chosen, np.asarray(values, dtype=float))
     residual = problem.residual([effects_at(chosen, values)])[0]
@@ -39,7 +41,8 @@ def gauss_newton(
     scales = np.concatenate([c.scales for c in chosen]) if len(chosen) else np.empty(0)
     moving = np.flatnonzero(scales)
     columns, at = taken_over(problem, chosen, values, moving, known)
-    columns = columns_at(problem, chosen, values, scales, coarse, columns, at)
+    hold = np.repeat([c in held for c in chosen], [len(c.nominal) for c in chosen]).astype(bool)[moving]
+    columns = columns_at(problem, chosen, values, scales, coarse, columns, at, hold)
     for _ in range(iterations if len(chosen) else 0):
         basis, inverse = project(problem, columns, weights, damping)
         move = np.zeros(len(values))
@@ -56,7 +59,7 @@ def gauss_newton(
         gained = cost - new[0]
         values, residual, (cost, nuisance) = trial, tried, new
         if not small:
-            columns = columns_at(problem, chosen, values, scales, coarse, columns, at)
+            columns = columns_at(problem, chosen, values, scales, coarse, columns, at, hold)
         if small or gained < 0.05:
             break
     return Fit(tuple(chosen), values, nuisance, residual, columns, cost)

@@ -17,18 +17,20 @@ def columns_at(
     coarse: bool,
     known: np.ndarray,
     at: np.ndarray,
+    held: np.ndarray | bool = False,
 ) -> np.ndarray:
     """Sensitivities (P', W, M) per scale at `values`, by differences of a fifth of it, or of the room to the bounds.
 
     Those of `known` (P', W, M), whose values were `at` (P', P), hold as long as nothing near has moved far; NaN in `at`
-    where nothing is known. `at` is brought up to date.
+    where nothing is known; those that are `held` (P',) hold wherever anything moves. `at` is brought up to date.
     """
     moving = np.flatnonzero(scales)
     if not len(moving):
         return np.empty((0, *problem.nuisance.shape[1:]))
     near = _near(problem, chosen)
     moved = np.abs(values - at) <= problem.thresholds.estimation.jacobian.moved * np.where(scales > 0, scales, np.inf)
-    stale = np.flatnonzero([not moved[k, near[i]].all() for k, i in enumerate(moving)])
+    fresh = np.array([moved[k, near[i]].all() for k, i in enumerate(moving)])
+    stale = np.flatnonzero(~(fresh | (held & np.isfinite(at).all(axis=1))))
     if not len(stale):
         return known
     sets, sizes = [], []

@@ -23,6 +23,7 @@ from bumblebee.diagnosis.report.prediction_error import (
     horizon_whiteners,
     horizon_windows,
 )
+from bumblebee.diagnosis.report.surface_notes import surface_notes
 from bumblebee.diagnosis.report.svg import cloud_picture, line_picture
 from bumblebee.diagnosis.report.terminal import gap_summary, plot, summary
 
@@ -53,6 +54,7 @@ __all__ = [
     "render_report",
     "shade",
     "summary",
+    "surface_notes",
     "table",
     "unseen_notes",
     "warning",

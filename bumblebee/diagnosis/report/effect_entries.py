@@ -17,6 +17,8 @@ from bumblebee.diagnosis.simulation import Plant, declared_values, unit_on
 from bumblebee.diagnosis.thresholds.report import Effects
 from bumblebee.sim.effects import CATALOGUE, Effect, is_native
 
+SURFACE = "surface_contact"
+
 
 def effect_entries(found: Search, last: Refined, holdout: Holdout, beyond: Discovery | None) -> list[dict[str, Any]]:
     """The list of `diagnosis.json`, most explaining first.
@@ -90,10 +92,15 @@ def _levels(fit: Fit, rule: Effects) -> dict[Candidate, Candidate]:
 
 
 def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray) -> dict[str, Any]:
-    """The contract's parameters of one effect, in its own units; `nominal` is null where the model knows no bound."""
+    """The contract's parameters of one effect, in its own units; `nominal` is null where the model knows no bound.
+
+    No model declares a surface that it lacks, nor do data say which point of a body touches it.
+    """
     out = {}
     # A limit is tried from the largest torque in the data on, which is not where the model has it.
     declared = declared_values(plant, c.effect, c.where) if c.effect == "torque_limit" else c.nominal
+    if c.effect == SURFACE:
+        declared, half = [np.inf] * len(values), np.where(c.scales > 0, half, np.nan)
     for p, value, nominal, wide in zip(CATALOGUE[c.effect].parameters, values, declared, half, strict=True):
         if p.default is not None and value == p.default:
             continue
@@ -104,7 +111,7 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
             low, high = 1.0 / max(ends[1], 1e-12), None if ends[0] <= 0 else 1.0 / ends[0]
             out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": unit}
         else:
-            inside = max(p.lower, ends[0]), min(p.upper, ends[1])
+            inside = np.clip(ends, p.lower, p.upper).tolist()
             ends = [end if np.isfinite(end) else None for end in inside]
             known = float(nominal) + 0.0 if np.isfinite(nominal) else None  # no -0
             out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": unit}

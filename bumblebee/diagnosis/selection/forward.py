@@ -27,6 +27,7 @@ from bumblebee.diagnosis.selection.proposals.packet_loss import find_packet_loss
 from bumblebee.diagnosis.selection.proposals.saturation import saturation_trials
 from bumblebee.diagnosis.selection.proposals.setpoints import setpoint_trials
 from bumblebee.diagnosis.selection.proposals.stribeck import add_dry_friction, add_stribeck_friction
+from bumblebee.diagnosis.selection.proposals.surface_contact import surface_trials
 from bumblebee.diagnosis.selection.proposals.torque_ripple import ripple_trials
 from bumblebee.diagnosis.selection.score_tests import Scores
 from bumblebee.diagnosis.selection.state import Loss, SearchState
@@ -132,7 +133,7 @@ def _select(run: SearchState, config: SearchConfig, budget: Budget) -> None:
 
 def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
     """Forward selection until nothing is worth a trial, too many in a row were in vain, or the time is over."""
-    vain, judged, limits, attempt = 0, None, [], run.problem.plant.failures.attempt
+    vain, judged, limits, touching, attempt = 0, None, [], _Touching(run), run.problem.plant.failures.attempt
     while len(run.fit.chosen) < config.most + run.given and vain < run.patience:
         if not budget.has_time_for("more effects"):
             break
@@ -146,6 +147,7 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         many = not _explains_much(tried, run)
         if many and attempt(_ALL_JOINTS, partial(start_with_all_joints, run), _no):
             continue
+        tried += attempt("contact with a surface", touching.trials, list)
         late = attempt("drives that follow their targets late", partial(setpoint_trials, run, tried), list)
         tried += [t for t in late if t.candidate not in run.closed]
         tried += attempt("torque ripple", partial(ripple_trials, run, tried), list)
@@ -174,6 +176,21 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         if accepted:
             attempt("a torque limit in the place of a weak drive", partial(swap_limits, run), _no)
             run.hopeless = {(kind, where) for kind, where in run.hopeless if place and where != place}
+
+
+class _Touching:
+    """Contacts with a surface that the model lacks, sought once for each fit."""
+
+    def __init__(self, run: SearchState) -> None:
+        self.run, self.fit, self.found = run, None, []
+
+    def trials(self) -> list[Trial]:
+        """The best, if none was refused there."""
+        run = self.run
+        if self.fit is not run.fit:
+            self.fit = run.fit
+            self.found = surface_trials(run.problem, run.fit, run.candidates, run.weights, tuple(run.closed))
+        return [t for t in self.found if t.candidate not in run.closed]
 
 
 def _drives(run: SearchState) -> list[Trial]:

@@ -54,6 +54,8 @@ class Terms:
     weighed_after: bool = False
     """Whether z has the weights that the refit itself leaves."""
     certainty: Certainty = by_slopes
+    held: bool = False
+    """Whether the sensitivities of what stays hold wherever it moves: enough for a trial, and far cheaper."""
     artefact: bool = True
     """Whether it must gain more than other integrators and the readings' noise would."""
 
@@ -101,8 +103,10 @@ def refitted(now: Now, rest: Fit, candidate: Candidate, starts: Sequence[np.ndar
     problem, holdout, before = now
     chosen = (*rest.chosen, candidate)
     weights = terms.weights if terms.weights is not None else _as_left(problem, rest, chosen, starts[0])
+    held = rest.chosen if terms.held else ()
     fits = [
-        gauss_newton(problem, chosen, start, weights, terms.iterations, coarse=True, known=before) for start in starts
+        gauss_newton(problem, chosen, start, weights, terms.iterations, coarse=True, known=before, held=held)
+        for start in starts
     ]
     new = min(fits, key=lambda fit: fit.cost)
     weights = window_weights(new.clean(problem)) if terms.weighed_after else weights

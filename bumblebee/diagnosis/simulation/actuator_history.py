@@ -22,7 +22,16 @@ from bumblebee.sim.servo import Servos, servos_each, servos_of
 
 def plant_servos(plant: Plant, model: mujoco.MjModel | None = None) -> Servos:
     """The servos of the plant's joints, in the log's column order, or those that `model` has there."""
-    model = plant.model if model is None else model
+    return _declared_servos(plant) if model is None else _servos(plant, model)
+
+
+@lru_cache(maxsize=64)
+def _declared_servos(plant: Plant) -> Servos:
+    """Those of the plant's own model, which nobody writes to."""
+    return _servos(plant, plant.model)
+
+
+def _servos(plant: Plant, model: mujoco.MjModel) -> Servos:
     return servos_of(model, [int(model.joint(name).id) for name in plant.joints])
 
 
@@ -67,6 +76,20 @@ def mean_squares(plant: Plant, rollout: Rollout) -> np.ndarray:
     return total
 
 
+def _shares_of_limit(plant: Plant, rollout: Rollout) -> np.ndarray:
+    """Mean squares (T - 1, J) of the servo torques as shares of their limits; of one without a limit in N m."""
+    limit = plant_servos(plant.of(rollout)).limit
+    return mean_squares(plant, rollout) / np.where(np.isfinite(limit), limit, 1.0) ** 2
+
+
+@lru_cache(maxsize=256)
+def full_heat(plant: Plant, rollout: Rollout) -> np.ndarray:
+    """Heat (T, J) [s] of drives that lose no strength."""
+    none = np.zeros(len(plant.joints))
+    clock = rollout.time - rollout.time[0]
+    return heated(clock, _shares_of_limit(plant, rollout), none, none, plant.thresholds.history)
+
+
 def at_starts(windows: Windows, of: Callable[[Rollout], np.ndarray]) -> np.ndarray:
     """Rows (W, ...) of the tables `of` the windows' rollouts (T, ...) at their starts."""
     tables = {i: of(windows.source[i]) for i in np.unique(windows.rollout)}
@@ -80,9 +103,10 @@ def remember(plant: Plant, windows: Windows, hooks: RuntimeHooks, step: float) -
     thermal[order], drift[order] = hooks.thermal, hooks.drift
 
     def heat(rollout: Rollout) -> np.ndarray:
-        time, limit = rollout.time - rollout.time[0], plant_servos(plant.of(rollout)).limit
-        scale = np.where(np.isfinite(limit), limit, 1.0)
-        return heated(time, mean_squares(plant, rollout) / scale**2, thermal, drift, plant.thresholds.history)
+        if not (thermal.any() or drift.any()):
+            return full_heat(plant, rollout)
+        time, rule = rollout.time - rollout.time[0], plant.thresholds.history
+        return heated(time, _shares_of_limit(plant, rollout), thermal, drift, rule)
 
     back = history_length(hooks, step)
     late = bool(hooks.torque_lag.any())

@@ -101,6 +101,7 @@ _DECLARED: dict[str, _Declared] = {
     "ground_friction": _ground_friction,
     "ground_compliance": lambda plant, place: (plant.model.geom_solref[int(plant.model.geom(place).id), 0],),
     "ground_slope": _NONE,
+    "surface_contact": lambda plant, place: (native.NO_SURFACE, *plant.model.body(place).ipos, 1.0),
     "thermal_fade": _NONE,
     "strength_drift": _NONE,
     "external_wrench": _NONE,

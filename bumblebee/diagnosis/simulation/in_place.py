@@ -148,6 +148,14 @@ def _slope(at: Target, x: float, y: float, z: float) -> None:
     at.model.opt.gravity = native.sloped(at.model.opt.gravity, x, y, z)
 
 
+def _surface(at: Target, height: float, x: float, y: float, z: float, friction: float) -> None:
+    model = at.model
+    point, plane = (int(model.geom(name).id) for name in native.contact_names(at.place))
+    model.geom_pos[point], model.geom_pos[plane] = (x, y, z), (0.0, 0.0, height)
+    pairs = np.flatnonzero((np.stack((model.pair_geom1, model.pair_geom2)) == point).any(axis=0))
+    model.pair_friction[pairs, :2] = friction
+
+
 WRITE: dict[str, Callable[..., None]] = {
     "coulomb_friction": _dry,
     "quadratic_friction": _drag,
@@ -173,6 +181,7 @@ WRITE: dict[str, Callable[..., None]] = {
     "ground_friction": _ground_friction,
     "ground_compliance": _ground_compliance,
     "ground_slope": _slope,
+    "surface_contact": _surface,
 }
 """Effect -> how it is written into a compiled model, (target, *parameters)."""
 if unlike := WRITE.keys() ^ ADDED.keys():

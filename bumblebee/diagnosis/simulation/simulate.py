@@ -114,9 +114,9 @@ def _simulated(chunk: "_Chunk", layout: Layout, cache: dict[bytes, np.ndarray], 
 
 
 def _together(variations: Sequence[Variation], first: int, chunk: int) -> range:
-    """Plain variations from `first` on run in one batch; one that is more than a model runs alone."""
+    """Plain variations of one structure from `first` on run in one batch; one that is more than a model runs alone."""
     last = first
-    while last < min(first + chunk, len(variations)) and variations[last].plain:
+    while last < min(first + chunk, len(variations)) and variations[last].beside(variations[first]):
         last += 1
     return range(first, max(last, first + 1))
 

@@ -15,8 +15,9 @@ from bumblebee.errors import BadInput
 from bumblebee.sim.effects import CATALOGUE, SETPOINTS, Effect, RuntimeHooks, add_to_spec, native, runtime_hooks
 
 _ORDER = tuple(CATALOGUE)
-# Effects that change the layout of MuJoCo's state: they are compiled, once for each set of places.
-STRUCTURAL = ("backlash", "series_elasticity", "hysteresis")
+# Effects that change the layout of MuJoCo's state or model: they are compiled, once for each set of places.
+STRUCTURAL = ("backlash", "series_elasticity", "hysteresis", "surface_contact")
+_NO_STATE = ("surface_contact",)
 # Effects after which constants that derive from the model are computed again.
 _NEW_CONSTANTS = ("armature", "link_mass", "link_com", "link_inertia", *STRUCTURAL)
 
@@ -62,8 +63,13 @@ class Variation:
     @property
     def plain(self) -> bool:
         """Whether a model and what becomes of single commands on their way are all there is to it."""
-        alone = self.plant is None and self.hooks is None and self.tilt is None and self.dropped is None
+        seen = all(kind in _NO_STATE for kind, _, _ in self.hidden)
+        alone = seen and self.hooks is None and self.tilt is None and self.dropped is None
         return alone and not self.impossible
+
+    def beside(self, other: "Variation") -> bool:
+        """Whether both are plain and of one structure, so that one batch holds both."""
+        return self.plain and other.plain and self.plant is other.plant
 
 
 def vary(plant: Plant, effects: Sequence[Effect]) -> Variation:

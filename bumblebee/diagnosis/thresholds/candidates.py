@@ -128,6 +128,22 @@ class BodySteps:
 
 
 @dataclass(frozen=True)
+class SurfaceSteps:
+    """Of a surface that a body of a robot on a fixed base touches."""
+
+    ticks: int = 25
+    """Every so manieth tick of the logs says how low a body comes."""
+    travel: float = 0.02
+    """Height through which a body must move [m]."""
+    below: float = 0.01
+    """How far below its lowest place no surface is felt [m]."""
+    deep: float = 0.1
+    """Share of that height by which a first surface is above its lowest place."""
+    friction: float = 0.5
+    """Sliding friction to begin with."""
+
+
+@dataclass(frozen=True)
 class CandidateLimits:
     """Of one candidate: how it is simulated and how far it may go."""
 
@@ -156,4 +172,5 @@ class CandidateThresholds:
     drive: DriveSteps = field(default_factory=DriveSteps)
     transmission: TransmissionSteps = field(default_factory=TransmissionSteps)
     body: BodySteps = field(default_factory=BodySteps)
+    surface: SurfaceSteps = field(default_factory=SurfaceSteps)
     limits: CandidateLimits = field(default_factory=CandidateLimits)

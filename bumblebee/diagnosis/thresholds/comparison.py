@@ -30,6 +30,9 @@ class Later:
 
     growth: float = 0.02
     """Growth of log(1 + error^2) that is none."""
+    growth_of_square: float = 0.1
+    """The same of error^2, as a share of what it was: of a model that is right but for one window in a hundred, in
+    which a joint swings away, the logarithm sees nothing."""
     z: float = 2.0
     """Standard errors of Student's t beyond which it has grown."""
     windows: int = 3

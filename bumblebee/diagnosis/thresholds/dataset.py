@@ -158,6 +158,11 @@ class Extent:
     """Times as many windows at most, for the smallest models."""
     long_window: float = 1.0
     """Length of the long windows on which an accepted effect must not be worse [s]."""
+    last_work: float = 270_000.0
+    """Steps of a long window times degrees of freedom below which more of them judge the last fit, in inverse
+    proportion."""
+    more_last: float = 50.0
+    """Times as many at most."""
 
 
 @dataclass(frozen=True)

@@ -66,6 +66,56 @@ class Backlash:
 
 
 @dataclass(frozen=True)
+class SurfaceContact:
+    """Of contact with a surface that the model lacks: where the robot is when it is further off than usual."""
+
+    off: float = 8.0
+    """Times the median power by which the furthest windows must be off."""
+    share: float = 0.05
+    """Share of the windows that these are."""
+    small_robot: int = 12
+    """Degrees of freedom up to which it is looked for."""
+    reach: float = 1.2
+    """Times the longest link, how far from a body's frame a point is looked for."""
+    points: int = 7
+    """Places of the point along each axis of the body's frame."""
+    least_windows: int = 4
+    """Windows that must come below a surface."""
+    most_share: float = 0.5
+    """Share of the windows that may."""
+    z: float = 5.0
+    """Standard errors by which these must be further off than the others."""
+    deep: float = 0.03
+    """How far below the height at which windows begin to be off they may come [m]: a surface gives way by no more."""
+    tried: int = 12
+    """Points that are tried in the simulator."""
+    moved: int = 3
+    """Of these that are moved on."""
+    windows: int = 40
+    """Windows on which they are: the lowest ones, and as many of the others."""
+    heights: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75)
+    """Surfaces that are tried, between the lowest place of the point and where windows begin to be off."""
+    coarse: float = 0.02
+    """First move of a point or a surface [m]; halved where none helps."""
+    fine: float = 0.002
+    """Last one [m]."""
+    moves: int = 25
+    """Moves at most."""
+    worth: float = 0.003
+    """Share of the gain that a move must add: along an axis that no height depends on a point stays."""
+    least_gain: float = 60.0
+    """Fall of the robust cost from which on it is proposed."""
+    window_gain: float = 4.0
+    """Fall of a window's cost from which on it counts as better."""
+    better_windows: int = 4
+    """Windows that must be better."""
+    largest_share: float = 0.6
+    """Share of the whole fall that one window may have."""
+    step: float = 0.005
+    """Change of the height that matters [m]."""
+
+
+@dataclass(frozen=True)
 class JointElasticity:
     """Of elastic joints, tried at a geometric series of stiffnesses; these are in units of the servo's own."""
 
@@ -401,6 +451,7 @@ class ProposalThresholds:
 
     saturation: Saturation = field(default_factory=Saturation)
     backlash: Backlash = field(default_factory=Backlash)
+    surface_contact: SurfaceContact = field(default_factory=SurfaceContact)
     joint_elasticity: JointElasticity = field(default_factory=JointElasticity)
     setpoints: SetPoints = field(default_factory=SetPoints)
     gain_grid: GainGrid = field(default_factory=GainGrid)

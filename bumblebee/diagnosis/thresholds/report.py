@@ -92,6 +92,10 @@ class Verdicts:
     """Times as far off as the worst fitted window, from which on a window that was not fitted is noted."""
     worse: float = 1.02
     """Times the error before by which the error after has to be larger to be called worse."""
+    touch: float = 0.005
+    """How far above a surface a point touches it, where readings are noisy [m]."""
+    touching: int = 6
+    """Rollouts that a note on a surface names."""
     large: float = 3.0
     """Times what sensor noise leaves, from which on an error is called large."""
     trace: float = 1e-3

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
+from bumblebee.sim.effects.native import NO_SURFACE
 from bumblebee.sim.effects.setpoints import NO_SPEED_LIMIT
 from bumblebee.sim.units import is_known
 
@@ -77,7 +78,7 @@ def _joint(
     return Kind("joint", tuple(Parameter(*p) for p in parameters), whole, native)
 
 
-def _body(*parameters: tuple[str, str, float, float, *tuple[float, ...]], native: bool = True) -> Kind:
+def _body(*parameters: tuple[str, str, float, float, *tuple[float | bool, ...]], native: bool = True) -> Kind:
     return Kind("body", tuple(Parameter(*p) for p in parameters), False, native)
 
 
@@ -137,6 +138,12 @@ CATALOGUE: dict[str, Kind] = {
     # The turn about the world's axes that takes the declared gravity to the true one; with gravity along z, z is 0.
     "ground_slope": Kind(
         "whole", (*(Parameter(axis, "rad", -0.5, 0.5) for axis in ("x", "y")), Parameter("z", "rad", -0.5, 0.5, 0.0))
+    ),
+    # A level surface that the model lacks, and the point of the body, in its frame, that touches it.
+    "surface_contact": _body(
+        ("height", "m", NO_SURFACE, 10.0),
+        *((axis, "m", -2.0, 2.0) for axis in _AXES),
+        ("friction", "", 0.0, 5.0, 1.0, False, 0.1),
     ),
     "thermal_fade": _joint(("rate", "1/s", -1.0, 1.0), native=False),
     "strength_drift": _joint(("rate", "1/s", -1.0, 1.0), native=False),

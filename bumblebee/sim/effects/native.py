@@ -11,6 +11,8 @@ _WEAK = 1e-4
 PLAY_SOLREF, PLAY_SOLIMP = (0.001, 1.0), (0.95, 0.99, 1e-3)
 HIDDEN_ARMATURE = 1e-5  # [kg m^2] keeps the mass matrix regular where the rotor has no armature
 ROTOR_MASS, ROTOR_INERTIA = 1e-6, 1e-9  # [kg], [kg m^2] of a rotor's body, which must have some
+NO_SURFACE = -10.0  # [m] the height of a surface so low that nothing touches it
+POINT_RADIUS = 1e-3  # [m] of the sphere that stands for a point that touches a surface
 SUFFIX = {"backlash": "_play", "series_elasticity": "_flex"}
 
 
@@ -51,6 +53,11 @@ def sloped(gravity: Sequence[float], x: float, y: float, z: float = 0.0) -> np.n
 def touch(a_type: int, a_affinity: int, b_type: int, b_affinity: int) -> bool:
     """Whether two geometries' masks let them touch."""
     return bool((a_type & b_affinity) | (b_type & a_affinity))
+
+
+def contact_names(body: str) -> tuple[str, str]:
+    """Names of the geometries of a body's point and of the surface that it touches."""
+    return f"{body}_contact_point", f"{body}_surface"
 
 
 def rotor_of(kind: str, joint: str) -> str:

@@ -15,6 +15,7 @@
 | link_mass, link_com, link_inertia | the body's inertial; the moments with the mass where `spread` says so |
 | ground_friction, ground_compliance | friction, solref of the geometry and of what can touch it |
 | ground_slope | gravity |
+| surface_contact | a sphere of 1 mm on the body, a plane of the world, and a contact pair of these two |
 
 The others need `sim.effects.hooks` at run time.
 """
@@ -33,6 +34,7 @@ from bumblebee.sim.effects.hinges import add_backlash, add_elasticity, angle_of,
 
 # The order matters: the encoder's offset is multiplied with the gain that is in force.
 _ORDER = tuple(CATALOGUE)
+_ROLLING = (0.005, 1e-4, 1e-4)  # MuJoCo's own, which a contact of three dimensions does not ask
 
 
 def add_to_spec(spec: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
@@ -203,6 +205,21 @@ def _slope(spec: mujoco.MjSpec, name: str, x: float, y: float, z: float) -> None
     spec.option.gravity = native.sloped(spec.option.gravity, x, y, z)
 
 
+def _surface(spec: mujoco.MjSpec, name: str, height: float, x: float, y: float, z: float, friction: float) -> None:
+    """A point of the body and a level plane, which touch each other and nothing else."""
+    body = spec.body(name)
+    if body is None:
+        raise BadInput(f"effect on body {name!r}", "a body of the model", "no body of this name")
+    point, plane = native.contact_names(name)
+    silent: dict[str, Any] = {"contype": 0, "conaffinity": 0}
+    size, place = [native.POINT_RADIUS, 0, 0], [x, y, z]
+    body.add_geom(name=point, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, pos=place, mass=0, **silent)
+    flat = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0, 0, 1], "pos": [0, 0, height]}
+    spec.worldbody.add_geom(name=plane, **flat, **silent)
+    sliding = [friction, friction, *_ROLLING]
+    spec.add_pair(geomname1=point, geomname2=plane, condim=3, friction=sliding)
+
+
 ADDED: dict[str, Callable[..., None]] = {
     "coulomb_friction": _frictionloss,
     "viscous_friction": _damping,
@@ -228,6 +245,7 @@ ADDED: dict[str, Callable[..., None]] = {
     "ground_friction": _ground_friction,
     "ground_compliance": _ground_compliance,
     "ground_slope": _slope,
+    "surface_contact": _surface,
 }
 """Effect -> what it changes in a spec, (spec, place, *parameters)."""
 if missing := {kind for kind, entry in CATALOGUE.items() if entry.native} - ADDED.keys():

@@ -87,7 +87,8 @@ def _tried(run: SearchState, candidate: Candidate, steps: np.ndarray) -> Trial |
     if trial is None:
         return None
     start = np.concatenate((run.fit.values, trial.values))
-    move = refitted(run.now, run.fit, candidate, [start], Terms(0.0, (), rule.iterations, weighed_after=True))
+    terms = Terms(0.0, (), rule.iterations, weighed_after=True, held=True)
+    move = refitted(run.now, run.fit, candidate, [start], terms)
     if move is None:
         return trial
     values, beside = move.after.of(candidate), LeftOver(run.problem, run.fit, run.weights)

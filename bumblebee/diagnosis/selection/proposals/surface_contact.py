@@ -1,0 +1,185 @@
+"""Contact with a surface that the model lacks: a table under an arm, a floor under a hand.
+
+A joint that stands while its drive pulls looks like dry friction, and a robot is fitted with the friction of a table.
+What tells them apart is where it happens: in some poses alone, those in which one point of one body is lowest. So the
+windows that are further off than the others are asked how low each of several hundred points of each body comes in
+them; the points that part them best, and surfaces between the lowest place of each and where windows begin to be off,
+are tried in the simulator, and the best is moved until nothing is gained by it. The joint fit then moves the surface
+and its friction; the point stays where it is, for a higher point and a lower surface are the same.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from bumblebee.diagnosis.candidates import Candidate, is_chosen
+from bumblebee.diagnosis.estimation import Fit, LeftOver, typical_power
+from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.proposals.joint_misfit import falls
+from bumblebee.diagnosis.selection.trial import Trial
+from bumblebee.diagnosis.thresholds.proposals import SurfaceContact
+
+KIND = "surface_contact"
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """A point of a body that is low in the windows that are off."""
+
+    candidate: Candidate
+    point: np.ndarray
+    """(3,) in the body's frame [m]."""
+    lows: np.ndarray
+    """(W,) lowest heights in the windows [m]."""
+    below: float
+    """Height below which windows are off [m]."""
+    z: float
+    """Standard errors by which the logarithm of their power is above that of the others."""
+    reach: float
+    """How far along each axis from the body's frame a point may be [m]."""
+
+
+def surface_trials(
+    problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, closed: Sequence[Candidate] = ()
+) -> list[Trial]:
+    """The contact with a surface that explains most; none where none does, or on a body where one was `closed`."""
+    rule = problem.thresholds.selection.proposals.surface_contact
+    refused = {c.where for c in closed if c.effect == KIND}
+    own = [c for c in candidates if c.effect == KIND and c.where not in refused and not is_chosen(c, fit.chosen)]
+    if not own or problem.plant.model.nv > rule.small_robot:
+        return []
+    clean = fit.clean(problem)
+    power, usual = (clean**2).mean(axis=1), max(typical_power(clean), 1.0)
+    if np.quantile(power, 1.0 - rule.share) < rule.off * usual:
+        return []
+    tried = [
+        _Tried(problem, fit, usual, place, rule)
+        for place in _spread(_places(problem, own, np.log(power), rule), rule.tried)
+    ]
+    best = sorted(tried, key=lambda one: -one.gain)[: rule.moved]
+    found = [f for f in (one.climbed().trial(weights) for one in best) if f is not None]
+    return [max(found, key=lambda f: f[1])[0]] if found else []
+
+
+def _places(problem: Problem, own: Sequence[Candidate], off: np.ndarray, rule: SurfaceContact) -> list[_Place]:
+    """Points of the candidates' bodies that part the windows by how far they are `off` (W,), the best first."""
+    model = problem.plant.model
+    reach = rule.reach * _longest(model, [c.where for c in own])
+    along = reach * np.linspace(-1.0, 1.0, rule.points)
+    points = np.stack(np.meshgrid(along, along, along, indexing="ij"), axis=-1).reshape(-1, 3)
+    origin, upward = _poses(problem, [c.where for c in own])
+    found = []
+    for k, c in enumerate(own):
+        lows = (origin[:, :, k, None] + upward[:, :, k] @ points.T).min(axis=1)
+        found += [
+            _Place(c, points[p], lows[:, p], below, z, reach)
+            for p, (z, below) in enumerate(_parted(lows, off, rule))
+            if z > rule.z and below - lows[:, p].min() < rule.deep
+        ]
+    return sorted(found, key=lambda place: -place.z)
+
+
+def _longest(model: mujoco.MjModel, bodies: Sequence[str]) -> float:
+    """Length [m] of the longest link between two bodies, or twice as far as a centre of mass of the `bodies` lies."""
+    links = np.linalg.norm(model.body_pos[model.body_parentid > 0], axis=1)
+    halves = [np.linalg.norm(model.body_ipos[model.body(name).id]) for name in bodies]
+    return float(max([*links, *(2.0 * half for half in halves)]))
+
+
+def _spread(places: Sequence[_Place], count: int) -> list[_Place]:
+    """The first places of each body in turn, at most `count`."""
+    turns: dict[str, int] = {}
+    ranked = []
+    for place in places:
+        where = place.candidate.where
+        ranked.append((turns.get(where, 0), -place.z, place))
+        turns[where] = turns.get(where, 0) + 1
+    return [place for _, _, place in sorted(ranked, key=lambda row: row[:2])[:count]]
+
+
+def _poses(problem: Problem, bodies: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Heights (W, N, B) [m] of the bodies' frames at the windows' ticks, and rows (W, N, B, 3) that turn points up."""
+    plant, windows = problem.plant, problem.windows
+    ids, data = [int(plant.model.body(name).id) for name in bodies], mujoco.MjData(plant.model)
+    read = windows.measured[..., problem.layout.slices["joint_pos"]]
+    origin, upward = np.empty((*read.shape[:2], len(ids))), np.empty((*read.shape[:2], len(ids), 3))
+    for w, n in np.ndindex(read.shape[:2]):
+        data.qpos[:] = windows.qpos[w]
+        data.qpos[plant.qpos] = read[w, n]
+        mujoco.mj_kinematics(plant.model, data)
+        origin[w, n], upward[w, n] = data.xpos[ids, 2], data.xmat[ids, 6:9]
+    return origin, upward
+
+
+def _parted(lows: np.ndarray, off: np.ndarray, rule: SurfaceContact) -> list[tuple[float, float]]:
+    """For each point, by its lowest heights (W, P): how plainly a height parts the windows, and that height."""
+    count = len(off)
+    order = np.argsort(lows, axis=0)
+    below = np.arange(rule.least_windows, max(int(rule.most_share * count), rule.least_windows) + 1)
+    below = below[below < count]
+    if not len(below):
+        return []
+    sums = np.cumsum(off[order], axis=0)
+    first, rest = sums[below - 1] / below[:, None], (sums[-1] - sums[below - 1]) / (count - below)[:, None]
+    z = (first - rest) / (off.std() * np.sqrt(1.0 / below + 1.0 / (count - below)))[:, None]
+    best = z.argmax(axis=0)
+    heights = np.take_along_axis(lows, order, axis=0)
+    edge = 0.5 * (heights[below - 1] + heights[below])
+    return [(float(z[k, p]), float(edge[k, p])) for p, k in enumerate(best)]
+
+
+class _Tried:
+    """A surface about a place, sought on the windows that come lowest there and on some of the others."""
+
+    def __init__(self, problem: Problem, fit: Fit, usual: float, place: _Place, rule: SurfaceContact) -> None:
+        self.problem, self.fit, self.usual, self.place, self.rule = problem, fit, usual, place, rule
+        order, count = np.argsort(place.lows), rule.windows
+        others = np.linspace(count, len(order) - 1, count).astype(int) if len(order) > 2 * count else []
+        some = np.sort(order[[*range(min(count, len(order))), *others]])
+        self.part, self.before = problem.part(some), fit.residual[some]
+        low = float(place.lows.min())
+        begun = [np.array([low + share * (place.below - low), *place.point]) for share in rule.heights]
+        tried = self._gains(begun)
+        self.surface, self.gain = begun[int(np.argmax(tried))], max(tried)
+
+    def _values(self, surface: np.ndarray) -> np.ndarray:
+        """Parameters (5,) of the effect with a surface (4,): its height and the point [m]."""
+        return np.array([*surface, self.place.candidate.start[4]])
+
+    def _gains(self, surfaces: Sequence[np.ndarray]) -> list[float]:
+        at = self.place.candidate.at
+        after = self.part.residual([[*self.fit.effects, at(self._values(s))] for s in surfaces])
+        return [float(falls(self.part, self.before, own, self.usual).sum()) for own in after]
+
+    def climbed(self) -> "_Tried":
+        """Itself after moves along single axes, halved where none gains."""
+        size = self.rule.coarse
+        for _ in range(self.rule.moves):
+            around = [self.surface + size * sign * axis for axis in np.eye(4) for sign in (1.0, -1.0)]
+            around = [s for s in around if np.abs(s[1:]).max() <= self.place.reach]
+            tried = self._gains(around)
+            if max(tried) > (1.0 + self.rule.worth) * self.gain:
+                self.surface, self.gain = around[int(np.argmax(tried))], max(tried)
+            elif size <= self.rule.fine:
+                break
+            else:
+                size = max(0.5 * size, self.rule.fine)
+        return self
+
+    def trial(self, weights: np.ndarray) -> tuple[Trial, float] | None:
+        """The trial on all windows and its gain there; None where that is not enough."""
+        problem, fit, rule, c = self.problem, self.fit, self.rule, self.place.candidate
+        if self.gain < rule.least_gain:
+            return None
+        away = float(np.ptp(self.place.lows)) + rule.coarse
+        nominal = (float(self.surface[0]) - away, *map(float, self.surface[1:]), c.nominal[4])
+        own, values = replace(c, nominal=nominal, step=(rule.step, *c.step[1:])), self._values(self.surface)
+        after = problem.residual([[*fit.effects, own.at(values)]])[0]
+        each = falls(problem, fit.residual, after, self.usual)
+        few = (each > rule.window_gain).sum() < rule.better_windows
+        if each.sum() < rule.least_gain or few or each.max() > rule.largest_share * each.sum():
+            return None
+        left_over = LeftOver(problem, fit, weights)
+        return Trial(own, values, left_over.cost(after), left_over.left(fit.residual - after)), float(each.sum())
