@@ -93,7 +93,7 @@ def _holdout(
 def _last_windows(session: Session, config: DiagnosisConfig) -> int:
     """How many windows of 1 s judge the last fit, of fitted and other rollouts each: more where they cost little."""
     extent = session.thresholds.extent
-    if not config.grow:
+    if not config.grow or session.plant.model.nv > extent.small_model:
         return config.max_long_windows
     work = session.plant.model.nv * extent.long_window / session.steps[0]
     return round(float(np.clip(extent.last_work / work, 1.0, extent.more_last)) * config.max_long_windows)

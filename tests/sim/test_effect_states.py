@@ -45,6 +45,16 @@ def test_a_log_followed_at_its_ticks_is_the_same_as_steps(state: State) -> None:
     np.testing.assert_allclose(state.followed(clock, steps, v, u), seen, atol=1e-9)
 
 
+@pytest.mark.parametrize("state", [REST, SLEW])
+def test_logs_followed_side_by_side_are_each_alone(state: State) -> None:
+    rng = np.random.default_rng(2)
+    clock, steps = np.arange(100) * 0.02 + rng.random((3, 1)), np.full((3, 100), 0.02)
+    v, u = rng.standard_normal((3, 100)), np.cumsum(0.05 * rng.standard_normal((3, 100)), axis=1)
+    together = state.followed(clock, steps, v, u)
+    for k in range(3):
+        np.testing.assert_allclose(together[k], state.followed(clock[k], steps[k], v[k], u[k]), atol=1e-12)
+
+
 def test_terms_that_share_a_state_keep_it_once() -> None:
     terms = [(0, 1.0, read_term("friction(rested(0.3, 0.02))")), (0, 2.0, read_term("v*rested(0.3, 0.02)"))]
     assert states_of(terms) == [REST]

@@ -32,6 +32,10 @@ class Traits:
     """Whether what it does grows with no power of its size, in few windows."""
     saturation: bool = False
     """Whether it is a limit, which only the windows feel that reach it."""
+    judged_alone: bool = False
+    """Whether it is judged with all others where they are, and refitted with them afterwards: the windows that feel it
+    are few, and what moving the others changes in all the rest would decide. Its proposal has asked more windows than
+    a fit has; those of the validation must not speak against it."""
     on_dry_friction: bool = False
     """Whether it is a friction that sits on a level, which is dry friction again."""
     usual: Literal["", "position", "joint", "torque", "robot", "body"] = ""
@@ -116,6 +120,7 @@ TRAITS: dict[str, Traits] = {
         "repeat the motion with the robot lifted off what it may touch, or with that taken away",
         column="simulated",
         abrupt=True,
+        judged_alone=True,
     ),
     "thermal_fade": Traits("repeat the motion after a pause"),
     "strength_drift": Traits("repeat the motion after a pause, without one"),
@@ -134,6 +139,7 @@ def _kinds(*usual: str) -> tuple[str, ...]:
 
 INVERSE = tuple(kind for kind, traits in TRAITS.items() if traits.inverse)
 ABRUPT = tuple(kind for kind, traits in TRAITS.items() if traits.abrupt)
+JUDGED_ALONE = tuple(kind for kind, traits in TRAITS.items() if traits.judged_alone)
 SATURATIONS = tuple(kind for kind, traits in TRAITS.items() if traits.saturation)
 SHAPED = tuple(kind for kind, traits in TRAITS.items() if traits.on_dry_friction)
 USUAL = _kinds("joint", "position")

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from bumblebee.diagnosis.budget import Budget
-from bumblebee.diagnosis.candidates import SATURATIONS, Candidate
+from bumblebee.diagnosis.candidates import JUDGED_ALONE, SATURATIONS, Candidate
 from bumblebee.diagnosis.comparison import Holdout, Step
 from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit
@@ -167,7 +167,8 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
             run.closed |= set(looked)
             vain += 1
             continue
-        best = simplest(tried, run.fit.cost, run.problem.thresholds.selection.trials)
+        confirmed = [t for t in tried if t.candidate.effect in JUDGED_ALONE and run.power() >= config.many]
+        best = simplest(confirmed or tried, run.fit.cost, run.problem.thresholds.selection.trials)
         if best.candidate.effect in SATURATIONS and attempt("lost commands", partial(find_packet_loss, run), _no):
             continue  # a lost command, too, spoils a few windows
         place, name = best.candidate.where, f"the fit with {best.candidate.effect} on {best.candidate.where}"
@@ -189,7 +190,9 @@ class _Touching:
         run = self.run
         if self.fit is not run.fit:
             self.fit = run.fit
-            self.found = surface_trials(run.problem, run.fit, run.candidates, run.weights, tuple(run.closed))
+            self.found = surface_trials(
+                run.problem, run.fit, run.candidates, run.weights, tuple(run.closed), run.holdout.problem
+            )
         return [t for t in self.found if t.candidate not in run.closed]
 
 

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate, is_chosen, is_like, shortlisted
+from bumblebee.diagnosis.candidates import ABRUPT, JUDGED_ALONE, SATURATIONS, Candidate, is_chosen, is_like, shortlisted
 from bumblebee.diagnosis.comparison import (
     Holdout,
     Step,
+    compare,
     drop_insignificant,
     evidence,
 )
@@ -158,14 +159,25 @@ class SearchState:
         """Refit with the candidate; keep it if the joint fit and the held-out windows agree."""
         rules = self.problem.thresholds.comparison
         few = rules.where_felt if candidate.effect in (*SATURATIONS, *ABRUPT) else rules.where_rare
-        terms = Terms(self.bound, (rules.validation, few), iterations=2)
+        alone = candidate.effect in JUDGED_ALONE
+        asked = (rules.validation, few, rules.no_worse_on_average) if alone else (rules.validation, few)
+        terms = Terms(self.bound, asked, iterations=0 if alone else 2)
         move = refitted(self.now, self.fit, candidate, [np.concatenate((self.fit.values, values))], terms)
         if move is None or not move.passes():  # if not sure the windows that judge need not be simulated
             return self.refuse(candidate)
         before = self.power()
         self.take(move)
+        if alone:
+            self.refit()
         self.fall = 1.0 - self.power() / max(before, 1e-12)
         return True
+
+    def refit(self) -> None:
+        """All effects together, if the validation windows are no further off then."""
+        moved = gauss_newton(self.problem, self.fit.chosen, self.fit.values, self.weights, 2, True, known=self.fit)
+        rule = self.problem.thresholds.comparison.no_worse_on_average
+        if moved.cost < self.fit.cost and compare(self.problem, self.holdout, self.fit, moved).passes(rule):
+            self.renew(moved)
 
     def take(self, move: Move, rivals: int | None = None) -> None:
         """Make a move; its p is shared among the `rivals`, all candidates if None."""

@@ -163,17 +163,25 @@ def state_before(plant: Plant, windows: Windows, state: State) -> np.ndarray:
 
     Speeds are means over a few ticks: what a sensor's noise would wear off is no motion.
     """
+    rows, clock = _together(windows, lambda rollout: _for_states(plant, rollout)[0])
+    _, steps = _together(windows, lambda rollout: _for_states(plant, rollout)[1])
+    _, speed = _together(windows, lambda rollout: _for_states(plant, rollout)[2][:, state.column])
+    _, target = _together(windows, lambda rollout: _for_states(plant, rollout)[3][:, state.column])
+    if len(clock) == 1:
+        return state.followed(clock[0], steps[0], speed[0], target[0])[windows.start]
+    return state.followed(clock, steps, speed, target)[rows, windows.start]
+
+
+@lru_cache(maxsize=256)
+def _for_states(plant: Plant, rollout: Rollout) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Times and steps (T,) [s], speeds and targets (T, J) of a rollout's joints."""
     servos = plant_servos(plant)  # targets are read off alike whatever the gains
-
-    def of(rollout: Rollout) -> np.ndarray:
-        wide = np.ones(2 * plant.thresholds.history.smooth + 1)
-        known = np.convolve(np.ones(len(rollout.time)), wide, mode="same")
-        speed = np.convolve(rollout.joint_vel[:, state.column], wide, mode="same") / known
-        target = servos.given(servos.controls(command_inputs(plant, rollout)))[:, state.column]
-        clock, steps = rollout.time - rollout.time[0], np.diff(rollout.time, append=rollout.time[-1])
-        return state.followed(clock, steps, speed, target)
-
-    return at_starts(windows, of)
+    wide = np.ones(2 * plant.thresholds.history.smooth + 1)
+    known = np.convolve(np.ones(len(rollout.time)), wide, mode="same")
+    speed = np.stack([np.convolve(v, wide, mode="same") / known for v in rollout.joint_vel.T], axis=1)
+    target = servos.given(servos.controls(command_inputs(plant, rollout)))
+    clock, steps = rollout.time - rollout.time[0], np.diff(rollout.time, append=rollout.time[-1])
+    return clock, steps, speed, target
 
 
 def heated(

@@ -159,8 +159,8 @@ class Extent:
     long_window: float = 1.0
     """Length of the long windows on which an accepted effect must not be worse [s]."""
     last_work: float = 270_000.0
-    """Steps of a long window times degrees of freedom below which more of them judge the last fit, in inverse
-    proportion."""
+    """Steps of a long window times degrees of freedom below which more of them judge the last fit of a small model, in
+    inverse proportion."""
     more_last: float = 50.0
     """Times as many at most."""
 

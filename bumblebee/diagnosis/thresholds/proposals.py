@@ -75,6 +75,12 @@ class SurfaceContact:
     """Share of the windows that these are."""
     small_robot: int = 12
     """Degrees of freedom up to which it is looked for."""
+    many: int = 800
+    """Windows that are asked how far they are off and how low the robot comes in them."""
+    outputs: int = 5
+    """Ticks of each."""
+    least_power: float = 1e-6
+    """Share of the mean power below which a window is no further off."""
     reach: float = 1.2
     """Times the longest link, how far from a body's frame a point is looked for."""
     points: int = 7
@@ -87,11 +93,11 @@ class SurfaceContact:
     """Standard errors by which these must be further off than the others."""
     deep: float = 0.03
     """How far below the height at which windows begin to be off they may come [m]: a surface gives way by no more."""
-    tried: int = 12
+    tried: int = 24
     """Points that are tried in the simulator."""
-    moved: int = 3
+    moved: int = 4
     """Of these that are moved on."""
-    windows: int = 40
+    windows: int = 50
     """Windows on which they are: the lowest ones, and as many of the others."""
     heights: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75)
     """Surfaces that are tried, between the lowest place of the point and where windows begin to be off."""
@@ -104,13 +110,15 @@ class SurfaceContact:
     worth: float = 0.003
     """Share of the gain that a move must add: along an axis that no height depends on a point stays."""
     least_gain: float = 60.0
-    """Fall of the robust cost from which on it is proposed."""
-    window_gain: float = 4.0
-    """Fall of a window's cost from which on it counts as better."""
-    better_windows: int = 4
-    """Windows that must be better."""
-    largest_share: float = 0.6
-    """Share of the whole fall that one window may have."""
+    """Fall of the robust cost of the fit's windows from which on it is proposed."""
+    felt: float = 0.1
+    """Change of a window's log(1 + power / median) from which on it counts."""
+    nearly: float = 0.8
+    """Share of these that must gain."""
+    least_felt: int = 4
+    """Windows of the fitted rollouts that must feel it."""
+    least_felt_alone: int = 12
+    """The same where no other rollout reaches it."""
     step: float = 0.005
     """Change of the height that matters [m]."""
 
@@ -227,6 +235,8 @@ class GainGrid:
     """Share of `wrong_servos` that must be nearly wrong then."""
     step: float = 0.1
     """Share of a value that matters: at a hundredth of the declared gain a tenth of that is no small change."""
+    refit: int = 3
+    """Gauss-Newton's steps of all gains and frictions together, from the grid's values on."""
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,12 @@
 """Contact with a surface that the model lacks: a table under an arm, a floor under a hand.
 
 A joint that stands while its drive pulls looks like dry friction, and a robot is fitted with the friction of a table.
-What tells them apart is where it happens: in some poses alone, those in which one point of one body is lowest. So the
-windows that are further off than the others are asked how low each of several hundred points of each body comes in
-them; the points that part them best, and surfaces between the lowest place of each and where windows begin to be off,
-are tried in the simulator, and the best is moved until nothing is gained by it. The joint fit then moves the surface
-and its friction; the point stays where it is, for a higher point and a lower surface are the same.
+What tells them apart is where it happens: in some poses alone, those in which one point of one body is lowest. So
+several hundred windows of the fitted rollouts, far more than a fit takes, are asked how low each of several hundred
+points of each body comes in them; the points that part them best by how far they are off, and surfaces between the
+lowest place of each and where windows begin to be off, are tried in the simulator, and the best is moved until nothing
+is gained by it. The joint fit then moves the surface and its friction; the point stays where it is, for a higher point
+and a higher surface are the same.
 """
 
 from collections.abc import Sequence
@@ -19,9 +20,49 @@ from bumblebee.diagnosis.estimation import Fit, LeftOver, typical_power
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls
 from bumblebee.diagnosis.selection.trial import Trial
+from bumblebee.diagnosis.simulation import Windows, choose_starts, cut, residuals, select, vary
 from bumblebee.diagnosis.thresholds.proposals import SurfaceContact
+from bumblebee.sim.effects import Effect
 
 KIND = "surface_contact"
+
+
+@dataclass(frozen=True, eq=False)
+class _Many:
+    """Many windows of the fitted rollouts, and how far off a fit leaves each; joint positions alone, not whitened."""
+
+    problem: Problem
+    fit: Fit
+    windows: Windows
+    size: np.ndarray
+    """(J,) root mean square of what is left of each joint's position."""
+    power: np.ndarray
+    """(W,) mean square of what is left, in units of `size`."""
+
+    def powers(self, keep: np.ndarray, models: Sequence[Sequence[Effect]]) -> np.ndarray:
+        """The same (V, K) of some windows under the fit's effects and each of some more."""
+        effects = [[*self.fit.effects, *more] for more in models]
+        return _left(self.problem, select(self.windows, keep), effects, self.size)
+
+
+def _left(
+    problem: Problem, windows: Windows, models: Sequence[Sequence[Effect]], size: np.ndarray | float
+) -> np.ndarray:
+    """Mean squares (V, W) of what models leave of joint positions, in units of `size`; infinite where one diverges."""
+    plant, part = problem.plant, problem.layout.slices["joint_pos"]
+    raw = residuals(plant, problem.layout, windows, [vary(plant, effects) for effects in models], problem.coarse)
+    return np.nan_to_num(((raw[..., part] / size) ** 2).mean(axis=(2, 3)), nan=np.inf)
+
+
+def _many(problem: Problem, fit: Fit, rule: SurfaceContact) -> _Many:
+    """Windows as long as those of the fit, spread evenly over its rollouts."""
+    source, ids = problem.windows.source, np.unique(problem.windows.rollout).tolist()
+    starts = choose_starts(source, ids, problem.windows.span, rule.many, problem.plant.thresholds.windows)
+    windows = cut(problem.plant, problem.layout, source, starts, outputs=rule.outputs)
+    plant, part = problem.plant, problem.layout.slices["joint_pos"]
+    raw = residuals(plant, problem.layout, windows, [vary(plant, fit.effects)], problem.coarse)[0][..., part]
+    size = np.maximum(np.sqrt(np.nanmean(raw**2, axis=(0, 1))), problem.sigma[part])
+    return _Many(problem, fit, windows, size, np.nan_to_num(((raw / size) ** 2).mean(axis=(1, 2)), nan=np.inf))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,34 +83,45 @@ class _Place:
 
 
 def surface_trials(
-    problem: Problem, fit: Fit, candidates: Sequence[Candidate], weights: np.ndarray, closed: Sequence[Candidate] = ()
+    problem: Problem,
+    fit: Fit,
+    candidates: Sequence[Candidate],
+    weights: np.ndarray,
+    closed: Sequence[Candidate] = (),
+    judge: Problem | None = None,
 ) -> list[Trial]:
-    """The contact with a surface that explains most; none where none does, or on a body where one was `closed`."""
+    """The contact with a surface that explains most; none where none does, or on a body where one was `closed`.
+
+    It must make nearly all windows better that it changes, of the fitted rollouts and of those of `judge`; where no
+    rollout of these reaches it, more of the fitted ones.
+    """
     rule = problem.thresholds.selection.proposals.surface_contact
     refused = {c.where for c in closed if c.effect == KIND}
     own = [c for c in candidates if c.effect == KIND and c.where not in refused and not is_chosen(c, fit.chosen)]
     if not own or problem.plant.model.nv > rule.small_robot:
         return []
     clean = fit.clean(problem)
-    power, usual = (clean**2).mean(axis=1), max(typical_power(clean), 1.0)
-    if np.quantile(power, 1.0 - rule.share) < rule.off * usual:
+    if np.quantile((clean**2).mean(axis=1), 1.0 - rule.share) < rule.off * max(typical_power(clean), 1.0):
         return []
-    tried = [
-        _Tried(problem, fit, usual, place, rule)
-        for place in _spread(_places(problem, own, np.log(power), rule), rule.tried)
-    ]
+    many = _many(problem, fit, rule)
+    tried = [_Tried(many, place, rule) for place in _spread(_places(many, own, rule), rule.tried)]
     best = sorted(tried, key=lambda one: -one.gain)[: rule.moved]
-    found = [f for f in (one.climbed().trial(weights) for one in best) if f is not None]
-    return [max(found, key=lambda f: f[1])[0]] if found else []
+    climbed = sorted((one.climbed() for one in best), key=lambda one: -one.gain)
+    others = None if judge is None else _many(judge, fit, rule)
+    for one in climbed:
+        if (trial := one.trial(weights)) is not None and one.is_confirmed(many, others):
+            return [trial]
+    return []
 
 
-def _places(problem: Problem, own: Sequence[Candidate], off: np.ndarray, rule: SurfaceContact) -> list[_Place]:
-    """Points of the candidates' bodies that part the windows by how far they are `off` (W,), the best first."""
-    model = problem.plant.model
-    reach = rule.reach * _longest(model, [c.where for c in own])
+def _places(many: _Many, own: Sequence[Candidate], rule: SurfaceContact) -> list[_Place]:
+    """Points of the candidates' bodies that part the windows by how far they are off, the best first."""
+    model, names = many.problem.plant.model, [c.where for c in own]
+    reach = rule.reach * _longest(model, names)
     along = reach * np.linspace(-1.0, 1.0, rule.points)
     points = np.stack(np.meshgrid(along, along, along, indexing="ij"), axis=-1).reshape(-1, 3)
-    origin, upward = _poses(problem, [c.where for c in own])
+    origin, upward = _poses(many, names)
+    off = np.log(np.clip(many.power, rule.least_power, 1.0 / rule.least_power))
     found = []
     for k, c in enumerate(own):
         lows = (origin[:, :, k, None] + upward[:, :, k] @ points.T).min(axis=1)
@@ -99,11 +151,11 @@ def _spread(places: Sequence[_Place], count: int) -> list[_Place]:
     return [place for _, _, place in sorted(ranked, key=lambda row: row[:2])[:count]]
 
 
-def _poses(problem: Problem, bodies: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+def _poses(many: _Many, bodies: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
     """Heights (W, N, B) [m] of the bodies' frames at the windows' ticks, and rows (W, N, B, 3) that turn points up."""
-    plant, windows = problem.plant, problem.windows
+    plant, windows = many.problem.plant, many.windows
     ids, data = [int(plant.model.body(name).id) for name in bodies], mujoco.MjData(plant.model)
-    read = windows.measured[..., problem.layout.slices["joint_pos"]]
+    read = windows.measured[..., many.problem.layout.slices["joint_pos"]]
     origin, upward = np.empty((*read.shape[:2], len(ids))), np.empty((*read.shape[:2], len(ids), 3))
     for w, n in np.ndindex(read.shape[:2]):
         data.qpos[:] = windows.qpos[w]
@@ -123,7 +175,7 @@ def _parted(lows: np.ndarray, off: np.ndarray, rule: SurfaceContact) -> list[tup
         return []
     sums = np.cumsum(off[order], axis=0)
     first, rest = sums[below - 1] / below[:, None], (sums[-1] - sums[below - 1]) / (count - below)[:, None]
-    z = (first - rest) / (off.std() * np.sqrt(1.0 / below + 1.0 / (count - below)))[:, None]
+    z = (first - rest) / (max(off.std(), 1e-12) * np.sqrt(1.0 / below + 1.0 / (count - below)))[:, None]
     best = z.argmax(axis=0)
     heights = np.take_along_axis(lows, order, axis=0)
     edge = 0.5 * (heights[below - 1] + heights[below])
@@ -133,12 +185,11 @@ def _parted(lows: np.ndarray, off: np.ndarray, rule: SurfaceContact) -> list[tup
 class _Tried:
     """A surface about a place, sought on the windows that come lowest there and on some of the others."""
 
-    def __init__(self, problem: Problem, fit: Fit, usual: float, place: _Place, rule: SurfaceContact) -> None:
-        self.problem, self.fit, self.usual, self.place, self.rule = problem, fit, usual, place, rule
+    def __init__(self, many: _Many, place: _Place, rule: SurfaceContact) -> None:
+        self.many, self.place, self.rule = many, place, rule
         order, count = np.argsort(place.lows), rule.windows
         others = np.linspace(count, len(order) - 1, count).astype(int) if len(order) > 2 * count else []
-        some = np.sort(order[[*range(min(count, len(order))), *others]])
-        self.part, self.before = problem.part(some), fit.residual[some]
+        self.keep = np.sort(order[[*range(min(count, len(order))), *others]])
         low = float(place.lows.min())
         begun = [np.array([low + share * (place.below - low), *place.point]) for share in rule.heights]
         tried = self._gains(begun)
@@ -149,9 +200,11 @@ class _Tried:
         return np.array([*surface, self.place.candidate.start[4]])
 
     def _gains(self, surfaces: Sequence[np.ndarray]) -> list[float]:
-        at = self.place.candidate.at
-        after = self.part.residual([[*self.fit.effects, at(self._values(s))] for s in surfaces])
-        return [float(falls(self.part, self.before, own, self.usual).sum()) for own in after]
+        """Falls of log(1 + power / its median), summed over the windows."""
+        usual = float(np.median(self.many.power))
+        models = [[self.place.candidate.at(self._values(s))] for s in surfaces]
+        old = np.log1p(self.many.power[self.keep] / usual)
+        return (old - np.log1p(self.many.powers(self.keep, models) / usual)).sum(axis=1).tolist()
 
     def climbed(self) -> "_Tried":
         """Itself after moves along single axes, halved where none gains."""
@@ -160,7 +213,7 @@ class _Tried:
             around = [self.surface + size * sign * axis for axis in np.eye(4) for sign in (1.0, -1.0)]
             around = [s for s in around if np.abs(s[1:]).max() <= self.place.reach]
             tried = self._gains(around)
-            if max(tried) > (1.0 + self.rule.worth) * self.gain:
+            if max(tried) > self.gain + self.rule.worth * abs(self.gain):
                 self.surface, self.gain = around[int(np.argmax(tried))], max(tried)
             elif size <= self.rule.fine:
                 break
@@ -168,18 +221,29 @@ class _Tried:
                 size = max(0.5 * size, self.rule.fine)
         return self
 
-    def trial(self, weights: np.ndarray) -> tuple[Trial, float] | None:
-        """The trial on all windows and its gain there; None where that is not enough."""
-        problem, fit, rule, c = self.problem, self.fit, self.rule, self.place.candidate
-        if self.gain < rule.least_gain:
-            return None
+    def is_confirmed(self, fitted: _Many, others: _Many | None) -> bool:
+        """Whether nearly all windows that it changes are better, of all windows of the fitted rollouts and others."""
+        own, seen = self._felt(fitted), np.empty(0) if others is None else self._felt(others)
+        enough = self.rule.least_felt if len(seen) else self.rule.least_felt_alone
+        nearly = all((some > 0).mean() >= self.rule.nearly for some in (own, seen) if len(some))
+        return len(own) >= enough and nearly
+
+    def _felt(self, many: _Many) -> np.ndarray:
+        """Falls of log(1 + power / its median) of the windows in which it changes that."""
+        usual, model = float(np.median(many.power)), [self.place.candidate.at(self._values(self.surface))]
+        (after,) = many.powers(np.arange(len(many.windows)), [model])
+        gain = np.log1p(many.power / usual) - np.log1p(after / usual)
+        return gain[np.abs(gain) > self.rule.felt]
+
+    def trial(self, weights: np.ndarray) -> Trial | None:
+        """The trial on the fit's windows; None where it gains too little there."""
+        problem, fit, rule, c = self.many.problem, self.many.fit, self.rule, self.place.candidate
         away = float(np.ptp(self.place.lows)) + rule.coarse
         nominal = (float(self.surface[0]) - away, *map(float, self.surface[1:]), c.nominal[4])
         own, values = replace(c, nominal=nominal, step=(rule.step, *c.step[1:])), self._values(self.surface)
         after = problem.residual([[*fit.effects, own.at(values)]])[0]
-        each = falls(problem, fit.residual, after, self.usual)
-        few = (each > rule.window_gain).sum() < rule.better_windows
-        if each.sum() < rule.least_gain or few or each.max() > rule.largest_share * each.sum():
+        each = falls(problem, fit.residual, after, max(typical_power(fit.clean(problem)), 1.0))
+        if each.sum() < rule.least_gain:
             return None
         left_over = LeftOver(problem, fit, weights)
-        return Trial(own, values, left_over.cost(after), left_over.left(fit.residual - after)), float(each.sum())
+        return Trial(own, values, left_over.cost(after), left_over.left(fit.residual - after))
