@@ -235,8 +235,6 @@ class GainGrid:
     """Share of `wrong_servos` that must be nearly wrong then."""
     step: float = 0.1
     """Share of a value that matters: at a hundredth of the declared gain a tenth of that is no small change."""
-    refit: int = 3
-    """Gauss-Newton's steps of all gains and frictions together, from the grid's values on."""
 
 
 @dataclass(frozen=True)

@@ -164,14 +164,9 @@ def start_with_gain_grid(run: SearchState) -> bool:
     chosen, values = [c for c, _ in found], np.array([v for _, v in found])
     weights = window_weights(run.problem.residual([effects_at(chosen, values)])[0])
     fit = gauss_newton(run.problem, chosen, values, weights, iterations=0, coarse=True)
-    rules = run.problem.thresholds
-    if not compare(run.problem, run.holdout, run.fit, fit).passes(rules.comparison.validation):
+    gain = compare(run.problem, run.holdout, run.fit, fit)
+    if not gain.passes(run.problem.thresholds.comparison.validation):
         return False
-    # Else the first effect beside them would be credited with what moving them gains.
-    steps = rules.selection.proposals.gain_grid.refit
-    moved = gauss_newton(run.problem, chosen, values, weights, steps, coarse=True, known=fit)
-    if compare(run.problem, run.holdout, fit, moved).passes(rules.comparison.no_worse_on_average):
-        fit = moved
     for i, c in enumerate(fit.chosen):
         z = wald(run.problem, fit, weights, i)
         run.steps.append(evidence(c, z, len(run.candidates)))
