@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import SATURATIONS, USUAL_OF_BODIES, Candidate, Formula
+from bumblebee.diagnosis.candidates import JUDGED_ALONE, SATURATIONS, USUAL_OF_BODIES, Candidate, Formula
 from bumblebee.diagnosis.comparison.compare import compare
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.submodel import moved_without, refitted, refitted_without
@@ -68,12 +68,13 @@ def drop_insignificant(
 
     One whose loss the others cannot make up for stays, however little the slopes at the fit say of it: far from
     the declared value they say nothing of the way back. `bound` is the z that an effect must reach. With `holdout`
-    an effect also stays if validation windows would be worse after 1 s without it.
+    an effect also stays if validation windows would be worse after 1 s without it. What was judged alone, by more
+    windows than these, is not asked.
     """
 
     def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
-        z = [np.inf if c in kept else wald(problem, fit, weights, i) for i, c in enumerate(fit.chosen)]
-        return _lowest(fit, z, bound)
+        spared = [c in kept or c.effect in JUDGED_ALONE for c in fit.chosen]
+        return _lowest(fit, [np.inf if s else wald(problem, fit, weights, i) for i, s in enumerate(spared)], bound)
 
     def without(fit: Fit, gone: Candidate) -> Fit:
         rest = fit.without([gone])
@@ -113,7 +114,9 @@ def drop_beside(problem: Problem, fit: Fit, new: Candidate) -> Fit:
 
     def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
         weights = window_weights(fit.clean(problem))
-        spared = [c is new or (isinstance(c, Formula) and not isinstance(new, Formula)) for c in fit.chosen]
+        forms = [isinstance(c, Formula) and not isinstance(new, Formula) for c in fit.chosen]
+        alone = [c is new or c.effect in JUDGED_ALONE for c in fit.chosen]
+        spared = [any(both) for both in zip(forms, alone, strict=True)]
         return _lowest(fit, [np.inf if s else wald(problem, fit, weights, i) for i, s in enumerate(spared)], bound)
 
     def without(fit: Fit, gone: Candidate) -> Fit:
@@ -201,7 +204,7 @@ def drop_unpaid(fit: Fit, refit: Refit, holdout: Holdout, problem: Problem | Non
             return None
         share = shares(holdout, fit)
         small = [i for i, c in enumerate(fit.chosen) if share[i] < rule.small_share and c not in kept]
-        asked = [i for i in small if fit.chosen[i].effect not in SATURATIONS]
+        asked = [i for i in small if fit.chosen[i].effect not in (*SATURATIONS, *JUDGED_ALONE)]
         return fit.chosen[min(asked, key=lambda i: share[i])] if asked else None
 
     def without(fit: Fit, gone: Candidate) -> Fit:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import ABRUPT, SATURATIONS, Candidate, effects_at
+from bumblebee.diagnosis.candidates import ABRUPT, JUDGED_ALONE, SATURATIONS, Candidate, effects_at
 from bumblebee.diagnosis.comparison import Holdout, drop_insignificant, drop_unpaid
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, interval, last_step, moves
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
@@ -148,10 +148,11 @@ def _sure_of(problem: Problem, fit: Fit, weights: np.ndarray) -> Refined:
     """
     alone = interval(problem, fit, weights) if fit.chosen else np.empty(0)
     half = half_widths(problem, fit, weights) if fit.chosen else np.empty(0)
-    rare = [c for c in fit.chosen if c.effect in (*SATURATIONS, *ABRUPT)]
+    rare = [c for c in fit.chosen if c.effect in (*SATURATIONS, *ABRUPT) and c.effect not in JUDGED_ALONE]
     gone = [c for c in rare if _sureness(fit, half, c) < 1.0]
     if not gone:
-        feigned = [c for c in fit.chosen if _sureness(fit, half, c) < 1.0 <= _sureness(fit, alone, c)]
+        asked = [c for c in fit.chosen if c.effect not in JUDGED_ALONE]
+        feigned = [c for c in asked if _sureness(fit, half, c) < 1.0 <= _sureness(fit, alone, c)]
         gone = [min(feigned, key=lambda c: _sureness(fit, half, c))] if feigned else []
     if not gone:
         return Refined(problem, fit, weights, half)

@@ -17,6 +17,7 @@ from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, resolved
 from bumblebee.diagnosis.residuals import Problem, screening_windows, window_weights
 from bumblebee.diagnosis.selection.moves import Move, Now, Terms, refitted
+from bumblebee.diagnosis.selection.proposals.surface_contact import is_still_confirmed
 from bumblebee.diagnosis.selection.score_tests import Scores, least_z, score_tests
 from bumblebee.diagnosis.selection.screening import Stages, is_promising, restless
 from bumblebee.diagnosis.selection.trial import Trial, try_one
@@ -222,6 +223,11 @@ class SearchState:
             return gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True, known=self.fit)
 
         self.fit = drop_insignificant(self.problem, self.fit, self.weights, self.bound, refit, self.holdout, self.say)
+        for c in [c for c in self.fit.chosen if c.effect in JUDGED_ALONE]:
+            if not is_still_confirmed(self.problem, self.fit, c, self.holdout.problem):
+                self.say(f"needless: {c.effect} on {c.where}")
+                rest = self.fit.without([c])
+                self.fit = refit(rest.chosen, rest.values)
 
 
 @dataclass(frozen=True, eq=False)

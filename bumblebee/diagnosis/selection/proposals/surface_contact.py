@@ -109,9 +109,31 @@ def surface_trials(
     climbed = sorted((one.climbed() for one in best), key=lambda one: -one.gain)
     others = None if judge is None else _many(judge, fit, rule)
     for one in climbed:
-        if (trial := one.trial(weights)) is not None and one.is_confirmed(many, others):
+        if (trial := one.trial(weights)) is not None and _is_confirmed(one.effect, many, others, rule):
             return [trial]
     return []
+
+
+def is_still_confirmed(problem: Problem, fit: Fit, candidate: Candidate, judge: Problem | None) -> bool:
+    """Whether a chosen contact still makes better what it changes, with the other effects of the fit where they are."""
+    rule, rest = problem.thresholds.selection.proposals.surface_contact, fit.without([candidate])
+    others = None if judge is None else _many(judge, rest, rule)
+    return _is_confirmed(candidate.at(fit.of(candidate)), _many(problem, rest, rule), others, rule)
+
+
+def _is_confirmed(effect: Effect, fitted: _Many, others: _Many | None, rule: SurfaceContact) -> bool:
+    """Whether nearly all windows that it changes are better, of all windows of the fitted rollouts and others."""
+    own, seen = _felt(effect, fitted, rule), np.empty(0) if others is None else _felt(effect, others, rule)
+    enough = rule.least_felt if len(seen) else rule.least_felt_alone
+    return len(own) >= enough and all((some > 0).mean() >= rule.nearly for some in (own, seen) if len(some))
+
+
+def _felt(effect: Effect, many: _Many, rule: SurfaceContact) -> np.ndarray:
+    """Falls of log(1 + power / its median) of the windows in which an effect changes that."""
+    usual = float(np.median(many.power))
+    (after,) = many.powers(np.arange(len(many.windows)), [[effect]])
+    gain = np.log1p(many.power / usual) - np.log1p(after / usual)
+    return gain[np.abs(gain) > rule.felt]
 
 
 def _places(many: _Many, own: Sequence[Candidate], rule: SurfaceContact) -> list[_Place]:
@@ -221,19 +243,10 @@ class _Tried:
                 size = max(0.5 * size, self.rule.fine)
         return self
 
-    def is_confirmed(self, fitted: _Many, others: _Many | None) -> bool:
-        """Whether nearly all windows that it changes are better, of all windows of the fitted rollouts and others."""
-        own, seen = self._felt(fitted), np.empty(0) if others is None else self._felt(others)
-        enough = self.rule.least_felt if len(seen) else self.rule.least_felt_alone
-        nearly = all((some > 0).mean() >= self.rule.nearly for some in (own, seen) if len(some))
-        return len(own) >= enough and nearly
-
-    def _felt(self, many: _Many) -> np.ndarray:
-        """Falls of log(1 + power / its median) of the windows in which it changes that."""
-        usual, model = float(np.median(many.power)), [self.place.candidate.at(self._values(self.surface))]
-        (after,) = many.powers(np.arange(len(many.windows)), [model])
-        gain = np.log1p(many.power / usual) - np.log1p(after / usual)
-        return gain[np.abs(gain) > self.rule.felt]
+    @property
+    def effect(self) -> Effect:
+        """As it is now."""
+        return self.place.candidate.at(self._values(self.surface))
 
     def trial(self, weights: np.ndarray) -> Trial | None:
         """The trial on the fit's windows; None where it gains too little there."""
