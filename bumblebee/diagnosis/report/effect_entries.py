@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from bumblebee.diagnosis.candidates import INVERSE, SHAPED, Candidate, Formula, experiment, label, without
+from bumblebee.diagnosis.candidates import INVERSE, JUDGED_ALONE, SHAPED, Candidate, Formula, experiment, label, without
 from bumblebee.diagnosis.comparison import Holdout, wald
 from bumblebee.diagnosis.discrepancy import Discovery
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.report.discrepancy_entries import discovered_entry
 from bumblebee.diagnosis.residuals import Problem
-from bumblebee.diagnosis.selection import Loss, Refined, Search, alike, rivals
+from bumblebee.diagnosis.selection import Loss, Refined, Search, alike, contact_share, rivals
 from bumblebee.diagnosis.simulation import Plant, declared_values, unit_on
 from bumblebee.diagnosis.thresholds.report import Effects
 from bumblebee.sim.effects import CATALOGUE, Effect, is_native
@@ -31,6 +31,9 @@ def effect_entries(found: Search, last: Refined, holdout: Holdout, beyond: Disco
     levels = _levels(last.fit, last.problem.thresholds.report.effects)
     groups = [[c, *([levels[c]] if c in levels else [])] for c in chosen if c not in levels.values()]
     shares = _explained(holdout.problem or last.problem, last.fit, groups)
+    alone = {k: g[0] for k, g in enumerate(groups) if g[0].effect in JUDGED_ALONE}
+    for k, c in alone.items():
+        shares[k] = contact_share(last.problem, last.fit, c, holdout.problem)
     classes = dict(zip(found.fit.chosen, rivals(found, holdout, alike(found.columns, found)), strict=True))
     entries = []
     for group, share in zip(groups, shares, strict=True):
@@ -100,7 +103,8 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
     # A limit is tried from the largest torque in the data on, which is not where the model has it.
     declared = declared_values(plant, c.effect, c.where) if c.effect == "torque_limit" else c.nominal
     if c.effect == SURFACE:
-        declared, half = [np.inf] * len(values), np.where(c.scales > 0, half, np.nan)
+        told = (c.scales > 0) & np.isfinite(half)
+        declared, half = [np.inf] * len(values), np.where(told, half, np.nan)
     for p, value, nominal, wide in zip(CATALOGUE[c.effect].parameters, values, declared, half, strict=True):
         if p.default is not None and value == p.default:
             continue
@@ -112,7 +116,8 @@ def _parameters(plant: Plant, c: Candidate, values: np.ndarray, half: np.ndarray
             out[p.name] = {"value": float(1.0 / value), "ci95": [low, high], "nominal": None, "unit": unit}
         else:
             inside = np.clip(ends, p.lower, p.upper).tolist()
-            ends = [end if np.isfinite(end) else None for end in inside]
+            open_ends = c.effect == SURFACE and ends[0] <= p.lower and ends[1] >= p.upper
+            ends = [end if np.isfinite(end) and not open_ends else None for end in inside]
             known = float(nominal) + 0.0 if np.isfinite(nominal) else None  # no -0
             out[p.name] = {"value": float(value), "ci95": ends, "nominal": known, "unit": unit}
     return out

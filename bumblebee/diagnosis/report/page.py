@@ -124,7 +124,7 @@ def _short(term: str) -> str:
 
 
 def _with_ends(value: float, ends: Sequence[float | None] | None) -> str:
-    if not ends:
+    if not ends or all(x is None for x in ends):
         return f"{value:.4g}"
     low, high = ("" if x is None else f"{x:.4g}" for x in ends)
     return f"{value:.4g} <span class='note'>[{low}, {high}]</span>"

@@ -5,6 +5,7 @@ from bumblebee.diagnosis.selection.final_fit import Refined, half_widths, refine
 from bumblebee.diagnosis.selection.forward import Search, search
 from bumblebee.diagnosis.selection.leads import Lead, leads
 from bumblebee.diagnosis.selection.proposals.encoder_resolution import entries, grids
+from bumblebee.diagnosis.selection.proposals.surface_contact import contact_share
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.simulation_error import least_simulation_error
 from bumblebee.diagnosis.selection.state import Loss
@@ -16,6 +17,7 @@ __all__ = [
     "Refined",
     "Search",
     "alike",
+    "contact_share",
     "detectable",
     "entries",
     "grids",

@@ -121,6 +121,21 @@ def is_still_confirmed(problem: Problem, fit: Fit, candidate: Candidate, judge: 
     return _is_confirmed(candidate.at(fit.of(candidate)), _many(problem, rest, rule), others, rule)
 
 
+def contact_share(problem: Problem, fit: Fit, candidate: Candidate, judge: Problem | None) -> float:
+    """Share of what all effects take off the mean square of joint positions that comes back without a chosen contact.
+
+    Of as many windows as its proposal asks, of the fitted rollouts and those of `judge`: of the few of a fit or a
+    validation perhaps none touches. Each position counts in units of its noise.
+    """
+    rule, rest = problem.thresholds.selection.proposals.surface_contact, fit.without([candidate])
+    powers = np.zeros(3)
+    for one in (problem, *([judge] if judge is not None else [])):
+        windows, sigma = _many(one, rest, rule).windows, one.sigma[one.layout.slices["joint_pos"]]
+        left = _left(one, windows, [fit.effects, rest.effects, []], sigma)
+        powers += left[:, np.isfinite(left).all(axis=0)].sum(axis=1)
+    return float(np.clip((powers[1] - powers[0]) / max(powers[2] - powers[0], 1e-12), 0.0, 1.0))
+
+
 def _is_confirmed(effect: Effect, fitted: _Many, others: _Many | None, rule: SurfaceContact) -> bool:
     """Whether nearly all windows that it changes are better, of all windows of the fitted rollouts and others."""
     own, seen = _felt(effect, fitted, rule), np.empty(0) if others is None else _felt(effect, others, rule)
