@@ -80,7 +80,7 @@ class SurfaceContact:
     outputs: int = 5
     """Ticks of each."""
     least_power: float = 1e-6
-    """Share of the mean power below which a window is no further off."""
+    """Share of the mean power below which a window counts as no nearer, and its inverse above which as no further."""
     reach: float = 1.2
     """Times the longest link, how far from a body's frame a point is looked for."""
     points: int = 7

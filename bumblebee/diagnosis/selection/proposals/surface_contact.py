@@ -38,11 +38,18 @@ class _Many:
     """(J,) root mean square of what is left of each joint's position."""
     power: np.ndarray
     """(W,) mean square of what is left, in units of `size`."""
+    most: float
+    """What a window counts at most, and one that diverges."""
 
-    def powers(self, keep: np.ndarray, models: Sequence[Sequence[Effect]]) -> np.ndarray:
+    def falls(self, keep: np.ndarray, models: Sequence[Sequence[Effect]]) -> np.ndarray:
+        """Falls (V, K) of log(1 + power / its median) of some windows by each of some more effects."""
+        usual = max(float(np.median(self.power)), 1e-12)
+        return np.log1p(self.power[keep] / usual) - np.log1p(self._powers(keep, models) / usual)
+
+    def _powers(self, keep: np.ndarray, models: Sequence[Sequence[Effect]]) -> np.ndarray:
         """The same (V, K) of some windows under the fit's effects and each of some more."""
         effects = [[*self.fit.effects, *more] for more in models]
-        return _left(self.problem, select(self.windows, keep), effects, self.size)
+        return np.minimum(_left(self.problem, select(self.windows, keep), effects, self.size), self.most)
 
 
 def _left(
@@ -59,10 +66,11 @@ def _many(problem: Problem, fit: Fit, rule: SurfaceContact) -> _Many:
     source, ids = problem.windows.source, np.unique(problem.windows.rollout).tolist()
     starts = choose_starts(source, ids, problem.windows.span, rule.many, problem.plant.thresholds.windows)
     windows = cut(problem.plant, problem.layout, source, starts, outputs=rule.outputs)
-    plant, part = problem.plant, problem.layout.slices["joint_pos"]
+    plant, part, most = problem.plant, problem.layout.slices["joint_pos"], 1.0 / rule.least_power
     raw = residuals(plant, problem.layout, windows, [vary(plant, fit.effects)], problem.coarse)[0][..., part]
     size = np.maximum(np.sqrt(np.nanmean(raw**2, axis=(0, 1))), problem.sigma[part])
-    return _Many(problem, fit, windows, size, np.nan_to_num(((raw / size) ** 2).mean(axis=(1, 2)), nan=np.inf))
+    power = np.nan_to_num(((raw / size) ** 2).mean(axis=(1, 2)), nan=np.inf)
+    return _Many(problem, fit, windows, size, np.minimum(power, most), most)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,10 +152,8 @@ def _is_confirmed(effect: Effect, fitted: _Many, others: _Many | None, rule: Sur
 
 
 def _felt(effect: Effect, many: _Many, rule: SurfaceContact) -> np.ndarray:
-    """Falls of log(1 + power / its median) of the windows in which an effect changes that."""
-    usual = float(np.median(many.power))
-    (after,) = many.powers(np.arange(len(many.windows)), [[effect]])
-    gain = np.log1p(many.power / usual) - np.log1p(after / usual)
+    """Falls of the windows' log(1 + power / its median) where an effect changes that."""
+    (gain,) = many.falls(np.arange(len(many.windows)), [[effect]])
     return gain[np.abs(gain) > rule.felt]
 
 
@@ -158,7 +164,7 @@ def _places(many: _Many, own: Sequence[Candidate], rule: SurfaceContact) -> list
     along = reach * np.linspace(-1.0, 1.0, rule.points)
     points = np.stack(np.meshgrid(along, along, along, indexing="ij"), axis=-1).reshape(-1, 3)
     origin, upward = _poses(many, names)
-    off = np.log(np.clip(many.power, rule.least_power, 1.0 / rule.least_power))
+    off = np.log(np.maximum(many.power, rule.least_power))
     found = []
     for k, c in enumerate(own):
         lows = (origin[:, :, k, None] + upward[:, :, k] @ points.T).min(axis=1)
@@ -238,10 +244,8 @@ class _Tried:
 
     def _gains(self, surfaces: Sequence[np.ndarray]) -> list[float]:
         """Falls of log(1 + power / its median), summed over the windows."""
-        usual = float(np.median(self.many.power))
         models = [[self.place.candidate.at(self._values(s))] for s in surfaces]
-        old = np.log1p(self.many.power[self.keep] / usual)
-        return (old - np.log1p(self.many.powers(self.keep, models) / usual)).sum(axis=1).tolist()
+        return self.many.falls(self.keep, models).sum(axis=1).tolist()
 
     def climbed(self) -> "_Tried":
         """Itself after moves along single axes, halved where none gains."""
