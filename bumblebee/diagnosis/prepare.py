@@ -86,7 +86,8 @@ def _holdout(
     )
     if not some:
         return Holdout(problem)
-    long, last = (cut(session.plant, session.layout, session.rollouts, starts, outputs=1) for starts in (some, many))
+    long = cut(session.plant, session.layout, session.rollouts, some, outputs=1)
+    last = long if many == some else cut(session.plant, session.layout, session.rollouts, many, outputs=1)
     return Holdout(problem, long, last)
 
 

@@ -114,10 +114,12 @@ def drop_beside(problem: Problem, fit: Fit, new: Candidate) -> Fit:
 
     def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
         weights = window_weights(fit.clean(problem))
-        forms = [isinstance(c, Formula) and not isinstance(new, Formula) for c in fit.chosen]
-        alone = [c is new or c.effect in JUDGED_ALONE for c in fit.chosen]
-        spared = [any(both) for both in zip(forms, alone, strict=True)]
-        return _lowest(fit, [np.inf if s else wald(problem, fit, weights, i) for i, s in enumerate(spared)], bound)
+        marks = [np.inf if stays(c) else wald(problem, fit, weights, i) for i, c in enumerate(fit.chosen)]
+        return _lowest(fit, marks, bound)
+
+    def stays(c: Candidate) -> bool:
+        form = isinstance(c, Formula) and not isinstance(new, Formula)
+        return form or c is new or c.effect in JUDGED_ALONE
 
     def without(fit: Fit, gone: Candidate) -> Fit:
         rest, weights = fit.without([gone]), window_weights(fit.clean(problem))

@@ -31,9 +31,9 @@ def effect_entries(found: Search, last: Refined, holdout: Holdout, beyond: Disco
     levels = _levels(last.fit, last.problem.thresholds.report.effects)
     groups = [[c, *([levels[c]] if c in levels else [])] for c in chosen if c not in levels.values()]
     shares = _explained(holdout.problem or last.problem, last.fit, groups)
-    alone = {k: g[0] for k, g in enumerate(groups) if g[0].effect in JUDGED_ALONE}
-    for k, c in alone.items():
-        shares[k] = contact_share(last.problem, last.fit, c, holdout.problem)
+    for k, (c, *_) in enumerate(groups):
+        if c.effect in JUDGED_ALONE:
+            shares[k] = contact_share(last.problem, last.fit, c, holdout.problem)
     classes = dict(zip(found.fit.chosen, rivals(found, holdout, alike(found.columns, found)), strict=True))
     entries = []
     for group, share in zip(groups, shares, strict=True):

@@ -61,12 +61,17 @@ def _left(
     return np.nan_to_num(((raw[..., part] / size) ** 2).mean(axis=(2, 3)), nan=np.inf)
 
 
-def _many(problem: Problem, fit: Fit, rule: SurfaceContact) -> _Many:
-    """Windows as long as those of the fit, spread evenly over its rollouts."""
+def _windows(problem: Problem, rule: SurfaceContact) -> Windows:
+    """Windows as long as those of a fit, spread evenly over its rollouts."""
     source, ids = problem.windows.source, np.unique(problem.windows.rollout).tolist()
     starts = choose_starts(source, ids, problem.windows.span, rule.many, problem.plant.thresholds.windows)
-    windows = cut(problem.plant, problem.layout, source, starts, outputs=rule.outputs)
-    plant, part, most = problem.plant, problem.layout.slices["joint_pos"], 1.0 / rule.least_power
+    return cut(problem.plant, problem.layout, source, starts, outputs=rule.outputs)
+
+
+def _many(problem: Problem, fit: Fit, rule: SurfaceContact) -> _Many:
+    """Many windows, and what a fit leaves of them."""
+    windows, most = _windows(problem, rule), 1.0 / rule.least_power
+    plant, part = problem.plant, problem.layout.slices["joint_pos"]
     raw = residuals(plant, problem.layout, windows, [vary(plant, fit.effects)], problem.coarse)[0][..., part]
     size = np.maximum(np.sqrt(np.nanmean(raw**2, axis=(0, 1))), problem.sigma[part])
     power = np.nan_to_num(((raw / size) ** 2).mean(axis=(1, 2)), nan=np.inf)
@@ -138,8 +143,8 @@ def contact_share(problem: Problem, fit: Fit, candidate: Candidate, judge: Probl
     rule, rest = problem.thresholds.selection.proposals.surface_contact, fit.without([candidate])
     powers = np.zeros(3)
     for one in (problem, *([judge] if judge is not None else [])):
-        windows, sigma = _many(one, rest, rule).windows, one.sigma[one.layout.slices["joint_pos"]]
-        left = _left(one, windows, [fit.effects, rest.effects, []], sigma)
+        sigma = one.sigma[one.layout.slices["joint_pos"]]
+        left = _left(one, _windows(one, rule), [fit.effects, rest.effects, []], sigma)
         powers += left[:, np.isfinite(left).all(axis=0)].sum(axis=1)
     return float(np.clip((powers[1] - powers[0]) / max(powers[2] - powers[0], 1e-12), 0.0, 1.0))
 
