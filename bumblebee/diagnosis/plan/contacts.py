@@ -9,6 +9,7 @@ import numpy as np
 
 from bumblebee.diagnosis.simulation import Plant
 from bumblebee.diagnosis.thresholds.plan import SafetyMargins
+from bumblebee.sim.effects import Effect
 
 _NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 _NO_SERVOS = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
@@ -23,9 +24,12 @@ class Clash:
 
 
 class Surroundings:
-    """The declared model with every colliding geometry awake, and which of them are near each other at rest."""
+    """The declared model with every colliding geometry awake, and which of them are near each other at rest.
 
-    def __init__(self, plant: Plant, rest: np.ndarray, rule: SafetyMargins) -> None:
+    And the level surfaces that a diagnosis found, each with the point of the robot that touches it.
+    """
+
+    def __init__(self, plant: Plant, rest: np.ndarray, rule: SafetyMargins, effects: Sequence[Effect] = ()) -> None:
         self.model = copy.copy(plant.model)
         self.rule, self._floating = rule, plant.floating
         awake = (self.model.geom_contype | self.model.geom_conaffinity) != 0
@@ -44,16 +48,17 @@ class Surroundings:
         self._feet_at = {b: self._data.xpos[b, :2].copy() for b in self.feet}
         self._base = int(self.model.jnt_bodyid[self.model.dof_jntid[plant.base_dof]]) if plant.floating else 0
         self._up = self._data.xmat[self._base].reshape(3, 3)[2].copy() if plant.floating else None
+        self._surfaces = [self._surface(e) for e in effects if e.effect == "surface_contact"]
         points = [p for some in self.feet.values() for p in some]
         self.radius = inner_radius(np.array(points)) if points else 0.0
 
     def clash(self, qpos: np.ndarray, qvel: np.ndarray, torque: np.ndarray) -> Clash | None:
         """The first thing wrong along states (n, nq), (n, nv) of joints that are driven with `torque` (n, J)."""
-        if not self.has_geometry and not self._floating:
+        if not self.has_geometry and not self._floating and not self._surfaces:
             return None
         for q, v, tau in zip(qpos, qvel, torque, strict=True):
             self._place(q)
-            found = (self._unsteady() if self._floating else None) or self._too_near()
+            found = (self._unsteady() if self._floating else None) or self._too_near() or self._too_low()
             found = found or (self._out_of_support(q, v, tau) if self._floating else None)
             if found:
                 return found
@@ -78,6 +83,22 @@ class Surroundings:
                 continue
             names = " and ".join(model.body(b).name or f"body {b}" for b in (one, other))
             return Clash(f"{names} come closer than {1000 * self.rule.clearance:.0f} mm", (one, other))
+        return None
+
+    def _surface(self, effect: Effect) -> tuple[int, np.ndarray, float]:
+        """Body, point (3,) [m] in its frame and how low [m] it may come: at rest on the surface, no lower than that."""
+        height, *point, _ = effect.values()
+        body, at = int(self.model.body(effect.where[0]).id), np.array(point)
+        return body, at, min(height + self.rule.clearance, self._height(body, at) - self.rule.touch)
+
+    def _height(self, body: int, point: np.ndarray) -> float:
+        return float(self._data.xpos[body, 2] + self._data.xmat[body, 6:9] @ point)
+
+    def _too_low(self) -> Clash | None:
+        for body, point, least in self._surfaces:
+            if self._height(body, point) < least:
+                name = self.model.body(body).name
+                return Clash(f"{name} comes too near to the surface that the diagnosis found", (body,))
         return None
 
     def _adjacent(self, one: int, other: int) -> bool:

@@ -32,6 +32,7 @@ def document(plan: Plan, sha256: str) -> dict[str, Any]:
         "start": dict(zip(machine.joints, _plain(machine.home), strict=True)),
         "limits": _limits(plan),
         "safe_on": [case.name for case in plan.cases],
+        "left_out": dict(plan.left_out),
         "runs": [_run(plan, k) for k in range(len(plan.motions))],
         "predicted": {"classes": classes(plan), "intervals": intervals(plan), "usual": usual(plan)},
         "noise": dict(zip(machine.seen_layout.labels(machine.joints), _plain(machine.sigma), strict=True)),
@@ -106,8 +107,7 @@ def notes(plan: Plan) -> list[str]:
     ]
     if not plan.checked:
         out.append("the model has no geometry that can touch: look for collisions yourself, at low speed first")
-    for name in plan.left_out:
-        out.append(f"not rehearsed on {name}: it does not even rest in the start pose")
+    out += _left_out(plan)
     for name in plan.basis.unasked:
         out.append(f"{name}: no candidate of this model stands for it; the plan does not ask about it")
     open_ = [row for row in classes(plan) if row["class"] in {f.name for f in plan.basis.found.values()}]
@@ -119,6 +119,18 @@ def notes(plan: Plan) -> list[str]:
             f"these runs are not expected to tell apart: {'; '.join(left[:6])}{more}. "
             "Other limits (--speed, --travel), "
             "other gains (--gains, --damping) or another experiment may: `separate_by` in diagnosis.json"
+        )
+    return out
+
+
+def _left_out(plan: Plan) -> list[str]:
+    """A note for each reason; `left_out` of the document names all robots."""
+    most, out = plan.config.thresholds.plan.unknowns.named, []
+    for reason in dict.fromkeys(plan.left_out.values()):
+        names = [name for name, why in plan.left_out.items() if why == reason]
+        more = f" and {len(names) - most} more" if len(names) > most else ""
+        out.append(
+            f"not rehearsed on {', '.join(names[:most])}{more}: {'each ' if more or names[1:] else 'it '}{reason}"
         )
     return out
 

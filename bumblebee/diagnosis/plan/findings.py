@@ -37,14 +37,28 @@ class Finding:
         """Effect and place, in words."""
         return f"{self.found.effect.replace('_', ' ')} {self.where}".strip()
 
+    @property
+    def _first(self) -> str:
+        """Name of its first parameter."""
+        return CATALOGUE[self.found.effect].parameters[0].name
+
+    @property
+    def _change(self) -> tuple[float, float]:
+        """Value of the first parameter, and how far it is from the declared one."""
+        value = self.found.parameters[self._first]
+        return value, abs(value - (self.nominal.get(self._first) or 0.0))
+
+    def differs(self, other: Effect, share: float) -> bool:
+        """Whether an effect of this kind is another robot: its first parameter differs by more than that share."""
+        value, change = self._change
+        return abs(other.parameters[self._first] - value) > share * change
+
     def ends(self, beyond: float) -> tuple[Effect, Effect]:
         """The effect with its first parameter at either end of its interval.
 
         An interval without an end: as far as `beyond` times the change from the declared value.
         """
-        first = CATALOGUE[self.found.effect].parameters[0]
-        value = self.found.parameters[first.name]
-        change = abs(value - (self.nominal.get(first.name) or 0.0))
+        first, (value, change) = CATALOGUE[self.found.effect].parameters[0], self._change
         ends = []
         for side, sign in ((self.low, -1.0), (self.high, 1.0)):
             end = side.get(first.name)

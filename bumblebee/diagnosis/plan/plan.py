@@ -1,7 +1,7 @@
 """The next experiment: safe runs, chosen to tell apart what a diagnosis could not and to narrow what it knows."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -18,14 +18,15 @@ from bumblebee.diagnosis.plan.limits import Limits
 from bumblebee.diagnosis.plan.machine import Machine
 from bumblebee.diagnosis.plan.motions import Motion
 from bumblebee.diagnosis.plan.objective import Objective, imitations, objective_of
-from bumblebee.diagnosis.plan.pool import refuse_none, resting, safe_pool, set_stage
+from bumblebee.diagnosis.plan.plausible import implausible
+from bumblebee.diagnosis.plan.pool import refuse_none, resting, safe_pool, set_stage, surest
 from bumblebee.diagnosis.plan.rehearsal import rehearse
-from bumblebee.diagnosis.plan.safety import Safe, made_safe
+from bumblebee.diagnosis.plan.safety import Safe, proven
 from bumblebee.diagnosis.plan.stage import Stage
 from bumblebee.diagnosis.plan.unknowns import Case, cases_of
 from bumblebee.diagnosis.simulation import Plant
-from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
+from bumblebee.sim.effects import Effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +52,8 @@ class Plan:
     """Why other candidates were given up -> how many."""
     checked: bool
     """Whether the model has geometry by which self-collision could be looked for."""
-    left_out: tuple[str, ...]
-    """Robots that cannot even rest in the start pose, so that no run is safe on them."""
+    left_out: Mapping[str, str]
+    """Robots that the runs are not rehearsed on, and why."""
 
     @property
     def basis(self) -> Basis:
@@ -95,18 +96,16 @@ def _make_plan(
     stage = set_stage(spec, name, config, session, findings)
     known = None if session is None else _measured(stage.machine, session, findings, config)
     if known is not None:
-        stage = _with_rivals(stage, known, findings, config)
-    say(f"{len(stage.cases)} robots to be safe on; {config.pool} candidate motions")
-    safe = safe_pool(stage, config)
+        stage = _with_rivals(stage, session, known, findings, config)
+    say(f"{config.pool} candidate motions")
+    safe = safe_pool(surest(stage), config)
     refuse_none(safe, say)
     say(f"{len(safe.motions)} of them are safe; what they would tell")
-    effects = findings.effects if findings else ()
-    runs = rehearse(stage.machine, safe.motions, effects, stage.step, stage.rules.motions.settle)
-    logs = logs_of(stage.machine, runs, safe.motions)
+    ask = _Asking(stage, findings.effects if findings else (), _windows(stage.machine, config))
+    logs = ask.logs(safe.motions)
     if known is None:
         known = _unmeasured(stage.machine, logs, config)
-    told = _told(stage.machine, safe.motions, logs, known.lens, _windows(stage.machine, config))
-    return _chosen(stage, safe, known, told, (config, findings), say)
+    return _chosen(ask, safe, known, ask.told(safe.motions, known.lens, logs), (config, findings), say)
 
 
 def _measured(machine: Machine, session: Session, findings: Findings | None, config: PlanConfig) -> _Known:
@@ -143,8 +142,11 @@ def _objective(machine: Machine, lens: Lens, data: np.ndarray | None, config: Pl
     return objective_of(lens.basis, first, data, bodies, config.thresholds.plan)
 
 
-def _with_rivals(stage: Stage, known: _Known, findings: Findings | None, config: PlanConfig) -> Stage:
-    """The stage with the rivals' robots among its cases, at the size at which each imitates what was found."""
+def _with_rivals(stage: Stage, session: Session, known: _Known, findings: Findings | None, config: PlanConfig) -> Stage:
+    """The stage with the rivals' robots among its cases, at the size at which each imitates what was found.
+
+    Without those that the data speak against.
+    """
     rule, basis = config.thresholds.plan.unknowns, known.lens.basis
     rivals, count = [], dict.fromkeys(basis.found, 0)
     for (k, other), steps in imitations(known.objective, known.data).items():
@@ -156,7 +158,10 @@ def _with_rivals(stage: Stage, known: _Known, findings: Findings | None, config:
             rivals.append((basis.found[k], c, c.clip(values)))
             count[k] += 1
     cases = cases_of(stage.machine, stage.limits, findings, rivals, rule)
-    return resting(stage, cases)
+    found = findings.effects if findings else ()
+    far = implausible(stage.machine, session, cases, found, known.lens.horizon, rule) if found else []
+    out = dict.fromkeys(far, "explains the data far worse than the diagnosed model")
+    return resting(replace(stage, left_out=out), [case for case in cases if case.name not in out])
 
 
 def _windows(machine: Machine, config: PlanConfig) -> int:
@@ -165,44 +170,71 @@ def _windows(machine: Machine, config: PlanConfig) -> int:
     return rule.windows if machine.plant.model.nv <= small else rule.few
 
 
-def _told(machine: Machine, motions: list[Motion], logs: list, lens: Lens, budget: int) -> np.ndarray:
-    """Information (R, N, N) of the motions, each by the robot at its gain."""
-    out: list[np.ndarray | None] = [None] * len(motions)
-    for gain in dict.fromkeys(m.gain for m in motions):
-        some = [i for i, m in enumerate(motions) if m.gain == gain]
-        told = information_of(machine.seen[gain], machine.seen_layout, [logs[i] for i in some], lens, budget)
-        for i, own in zip(some, told, strict=True):
-            out[i] = own
-    return np.stack([own for own in out if own is not None])
+@dataclass(frozen=True, eq=False)
+class _Asking:
+    """What motions would tell, by simulations of them."""
+
+    stage: Stage
+    effects: Sequence[Effect]
+    """Of the robot that is expected."""
+    windows: int
+    """That stand for a run."""
+
+    def logs(self, motions: Sequence[Motion]) -> list[Rollout]:
+        """What would be recorded."""
+        stage = self.stage
+        runs = rehearse(stage.machine, motions, self.effects, stage.step, stage.rules.motions.settle)
+        return logs_of(stage.machine, runs, motions)
+
+    def told(self, motions: Sequence[Motion], lens: Lens, logs: Sequence[Rollout]) -> np.ndarray:
+        """Information (R, N, N) of the motions, each by the robot at its gain."""
+        machine, out = self.stage.machine, {}
+        for gain in dict.fromkeys(m.gain for m in motions):
+            some = [i for i, m in enumerate(motions) if m.gain == gain]
+            own = [logs[i] for i in some]
+            told = information_of(machine.seen[gain], machine.seen_layout, own, lens, self.windows)
+            out |= dict(zip(some, told, strict=True))
+        return np.stack([out[i] for i in range(len(motions))])
 
 
 def _chosen(
-    stage: Stage,
+    ask: _Asking,
     safe: Safe,
     known: _Known,
     told: np.ndarray,
     asked: tuple[PlanConfig, Findings | None],
     say: Callable[[str], None],
 ) -> Plan:
-    """The best runs that are safe in fine steps, too; a run that is not is left out and the choice made again."""
+    """The best runs that are safe on all robots in fine steps.
+
+    Those that are chosen are tried on all of them; what had to be made smaller is asked again what it tells, what is
+    never safe is left out, and the choice is made again until all that is chosen was tried as it is.
+    """
     config, findings = asked
+    stage, motions, refused = ask.stage, list(safe.motions), safe.refused.copy()
+    tried: dict[int, np.ndarray] = {}  # motion -> the shares (3, J) of the limits that it reaches
     shut: list[int] = []
     while True:
         picked = choose(known.objective, known.data, told, config.runs, shut)
         if not picked:
-            raise BadInput("plan", "a motion that is safe in fine steps", "none", "Ask for less --travel or --speed.")
-        some, fine = [safe.motions[r] for r in picked], stage.machine.steps[0]
-        if fine == stage.step:
-            reached = safe.reached[picked]
+            refuse_none(Safe([], safe.reached[:0], refused), say)
+        new = [r for r in picked if r not in tried]
+        if not new:
             break
-        say("the chosen runs again, in fine steps")
-        again = made_safe(stage, some, fine, shrinks=0)
-        if len(again.motions) == len(some):
-            reached = again.reached
-            break
-        kept = {m.number for m in again.motions}
-        shut += [r for r in picked if safe.motions[r].number not in kept]
+        say(f"{len(new)} runs on each of {len(stage.cases)} robots")
+        proof = proven(stage, [motions[r] for r in new])
+        refused += proof.refused
+        found = {m.number: (m, reached) for m, reached in zip(proof.motions, proof.reached, strict=True)}
+        shut += [r for r in new if motions[r].number not in found]
+        kept = [r for r in new if r not in shut]
+        smaller = [r for r in kept if found[motions[r].number][0] is not motions[r]]
+        for r in kept:
+            motions[r], tried[r] = found[motions[r].number]
+        if smaller:
+            again = [motions[r] for r in smaller]
+            told[smaller] = ask.told(again, known.lens, ask.logs(again))
     return Plan(
-        stage.machine, stage.limits, config, findings, stage.cases, some, reached, known.objective, known.data,
-        told[picked], dict(safe.refused), stage.around.has_geometry, stage.left_out,
+        stage.machine, stage.limits, config, findings, stage.cases, [motions[r] for r in picked],
+        np.stack([tried[r] for r in picked]), known.objective, known.data, told[picked], dict(refused),
+        stage.around.has_geometry, stage.left_out,
     )  # fmt: skip

@@ -6,7 +6,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.dataset import Session
+from bumblebee.diagnosis.dataset import Session, step_for
 from bumblebee.diagnosis.plan.config import Gain, PlanConfig
 from bumblebee.diagnosis.plan.contacts import Surroundings
 from bumblebee.diagnosis.plan.findings import Findings, refuse_strange
@@ -33,16 +33,23 @@ def set_stage(
     if findings is not None:
         refuse_strange(findings, machine.plant)
     limits = limits_of(machine, session, config)
-    small = machine.plant.model.nv <= config.thresholds.dataset.time_steps.small_model
-    step = machine.steps[0] if small else machine.steps[1]
+    step = _rough_step(machine, float((session.spec if session else spec).option.timestep), config)
     start = Surroundings(machine.plant, machine.qpos, rules.safety)
     machine = settled(machine, step, rules.motions.settle)
     refuse_fallen(machine, start)
-    around = Surroundings(machine.plant, machine.qpos, rules.safety)
+    around = Surroundings(machine.plant, machine.qpos, rules.safety, findings.effects if findings else ())
     cases = cases_of(machine, limits, findings, (), rules.unknowns)
     support = _supporting(machine, around)
     scope = Scope(machine.home, machine.moved, support, limits, machine.rate, config.seconds, rules.motions)
     return resting(Stage(machine, limits, around, cases, scope, step, rules), cases)
+
+
+def _rough_step(machine: Machine, declared: float, config: PlanConfig) -> float:
+    """The step [s] in which most candidates are given up: for a small model no longer than the declared one."""
+    rule = config.thresholds.dataset.time_steps
+    if machine.plant.model.nv > rule.small_model:
+        return machine.steps[1]
+    return max(machine.steps[0], step_for(1.0 / machine.rate, min(rule.coarse, declared), rule))
 
 
 def safe_pool(stage: Stage, config: PlanConfig, families: tuple[str, ...] = FAMILIES) -> Safe:
@@ -53,6 +60,11 @@ def safe_pool(stage: Stage, config: PlanConfig, families: tuple[str, ...] = FAMI
         for k in range(config.pool)
     ]
     return made_safe(stage, motions)
+
+
+def surest(stage: Stage) -> Stage:
+    """The stage with the declared and the diagnosed robot alone: the others' turn is when runs have been chosen."""
+    return replace(stage, cases=[case for case in stage.cases if case.must])
 
 
 def _refuse_config(config: PlanConfig) -> None:
@@ -101,7 +113,7 @@ def resting(stage: Stage, cases: list[Case]) -> Stage:
 
     `BadInput` for one that must; others are left out, and their names kept.
     """
-    machine, out = stage.machine, []
+    machine, out = stage.machine, dict(stage.left_out)
     for case in cases:
         for gain in machine.driven:
             found = _unrest(stage, case, gain)
@@ -112,9 +124,9 @@ def resting(stage: Stage, cases: list[Case]) -> Stage:
                     found,
                     _STAND if machine.plant.floating else "Choose a keyframe with --start, or other limits.",
                 )
-            if found and case.name not in out:
-                out.append(case.name)
-    return replace(stage, cases=[case for case in cases if case.name not in out], left_out=tuple(out))
+            if found:
+                out[case.name] = "does not even rest in the start pose"
+    return replace(stage, cases=[case for case in cases if case.name not in out], left_out=out)
 
 
 def _unrest(stage: Stage, case: Case, gain: Gain) -> str:

@@ -63,7 +63,7 @@ def _by_joint(stage: Stage, runs: Rehearsed, r: int, motion: Motion) -> Verdict:
 
 
 def _carriers(machine: Machine, clash: Clash) -> np.ndarray:
-    """(J,) bool: joints that move one of the clashing bodies against the other."""
+    """(J,) bool: joints that move one of the clashing bodies against the other, or against the world."""
     model = machine.plant.model
     chains = []
     for body in clash.bodies:
@@ -72,7 +72,9 @@ def _carriers(machine: Machine, clash: Clash) -> np.ndarray:
             above.add(body)
             body = int(model.body_parentid[body])
         chains.append(above)
-    apart = chains[0] ^ chains[1] if len(chains) == 2 else set()
+    apart = set[int]()
+    for chain in chains:
+        apart ^= chain
     return np.array([int(model.jnt_bodyid[model.joint(name).id]) in apart for name in machine.joints])
 
 
@@ -87,38 +89,59 @@ class Safe:
     """Why others were given up -> how many."""
 
 
-def made_safe(stage: Stage, motions: Sequence[Motion], step: float | None = None, shrinks: int | None = None) -> Safe:
+def made_safe(stage: Stage, motions: Sequence[Motion], step: float | None = None) -> Safe:
     """Rehearse the motions in all cases, shrink what breaks a limit, give up what never keeps them.
 
-    In steps of `step` [s] and at most so many `shrinks`, where these are not the stage's own.
+    In steps of `step` [s], where these are not the stage's own. The cases come in turn, round after round, until each
+    motion has passed all of them as it is: one that was made smaller goes on where it was stopped.
     """
-    waiting, rule = dict(enumerate(motions)), stage.rules.motions
-    done: dict[int, tuple[Motion, np.ndarray]] = {}
-    reason: dict[int, str] = {}
-    for _ in range(1 + (rule.shrinks if shrinks is None else shrinks)):
-        if not waiting:
-            break
-        for k, verdict in _worst(stage, waiting, stage.step if step is None else step).items():
-            if verdict.reason:
-                waiting[k], reason[k] = waiting[k].smaller(verdict.joints, rule.shrink), verdict.reason
-            else:
-                done[k] = (waiting.pop(k), verdict.reached)
-    kept = [done[k] for k in sorted(done)]
-    shares = np.array([reached for _, reached in kept]).reshape(len(kept), 3, len(stage.machine.home))
-    return Safe([motion for motion, _ in kept], shares, Counter(reason[k] for k in waiting))
+    step = stage.step if step is None else step
+    tests = [_Test(motion) for motion in motions]
+    while any(t.goes_on(stage) for t in tests):
+        for k, case in enumerate(stage.cases):
+            while now := [t for t in tests if t.goes_on(stage) and k not in t.passed]:
+                some = [t.motion for t in now]
+                runs = rehearse(stage.machine, some, case.effects, step, stage.rules.motions.settle)
+                for test, verdict in zip(now, judge(stage, runs, some), strict=True):
+                    test.hears(verdict, k, case.name, stage.rules.motions.shrink)
+    kept = [t for t in tests if t.has_passed(stage)]
+    shares = np.array([t.reached for t in kept]).reshape(len(kept), 3, len(stage.machine.home))
+    return Safe([t.motion for t in kept], shares, Counter(t.reason for t in tests if not t.has_passed(stage)))
 
 
-def _worst(stage: Stage, waiting: dict[int, Motion], step: float) -> dict[int, Verdict]:
-    """For each motion the first verdict against it over the cases; without one, what was reached in any of them."""
-    out: dict[int, Verdict] = {}
-    for case in stage.cases:
-        open_ = [k for k in waiting if k not in out or not out[k].reason]
-        if not open_:
-            break
-        some = [waiting[k] for k in open_]
-        runs = rehearse(stage.machine, some, case.effects, step, stage.rules.motions.settle)
-        for k, new in zip(open_, judge(stage, runs, some), strict=True):
-            reached = np.maximum(new.reached, out[k].reached) if k in out else new.reached
-            told = f"{new.reason} ({case.name})" if new.reason else ""
-            out[k] = Verdict(told, new.joints, reached)
-    return out
+def proven(stage: Stage, motions: Sequence[Motion]) -> Safe:
+    """The motions made safe in fine steps; what long steps see already is seen in them, at a fraction of the cost."""
+    fine, refused = stage.machine.steps[0], Counter[str]()
+    if fine < stage.step:
+        rough = made_safe(stage, motions)
+        motions, refused = rough.motions, rough.refused
+    safe = made_safe(stage, motions, fine)
+    return Safe(safe.motions, safe.reached, safe.refused + refused)
+
+
+class _Test:
+    """One motion on its way through the cases."""
+
+    def __init__(self, motion: Motion) -> None:
+        self.motion, self.reason, self.shrinks = motion, "", 0
+        self.passed: set[int] = set()
+        """Cases that it passed as it is."""
+        self.reached: np.ndarray | float = 0.0
+        """(3, J) largest shares of the limits in these."""
+
+    def hears(self, verdict: Verdict, case: int, name: str, shrink: float) -> None:
+        """Pass a case, or grow smaller and begin anew."""
+        if not verdict.reason:
+            self.passed.add(case)
+            self.reached = np.maximum(self.reached, verdict.reached)
+            return
+        self.motion, self.reason = self.motion.smaller(verdict.joints, shrink), f"{verdict.reason} ({name})"
+        self.shrinks, self.passed, self.reached = self.shrinks + 1, set(), 0.0
+
+    def has_passed(self, stage: Stage) -> bool:
+        """Whether no case is left."""
+        return len(self.passed) == len(stage.cases) and self.shrinks <= stage.rules.motions.shrinks
+
+    def goes_on(self, stage: Stage) -> bool:
+        """Whether it is neither safe nor given up."""
+        return not self.has_passed(stage) and self.shrinks <= stage.rules.motions.shrinks

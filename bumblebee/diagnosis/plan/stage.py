@@ -1,6 +1,7 @@
 """Where motions are rehearsed: the robot at rest, its limits, and the robots that a plan must be safe on."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from bumblebee.diagnosis.plan.contacts import Surroundings
 from bumblebee.diagnosis.plan.limits import Limits
@@ -22,5 +23,5 @@ class Stage:
     step: float
     """Of rehearsals [s]."""
     rules: PlanThresholds
-    left_out: tuple[str, ...] = ()
-    """Cases that are possible by the data and cannot even rest in the start pose."""
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    """Cases that a plan is not rehearsed on, and why."""

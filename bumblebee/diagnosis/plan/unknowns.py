@@ -49,7 +49,8 @@ def cases_of(
     for finding in findings.listed:
         rest = [e for e in findings.effects if e is not finding.found]
         for end, values in zip(("lower", "upper"), finding.ends(rule.beyond), strict=True):
-            cases.append(Case(f"{finding.name} at the {end} end of its interval", [*rest, values], must=False))
+            if finding.differs(values, rule.same):
+                cases.append(Case(f"{finding.name} at the {end} end of its interval", [*rest, values], must=False))
     for finding, candidate, values in rivals:
         rest = [e for e in findings.effects if e is not finding.found]
         name = f"{candidate.effect} {candidate.where}".strip()

@@ -47,8 +47,18 @@ class Unknowns:
     """Dry friction of each joint as a share of its torque limit."""
     rivals: int = 6
     """Other explanations of an effect that a plan is rehearsed with, the nearest first."""
+    same: float = 0.01
+    """Share of an effect's change within which the end of its interval is the diagnosed robot again."""
     beyond: float = 2.0
     """Times an effect's change that stands for an interval without an end."""
+    windows: int = 24
+    """Windows of the data on which robots that it may be are held against the diagnosed one."""
+    share: float = 0.25
+    """Share of a joint's motion in these windows by which a robot errs at least that is not this one."""
+    worse: float = 1.5
+    """Times the diagnosed robot's error on the same joint, likewise."""
+    named: int = 6
+    """Robots of one reason that a note names: where a diagnosis knows little there are dozens."""
 
 
 @dataclass(frozen=True)
