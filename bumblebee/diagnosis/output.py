@@ -4,18 +4,21 @@ A diagnosis is diagnosis.json, model.xml, effects.yaml and report.html; a gap re
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import mujoco
 
 from bumblebee.diagnosis.diagnose import Diagnosis
 from bumblebee.diagnosis.gap import Gap, gap_page
 from bumblebee.diagnosis.places import DIAGNOSIS, GAP, Result, refuse_file, refuse_folder
 from bumblebee.diagnosis.report import examples, render_report
+from bumblebee.diagnosis.simulation import REFUSALS, effects_in_words
 from bumblebee.errors import BadInput
 from bumblebee.io.write import kept, write_file, write_folder
 from bumblebee.measured.model_file import name_assets_in_full
-from bumblebee.sim.effects import add_to_spec, effects_yaml
+from bumblebee.sim.effects import Effect, add_to_spec, effects_yaml
 
 
 def write_diagnosis(diagnosis: Diagnosis, out: Path, overwrite: bool = False) -> None:
@@ -48,19 +51,40 @@ def contents(diagnosis: Diagnosis) -> dict[str, str]:
     """The four files by name."""
     rules = diagnosis.problem.thresholds.report
     shown = examples(diagnosis.session, diagnosis.effects, rule=rules.example_windows)
+    xml, notes = corrected_xml(diagnosis.session.spec, diagnosis.effects)
+    document = {**diagnosis.document, "notes": [*diagnosis.document["notes"], *notes]}
     return {
-        "diagnosis.json": as_json(diagnosis.document),
+        "diagnosis.json": as_json(document),
         "effects.yaml": effects_yaml(diagnosis.effects),
-        "model.xml": corrected_xml(diagnosis),
-        "report.html": render_report(diagnosis.document, shown, rules),
+        "model.xml": xml,
+        "report.html": render_report(document, shown, rules),
     }
 
 
-def corrected_xml(diagnosis: Diagnosis) -> str:
-    """The declared model with every native effect; checked by loading it in plain MuJoCo."""
-    spec = diagnosis.session.spec.copy()
+def corrected_xml(declared: mujoco.MjSpec, effects: Sequence[Effect]) -> tuple[str, list[str]]:
+    """The declared model with every native effect, checked by loading it in plain MuJoCo; and what it cannot carry.
+
+    An effect that cannot be written as MJCF costs its place in this file, with a note, and nothing else.
+    """
+    try:
+        return _with_effects(declared, effects), []
+    except REFUSALS:
+        kept: list[Effect] = []
+        notes = []
+        for effect in effects:
+            try:
+                _with_effects(declared, [*kept, effect])
+                kept.append(effect)
+            except REFUSALS as error:
+                told = " ".join(str(error).split())
+                notes.append(f"model.xml is without {effects_in_words([effect])}, which effects.yaml has: {told}")
+        return _with_effects(declared, kept), notes
+
+
+def _with_effects(declared: mujoco.MjSpec, effects: Sequence[Effect]) -> str:
+    spec = declared.copy()
     name_assets_in_full(spec)
-    add_to_spec(spec, diagnosis.effects)
+    add_to_spec(spec, effects)
     spec.compile()
     return spec.to_xml()
 

@@ -9,12 +9,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.output import write_diagnosis
+from bumblebee.diagnosis.output import corrected_xml, write_diagnosis
 from bumblebee.diagnosis.report.example_windows import examples
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.terminal import plot, summary
 from bumblebee.errors import BadInput
-from bumblebee.sim.effects import read_effects
+from bumblebee.sim.effects import read_effects, single
+from tests.diagnosis.arm import XML
 
 CASE = {("motor_strength", "j3"): 0.85}
 
@@ -49,6 +50,27 @@ def test_the_files_keep_the_contract(diagnosed, tmp_path: Path) -> None:
     assert model.actuator("j3").gainprm[0] == pytest.approx(0.85 * 30, rel=0.01)
     (effect,) = read_effects(tmp_path / "out" / "effects.yaml")
     assert (effect.effect, effect.where) == ("motor_strength", ("j3",))
+
+
+def test_an_effect_that_mjcf_cannot_carry_costs_its_place_in_the_model_and_a_note() -> None:
+    spec = mujoco.MjSpec.from_string(XML)
+    effects = [
+        single("viscous_friction", "j1", 0.3),
+        single("motor_strength", "j9", 0.8),
+        single("armature", "j3", 0.02),
+    ]
+    xml, notes = corrected_xml(spec, effects)
+    model = mujoco.MjModel.from_xml_string(xml)
+    assert model.dof_damping[0] == pytest.approx(0.3) and model.dof_armature[2] == pytest.approx(0.02)
+    (note,) = notes
+    assert note.startswith("model.xml is without motor_strength") and "j9" in note
+
+
+def test_an_offset_of_a_passive_joints_encoder_is_no_obstacle_to_the_model() -> None:
+    passive = XML.replace(XML[XML.index('<position name="j3"') : XML.index("</actuator>")], "")
+    xml, notes = corrected_xml(mujoco.MjSpec.from_string(passive), [single("encoder_offset", "j3", 0.1)])
+    assert not notes
+    assert mujoco.MjModel.from_xml_string(xml).nu == 2
 
 
 def test_an_earlier_diagnosis_is_replaced_only_when_told_and_nothing_else_ever(

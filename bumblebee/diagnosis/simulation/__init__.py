@@ -18,7 +18,7 @@ from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, witho
 from bumblebee.diagnosis.simulation.condition_plants import make_plants
 from bumblebee.diagnosis.simulation.conditions import Condition, in_words
 from bumblebee.diagnosis.simulation.declared import declared_values, touching
-from bumblebee.diagnosis.simulation.failures import LEFT_OUT, NOT_TRIED
+from bumblebee.diagnosis.simulation.failures import LEFT_OUT, NOT_TRIED, REFUSALS, effects_in_words
 from bumblebee.diagnosis.simulation.joint_path import joint_path
 from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, plant_by, refuse_unlogged
 from bumblebee.diagnosis.simulation.readings import (
@@ -57,6 +57,7 @@ __all__ = [
     "KINDS",
     "LEFT_OUT",
     "NOT_TRIED",
+    "REFUSALS",
     "Changes",
     "Condition",
     "Layout",
@@ -75,6 +76,7 @@ __all__ = [
     "cut",
     "declared_values",
     "difference",
+    "effects_in_words",
     "fold_dampers",
     "in_words",
     "inputs_of",

@@ -39,7 +39,7 @@ class Failures:
 
     def add(self, effects: Sequence[Effect], error: BaseException) -> None:
         """Write down that the declared model with `effects` could not be had."""
-        _count(self.reasons, in_words(effects), error)
+        _count(self.reasons, effects_in_words(effects), error)
 
     def attempt(self, step: str, take: Callable[[], T], instead: Callable[[], T]) -> T:
         """What `take` gives, or `instead` where that fails; the `step` in words is then written down."""
@@ -62,6 +62,6 @@ def _count(seen: dict[tuple[str, str], int], what: str, error: BaseException) ->
     seen[key] = seen.get(key, 0) + 1
 
 
-def in_words(effects: Sequence[Effect]) -> str:
+def effects_in_words(effects: Sequence[Effect]) -> str:
     """Kinds and places of effects."""
     return ", ".join(f"{e.effect} on {' and '.join(e.where) or 'the whole robot'}" for e in effects) or "no effect"

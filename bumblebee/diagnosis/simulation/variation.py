@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.simulation.failures import REFUSALS, in_words
+from bumblebee.diagnosis.simulation.failures import REFUSALS, effects_in_words
 from bumblebee.diagnosis.simulation.in_place import WRITE, Target
 from bumblebee.diagnosis.simulation.plant import Plant, make_plant
 from bumblebee.diagnosis.simulation.setpoints import SetPoint, setpoints_of
@@ -99,7 +99,7 @@ def vary_or_refuse(plant: Plant, effects: Sequence[Effect]) -> Variation:
         return _made(plant, effects)
     except REFUSALS as error:
         came = " ".join(str(error).split())[:300]
-        raise BadInput(f"effects {in_words(effects)}", "a model that MuJoCo can make of them", came) from error
+        raise BadInput(f"effects {effects_in_words(effects)}", "a model that MuJoCo can make of them", came) from error
 
 
 def _made(plant: Plant, effects: Sequence[Effect]) -> Variation:

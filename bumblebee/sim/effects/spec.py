@@ -8,7 +8,7 @@
 | motor_strength, kp, kd | the servo's gainprm and biasprm |
 | torque_limit | the servo's forcerange |
 | command_delay | actuator delay, nsample, interp="linear": the mean of the held, delayed command over each step |
-| encoder_offset | biasprm[0] = biasprm[1] * offset: the servo's part; the reading's part is a runtime hook |
+| encoder_offset | biasprm[0] = biasprm[1] * offset: a servo's part; the reading's part is a runtime hook |
 | joint_spring, hysteresis | joint stiffness with springref; with springyield |
 | backlash, series_elasticity | a second hinge on the same axis, with a range; with a stiffness. nq grows |
 | the same, encoder on the joint | a rotor of its own: a weightless body on such a hinge, whose inertia is a tendon's |
@@ -56,10 +56,15 @@ def _everywhere(spec: mujoco.MjSpec, kind: str) -> tuple[str, ...]:
 _ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 
-def _servos(spec: mujoco.MjSpec, joint: str) -> list[Any]:
-    """Every actuator that drives `joint`."""
+def _drives(spec: mujoco.MjSpec, joint: str) -> list[Any]:
+    """Every actuator that drives `joint`; none for a passive one."""
     joint_of(spec, joint)
-    servos = [a for a in spec.actuators if a.trntype in _ON_JOINT and a.target == joint]
+    return [a for a in spec.actuators if a.trntype in _ON_JOINT and a.target == joint]
+
+
+def _servos(spec: mujoco.MjSpec, joint: str) -> list[Any]:
+    """The same of a joint that must have one."""
+    servos = _drives(spec, joint)
     if not servos:
         raise BadInput(f"effect on joint {joint!r}", "a joint with an actuator", "a passive joint")
     return servos
@@ -142,7 +147,7 @@ def _delay(spec: mujoco.MjSpec, name: str, value: float) -> None:
 
 
 def _offset(spec: mujoco.MjSpec, name: str, value: float) -> None:
-    for servo in _servos(spec, name):
+    for servo in _drives(spec, name):  # the encoder of a passive joint moves nothing
         bias = servo.biasprm.copy()
         bias[0] = bias[1] * value * servo.gear[0]
         servo.biasprm = bias
