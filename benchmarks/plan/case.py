@@ -112,7 +112,7 @@ def _run(case: PlanCase, seed: int) -> dict[str, Any]:
     plan = make_plan(robot.spec, "arm", config, _session(robot, shown), found)
     line["plan_seconds"] = round(time.monotonic() - began, 1)
     line["predicted"] = _predicted(plan)
-    random = _random(robot, config, _session(robot, shown), found)
+    random = _random(robot, plan, config, _session(robot, shown), found)
     for name, motions in (("planned", plan.motions), ("random", random)):
         flights = [
             (at, fly(at, [law], Targets(motion.targets[:, None], plan.machine.qpos), rng))
@@ -153,10 +153,10 @@ def robot_at(robot: Declared, gain: Gain) -> Declared:
     return describe(robot.name, spec)
 
 
-def _random(robot: Declared, config: PlanConfig, session: Session, found: Any) -> list[Motion]:
-    """As many random multisines of the same length, within the same limits, safe on the same robots."""
-    other = replace(config, pool=RUNS + 4, seed=config.seed + 1, gains=(1.0,), damping=())
-    stage = set_stage(robot.spec, "arm", other, session, found)
+def _random(robot: Declared, plan: Plan, config: PlanConfig, session: Session, found: Any) -> list[Motion]:
+    """As many random multisines of the same length, within the same limits, safe on the same robots as the plan."""
+    other = replace(config, pool=4 * RUNS, seed=config.seed + 1, gains=(1.0,), damping=())
+    stage = replace(set_stage(robot.spec, "arm", other, session, found), cases=plan.cases)
     safe = safe_pool(stage, other, ("multisine",)).motions[:RUNS]
     if len(safe) < RUNS:
         raise ValueError("too few random motions are safe")

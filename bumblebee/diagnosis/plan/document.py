@@ -107,9 +107,11 @@ def notes(plan: Plan) -> list[str]:
     ]
     if not plan.checked:
         out.append("the model has no geometry that can touch: look for collisions yourself, at low speed first")
+    out += [f"no run at {gain}: {reason}" for gain, reason in plan.restless.items()]
     out += _left_out(plan)
-    for name in plan.basis.unasked:
-        out.append(f"{name}: no candidate of this model stands for it; the plan does not ask about it")
+    if plan.basis.unasked:
+        names = ", ".join(plan.basis.unasked)
+        out.append(f"no candidate of this model stands for what was found, and the plan does not ask about it: {names}")
     open_ = [row for row in classes(plan) if row["class"] in {f.name for f in plan.basis.found.values()}]
     pairs = (sorted((words_of(r["if"]), words_of(r["not"]))) for r in open_ if not r["resolved"]["after"])
     left = list(dict.fromkeys(" and ".join(pair) for pair in pairs))

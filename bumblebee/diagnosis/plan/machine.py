@@ -1,6 +1,6 @@
 """The robot as a plan moves it: its servos at each gain, what will be logged of it, and the pose that it rests in."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -130,6 +130,15 @@ def start_pose(plant: Plant, session: Session | None, start: str | None, name: s
 def at_rest(machine: Machine, qpos: np.ndarray) -> Machine:
     """The machine whose rehearsals begin in the state `qpos` (nq,); its targets stay."""
     return replace(machine, qpos=qpos)
+
+
+def without_gains(machine: Machine, names: Collection[str]) -> Machine:
+    """The machine without the gains of these names."""
+    driven, seen = (
+        {gain: plant for gain, plant in some.items() if str(gain) not in names}
+        for some in (machine.driven, machine.seen)
+    )
+    return replace(machine, driven=driven, seen=seen)
 
 
 def _joints(model: mujoco.MjModel, name: str) -> tuple[str, ...]:

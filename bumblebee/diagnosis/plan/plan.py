@@ -54,6 +54,8 @@ class Plan:
     """Whether the model has geometry by which self-collision could be looked for."""
     left_out: Mapping[str, str]
     """Robots that the runs are not rehearsed on, and why."""
+    restless: Mapping[str, str]
+    """Gains at which no run is made since the robot does not rest, and why."""
 
     @property
     def basis(self) -> Basis:
@@ -236,5 +238,5 @@ def _chosen(
     return Plan(
         stage.machine, stage.limits, config, findings, stage.cases, [motions[r] for r in picked],
         np.stack([tried[r] for r in picked]), known.objective, known.data, told[picked], dict(refused),
-        stage.around.has_geometry, stage.left_out,
+        stage.around.has_geometry, stage.left_out, stage.restless,
     )  # fmt: skip

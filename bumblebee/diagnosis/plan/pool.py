@@ -11,7 +11,7 @@ from bumblebee.diagnosis.plan.config import Gain, PlanConfig
 from bumblebee.diagnosis.plan.contacts import Surroundings
 from bumblebee.diagnosis.plan.findings import Findings, refuse_strange
 from bumblebee.diagnosis.plan.limits import limits_of
-from bumblebee.diagnosis.plan.machine import Machine, make_machine
+from bumblebee.diagnosis.plan.machine import Machine, make_machine, without_gains
 from bumblebee.diagnosis.plan.motions import FAMILIES, Motion, Scope, draw_motion
 from bumblebee.diagnosis.plan.rehearsal import rehearse, settled
 from bumblebee.diagnosis.plan.safety import Safe, judge, made_safe
@@ -54,7 +54,10 @@ def _rough_step(machine: Machine, declared: float, config: PlanConfig) -> float:
 
 def safe_pool(stage: Stage, config: PlanConfig, families: tuple[str, ...] = FAMILIES) -> Safe:
     """The candidate motions of a seed, as far as they are safe."""
-    gains = config.all_gains
+    gains = [gain for gain in config.all_gains if gain in stage.machine.driven]
+    if not gains:
+        why = "; ".join(f"{gain}: {reason}" for gain, reason in stage.restless.items())
+        raise BadInput("--gains", "gains at which the robot rests in the start pose", why, "Allow 1, or others.")
     motions = [
         draw_motion(stage.scope, config.seed, k, gains[(k // len(families)) % len(gains)], families)
         for k in range(config.pool)
@@ -111,21 +114,26 @@ def _holding(machine: Machine) -> np.ndarray:
 def resting(stage: Stage, cases: list[Case]) -> Stage:
     """The stage with those of the cases that rest in the start pose within all limits, at every gain.
 
-    `BadInput` for one that must; others are left out, and their names kept.
+    Gains other than the declared ones at which one that must does not are left out, and so are cases that need not;
+    their names are kept. `BadInput` for one that must at the declared gains.
     """
-    machine, out = stage.machine, dict(stage.left_out)
-    for case in cases:
-        for gain in machine.driven:
-            found = _unrest(stage, case, gain)
-            if found and case.must:
-                raise BadInput(
-                    f"{machine.name}: start pose, {gain}, {case.name}",
-                    "a robot that rests under its servos within the limits",
-                    found,
-                    _STAND if machine.plant.floating else "Choose a keyframe with --start, or other limits.",
-                )
-            if found:
-                out[case.name] = "does not even rest in the start pose"
+    restless = dict(stage.restless)
+    for case in (case for case in cases if case.must):
+        for gain in (gain for gain in stage.machine.driven if str(gain) not in restless):
+            if found := _unrest(stage, case, gain):
+                if gain == Gain():
+                    raise BadInput(
+                        f"{stage.machine.name}: start pose, {gain}, {case.name}",
+                        "a robot that rests under its servos within the limits",
+                        found,
+                        _STAND if stage.machine.plant.floating else "Choose a keyframe with --start, or other limits.",
+                    )
+                restless[str(gain)] = f"{case.name}: {found}"
+    stage = replace(stage, machine=without_gains(stage.machine, restless), restless=restless)
+    out = dict(stage.left_out)
+    for case in (case for case in cases if not case.must):
+        if any(_unrest(stage, case, gain) for gain in stage.machine.driven):
+            out[case.name] = "does not even rest in the start pose"
     return replace(stage, cases=[case for case in cases if case.name not in out], left_out=out)
 
 

@@ -25,3 +25,5 @@ class Stage:
     rules: PlanThresholds
     left_out: Mapping[str, str] = field(default_factory=dict)
     """Cases that a plan is not rehearsed on, and why."""
+    restless: Mapping[str, str] = field(default_factory=dict)
+    """Gains at which the robot does not rest in the start pose, so that no run is made at them, and why."""

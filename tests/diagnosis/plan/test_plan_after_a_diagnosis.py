@@ -5,11 +5,13 @@ from functools import cache
 
 import mujoco
 import numpy as np
+import pytest
 
 from bumblebee.diagnosis.plan import Plan, findings_of, make_plan, set_stage
 from bumblebee.diagnosis.plan.contacts import Surroundings
 from bumblebee.diagnosis.plan.document import document
 from bumblebee.diagnosis.plan.safety import made_safe, proven
+from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect, single
 from tests.diagnosis.arm import XML, session_of, simulate
 from tests.diagnosis.plan.made import LIMITS, entry, planned, slow_session
@@ -104,3 +106,19 @@ def test_a_hand_keeps_clear_of_the_surface_that_a_diagnosis_found() -> None:
             mujoco.mj_kinematics(model, data)
             heights.append(data.xpos[3, 2] + data.xmat[3, 6:9] @ np.array(TIP))
     assert min(heights) > TOP
+
+
+def test_gains_at_which_the_robot_does_not_rest_are_left_out_with_a_note() -> None:
+    """Upright, the arm needs 4.4 N m/rad at j2 to stay so: a twentieth of its 60 lets it fall over."""
+    config = replace(LIMITS, gains=(0.05, 1.0), speed={"": 9.0})
+    plan = make_plan(mujoco.MjSpec.from_string(XML), "arm.xml", config)
+    assert list(plan.restless) == ["kp x 0.05"]
+    assert {motion.gain.kp for motion in plan.motions} == {1.0}
+    assert any(note.startswith("no run at kp x 0.05") for note in document(plan, "")["notes"])
+
+
+def test_where_no_gain_that_was_asked_for_is_left_there_is_no_plan() -> None:
+    config = replace(LIMITS, gains=(0.05,), speed={"": 9.0})
+    with pytest.raises(BadInput, match="at which the robot rests") as caught:
+        make_plan(mujoco.MjSpec.from_string(XML), "arm.xml", config)
+    assert "kp x 0.05" in str(caught.value)
