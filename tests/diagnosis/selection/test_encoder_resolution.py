@@ -48,3 +48,13 @@ def test_the_error_of_a_step_is_that_of_the_readings_that_count():
         (found,) = grids([replace(rollout, joint_pos=still)], [NOISE])
         away.append((found.step - step) / found.error)
     assert 0.7 < np.sqrt(np.mean(np.square(away))) < 1.3
+
+
+def test_rest_at_two_places_is_no_grid():
+    """Two places lie on a grid of any step that divides their distance; readings go to and fro within each."""
+    creep = 5e-4 * np.sin(np.arange(170) / 50)
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        places = rng.uniform(-0.1, 0.1) + np.array([0.0, rng.uniform(0.04, 0.09)])
+        read = [(p + creep + 1.5e-4 * rng.standard_normal(170))[:, None] for p in places]
+        assert grids([replace(_rollout(0.0, 1, seed, 170), joint_pos=q) for q in read], [1.5e-4]) == []

@@ -168,7 +168,11 @@ def _uncrowded(x: np.ndarray, span: float, places: int) -> np.ndarray:
 
 
 def _readings(x: np.ndarray, weights: np.ndarray, step: float) -> float:
-    """How many readings count as independent: a stay within a step is one."""
-    stay = np.concatenate(([0], np.cumsum(np.abs(np.diff(np.round(x / step))) > 0)))
+    """How many readings count as independent: a stay at a mark of the grid is one.
+
+    Marks are where the phase of the readings says: between two of them noise alone would end a stay at every reading.
+    """
+    phase = np.angle(np.exp(2j * np.pi * x / step) @ weights) / (2 * np.pi)
+    stay = np.concatenate(([0], np.cumsum(np.abs(np.diff(np.round(x / step - phase))) > 0)))
     together = np.bincount(stay, weights)
     return float(1.0 / (together**2).sum())
