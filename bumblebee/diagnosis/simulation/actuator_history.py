@@ -230,9 +230,7 @@ def _past(
     plant: Plant, windows: Windows, back: int, step: float, delay: np.ndarray, order: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (W, back, J) at the `back` steps before each start, the newest last."""
-    rule = plant.thresholds.path
-    parts = [read_at(windows, -step * k, delay, order, rule) for k in range(back, 0, -1)]
-    return np.stack([p for p, _ in parts], axis=1), np.stack([v for _, v in parts], axis=1)
+    return _read_at_each(windows, -step * np.arange(back, 0, -1), delay, order, plant.thresholds.path)
 
 
 def read_at(
@@ -245,20 +243,29 @@ def read_at(
     have the mean noise of both ticks and thus half of its variance, and a joint at rest would gain by a late encoder.
     Between ticks a position is on the cubic that has the positions and speeds of both, a speed on a line.
     """
-    some = np.unique(windows.rollout)
-    states = {i: np.stack([joint_states(windows.source[i], j, rule) for j in order], axis=1) for i in some}
-    place, speed = np.empty((len(windows), len(order))), np.empty((len(windows), len(order)))
-    for w, (i, k) in enumerate(zip(windows.rollout, windows.start, strict=True)):
-        time = windows.source[i].time
-        at = np.clip(time[k] + shift + delay, time[0], time[-1])
-        high = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
-        dt, each = time[high] - time[high - 1], np.arange(len(order))
-        share, (first, speed_before) = (at - time[high - 1]) / dt, states[i][high - 1, each].T
-        last, speed_after = states[i][high, each].T
-        gone = last - first
-        bow = (1 - share) * (dt * speed_before - gone) + share * (gone - dt * speed_after)
-        place[w] = first + share * gone + share * (1 - share) * bow
-        speed[w] = speed_before + share * (speed_after - speed_before)
+    place, speed = _read_at_each(windows, np.array([shift]), delay, order, rule)
+    return place[:, 0], speed[:, 0]
+
+
+def _read_at_each(
+    windows: Windows, shifts: np.ndarray, delay: np.ndarray, order: Sequence[int], rule: JointPath
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same (W, S, J) for several shifts (S,) at once."""
+    place, speed = np.empty((2, len(windows), len(shifts), len(order)))
+    for i in np.unique(windows.rollout):
+        own, source = windows.rollout == i, windows.source[i]
+        time = source.time
+        for column, joint in enumerate(order):
+            state = joint_states(source, joint, rule)
+            at = np.clip(time[windows.start[own], None] + shifts + delay[column], time[0], time[-1])
+            high = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
+            dt = time[high] - time[high - 1]
+            share, (first, speed_before) = (at - time[high - 1]) / dt, np.moveaxis(state[high - 1], -1, 0)
+            last, speed_after = np.moveaxis(state[high], -1, 0)
+            gone = last - first
+            bow = (1 - share) * (dt * speed_before - gone) + share * (gone - dt * speed_after)
+            place[own, :, column] = first + share * gone + share * (1 - share) * bow
+            speed[own, :, column] = speed_before + share * (speed_after - speed_before)
     return place, speed
 
 
