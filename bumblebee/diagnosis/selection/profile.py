@@ -85,3 +85,11 @@ def stepped(gain: Callable[[float], float], size: float, most: float, ratios: Se
                 size, most = size * factor, value
                 break
     return size, most
+
+
+def reachable(ratios: Sequence[float]) -> list[float]:
+    """Every size that `stepped` can ask for from 1 on."""
+    sizes = [1.0]
+    for ratio in ratios:
+        sizes += [size * factor for size in sizes for factor in (ratio, 1 / ratio)]
+    return sizes

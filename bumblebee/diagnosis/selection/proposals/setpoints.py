@@ -16,10 +16,11 @@ from bumblebee.diagnosis.candidates import Candidate, is_chosen, rough
 from bumblebee.diagnosis.comparison import columns_without, criterion, linear_cost
 from bumblebee.diagnosis.estimation import Fit, LeftOver, gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem
-from bumblebee.diagnosis.selection.profile import profile, stepped
+from bumblebee.diagnosis.selection.profile import profile, reachable, stepped
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls, joint_chi_squares, odd_joints
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
+from bumblebee.diagnosis.simulation import begin_setpoints, setpoints_of
 from bumblebee.sim.effects import SETPOINTS, Effect
 
 TIMING = ("command_delay", "torque_lag", "encoder_delay", *SETPOINTS)
@@ -106,7 +107,12 @@ def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tupl
     rule, first = some.thresholds.selection.proposals.setpoints, candidate.start
     coarse = rough(e.effect for e in fit.effects)
 
+    def begin(tried: Sequence[np.ndarray]) -> None:
+        effects = [e for values in tried for e in _with(fit, candidate, values)]
+        begin_setpoints(some.windows, setpoints_of(some.plant, effects))
+
     def gains(tried: Sequence[np.ndarray]) -> list[float]:
+        begin(tried)
         models = [fit.effects, *(_with(fit, candidate, values) for values in tried)]
         none, *others = some.residual(models, coarse=coarse)
         return [float(falls(some, none, r, usual).sum()) for r in others]
@@ -117,9 +123,11 @@ def _sought(some: Problem, fit: Fit, candidate: Candidate, usual: float) -> tupl
     if gain <= 0:
         return gain, values
     for _ in speeds[: rule.turns]:
+        begin([_scaled(values, f) for f in reachable(rule.finer)])
         size, gain = stepped(lambda f, v=values: gains([_scaled(v, f)])[0], 1.0, gain, rule.finer)
         values = _scaled(values, size)
         if candidate.shape_scale:
+            begin([_scaled(values, 1.0, f) for f in reachable(rule.finer)])
             speed, gain = stepped(lambda f, v=values: gains([_scaled(v, 1.0, f)])[0], 1.0, gain, rule.finer)
             values = _scaled(values, 1.0, speed)
     return gain, values
