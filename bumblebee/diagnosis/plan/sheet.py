@@ -45,7 +45,7 @@ def _front(plan: Plan, told: dict[str, Any]) -> str:
     command = told["command"]
     parts = [
         f"<h1>Run sheet: {escape(told['model'])}</h1>",
-        f"<p class='lead'>{runs} runs of {seconds:g} s, position targets at {told['rate']:g} Hz, followed by "
+        f"<p class='lead'>{runs} runs of {seconds:.4g} s, position targets at {told['rate']:g} Hz, followed by "
         f"{escape(command['follow'])}.</p>",
         f"<p class='note'>seed {told['seed']}, sha256 {told['sha256'][:16]}</p>",
         "".join(f"<p class='warn'>{escape(_sentence(note))}</p>" for note in told["notes"][1:]),
@@ -191,7 +191,7 @@ def _page(plan: Plan, told: dict[str, Any], k: int) -> str:
     name = run_names(plan)[k]
     gain = f", {run['gains']}" if "kp" in run else ""
     parts = [
-        f"<div class='head'><h2>Run {name}</h2><span class='tag'>runs/{name}.csv, {told['seconds']:g} s at "
+        f"<div class='head'><h2>Run {name}</h2><span class='tag'>runs/{name}.csv, {told['seconds']:.4g} s at "
         f"{told['rate']:g} Hz{gain}</span></div>",
         f"<p class='lead'>{escape(run['motion'][0].upper() + run['motion'][1:])}.</p>",
         f"<p>Start and end: {escape(_start_words(told))}.</p>",

@@ -8,7 +8,7 @@ from bumblebee.diagnosis.plan.predicted import words_of
 def summary(told: dict[str, Any]) -> str:
     """Runs with what they reach, pairs that are told apart, intervals before and after."""
     lines = [
-        f"{len(told['runs'])} runs of {told['seconds']:g} s at {told['rate']:g} Hz, "
+        f"{len(told['runs'])} runs of {told['seconds']:.4g} s at {told['rate']:g} Hz, "
         f"safe on {len(told['safe_on'])} robots:"
     ]
     for run in told["runs"]:

@@ -1,8 +1,9 @@
 """Sizes that no slope leads to: a series, ended early where it is told, and a closer look around its best."""
 
+import numpy as np
 import pytest
 
-from bumblebee.diagnosis.selection.profile import halved, profile, stepped
+from bumblebee.diagnosis.selection.profile import halved, profile, reachable, stepped
 
 
 def hill(size: float) -> float:
@@ -39,3 +40,17 @@ def test_steps_go_to_the_side_that_gains_and_stay_where_none_does() -> None:
     assert size == pytest.approx(2.0 * 1.4 * 1.1)
     assert most == hill(size)
     assert stepped(hill, 3.0, 0.0, (1.4, 1.1)) == (3.0, 0.0)
+
+
+def test_steps_ask_for_nothing_but_what_is_reachable() -> None:
+    """To the last bit: what is worked out for a size beforehand is found by that size."""
+    ratios = (1.25, 1.12, 1.06, 1.03)
+    for best in np.geomspace(0.5, 2.0, 41):
+        asked: list[float] = []
+
+        def gain(size: float, best: float = best, asked: list[float] = asked) -> float:
+            asked.append(size)
+            return -abs(np.log(size / best))
+
+        stepped(gain, 1.0, -abs(np.log(1.0 / best)), ratios)
+        assert set(asked) <= set(reachable(ratios))
