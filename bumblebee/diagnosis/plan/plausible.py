@@ -36,6 +36,8 @@ def implausible(
     windows = cut(session.plant, machine.seen_layout, rollouts, starts)
     least = _left(machine, session, windows, found)
     known = np.isfinite(least).all(axis=(1, 2))
+    if not known.any():
+        return []
     joints = machine.seen_layout.slices["joint_pos"]
     moved = windows.measured[known][..., joints] - windows.qpos[known][:, None, session.plant.qpos]
     most = np.maximum(rule.share * _size(moved), rule.worse * _size(least[known]))
