@@ -69,16 +69,16 @@ def corrected_xml(declared: mujoco.MjSpec, effects: Sequence[Effect]) -> tuple[s
     try:
         return _with_effects(declared, effects), []
     except REFUSALS:
-        kept: list[Effect] = []
+        carried: list[Effect] = []
         notes = []
         for effect in effects:
             try:
-                _with_effects(declared, [*kept, effect])
-                kept.append(effect)
+                _with_effects(declared, [*carried, effect])
+                carried.append(effect)
             except REFUSALS as error:
                 told = " ".join(str(error).split())
                 notes.append(f"model.xml is without {effects_in_words([effect])}, which effects.yaml has: {told}")
-        return _with_effects(declared, kept), notes
+        return _with_effects(declared, carried), notes
 
 
 def _with_effects(declared: mujoco.MjSpec, effects: Sequence[Effect]) -> str:

@@ -18,9 +18,7 @@ from tests.diagnosis.plan.made import LIMITS, entry, planned, slow_session
 from tests.diagnosis.plan.test_plan_is_safe import follow
 
 WIDE = "viscous friction j2 at the upper end of its interval"
-STIFF = XML.replace(
-    'joint="j3" kp="30" kv="2"', 'joint="j3" kp="3000" kv="200"'
-)  # as if someone had slipped a digit or two
+STIFF = XML.replace('joint="j3" kp="30" kv="2"', 'joint="j3" kp="3000" kv="200"')
 TOP, TIP = 1.62, (0.0, 0.0, 0.25)
 
 
@@ -67,8 +65,7 @@ def test_a_declared_robot_that_is_not_this_one_does_not_hold_the_plan_back() -> 
 
 def test_such_a_plan_keeps_its_limits_on_the_true_robot() -> None:
     plan, model = of_stiff(), mujoco.MjModel.from_xml_string(XML)
-    model.actuator_gainprm[2], model.actuator_biasprm[2] = (np.array([g, 0, 0, *[0] * 7]) for g in (6.0, 0.0))
-    model.actuator_biasprm[2, 1:3] = -6.0, -0.4
+    model.actuator_gainprm[2, 0], model.actuator_biasprm[2, 1:3] = 6.0, (-6.0, -0.4)  # a fifth of those of XML
     for motion in plan.motions:
         _, v, tau = follow(model, plan.machine.home, motion.targets)
         assert (np.abs(v) <= 1.02 * plan.limits.speed).all()
