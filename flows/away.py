@@ -17,7 +17,7 @@ from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from flows import checkpoints, node, parcel, ray_cluster, reproduce
 from flows.stages import Stage, kind_of, read_stages
-from tasks import lineage, params
+from tasks import lineage, lock_file, params
 from tasks.lab import FILE, Lab, read_lab
 from tasks.parent import end_with_parent
 
@@ -159,7 +159,7 @@ def bring(name: str) -> int:
     workspace, lab = Path.cwd(), read_lab(Path.cwd())
     if lab is None or lab.ray is None:
         raise BadInput(workspace / FILE, "a section ray", "none", "python -m flows.reproduce runs a stage here.")
-    reproduce.wait_for_whole_lockfile()
+    lock_file.read_whole()
     settle(lab)
     what = errand(workspace, name)
     if what.stays:

@@ -2,34 +2,14 @@
 
 import signal
 import sys
-import time
 from pathlib import Path
 
 if __name__ == "__main__" and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # while DVC is imported, Ctrl-C ends it without a word
 
 from flows.rwlock import clear_cut_off
+from tasks import lock_file
 from tasks.parent import end_with_parent
-
-_TRIES, _PAUSE = 20, 0.1  # s: a lock file of 10,000 stages is written in less than one
-
-
-def wait_for_whole_lockfile() -> None:
-    """DVC reads dvc.lock before it takes its lock, and writes it in place: half a file is read again, not believed."""
-    from dvc.dvcfile import Lockfile
-    from dvc.utils.strictyaml import YAMLSyntaxError, YAMLValidationError
-
-    read = Lockfile._load
-
-    def patient(self: Lockfile, **options: object) -> object:
-        for _ in range(_TRIES - 1):
-            try:
-                return read(self, **options)
-            except (YAMLSyntaxError, YAMLValidationError):
-                time.sleep(_PAUSE)
-        return read(self, **options)
-
-    Lockfile._load = patient
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -39,7 +19,7 @@ def main(argv: list[str] | None = None) -> int:
 
     if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    wait_for_whole_lockfile()
+    lock_file.read_whole()
     clear_cut_off(Path.cwd())
     names = sys.argv[1:] if argv is None else argv
     # Waiting for the lock matters: of stages that run side by side one would otherwise lose its finished work.

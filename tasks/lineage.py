@@ -12,6 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from tasks import lock_file
+
 COMMIT = "BUMBLEBEE_COMMIT"  # variable
 PLACE = "BUMBLEBEE_PLACE"  # variable
 
@@ -42,6 +44,7 @@ def stage_inputs(stage: str, root: Path = Path(".")) -> dict[str, str]:
     from dvc.dependency.param import ParamsDependency
     from dvc.repo import Repo
 
+    lock_file.read_whole()
     found: dict[str, str] = {}
     with Repo(str(root)) as repo:
         for loaded in repo.stage.load_all("dvc.yaml"):
@@ -64,7 +67,7 @@ def current_inputs() -> dict[str, str]:
     return stage_inputs(stage) if stage else {}
 
 
-def upstream(output: Path, lock: Path = Path("dvc.lock")) -> dict[str, str]:
+def upstream(output: Path, lock: Path = lock_file.FILE) -> dict[str, str]:
     """Path -> hash of everything that `output` was made from, over all stages back to the first, by dvc.lock.
 
     Parameters are `params:<section>` -> hash of their values. Empty where DVC has not made the output.
@@ -72,11 +75,9 @@ def upstream(output: Path, lock: Path = Path("dvc.lock")) -> dict[str, str]:
     return {entry["path"]: entry["md5"] for entry in history(output, lock)}
 
 
-def history(output: Path, lock: Path = Path("dvc.lock")) -> list[dict[str, str]]:
+def history(output: Path, lock: Path = lock_file.FILE) -> list[dict[str, str]]:
     """The same as a list of `path`, `md5` and, where a stage made it, `stage`."""
-    if not lock.exists():
-        return []
-    stages = _locked_stages(lock.read_text())
+    stages = lock_file.locked_stages(lock)
     makers = {out["path"]: name for name, stage in stages.items() for out in stage.get("outs", [])}
     found: dict[str, dict[str, str]] = {}
     waiting = [output.as_posix()]
@@ -93,14 +94,6 @@ def history(output: Path, lock: Path = Path("dvc.lock")) -> list[dict[str, str]]
                 entry = {"path": f"params:{section}", "md5": hashlib.md5(text.encode()).hexdigest()}
                 found[entry["path"]] = entry
     return list(found.values())
-
-
-@cache
-def _locked_stages(text: str) -> dict[str, Any]:
-    """The stages of a dvc.lock; read once, since a policy's history is asked for again and again."""
-    import yaml
-
-    return dict(yaml.safe_load(text).get("stages", {}))
 
 
 def _makers(path: str, makers: Mapping[str, str]) -> list[str]:
@@ -133,8 +126,7 @@ def lineage(made_from: list[dict[str, str]], settings: Mapping[str, str], seed: 
 
 def inputs_of_stage() -> list[dict[str, str]]:
     """The inputs of the stage that DVC runs in this process, with who made each."""
-    lock = Path("dvc.lock")
-    stages = _locked_stages(lock.read_text()) if lock.exists() else {}
+    stages = lock_file.locked_stages()
     makers = {out["path"]: name for name, stage in stages.items() for out in stage.get("outs", [])}
     found = []
     for path, md5 in current_inputs().items():

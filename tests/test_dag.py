@@ -77,6 +77,7 @@ NO_RESULT = {
     "tasks/lab_serve.py": "the same",
     "tasks/run_form.py": "the same",
     "tasks/lineage.py": "the same",
+    "tasks/lock_file.py": "the same",
 }
 _PAGE = "draws the page for people, which no later stage reads"
 _NETWORK = "of learning/ppo.py it takes the algorithm; the task of policies and their motions are not its own"

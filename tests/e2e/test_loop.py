@@ -60,7 +60,8 @@ def call(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 
 def printed_answer(output: str) -> list[str]:
     """The command that the waiting loop printed, from the module's name up to where the person's name goes."""
-    command = next(part for part in output.split("`") if " approve " in part)
+    command = next((part for part in output.split("`") if " approve " in part), None)
+    assert command is not None, f"the loop printed no way to answer:\n{output}"
     words = shlex.split(command)
     assert words[-1] == "NAME"
     return words[words.index("-m") + 1 : -1]
@@ -103,6 +104,7 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> Loop:
     folder = workspaces.create(tmp_path_factory.mktemp("e2e") / "smoke", "smoke", **over)
     killed, left = run_until_base_and_kill(folder)
     waiting = call(folder, "flows.demo", "--workspace", str(folder))
+    assert waiting.returncode == demo.EXIT_WAITING, f"{waiting.returncode}: {waiting.stdout}\n{waiting.stderr}"
     stopped = call(folder, "dvc", "repro")
     answer = call(folder, *printed_answer(waiting.stderr), "a tester")
     finished = call(folder, "dvc", "repro")
