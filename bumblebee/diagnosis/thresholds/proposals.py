@@ -69,7 +69,7 @@ class Backlash:
 class SurfaceContact:
     """Of contact with a surface that the model lacks: where the robot is when it is further off than usual."""
 
-    off: float = 8.0
+    off: float = 5.0
     """Times the median power by which the furthest windows must be off."""
     share: float = 0.05
     """Share of the windows that these are."""
