@@ -154,6 +154,16 @@ def test_each_corruption_of_an_arm_is_found_in_its_column(name: str, seed: int) 
     assert any(broken.startswith(rule) and place.startswith(column) for broken, place in found), found
 
 
+def test_a_velocity_that_was_never_logged_is_told_how_to_come_by_one() -> None:
+    """A driver that fills the column with zeros; one that stops amid a log needs other advice."""
+    never, stopped = (
+        [f.expected for f in findings(change(arm_rollout(0))) if (f.rule, f.column) == ("frozen", "joint_vel[elbow]")]
+        for change in (scale("joint_vel", 0.0), freeze("joint_vel", 1))
+    )
+    assert never == ["a reading that follows (or no joint_vel: an import makes it from joint_pos)"]
+    assert stopped == ["a reading that follows"]
+
+
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("joint", [0, 1])
 def test_a_reversed_torque_or_joint_is_found(seed: int, joint: int) -> None:

@@ -148,7 +148,9 @@ def _check_frozen_rate(view: View, joint: int, need: int) -> None:
     said = abs(float(rollout.joint_vel[start, joint])) * seconds
     if abs(travelled - said) > limits.freeze_command and abs(travelled - said) > 0.3 * max(travelled, said):
         came = f"{length + 1} equal rows in which the joint travelled {travelled:.3g} rad"
-        view.add(view.label("joint_vel", joint), start, "frozen", "a reading that follows", came, fatal=True)
+        never = length + 1 == rollout.frames
+        expected = "a reading that follows" + " (or no joint_vel: an import makes it from joint_pos)" * never
+        view.add(view.label("joint_vel", joint), start, "frozen", expected, came, fatal=True)
 
 
 def _check_frozen_base(view: View, need: int) -> None:
