@@ -1,0 +1,134 @@
+"""What decides in proposals on the whole robot: all joints at once, lost commands, surfaces that it touches."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class AllJoints:
+    """Of the usual effects of all joints, fitted together."""
+
+    windows: int = 60
+    """Windows that the way from the declared values is gone on."""
+    steps: int = 9
+    """Steps of Levenberg's and Marquardt's way at most."""
+    steps_with_links: int = 5
+    """The same with the links' effects, which begin from the joints'."""
+    damping: float = 1e-3
+    """The least damping, as a share of each parameter's own normal equation."""
+    most_damping: float = 100.0
+    """Damping from which on no step is left to try."""
+    more_damping: float = 10.0
+    """Factor on the damping after a step that was no better."""
+    less_damping: float = 0.1
+    """The same after one that was."""
+    settled: float = 0.995
+    """Share of the cost that a step must leave less of, or it is the last."""
+    free: float = 10.0
+    """Changes that matter within which what the data hardly tell stays in one step."""
+    rounds: int = 3
+    """Rounds of fitting on all windows and taking out what is not sure there."""
+    small_robot: int = 12
+    """Degrees of freedom up to which the links are asked, too."""
+    still_off: float = 2.0
+    """Median chi-square beside the joints' effects, from which on they are."""
+
+
+@dataclass(frozen=True)
+class PacketLoss:
+    """Of commands that never arrived."""
+
+    longest: int = 3
+    """Lost commands in a row at most, in ticks."""
+    most_ticks: int = 12
+    """Ticks of a window: of more the patterns are too many, and single ticks too short to matter."""
+    odd_power: float = 1.6
+    """Whitened power of a window that a lost command may have spoilt."""
+    least_odd: int = 2
+    """Such windows, of which there must be as many."""
+    few_odd: float = 0.5
+    """Share of windows that are odd, below which these alone are asked first."""
+    hint: float = 4.0
+    """Log-likelihood that these must gain for the others to be asked."""
+    most_usual_power: float = 10.0
+    """Median power of a model that lacks something in every window: that comes first."""
+    most_joints: int = 8
+    """Joints up to which losses on single joints are tried."""
+    least_gain: float = 8.0
+    """Log-likelihood on the fitted windows."""
+    held_out_gain: float = 2.0
+    """Log-likelihood on the held-out windows."""
+    sure_gain: float = 30.0
+    """Log-likelihood on the fitted windows that is so sure that the held-out ones need only not contradict."""
+    contradiction: float = -3.0
+    """Log-likelihood on the held-out windows, below which these contradict: few of them may have any loss."""
+    cleared: float = 0.7
+    """Share of the excess of log(1 + power) that must go in the windows said to have lost commands."""
+    own_explained: float = 0.5
+    """Share of the held-out excess of chi-square that must go with a joint's own lost commands.
+
+    Sticking, too, looks like a command that comes late, here and there.
+    """
+    first_share: float = 0.02
+    """Share of lost commands from which expectation and maximisation begin."""
+    iterations: int = 60
+    """Of these."""
+    rounds: int = 3
+    """Of finding nuisances beside the commands that arrived, and these beside the nuisances."""
+
+
+@dataclass(frozen=True)
+class SurfaceContact:
+    """Of contact with a surface that the model lacks: where the robot is when it is further off than usual."""
+
+    off: float = 5.0
+    """Times the median power by which the furthest windows must be off."""
+    share: float = 0.05
+    """Share of the windows that these are."""
+    small_robot: int = 12
+    """Degrees of freedom up to which it is looked for."""
+    many: int = 800
+    """Windows that are asked how far they are off and how low the robot comes in them."""
+    outputs: int = 5
+    """Ticks of each."""
+    least_power: float = 1e-6
+    """Share of the mean power below which a window counts as no nearer, and its inverse above which as no further."""
+    reach: float = 1.2
+    """Times the longest link, how far from a body's frame a point is looked for."""
+    points: int = 7
+    """Places of the point along each axis of the body's frame."""
+    least_windows: int = 4
+    """Windows that must come below a surface."""
+    most_share: float = 0.5
+    """Share of the windows that may."""
+    z: float = 5.0
+    """Standard errors by which these must be further off than the others."""
+    deep: float = 0.03
+    """How far below the height at which windows begin to be off they may come [m]: a surface gives way by no more."""
+    tried: int = 24
+    """Points that are tried in the simulator."""
+    moved: int = 4
+    """Of these that are moved on."""
+    windows: int = 50
+    """Windows on which they are: the lowest ones, and as many of the others."""
+    heights: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75)
+    """Surfaces that are tried, between the lowest place of the point and where windows begin to be off."""
+    coarse: float = 0.02
+    """First move of a point or a surface [m]; halved where none helps."""
+    fine: float = 0.002
+    """Last one [m]."""
+    moves: int = 25
+    """Moves at most."""
+    worth: float = 0.003
+    """Share of the gain that a move must add: along an axis that no height depends on a point stays."""
+    least_gain: float = 60.0
+    """Fall of the robust cost of the fit's windows from which on it is proposed."""
+    felt: float = 0.1
+    """Change of a window's log(1 + power / median) from which on it counts."""
+    nearly: float = 0.8
+    """Share of these that must gain."""
+    least_felt: int = 4
+    """Windows of the fitted rollouts that must feel it."""
+    least_felt_alone: int = 12
+    """The same where no other rollout reaches it."""
+    step: float = 0.005
+    """Change of the height that matters [m]."""
