@@ -2,6 +2,7 @@
 
     python -m benchmarks.diagnosis_cost                        6 rollouts of 8 s, and 20 motions x 8 rollouts of 8 s
     python -m benchmarks.diagnosis_cost --rows small --kinds   the first with nothing to find
+    python -m benchmarks.diagnosis_cost --rows small --kinds position_friction    ... with a law that no catalogue has
     python -m benchmarks.diagnosis_cost --keep FOLDER          the data and diagnoses are kept
 
 The robot is the sealed benchmark's (1 ms, another integrator, effects of its own), three effects in it by default; it
@@ -36,8 +37,10 @@ SEALED = {
     "link_mass": ("right_wrist_yaw_link", 0.5),
     "armature": ("right_shoulder_roll_joint", 1.0),
     "joint_spring": ("waist_yaw_joint", 4.0),
+    "position_friction": ("left_shoulder_pitch_joint", 1.5),
+    "gain_cycle": ("right_elbow_joint", 0.4),
 }
-"""Kind -> place and size: N m, s, share of the declared mass, share of the declared armature, N m/rad."""
+"""Kind -> place and size: N m, s, share of the declared mass, share of the declared armature, N m/rad, N m, a share."""
 _DEFAULT = ("coulomb_friction", "command_delay", "link_mass")
 _START = 0.005  # [rad] by which repeats of a motion start apart
 

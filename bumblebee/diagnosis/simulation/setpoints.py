@@ -16,6 +16,7 @@ from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import SETPOINTS, Effect, advance
 
 _BYTES = 48e6  # of paths at once
+_FORGOTTEN = 1e-18  # below the rounding of what is kept
 
 
 @dataclass(frozen=True)
@@ -129,9 +130,14 @@ def _paths(rollouts: Sequence[Rollout], points: Sequence[SetPoint]) -> list[np.n
     """Place and speed (P, T, 2) of P set-points of one kind as each command of each rollout is issued.
 
     They are at rest under a rollout's first command. Long rollouts are followed in parts side by side, each from so
-    much earlier on that it no longer matters where the set-point was then.
+    much earlier on that it no longer matters where the set-point was then; filters, which are linear, all at once.
     """
-    parts = [(i, *part) for i, r in enumerate(rollouts) for part in _parts(r, points[0].memory)]
+    linear = points[0].kind == "command_filter"
+    parts = [
+        (i, *part)
+        for i, r in enumerate(rollouts)
+        for part in ([(0, 0, r.frames)] if linear else _parts(r, points[0].memory))
+    ]
     longest = max(last - start for _, start, _, last in parts)
     command, lasts = np.empty((len(points), len(parts), longest)), np.zeros((len(parts), longest))
     for row, (i, start, _, last) in enumerate(parts):
@@ -140,15 +146,41 @@ def _paths(rollouts: Sequence[Rollout], points: Sequence[SetPoint]) -> list[np.n
         spans = np.diff(rollouts[i].time[start : last + 1])
         lasts[row, : len(spans)] = spans
     values = [np.array(each)[:, None] for each in zip(*(point.values for point in points), strict=True)]
-    path = np.zeros((len(points), len(parts), longest, 2))
-    place, speed = command[..., 0], np.zeros(command.shape[:2])
-    for k in range(longest):
-        path[..., k, 0], path[..., k, 1] = place, speed
-        _, place, speed = advance(points[0].kind, values, place, speed, command[..., k], lasts[:, k])
+    if linear:
+        path = np.stack((_filtered(values[0][..., None], command, lasts), np.zeros_like(command)), axis=-1)
+    else:
+        path = _followed(points[0].kind, values, command, lasts)
     out = [np.empty((len(points), r.frames, 2)) for r in rollouts]
     for row, (i, start, first, last) in enumerate(parts):
         out[i][:, first:last] = path[:, row, first - start : last - start]
     return out
+
+
+def _followed(kind: str, values: Sequence[np.ndarray], command: np.ndarray, lasts: np.ndarray) -> np.ndarray:
+    """Place and speed (P, R, T, 2) as each of the commands (P, R, T), which last (R, T) [s], is issued."""
+    path = np.zeros((*command.shape, 2))
+    place, speed = command[..., 0], np.zeros(command.shape[:2])
+    for k in range(command.shape[-1]):
+        path[..., k, 0], path[..., k, 1] = place, speed
+        _, place, speed = advance(kind, values, place, speed, command[..., k], lasts[:, k])
+    return path
+
+
+def _filtered(constant: np.ndarray, command: np.ndarray, lasts: np.ndarray) -> np.ndarray:
+    """The same places (P, R, T) of filters with the time constants (P, 1, 1) [s].
+
+    A filter's step is y -> keep y + (1 - keep) u; two steps are one of the same form, so that spans of twice as many
+    ticks follow from one another until what was before a span is forgotten.
+    """
+    keep = np.exp(-lasts[:, :-1] / constant)
+    grown = (1.0 - keep) * command[..., :-1]
+    span = 1
+    while span < keep.shape[-1] and keep[..., span:].max() > _FORGOTTEN:
+        grown[..., span:] += keep[..., span:] * grown[..., :-span]
+        keep[..., span:] = keep[..., span:] * keep[..., :-span]
+        span *= 2
+    begun = command[..., :1]
+    return np.concatenate((begun, keep * begun + grown), axis=-1)
 
 
 def _parts(rollout: Rollout, memory: float) -> list[tuple[int, int, int]]:

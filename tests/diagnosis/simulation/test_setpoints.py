@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.simulation.setpoints import _at_first_command, _paths, begin_setpoints, setpoints_of
+from bumblebee.diagnosis.simulation.setpoints import (
+    _at_first_command,
+    _filtered,
+    _followed,
+    _paths,
+    begin_setpoints,
+    setpoints_of,
+)
 from bumblebee.diagnosis.simulation.simulate import inputs_of
 from bumblebee.diagnosis.simulation.variation import vary
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
@@ -98,3 +105,14 @@ def test_many_set_points_at_once_begin_where_each_does(effect: Effect, drive: Dr
             np.testing.assert_allclose(together, by_itself, rtol=0, atol=1e-12)
     moved = np.stack([_at_first_command(windows, point)[0] for point in points])
     assert np.abs(moved - [windows.command[:, 0, p.actuator] / p.scale for p in points]).max() > 1e-3
+
+
+@pytest.mark.parametrize("time", [1e-4, 0.03, 5.0])
+def test_a_filter_over_spans_is_the_one_that_goes_tick_by_tick(time: float) -> None:
+    """Uneven stamps, a part that ends early, a filter faster than a tick and one slower than the rollout."""
+    rng = np.random.default_rng(0)
+    command, lasts = rng.standard_normal((2, 3, 700)), rng.uniform(0.0005, 0.004, (3, 700))
+    lasts[1, 400:] = 0.0
+    constant = np.array([[time], [2.0 * time]])
+    expected = _followed("command_filter", [constant], command, lasts)[..., 0]
+    np.testing.assert_allclose(_filtered(constant[..., None], command, lasts), expected, rtol=0, atol=1e-12)
