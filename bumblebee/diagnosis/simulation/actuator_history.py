@@ -11,6 +11,7 @@ from functools import lru_cache
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.simulation.first_order import first_order
 from bumblebee.diagnosis.simulation.joint_path import joint_path, joint_states
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.windows import Windows, command_inputs
@@ -210,20 +211,12 @@ def heated(
 
 
 def lagged(plant: Plant, rollout: Rollout, order: Sequence[int], time: np.ndarray) -> np.ndarray:
-    """State (T, J) of a first-order lag of the logged torque, whose course between ticks is linear.
-
-    Every tick's state follows from that of the tick before; so many passes over all ticks are made as it takes the
-    start to be forgotten.
-    """
-    before, after = (x[:, order] for x in logged_torques(plant, rollout))
-    dt, safe = np.diff(rollout.time)[:, None], np.maximum(time, 1e-6)
+    """State (T, J) of a first-order lag of the logged torque, whose course between ticks is linear."""
+    before, after = (x[:, order].T for x in logged_torques(plant, rollout))
+    dt, safe = np.diff(rollout.time), np.maximum(time, 1e-6)[:, None]
     keep = np.exp(-dt / safe)
-    fed = (1 - keep) * after[:-1] + (before[1:] - after[:-1]) / dt * (dt - safe * (1 - keep))
-    out = before.copy()
-    passes = int(np.ceil(plant.thresholds.history.forgotten * float(safe.max()) / float(np.median(dt))))
-    for _ in range(min(passes, len(out))):
-        out[1:] = keep * out[:-1] + fed
-    return out
+    fed = (1 - keep) * after[:, :-1] + (before[:, 1:] - after[:, :-1]) / dt * (dt - safe * (1 - keep))
+    return first_order(keep, fed, before[:, :1]).T
 
 
 def _past(

@@ -10,13 +10,13 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from bumblebee.diagnosis.simulation.first_order import first_order
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.windows import Windows
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import SETPOINTS, Effect, advance
 
 _BYTES = 48e6  # of paths at once
-_FORGOTTEN = 1e-18  # below the rounding of what is kept
 
 
 @dataclass(frozen=True)
@@ -167,20 +167,9 @@ def _followed(kind: str, values: Sequence[np.ndarray], command: np.ndarray, last
 
 
 def _filtered(constant: np.ndarray, command: np.ndarray, lasts: np.ndarray) -> np.ndarray:
-    """The same places (P, R, T) of filters with the time constants (P, 1, 1) [s].
-
-    A filter's step is y -> keep y + (1 - keep) u; two steps are one of the same form, so that spans of twice as many
-    ticks follow from one another until what was before a span is forgotten.
-    """
+    """The same places (P, R, T) of filters with the time constants (P, 1, 1) [s]."""
     keep = np.exp(-lasts[:, :-1] / constant)
-    grown = (1.0 - keep) * command[..., :-1]
-    span = 1
-    while span < keep.shape[-1] and keep[..., span:].max() > _FORGOTTEN:
-        grown[..., span:] += keep[..., span:] * grown[..., :-span]
-        keep[..., span:] = keep[..., span:] * keep[..., :-span]
-        span *= 2
-    begun = command[..., :1]
-    return np.concatenate((begun, keep * begun + grown), axis=-1)
+    return first_order(keep, (1.0 - keep) * command[..., :-1], command[..., :1])
 
 
 def _parts(rollout: Rollout, memory: float) -> list[tuple[int, int, int]]:

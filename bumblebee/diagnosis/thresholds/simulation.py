@@ -32,8 +32,6 @@ class ActuatorHistory:
     """Passes at most, until a drive's heat and the strength that it leaves agree."""
     settled: float = 1e-9
     """Heat [s] by which two passes differ at most in the end."""
-    forgotten: float = 20.0
-    """Time constants after which a lag knows nothing of its start."""
     set_point: float = 10.0
     """Time [s] after which a filtered, limited or profiled target knows nothing of where it was."""
 
