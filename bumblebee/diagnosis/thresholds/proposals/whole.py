@@ -126,6 +126,8 @@ class SurfaceContact:
     """Change of a window's log(1 + power / median) from which on it counts."""
     nearly: float = 0.8
     """Share of these that must gain."""
+    nearly_later: float = 0.7
+    """The same after 1 s, of one that was chosen."""
     least_felt: int = 4
     """Windows of the fitted rollouts that must feel it."""
     least_felt_alone: int = 12
