@@ -80,7 +80,7 @@ class PacketLoss:
 class SurfaceContact:
     """Of contact with a surface that the model lacks: where the robot is when it is further off than usual."""
 
-    off: float = 5.0
+    off: float = 8.0
     """Times the median power by which the furthest windows must be off."""
     share: float = 0.05
     """Share of the windows that these are."""
@@ -126,8 +126,6 @@ class SurfaceContact:
     """Change of a window's log(1 + power / median) from which on it counts."""
     nearly: float = 0.8
     """Share of these that must gain."""
-    nearly_later: float = 0.7
-    """The same after 1 s, of one that was chosen."""
     least_felt: int = 4
     """Windows of the fitted rollouts that must feel it."""
     least_felt_alone: int = 12
