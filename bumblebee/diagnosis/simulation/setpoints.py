@@ -130,14 +130,9 @@ def _paths(rollouts: Sequence[Rollout], points: Sequence[SetPoint]) -> list[np.n
     """Place and speed (P, T, 2) of P set-points of one kind as each command of each rollout is issued.
 
     They are at rest under a rollout's first command. Long rollouts are followed in parts side by side, each from so
-    much earlier on that it no longer matters where the set-point was then; filters, which are linear, all at once.
+    much earlier on that it no longer matters where the set-point was then.
     """
-    linear = points[0].kind == "command_filter"
-    parts = [
-        (i, *part)
-        for i, r in enumerate(rollouts)
-        for part in ([(0, 0, r.frames)] if linear else _parts(r, points[0].memory))
-    ]
+    parts = [(i, *part) for i, r in enumerate(rollouts) for part in _parts(r, points[0].memory)]
     longest = max(last - start for _, start, _, last in parts)
     command, lasts = np.empty((len(points), len(parts), longest)), np.zeros((len(parts), longest))
     for row, (i, start, _, last) in enumerate(parts):
@@ -146,8 +141,8 @@ def _paths(rollouts: Sequence[Rollout], points: Sequence[SetPoint]) -> list[np.n
         spans = np.diff(rollouts[i].time[start : last + 1])
         lasts[row, : len(spans)] = spans
     values = [np.array(each)[:, None] for each in zip(*(point.values for point in points), strict=True)]
-    if linear:
-        path = np.stack((_filtered(values[0][..., None], command, lasts), np.zeros_like(command)), axis=-1)
+    if points[0].kind == "command_filter":  # which is linear
+        path = np.stack((_filtered(values[0], command, lasts), np.zeros_like(command)), axis=-1)
     else:
         path = _followed(points[0].kind, values, command, lasts)
     out = [np.empty((len(points), r.frames, 2)) for r in rollouts]
@@ -166,10 +161,13 @@ def _followed(kind: str, values: Sequence[np.ndarray], command: np.ndarray, last
     return path
 
 
-def _filtered(constant: np.ndarray, command: np.ndarray, lasts: np.ndarray) -> np.ndarray:
-    """The same places (P, R, T) of filters with the time constants (P, 1, 1) [s]."""
-    keep = np.exp(-lasts[:, :-1] / constant)
-    return first_order(keep, (1.0 - keep) * command[..., :-1], command[..., :1])
+def _filtered(constants: np.ndarray, command: np.ndarray, lasts: np.ndarray) -> np.ndarray:
+    """The same places (P, R, T) of filters with time constants (P, 1) [s]; one by one, for a cache holds one."""
+    out = np.empty_like(command)
+    for p, told in enumerate(command):
+        keep = np.exp(-lasts[:, :-1] / constants[p])
+        out[p] = first_order(keep, (1.0 - keep) * told[:, :-1], told[:, :1])
+    return out
 
 
 def _parts(rollout: Rollout, memory: float) -> list[tuple[int, int, int]]:

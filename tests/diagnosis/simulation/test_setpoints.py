@@ -115,4 +115,4 @@ def test_a_filter_over_spans_is_the_one_that_goes_tick_by_tick(time: float) -> N
     lasts[1, 400:] = 0.0
     constant = np.array([[time], [2.0 * time]])
     expected = _followed("command_filter", [constant], command, lasts)[..., 0]
-    np.testing.assert_allclose(_filtered(constant[..., None], command, lasts), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(_filtered(constant, command, lasts), expected, rtol=0, atol=1e-12)
