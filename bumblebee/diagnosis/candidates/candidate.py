@@ -59,6 +59,8 @@ class Candidate:
             low[0], high[0] = max(1.0 / high[0], self.limits.stiffest * abs(self.step[0])), 1.0 / low[0]
         if self.effect == "link_inertia":
             low = np.maximum(low, self.limits.point * np.array(self.nominal))
+        if self.effect == "surface_contact":
+            high[-1] = self.limits.contact_friction
         inside = np.clip(np.asarray(values, dtype=float), low, high)
         return physical_inertia(inside) if self.effect == "link_inertia" else inside
 

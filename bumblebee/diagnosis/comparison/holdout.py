@@ -39,9 +39,12 @@ class Holdout:
         """The same in the steps of the last fit, and judged by the windows that there are for it."""
         if self.problem is None:
             return self
-        if self.last is None or self.last is self.long:
-            return self._with(self.problem.finely())
-        return Holdout(self.problem.finely(), self.last, self.last)
+        wide = self.widely()
+        return wide._with(self.problem.finely())
+
+    def widely(self) -> "Holdout":
+        """The same, and after 1 s judged by all windows that there are for the last fit."""
+        return self if self.last is None or self.last is self.long else Holdout(self.problem, self.last, self.last)
 
     def _with(self, problem: Problem) -> "Holdout":
         """The same on another problem; what is known of the declared model after 1 s stays known."""

@@ -2,8 +2,7 @@
 
 A smooth signal has almost no fourth difference, white noise of variance s^2 has 70 s^2. The lower quartile over
 short blocks keeps fast motion and impacts out; a signal that repeats itself is quantised, and its step sets a floor.
-A velocity that hardly ever changes shows none of this: its smallest move is its step, and one that never changes is as
-good as one made from positions.
+A velocity that reads the same from end to end says nothing of its noise: it is as good as one made from positions.
 """
 
 from collections.abc import Sequence
@@ -11,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from bumblebee.diagnosis.simulation import Layout, measured_readings
+from bumblebee.diagnosis.simulation import Layout, measured_readings, smallest_moves
 from bumblebee.diagnosis.thresholds.dataset import Noise
 from bumblebee.measured.rollout import Rollout
 from bumblebee.quaternions import conjugate, multiply, rotation_vector
@@ -22,19 +21,19 @@ _RATES = {"joint_vel": "joint_pos", "base_ang_vel": "base_rot", "base_lin_vel": 
 
 def estimate_noise(rollouts: Sequence[Rollout], layout: Layout, rule: Noise) -> np.ndarray:
     """Standard deviation of the white part of every signal, (D,)."""
-    powers, steps, rarely = [], [], np.full(layout.size, np.inf)
+    powers, steps = [], []
     for rollout in rollouts:
         readings, quat = measured_readings(rollout, layout)
         if quat is not None:
             turn = rotation_vector(multiply(conjugate(quat[:-1]), quat[1:]))
             readings[1:, layout.slices["base_rot"]] = np.cumsum(turn, axis=0)
         powers.append(_block_powers(rollout.time, readings, rule.block))
-        steps.append(_quantisation(readings, rule))
-        rarely = np.minimum(rarely, _smallest_move(readings, rule))
+        steps.append(smallest_moves(readings, rule))
     every = np.concatenate([p for p in powers if len(p)]) if any(len(p) for p in powers) else np.zeros((1, layout.size))
     dof = rule.block * rule.freedom
     sigma = np.sqrt(np.quantile(every, rule.quantile, axis=0) * dof / chi2.ppf(rule.quantile, dof))
-    sigma = np.maximum(sigma, np.median(steps, axis=0) / np.sqrt(12))
+    known = np.ma.median(np.ma.masked_invalid(steps), axis=0)  # by the rollouts in which a signal moves
+    sigma = np.maximum(sigma, known.filled(0.0) / np.sqrt(12))
     for name, part in layout.slices.items():
         # A channel far calmer than its kin was probably still: it is no better a sensor than the others.
         kin = np.median(sigma[part])
@@ -44,8 +43,8 @@ def estimate_noise(rollouts: Sequence[Rollout], layout: Layout, rule: Noise) -> 
     for name, of in _RATES.items():
         if name in layout.slices and of in layout.slices:
             part = layout.slices[name]
-            least = np.where(np.isfinite(rarely[part]), rarely[part] / np.sqrt(12), hz * sigma[layout.slices[of]])
-            sigma[part] = np.where(sigma[part] <= rule.least, np.maximum(least, rule.least), sigma[part])
+            least = np.where(np.ma.getmaskarray(known)[part], hz * sigma[layout.slices[of]], 0.0)
+            sigma[part] = np.maximum(sigma[part], least)
     return sigma
 
 
@@ -61,20 +60,3 @@ def _block_powers(time: np.ndarray, readings: np.ndarray, block: int) -> np.ndar
     fourth = np.einsum("tk,tkd->td", weights, readings[rows])
     blocks = len(fourth) // block
     return (fourth[: blocks * block].reshape(blocks, block, -1) ** 2).mean(axis=1)
-
-
-def _quantisation(readings: np.ndarray, rule: Noise) -> np.ndarray:
-    """Step of a quantised signal, (D,): its smallest move, where it often does not move at all; else 0."""
-    moves = np.abs(np.diff(readings, axis=0))
-    out = np.zeros(readings.shape[1])
-    for column, steps in enumerate(moves.T):
-        nonzero = steps[steps > rule.moves]
-        if len(nonzero) > rule.moved_rows and len(nonzero) < rule.resting * len(steps):
-            out[column] = np.quantile(nonzero, rule.smallest)
-    return out
-
-
-def _smallest_move(readings: np.ndarray, rule: Noise) -> np.ndarray:
-    """The smallest move (D,) of signals (T, D) from row to row; infinite for one that never moves."""
-    moves = np.abs(np.diff(readings, axis=0))
-    return np.where(moves > rule.moves, moves, np.inf).min(axis=0, initial=np.inf)

@@ -11,6 +11,7 @@ from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, interval,
 from bumblebee.diagnosis.residuals import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection.proposals.hysteresis_law import KIND as HYSTERESIS
 from bumblebee.diagnosis.selection.proposals.hysteresis_law import has_other_law, other_law
+from bumblebee.diagnosis.selection.proposals.surface_contact import is_still_confirmed
 from bumblebee.errors import BadInput
 
 
@@ -120,7 +121,18 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
     if holdout is not None and holdout.worse_later(_with_nuisance(problem, found, weights), fit):
         # Short windows alone led it astray.
         fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
+    if holdout is not None:
+        fit = _confirmed(problem, fit, weights, holdout)
     return _sure_of(problem, fit, weights)
+
+
+def _confirmed(problem: Problem, fit: Fit, weights: np.ndarray, holdout: Holdout) -> Fit:
+    """The fit less the contacts that no more make better what they change, the last found first."""
+    for c in [c for c in reversed(fit.chosen) if c.effect in JUDGED_ALONE]:
+        if not is_still_confirmed(problem, fit, c, holdout):
+            rest = fit.without([c])
+            fit = last_step(problem, rest.chosen, rest.values, weights)
+    return fit
 
 
 def _refit_near(problem: Problem, known: Fit, weights: np.ndarray) -> Callable[[Sequence[Candidate], np.ndarray], Fit]:

@@ -27,6 +27,7 @@ from bumblebee.diagnosis.simulation.readings import (
     layout_of,
     measured_readings,
     simulated_readings,
+    smallest_moves,
 )
 from bumblebee.diagnosis.simulation.setpoints import begin_setpoints, setpoints_of
 from bumblebee.diagnosis.simulation.simulate import (
@@ -107,6 +108,7 @@ __all__ = [
     "select",
     "setpoints_of",
     "simulated_readings",
+    "smallest_moves",
     "state_before",
     "touching",
     "unit_on",

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bumblebee.diagnosis.simulation.plant import Plant
+from bumblebee.diagnosis.thresholds.dataset import Noise
 from bumblebee.measured.rollout import Rollout
 from bumblebee.quaternions import conjugate, multiply, rotate_by_cross, rotation_vector
 
@@ -52,6 +53,22 @@ def measured_readings(rollout: Rollout, layout: Layout) -> tuple[np.ndarray, np.
             out[:, part] = getattr(rollout, name)
     quat = rollout.base_quat
     return out, None if quat is None else quat / np.linalg.norm(quat, axis=-1, keepdims=True)
+
+
+def smallest_moves(readings: np.ndarray, rule: Noise) -> np.ndarray:
+    """Steps (D,) that signals (T, D) are read in: the smallest move of one that often does not move at all; else 0.
+
+    NaN for a signal that never moves: it may be read in any.
+    """
+    moves = np.abs(np.diff(readings, axis=0))
+    out = np.zeros(readings.shape[1])
+    for column, steps in enumerate(moves.T):
+        nonzero = steps[steps > rule.moves]
+        if not len(nonzero):
+            out[column] = np.nan
+        elif len(nonzero) < rule.resting * len(steps):
+            out[column] = np.quantile(nonzero, rule.smallest)
+    return out
 
 
 def simulated_readings(

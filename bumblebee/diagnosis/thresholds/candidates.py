@@ -160,6 +160,8 @@ class CandidateLimits:
     cannot be simulated."""
     point: float = 0.01
     """Share of its declared moments that a link keeps: what moments near zero say is lost to their bound."""
+    contact_friction: float = 1.0
+    """Friction of a contact at most: short windows hold it by little, and a hand that sticks swings later."""
 
 
 @dataclass(frozen=True)

@@ -93,8 +93,6 @@ class Noise:
     """Noise of all other signals at least [rad/s, m/s]."""
     moves: float = 1e-7
     """Change from row to row above which a signal has moved [its unit]."""
-    moved_rows: int = 10
-    """Rows in which a signal must move to be called quantised."""
     resting: float = 0.95
     """Share of the rows below which a quantised signal moves: it often repeats itself."""
     smallest: float = 0.05

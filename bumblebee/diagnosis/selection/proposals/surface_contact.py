@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, is_chosen
+from bumblebee.diagnosis.comparison import Holdout
 from bumblebee.diagnosis.estimation import Fit, LeftOver, typical_power
 from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.proposals.joint_misfit import falls
@@ -68,9 +69,9 @@ def _windows(problem: Problem, rule: SurfaceContact) -> Windows:
     return cut(problem.plant, problem.layout, source, starts, outputs=rule.outputs)
 
 
-def _many(problem: Problem, fit: Fit, rule: SurfaceContact) -> _Many:
-    """Many windows, and what a fit leaves of them."""
-    windows, most = _windows(problem, rule), 1.0 / rule.least_power
+def _many(problem: Problem, fit: Fit, rule: SurfaceContact, later: Windows | None = None) -> _Many:
+    """Many windows, those of 1 s if given, and what a fit leaves of them."""
+    windows, most = _windows(problem, rule) if later is None else later, 1.0 / rule.least_power
     plant, part = problem.plant, problem.layout.slices["joint_pos"]
     raw = residuals(plant, problem.layout, windows, [vary(plant, fit.effects)], problem.coarse)[0][..., part]
     size = np.maximum(np.sqrt(np.nanmean(raw**2, axis=(0, 1))), problem.sigma[part])
@@ -127,11 +128,21 @@ def surface_trials(
     return []
 
 
-def is_still_confirmed(problem: Problem, fit: Fit, candidate: Candidate, judge: Problem | None) -> bool:
-    """Whether a chosen contact still makes better what it changes, with the other effects of the fit where they are."""
-    rule, rest = problem.thresholds.selection.proposals.surface_contact, fit.without([candidate])
-    others = None if judge is None else _many(judge, rest, rule)
-    return _is_confirmed(candidate.at(fit.of(candidate)), _many(problem, rest, rule), others, rule)
+def is_still_confirmed(problem: Problem, fit: Fit, candidate: Candidate, holdout: Holdout) -> bool:
+    """Whether a chosen contact still makes better what it changes, with the other effects of the fit where they are.
+
+    After 1 s, too: what holds the arm for a moment where it should slide is right after 0.2 s and wrong after 1 s.
+    """
+    rule, rest, judge = (
+        problem.thresholds.selection.proposals.surface_contact,
+        fit.without([candidate]),
+        holdout.problem,
+    )
+    effect, others = candidate.at(fit.of(candidate)), None if judge is None else _many(judge, rest, rule)
+    if not _is_confirmed(effect, _many(problem, rest, rule), others, rule):
+        return False
+    felt = np.empty(0) if holdout.long is None else _felt(effect, _many(problem, rest, rule, holdout.long), rule)
+    return len(felt) < rule.least_felt or bool((felt > 0).mean() >= rule.nearly_later)
 
 
 def contact_share(problem: Problem, fit: Fit, candidate: Candidate, judge: Problem | None) -> float:

@@ -80,7 +80,7 @@ class PacketLoss:
 class SurfaceContact:
     """Of contact with a surface that the model lacks: where the robot is when it is further off than usual."""
 
-    off: float = 8.0
+    off: float = 5.0
     """Times the median power by which the furthest windows must be off."""
     share: float = 0.05
     """Share of the windows that these are."""
@@ -92,7 +92,7 @@ class SurfaceContact:
     """Ticks of each."""
     least_power: float = 1e-6
     """Share of the mean power below which a window counts as no nearer, and its inverse above which as no further."""
-    reach: float = 1.2
+    reach: float = 0.8
     """Times the longest link, how far from a body's frame a point is looked for."""
     points: int = 7
     """Places of the point along each axis of the body's frame."""
@@ -126,6 +126,8 @@ class SurfaceContact:
     """Change of a window's log(1 + power / median) from which on it counts."""
     nearly: float = 0.8
     """Share of these that must gain."""
+    nearly_later: float = 0.7
+    """The same after 1 s, of one that was chosen."""
     least_felt: int = 4
     """Windows of the fitted rollouts that must feel it."""
     least_felt_alone: int = 12
