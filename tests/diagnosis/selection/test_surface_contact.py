@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates import Candidate, all_candidates
+from bumblebee.diagnosis.comparison import Holdout
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, window_weights
-from bumblebee.diagnosis.selection.proposals.surface_contact import surface_trials
-from bumblebee.diagnosis.simulation import residuals, vary
+from bumblebee.diagnosis.selection.proposals.surface_contact import is_still_confirmed, surface_trials
+from bumblebee.diagnosis.simulation import choose_starts, cut, residuals, vary
 from bumblebee.measured.rollout import Rollout
 from bumblebee.sim.effects import single
 from tests.diagnosis import arm, stander
@@ -86,6 +87,30 @@ def test_without_a_table_and_on_a_body_where_one_was_refused_none_is_tried(
     weights = window_weights(other.residual([[]])[0])
     nothing = gauss_newton(other, (), (), weights)
     assert not surface_trials(other, nothing, all_candidates(free.plant, free.rollouts, []), weights)
+
+
+def test_a_chosen_contact_is_asked_again_after_1_s(
+    touching: list[Rollout], windows: tuple[Problem, Fit, list[Candidate]]
+) -> None:
+    """At its height it stays; too high, or where the later windows are of an arm without a table, it does not."""
+    problem, fit, candidates = windows
+    hand = next(c for c in candidates if c.effect == "surface_contact" and c.where == "l3")
+    weights = window_weights(fit.residual)
+
+    def confirmed(height: float, rollouts: list[Rollout]) -> bool:
+        starts = choose_starts(rollouts, range(len(rollouts)), 1.0, 60)
+        later = cut(problem.plant, problem.layout, rollouts, starts, outputs=1)
+        chosen = gauss_newton(problem, (hand,), np.array([height, *TIP, 0.5]), weights, iterations=0)
+        return is_still_confirmed(problem, chosen, hand, Holdout(None, later, later))
+
+    assert confirmed(TOP, touching)
+    assert not confirmed(TOP + 0.1, touching)
+    assert not confirmed(TOP, arm.simulate({}, count=6, seconds=8.0, seed=3))
+
+
+def test_the_friction_of_a_contact_is_bounded(windows: tuple[Problem, Fit, list[Candidate]]) -> None:
+    hand = next(c for c in windows[2] if c.effect == "surface_contact")
+    assert hand.at([TOP, *TIP, 3.2]).values() == (TOP, *TIP, 1.0)
 
 
 def test_surfaces_in_one_batch_are_what_each_is_alone(windows: tuple[Problem, Fit, list[Candidate]]) -> None:

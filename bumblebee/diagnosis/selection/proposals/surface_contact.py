@@ -133,12 +133,9 @@ def is_still_confirmed(problem: Problem, fit: Fit, candidate: Candidate, holdout
 
     After 1 s, too: what holds the arm for a moment where it should slide is right after 0.2 s and wrong after 1 s.
     """
-    rule, rest, judge = (
-        problem.thresholds.selection.proposals.surface_contact,
-        fit.without([candidate]),
-        holdout.problem,
-    )
-    effect, others = candidate.at(fit.of(candidate)), None if judge is None else _many(judge, rest, rule)
+    rule, rest = problem.thresholds.selection.proposals.surface_contact, fit.without([candidate])
+    others = None if holdout.problem is None else _many(holdout.problem, rest, rule)
+    effect = candidate.at(fit.of(candidate))
     if not _is_confirmed(effect, _many(problem, rest, rule), others, rule):
         return False
     felt = np.empty(0) if holdout.long is None else _felt(effect, _many(problem, rest, rule, holdout.long), rule)
