@@ -17,6 +17,7 @@ from rich.table import Table
 from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from flows.rwlock import clear_cut_off
+from tasks import lock_file
 
 WIDTH = 100
 STALE, AFTER, LACKS, DONE = "stale", "after a stale one", "waits for", "up to date"
@@ -63,6 +64,7 @@ def read_stages(workspace: Path) -> list[Stage]:
     from dvc.exceptions import DvcException
     from dvc.repo import Repo
 
+    lock_file.read_whole()
     try:
         with Repo(str(workspace)) as repo:
             graph = repo.index.graph
@@ -78,6 +80,8 @@ def read_stages(workspace: Path) -> list[Stage]:
                 name = _name(node.addressing, workspace)
                 found[name] = Stage(name, str(node.cmd), needs, lacks)
     except DvcException as error:
+        if lock_file.FILE.name in str(error):
+            raise lock_file.damaged(workspace / lock_file.FILE, str(error)) from None
         raise BadInput(workspace / "dvc.yaml", "stages that DVC can read", str(error)) from None
     return in_order(found.values())
 

@@ -44,8 +44,13 @@ def locked_stages(path: Path = FILE) -> dict[str, Any]:
         except ValueError as error:
             said = str(error)
         time.sleep(PAUSE)
+    raise damaged(path, said)
+
+
+def damaged(path: Path, said: str) -> BadInput:
+    """The one line for a lock file that a kill left half written; `dvc repro` restores every stage's run without it."""
     do = "Remove it: what is in DVC's run cache is not computed again."
-    raise BadInput(path, "DVC's lock file with its stages", said, do)
+    return BadInput(path, "DVC's lock file with its stages", " ".join(said.split()), do)
 
 
 @cache

@@ -9,6 +9,7 @@ from dvc.repo import Repo
 
 from bumblebee.errors import BadInput
 from flows.stages import Stage, changed_stages, downstream, in_order, read_stages, to_run
+from tasks import lock_file
 
 
 def stage(name: str, *needs: str, command: str = "") -> Stage:
@@ -71,3 +72,23 @@ def test_a_pipeline_that_dvc_cannot_read_is_bad_input(workspace: Path):
     (workspace / "dvc.yaml").write_text("stages: {one: {cmd: 1, typo: 2}}\n")
     with pytest.raises(BadInput, match="stages that DVC can read"):
         read_stages(workspace)
+
+
+def test_a_lock_file_that_a_kill_cut_off_costs_no_finished_stage(workspace: Path, monkeypatch: pytest.MonkeyPatch):
+    """The line says to remove it, and without it DVC's run cache restores what was done."""
+    monkeypatch.setattr(lock_file, "LOOKS", 2)
+    command = f"{sys.executable} -c \"open('runs', 'a').write('x'); open('a.txt', 'w').write('1')\""
+    one = {"cmd": command, "params": ["one"], "outs": ["a.txt"]}
+    (workspace / "dvc.yaml").write_text(yaml.safe_dump({"stages": {"one": one}}))
+    with Repo(str(workspace)) as repo:
+        repo.reproduce()
+    lock = workspace / "dvc.lock"
+    whole = lock.read_text()
+    for cut in (0, whole.index("schema") + 3, whole.index("    cmd")):
+        lock.write_text(whole[:cut])
+        with pytest.raises(BadInput, match=r"dvc\.lock: expected DVC's lock file with its stages, .*Remove it"):
+            read_stages(workspace)
+    lock.unlink()
+    with Repo(str(workspace)) as repo:
+        repo.reproduce()
+    assert (workspace / "runs").read_text() == "x" and lock.read_text() == whole

@@ -222,7 +222,7 @@ class SearchState:
         def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
             return gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True, known=self.fit)
 
-        # Without one of its effects a joint may swing away in one window of a thousand: 400 of 1,700 showed none of it.
+        # Without one of its effects a joint may swing away in so few windows that 400 of 1,700 showed none of it.
         wide = self.holdout.widely()
         self.fit = drop_insignificant(self.problem, self.fit, self.weights, self.bound, refit, wide, self.say)
         for c in [c for c in reversed(self.fit.chosen) if c.effect in JUDGED_ALONE]:
