@@ -3,11 +3,13 @@
 A robot with friction and latency on every joint is found one effect at a time only by a long way round: each effect
 alone explains a twentieth, and what stands for the others' share has a strange name. Where residuals are large still
 after two effects (after one, where they are hundreds of times the noise), and the last explained little or they are
-very large, the usual ones of all joints are fitted together from the declared values on, or from those found. Of a
-small robot whose residuals stay large masses and centres of mass of all links follow. What is not sure is taken out
-again, and the rest has to pay on windows that took no part; these and the fitted ones are then whitened anew, and the
-search goes on from there. It never begins so: a load at the end of an arm weakens all drives as far as these can
-tell.
+very large, the usual ones of all joints are fitted together from the declared values on, or from those found. The
+drives' strengths are free only where the data need them: a servo's strength, its joint's inertia and its friction go by
+one common factor nearly as a torque drive's do (`declared_scale`). Of a small robot whose residuals stay large masses
+and centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows that
+took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It begins so only in
+the place of gains far from the declared ones (`gain_grid`): a load at the end of an arm weakens all drives as far as
+these can tell.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,6 +34,9 @@ from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
+_STRENGTH = "motor_strength"
+_GAIN = "kp"
+
 
 def usual_effects(candidates: Sequence[Candidate], torque: bool = False) -> list[Candidate]:
     """Of `candidates` those that every joint of a real robot has; `torque`: whose drives are told torques."""
@@ -45,9 +50,11 @@ def is_whole(c: Candidate) -> bool:
 
 
 def fit_all_joints(
-    problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None]
+    problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None], below: float = np.inf
 ) -> Fit | None:
     """A fit of the usual effects, from the declared values on, that are sure together; None where none is.
+
+    Or where their median chi-square is not `below`.
 
     Or from those that were `found` on, together with the others, if this leads nearer to the data. The long way is
     gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot with large
@@ -58,19 +65,48 @@ def fit_all_joints(
     if not usual:
         return None
     some = problem.part(screening_windows(problem, rule.windows))
-    fit = _large_residual_fit(some, usual, np.concatenate([c.nominal for c in usual]), rule.steps)
+    small = problem.plant.model.nv <= rule.small_robot and not problem.plant.floating
+    steps = rule.steps_of_small if small else rule.steps
+    fit = _simplest(some, _sets(usual, candidates), steps)
     if found.chosen:
         there = {(c.effect, c.where) for c in found.chosen}
         chosen = [*found.chosen, *(c for c in usual if (c.effect, c.where) not in there)]
         values = np.concatenate((found.values, *(c.nominal for c in chosen[len(found.chosen) :])))
-        fit = min(fit, _large_residual_fit(some, chosen, values, rule.steps), key=lambda f: f.power(some))
+        fit = _better(some, fit, _large_residual_fit(some, chosen, values, steps))
     say(f"{len(fit.chosen)} usual effects together: chi-square {fit.power(some):.3g}")
-    small = problem.plant.model.nv <= rule.small_robot and not problem.plant.floating
+    if fit.power(some) >= below:
+        return None
     for kind in USUAL_OF_BODIES if small else ():
         fit = _with_links(some, fit, [c for c in candidates if c.effect == kind and is_whole(c)], say)
     if fit.power(some) < rule.still_off:
         return _sure_of(problem, drop_unsure(some, fit, window_weights(fit.clean(some))))
     return _sure_by_misfit(problem, fit)
+
+
+def _sets(usual: Sequence[Candidate], candidates: Sequence[Candidate]) -> list[list[Candidate]]:
+    """Usual effects at the declared strength of every drive; with strengths; with servos' `kp` in their place."""
+    declared = [c for c in usual if c.effect != _STRENGTH]
+    gains = [c for c in candidates if c.effect == _GAIN]
+    sets = [declared, list(usual), [*declared, *gains] if gains else []]
+    return [s for k, s in enumerate(sets) if s and s not in sets[:k]]
+
+
+def _simplest(problem: Problem, sets: Sequence[Sequence[Candidate]], steps: int) -> Fit:
+    """The fit from the declared values on of the first set that leaves little, or of one that leaves much less."""
+    best = None
+    for chosen in sets:
+        fit = _large_residual_fit(problem, chosen, np.concatenate([c.nominal for c in chosen]), steps)
+        best = fit if best is None else _better(problem, best, fit)
+        if best.power(problem) < problem.thresholds.selection.proposals.all_joints.still_off:
+            break
+    assert best is not None
+    return best
+
+
+def _better(problem: Problem, simple: Fit, other: Fit) -> Fit:
+    """The other fit where it leaves less by far, else the simple one."""
+    fall = problem.thresholds.comparison.together.fall
+    return other if other.power(problem) < (1 - fall) * simple.power(problem) else simple
 
 
 def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Callable[[str], None]) -> Fit:
@@ -82,11 +118,7 @@ def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Ca
     values = np.concatenate((fit.values, *(c.nominal for c in bodies)))
     larger = _large_residual_fit(problem, [*fit.chosen, *bodies], values, rule.steps_with_links)
     say(f"{len(larger.chosen)} with {bodies[0].effect} on all links: chi-square {larger.power(problem):.3g}")
-    return (
-        larger
-        if larger.power(problem) < (1 - problem.thresholds.comparison.together.fall) * fit.power(problem)
-        else fit
-    )
+    return _better(problem, fit, larger)
 
 
 def _large_residual_fit(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int) -> Fit:
@@ -211,12 +243,18 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
     rule = run.problem.thresholds.comparison.together
     if fit is None or not compare(run.problem, run.holdout, run.fit, fit).passes(rule):
         return False
+    begin_with(run, fit)
+    return True
+
+
+def begin_with(run: SearchState, fit: Fit) -> None:
+    """Begin anew with many effects at once, which are not fitted so again."""
     _start_anew(run, *whitened_anew(run.problem, run.holdout, fit))
     z = certainty(run.problem, run.fit, run.weights)
     run.steps = [evidence(c, float(least), len(run.candidates)) for c, least in zip(run.fit.chosen, z, strict=True)]
     run.say(f"begun anew with {len(run.fit.chosen)} effects together: chi-square {run.power():.3g}")
-    run.given, run.patience = len(run.fit.chosen), min(run.patience, run.rule.many_patience)
-    return True
+    run.tried_many, run.given = True, len(run.fit.chosen)
+    run.patience = min(run.patience, run.rule.many_patience)
 
 
 def _start_anew(run: SearchState, problem: Problem, holdout: Holdout, fit: Fit) -> None:

@@ -10,6 +10,9 @@ Windows of a second are compared, for in a short one gain, damping and friction 
 joint is the mean of log(error^2 + (3 noise)^2), so that no few windows decide alone; a servo pays a little for gains
 unlike the others' (log of the factor, squared), which only matters where its own data say next to nothing. Joints are
 scored one by one: each tries its options while the others try theirs, and what they chose together must be better.
+
+A servo whose joint lacks its armature is as slow as one of a tenth of the gain, and a model made from a drawing lacks
+it on every joint. So the usual effects of all joints are fitted, too, and the search begins with what leaves less.
 """
 
 import itertools
@@ -22,6 +25,7 @@ from bumblebee.diagnosis.candidates import Candidate, effects_at
 from bumblebee.diagnosis.comparison import compare, evidence, wald
 from bumblebee.diagnosis.estimation import gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
+from bumblebee.diagnosis.selection.proposals.all_joints import begin_with, fit_all_joints
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.simulation import Windows, choose_starts, cut, residuals, vary
 from bumblebee.diagnosis.thresholds.proposals import GainGrid
@@ -165,8 +169,13 @@ def start_with_gain_grid(run: SearchState) -> bool:
     weights = window_weights(run.problem.residual([effects_at(chosen, values)])[0])
     fit = gauss_newton(run.problem, chosen, values, weights, iterations=0, coarse=True)
     gain = compare(run.problem, run.holdout, run.fit, fit)
-    if not gain.passes(run.problem.thresholds.comparison.validation):
+    rules = run.problem.thresholds.comparison
+    if not gain.passes(rules.validation):
         return False
+    usual = fit_all_joints(run.problem, run.candidates, run.fit, run.say, fit.power(run.problem))
+    if usual is not None and compare(run.problem, run.holdout, fit, usual).passes(rules.together):
+        begin_with(run, usual)
+        return True
     for i, c in enumerate(fit.chosen):
         z = wald(run.problem, fit, weights, i)
         run.steps.append(evidence(c, z, len(run.candidates)))

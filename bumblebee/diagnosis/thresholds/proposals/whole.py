@@ -11,6 +11,8 @@ class AllJoints:
     """Windows that the way from the declared values is gone on."""
     steps: int = 9
     """Steps of Levenberg's and Marquardt's way at most."""
+    steps_of_small: int = 20
+    """The same of a small robot: where every joint lacks its armature and friction the way is that long."""
     steps_with_links: int = 5
     """The same with the links' effects, which begin from the joints'."""
     damping: float = 1e-3
@@ -28,9 +30,9 @@ class AllJoints:
     rounds: int = 3
     """Rounds of fitting on all windows and taking out what is not sure there."""
     small_robot: int = 12
-    """Degrees of freedom up to which the links are asked, too."""
+    """Degrees of freedom up to which a robot is small; of these the links are asked, too."""
     still_off: float = 2.0
-    """Median chi-square beside the joints' effects, from which on they are."""
+    """Median chi-square beside the joints' effects, from which on they are, and strengths and gains before them."""
 
 
 @dataclass(frozen=True)
