@@ -6,7 +6,7 @@ from pathlib import Path
 import mujoco
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.checks.units import driven_joints
+from bumblebee.measured.checks import driven_joints
 from bumblebee.measured.importers.column_map import LEFT_OUT, ColumnMap
 
 _TURNED = ("rad", "deg", "turn")
