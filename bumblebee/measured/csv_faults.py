@@ -20,12 +20,10 @@ def csv_fault(where: object, content: bytes, error: Exception) -> BadInput:
     if isinstance(error, pd.errors.EmptyDataError):
         return BadInput(where, "a header and rows", "an empty file", "Take it out of what is imported.")
     if found := _FIELDS.search(said):
-        fields, line, came = found.groups()
-        expected = f"{fields} fields, as in the lines above it"
-        return BadInput(f"{where}: line {line}", expected, came, f"Mend or remove the line. {_HEADER}")
+        expected = f"{found[1]} fields, as in the lines above it"
+        return BadInput(f"{where}: line {found[2]}", expected, found[3], f"Mend or remove the line. {_HEADER}")
     if found := _QUOTE.search(said):
-        line = int(found[1]) + 1
-        return BadInput(f"{where}: line {line}", "a quoted cell that ends", "a quote that is never closed")
+        return BadInput(f"{where}: line {int(found[1]) + 1}", "a quoted cell that ends", "a quote that is never closed")
     return BadInput(where, "a CSV file with a header", f"one that cannot be read ({said})"[:200])
 
 

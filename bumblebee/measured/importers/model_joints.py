@@ -1,4 +1,4 @@
-"""A map beside the declared model: joints that it has, units that suit their kind, `_` only where no drive is."""
+"""A map beside the declared model: joints that it has, and units that suit their kind."""
 
 import difflib
 from pathlib import Path
@@ -6,7 +6,6 @@ from pathlib import Path
 import mujoco
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.checks import driven_joints
 from bumblebee.measured.importers.column_map import LEFT_OUT, ColumnMap
 
 _TURNED = ("rad", "deg", "turn")
@@ -14,27 +13,15 @@ _LISTED = "Say a unit a joint, a list, with m for slides; for mm say m, and fact
 
 
 def require_joints(path: Path, chosen: ColumnMap, model: mujoco.MjModel | None) -> None:
-    """Refuse what the declared model contradicts; without a model, what only a model can tell.
+    """Refuse what the declared model contradicts; without a model nobody can tell.
 
     Raises:
-        BadInput: a joint that the model lacks, a unit of angles for a slide or of lengths for a hinge, or `_` in the
-            place of a command of a joint that an actuator drives.
+        BadInput: a joint that the model lacks, or a unit of angles for a slide or of lengths for a hinge.
     """
-    passive = {column: names for column, names in chosen.columns.items() if LEFT_OUT in names}
     if model is None:
-        if passive:
-            do = "Give the model: --model."
-            raise BadInput(f"{path}: columns: {next(iter(passive))}", "a model that says what is driven", "none", do)
         return
     _require_names(path, chosen, model)
     _require_units(path, chosen, model)
-    driven = set(driven_joints(model))
-    for column, names in passive.items():
-        for joint, name in zip(chosen.joints, names, strict=True):
-            if name == LEFT_OUT and joint in driven:
-                expected = f"a column for {joint}, which an actuator of the model drives"
-                do = "`_` is for joints without an actuator."
-                raise BadInput(f"{path}: columns: {column}", expected, LEFT_OUT, do)
 
 
 def _require_names(path: Path, chosen: ColumnMap, model: mujoco.MjModel) -> None:

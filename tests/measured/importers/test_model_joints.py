@@ -1,4 +1,4 @@
-"""A map beside the declared model: joints it lacks, units that do not suit their kind, joints that nothing drives."""
+"""A map beside the declared model: joints it lacks, and units that do not suit their kind."""
 
 from pathlib import Path
 
