@@ -148,11 +148,11 @@ def import_(
     ] = None,
 ) -> None:
     """Turn logs of another layout into a dataset of the contract."""
-    from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output
+    from bumblebee.io.write import refuse_existing, refuse_overlap, try_output
     from bumblebee.measured.importers import import_dataset
 
     refuse_overlap(dataset, [path for path in (source, model, columns, conditions) if path])
-    refuse_foreign(dataset, lambda path: False, "nothing")
+    refuse_existing(dataset)
     try_output(dataset)
     ids = import_dataset(source, kind, dataset, model, columns, conditions)
     print(f"{len(ids)} rollouts: {', '.join(ids[:6])}{' ...' if len(ids) > 6 else ''}")

@@ -242,10 +242,10 @@ def _chosen(path: Path, name: str, options: "FileConfig") -> "Clip":
 
 
 def _claim_picture(out: Path, path: Path) -> None:
-    from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output
+    from bumblebee.io.write import refuse_existing, refuse_overlap, try_output
 
     refuse_overlap(out, [path])
-    refuse_foreign(out, lambda path: False, "nothing")
+    refuse_existing(out)
     try_output(out)
 
 

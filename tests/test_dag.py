@@ -59,6 +59,7 @@ NO_RESULT = {
     "bumblebee/learning/curve.py": "the learning curve, to be looked at",
     "bumblebee/measured/metadata.py": "reads and writes files of rollouts: it refuses or passes",
     "bumblebee/measured/tables.py": "the same",
+    "bumblebee/measured/csv_faults.py": "how a refusal reads",
     **{
         f"bumblebee/motion/{name}.py": "reads and writes the library of clips: it refuses or passes"
         for name in ("captions", "checks", "clip_facts", "parquet", "raw", "texts")

@@ -28,6 +28,12 @@ def refuse_foreign(out: Path, is_ours: Callable[[Path], bool], what: str) -> Non
         raise BadInput(out, f"a new name, or {what} to replace", "something else", "Choose another name.")
 
 
+def refuse_existing(out: Path) -> None:
+    """`BadInput` where anything lies at `out`: for what replaces nothing, not even its own earlier result."""
+    if os.path.lexists(out):
+        raise BadInput(out, "a new name", "one that exists", "Nothing is replaced: choose another, or remove it first.")
+
+
 def try_output(out: Path) -> None:
     """See whether the disk takes an output at `out`, before minutes of work; nothing is left behind.
 

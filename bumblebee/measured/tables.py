@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import LIMITS, Limits
+from bumblebee.measured.csv_faults import csv_fault, require_unshifted
 
 _CELL = 8  # bytes of a number in memory
 _COLUMNS = 20_000  # a humanoid's log has a few hundred
@@ -25,9 +26,10 @@ def read_csv(where: object, content: bytes, limits: Limits = LIMITS, **options: 
     rows, columns = content.count(b"\n"), 1 + max(head.count(sign) for sign in (b",", b";", b"\t"))
     _within(where, rows, columns, limits)
     try:
-        return pd.read_csv(io.BytesIO(content), encoding="utf-8-sig", low_memory=False, **options)
+        table = pd.read_csv(io.BytesIO(content), encoding="utf-8-sig", low_memory=False, **options)
     except Exception as error:  # pandas' parser raises what it likes
-        raise BadInput(where, "a CSV file with a header", _said(error)) from None
+        raise csv_fault(where, content, error) from None
+    return require_unshifted(where, table)
 
 
 def read_parquet(where: object, content: bytes, wanted: Sequence[str], limits: Limits = LIMITS) -> pd.DataFrame:

@@ -38,6 +38,15 @@ def test_what_is_not_ours_is_not_replaced(tmp_path: Path):
     write.refuse_foreign(tmp_path / "a", lambda path: True, "a file of errors")
 
 
+def test_what_replaces_nothing_says_so(tmp_path: Path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
+    for name in ("a", "dangling"):
+        with pytest.raises(BadInput, match=r"came one that exists\. Nothing is replaced.*remove it first"):
+            write.refuse_existing(tmp_path / name)
+    write.refuse_existing(tmp_path / "new")
+
+
 def test_trying_an_output_leaves_nothing(tmp_path: Path):
     write.try_output(tmp_path / "a" / "b" / "out")
     assert list(tmp_path.iterdir()) == []

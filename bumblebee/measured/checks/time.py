@@ -47,6 +47,8 @@ def _check_gaps(view: View, steps: np.ndarray, period: float) -> None:
     missing = float((steps[gaps] / period - 1).sum()) / len(steps)
     came = f"{int(gaps.sum())} gaps, the longest {longest:.4g} s = {longest / period:.1f} periods"
     fatal = longest > limits.gap_fatal * period or missing > limits.gap_share_fatal
+    if fatal and longest > limits.gap_episode:
+        came += " (several recordings in one file? `episode` in the import's map tells them apart)"
     row = int(np.argmax(steps)) + 1 if fatal else int(np.argmax(gaps)) + 1
     view.add("time", row, "time-gap", f"a row every {period:.4g} s", came, fatal=fatal)
 

@@ -8,6 +8,7 @@ import numpy as np
 from bumblebee.measured.checks.view import View
 
 DEGREE = np.pi / 180
+_MM = ": mm?"
 
 
 def check_degrees(view: View) -> None:
@@ -18,18 +19,30 @@ def check_degrees(view: View) -> None:
         if values is not None and _fits_only_as_degrees(values, ranges):
             joint = int(np.argmax(_excess(values, ranges).max(axis=0)))
             row = int(np.argmax(_excess(values, ranges)[:, joint]))
-            _add(view, column, joint, row, f"{values[row, joint]:.4g}, within the range only as degrees")
+            slide = _is_slide(view, joint)
+            why = "beyond the range" if slide else "within the range only as degrees"
+            thousandth = bool((_excess(values * 1e-3, ranges)[:, joint] < 0.1).all())
+            _add(view, column, joint, row, f"{values[row, joint]:.4g}, {why}{_MM if slide and thousandth else ''}")
     target, place = view.rollout.joint_target, view.rollout.joint_pos
     if target is None or view.found("degrees"):
         return
     for column, ratio in (("joint_target", _rms(target) / _rms(place)), ("joint_pos", _rms(place) / _rms(target))):
         if 40 < ratio < 80 and _rms(getattr(view.rollout, column)) > 3:
             joint = int(np.argmax(np.abs(getattr(view.rollout, column)).max(axis=0)))
-            _add(view, column, joint, None, f"values {ratio:.0f} times those of the other column")
+            other = place if column == "joint_target" else target
+            own = _rms(getattr(view.rollout, column)[:, joint]) / _rms(other[:, joint])
+            hint = _MM if _is_slide(view, joint) and 500 < own < 2000 else ""
+            _add(view, column, joint, None, f"values {ratio:.0f} times those of the other column{hint}")
 
 
 def _add(view: View, column: str, joint: int, row: int | None, came: str) -> None:
-    view.add(view.label(column, joint), row, "degrees", "radians", came, fatal=True)
+    unit = "m, as the joint is a slide" if _is_slide(view, joint) else "radians"
+    view.add(view.label(column, joint), row, "degrees", unit, came, fatal=True)
+
+
+def _is_slide(view: View, joint: int) -> bool:
+    found = view.joint_ids()[joint]
+    return found >= 0 and int(view.model.jnt_type[found]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
 def _rms(values: np.ndarray) -> float:

@@ -19,6 +19,8 @@ def check_finite(view: View) -> None:
         per_joint = values.ndim == 2 and values.shape[1] == len(view.rollout.joints)
         name = view.label(column, place) if per_joint else column
         came = f"{values.reshape(len(values), -1)[row, place]} ({int(bad.sum())} such values)"
+        if np.isnan(values).any():
+            came += ": empty cells? `valid` in the map of csv and lerobot names a column that is 0 in rows to leave out"
         view.add(name, row, "finite", "finite numbers", came, fatal=True)
 
 

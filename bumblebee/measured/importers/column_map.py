@@ -44,9 +44,10 @@ class ColumnMap:
     """Of a bag, topic -> the stamp that counts: header, log or publish; under "" for all other topics."""
     grid: Literal["states", "commands"] = "states"
     """Of a bag, whose stamps become the rows: the joint states', or the commands'."""
-    angle_unit: tuple[str, ...] = ("rad",)
+    angle_unit: tuple[str, ...] = ()
     """Unit of joint positions, velocities and targets, one of `ANGLES` for all or one a joint; m of slides.
 
+    Empty: the map states none, and it is the contract's, rad and m of slides.
     normalised: any other scale; `scale` and `offset` then lead to rad.
     """
     gyro_unit: Literal["rad", "deg"] = "rad"

@@ -41,12 +41,13 @@ def read_table(source: Source, name: str, rollout_id: str, maps: Sequence[Column
     chosen = next((one for one in maps if not _missing(one, table)), None)
     if chosen is None:
         came = ", ".join(map(str, table.columns[:40])) or "none"
-        raise BadInput(where, f"the columns {', '.join(_missing(maps[0], table))}", f"only {came}")
+        do = "The header must be the first line." if where.lower().endswith(".csv") else ""
+        raise BadInput(where, f"the columns {', '.join(_missing(maps[0], table))}", f"only {came}", do)
     table = table[table[_wanted(chosen)].notna().any(axis=1)]  # rows of nothing but separators
     if chosen.valid:
         table = table[table[chosen.valid].fillna(0).astype(bool)]
     if not len(table):
-        raise BadInput(where, "rows under the header", "none")
+        raise BadInput(where, "rows under the header", "none", "Take the file out of what is imported.")
     if not chosen.episode:
         return _rollouts(where, table, rollout_id, chosen)
     return [

@@ -17,6 +17,7 @@ from bumblebee.measured.importers.csv_map import import_csv
 from bumblebee.measured.importers.hdf5_log import import_hdf5
 from bumblebee.measured.importers.lerobot import import_lerobot
 from bumblebee.measured.importers.map_file import read_map
+from bumblebee.measured.importers.model_joints import require_joints
 from bumblebee.measured.importers.ros import import_rosbag
 from bumblebee.measured.importers.so101 import import_so101
 from bumblebee.measured.importers.source import open_source
@@ -52,6 +53,8 @@ def read_rollouts(
     if kind in MAPPED and column_map is None:
         raise BadInput(kind, "a column map", "none", "Give a YAML file with joints, columns and units: --columns.")
     mapped = read_map(column_map, kind) if kind in MAPPED and column_map else DOUBLE_PENDULUM[0]
+    if kind in MAPPED and column_map:
+        require_joints(column_map, mapped, model)
     readers: dict[str, Callable[[], list[Rollout]]] = {
         "so101": lambda: import_so101(source),
         "csv": lambda: import_csv(source, [mapped], no_log),

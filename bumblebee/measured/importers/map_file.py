@@ -53,7 +53,7 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     given = {"joints": joints, "columns": columns, "time": ("time",), "episode": _one_name(path, table, "episode")}
     given["valid"] = _one_name(path, table, "valid")
     given |= _clock(path, table, kind) | {"hz": _rate(f"{path}: hz", table.get("hz", 0.0))}
-    given["angle_unit"] = _angle_unit(f"{path}: angle_unit", table.get("angle_unit", "rad"), len(joints))
+    given["angle_unit"] = _angle_unit(f"{path}: angle_unit", table, len(joints))
     given["names"] = _renamed(f"{path}: names", table.get("names"), joints)
     given["order"] = _orders(f"{path}: order", table.get("order"))
     given["meta"] = _meta(f"{path}: meta", table.get("meta", {}))
@@ -127,10 +127,14 @@ def _clock(path: Path, table: dict[str, Any], kind: str) -> dict[str, Any]:
     return {"clock": clock}
 
 
-def _angle_unit(where: str, said: Any, joints: int) -> tuple[str, ...]:
+def _angle_unit(where: str, table: dict[str, Any], joints: int) -> tuple[str, ...]:
+    if "angle_unit" not in table:
+        return ()
+    said = table["angle_unit"]
     units = tuple(said) if isinstance(said, list) else (said,)
     if len(units) not in (1, joints) or any(unit not in ANGLES for unit in units):
-        raise BadInput(where, f"one of {', '.join(ANGLES)}, or {joints} of them", repr(said)[:80])
+        do = "Say m, and factors of 0.001 under scale." if "mm" in units else ""
+        raise BadInput(where, f"one of {', '.join(ANGLES)}, or {joints} of them", repr(said)[:80], do)
     return units
 
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.measured.importers.clock import require_clock
 from bumblebee.measured.importers.column_map import LEFT_OUT, NAMED, ColumnMap
 from bumblebee.measured.importers.drive import stretches
 from bumblebee.measured.importers.source import NO_VELOCITY, differences, measured_rate
@@ -31,7 +32,11 @@ def rollouts_of(
         values: column of `NAMED` -> (T, width), in the map's units and orders; NaN where nothing was logged.
         chosen: the map.
         notes: what the reader found, for the metadata.
+
+    Raises:
+        BadInput: stamps that step back or have another unit; gains without a use; no command.
     """
+    require_clock(where, time, chosen)
     lost = [f"{column}: {n} cells without a number" for column, v in values.items() if (n := int(np.isnan(v).sum()))]
     turned = {column: _turned(column, value, chosen) for column, value in values.items()}
     keep = [place for place, joint in enumerate(chosen.joints) if joint != LEFT_OUT]

@@ -1,0 +1,46 @@
+"""A map beside the declared model: joints that it has, and units that suit their kind."""
+
+import difflib
+from pathlib import Path
+
+import mujoco
+
+from bumblebee.errors import BadInput
+from bumblebee.measured.importers.column_map import LEFT_OUT, ColumnMap
+
+_TURNED = ("rad", "deg", "turn")
+_LISTED = "Say a unit a joint, a list, with m for slides; for mm say m, and factors of 0.001 under scale."
+
+
+def require_joints(path: Path, chosen: ColumnMap, model: mujoco.MjModel | None) -> None:
+    """Refuse what the declared model contradicts; without a model nobody can tell.
+
+    Raises:
+        BadInput: a joint that the model lacks, or a unit of angles for a slide or of lengths for a hinge.
+    """
+    if model is None:
+        return
+    _require_names(path, chosen, model)
+    _require_units(path, chosen, model)
+
+
+def _require_names(path: Path, chosen: ColumnMap, model: mujoco.MjModel) -> None:
+    known = [name for i in range(model.njnt) if (name := model.joint(i).name)]
+    for joint in chosen.joints:
+        if joint != LEFT_OUT and joint not in known:
+            near = difflib.get_close_matches(joint, known, 1)
+            do = f"The nearest is {near[0]}." if near else f"It has {', '.join(known) or 'none with a name'}."[:300]
+            raise BadInput(f"{path}: joints", "joints of the model", repr(joint)[:80], do)
+
+
+def _require_units(path: Path, chosen: ColumnMap, model: mujoco.MjModel) -> None:
+    """A map that states no unit has the contract's, rad and m."""
+    units = chosen.angle_unit * (len(chosen.joints) if len(chosen.angle_unit) == 1 else 1)
+    for joint, unit in zip(chosen.joints, units, strict=False):
+        if joint == LEFT_OUT:
+            continue
+        slide = int(model.joint(joint).type[0]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+        if slide and unit in _TURNED:
+            raise BadInput(f"{path}: angle_unit", f"m for {joint}, which is a slide", unit, _LISTED)
+        if unit == "m" and not slide:
+            raise BadInput(f"{path}: angle_unit", f"rad, deg or turn for {joint}, which is no slide", unit, _LISTED)

@@ -1,0 +1,64 @@
+"""A map beside the declared model: joints it lacks, and units that do not suit their kind."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from bumblebee.errors import BadInput
+from bumblebee.measured.importers import import_dataset, read_rollouts
+from bumblebee.measured.rollout import Rollout
+
+CART = (
+    "<mujoco><worldbody><body><joint name='slider' type='slide' axis='1 0 0'/><geom size='.1'/>"
+    "<body><joint name='wrist' axis='0 1 0'/><geom size='.1'/></body></body></worldbody>"
+    "<actuator><position joint='slider' kp='10'/></actuator></mujoco>"
+)
+MAP = "joints: [slider, wrist]\ncolumns: {joint_pos: [x, q], joint_target: [u, w]}\n"
+ROWS = "\n".join(["time,x,q,u,w", *(f"{0.02 * k:.2f},0.5,90,0.25,45" for k in range(20))])
+
+
+def read(folder: Path, text: str, model: str | None = CART) -> Rollout:
+    (folder / "log.csv").write_text(ROWS)
+    (folder / "map.yaml").write_text(text)
+    given = mujoco.MjModel.from_xml_string(model) if model else None
+    (rollout,) = read_rollouts(folder / "log.csv", "csv", given, folder / "map.yaml")
+    return rollout
+
+
+@pytest.mark.parametrize("unit", ["rad", "deg", "turn", "[deg, deg]"])
+def test_a_slide_in_a_unit_of_angles_is_refused(tmp_path: Path, unit: str) -> None:
+    with pytest.raises(BadInput, match=r"angle_unit: expected m for slider, which is a slide.*a list.*m.*0\.001"):
+        read(tmp_path, f"{MAP}angle_unit: {unit}\n")
+    assert read(tmp_path, f"{MAP}angle_unit: {unit}\n", None).frames == 20  # without a model nobody can tell
+
+
+@pytest.mark.parametrize("unit", ["m", "[m, m]"])
+def test_a_hinge_in_metres_is_refused(tmp_path: Path, unit: str) -> None:
+    with pytest.raises(BadInput, match="for wrist, which is no slide"):
+        read(tmp_path, f"{MAP}angle_unit: {unit}\n")
+
+
+def test_a_unit_a_joint_leaves_metres_alone(tmp_path: Path) -> None:
+    rollout = read(tmp_path, f"{MAP}angle_unit: [m, deg]\n")
+    np.testing.assert_allclose(rollout.joint_pos[0], [0.5, np.pi / 2])
+    np.testing.assert_allclose(read(tmp_path, MAP).joint_pos[0], [0.5, 90])  # unstated: the contract's rad and m
+
+
+def test_millimetres_are_said_by_a_factor(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"Say m, and factors of 0\.001 under scale"):
+        read(tmp_path, f"{MAP}angle_unit: [mm, deg]\n")
+    text = f"{MAP}angle_unit: [m, deg]\nscale: {{joint_pos: [0.001, 1]}}\n"
+    assert read(tmp_path, text).joint_pos[0, 0] == 0.5e-3
+
+
+def test_a_joint_that_the_model_lacks_is_refused_with_the_nearest_and_nothing_is_written(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"map\.yaml: joints: expected joints of the model, came 'wirst'.*wrist"):
+        read(tmp_path, MAP.replace("wrist", "wirst"))
+    (tmp_path / "model.xml").write_text(CART)
+    with pytest.raises(BadInput, match="wirst"):
+        import_dataset(
+            tmp_path / "log.csv", "csv", tmp_path / "out", tmp_path / "model.xml", tmp_path / "map.yaml"
+        )  # fmt: skip
+    assert not (tmp_path / "out").exists()
