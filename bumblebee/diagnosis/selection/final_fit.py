@@ -150,31 +150,38 @@ def _significant(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
     return drop_insignificant(problem, fit, weights, sure, _refit_near(problem, fit, weights))
 
 
-def _sure_of(problem: Problem, fit: Fit, weights: np.ndarray) -> Refined:
+def _sure_of(problem: Problem, fit: Fit, weights: np.ndarray, needed: frozenset[Candidate] = frozenset()) -> Refined:
     """The fit with its intervals, less what these do not bear out: limits and gaps at once, then one by one.
 
     A single odd window may find a limit or a gap that explains it: a torque limit of 39 N m in the place of 50, with an
     interval from none to 5e8. Other effects go where the windows alone are sure of them and another integrator would
     have found as much: an implicit servo damps as a rotor does, and beside six gains three armatures were named a third
-    below the declared ones. What the windows themselves leave open was fitted together with others and stays.
+    below the declared ones. What the windows themselves leave open was fitted together with others and stays. So does
+    what is `needed`: without it the others leave much more, which no integrator does, however far it would move a size.
     """
     alone = interval(problem, fit, weights) if fit.chosen else np.empty(0)
     half = half_widths(problem, fit, weights) if fit.chosen else np.empty(0)
     rare = [c for c in fit.chosen if c.effect in (*SATURATIONS, *ABRUPT) and c.effect not in JUDGED_ALONE]
-    gone = [c for c in rare if _sureness(fit, half, c) < 1.0]
-    if not gone:
-        asked = [c for c in fit.chosen if c.effect not in JUDGED_ALONE]
-        feigned = [c for c in asked if _sureness(fit, half, c) < 1.0 <= _sureness(fit, alone, c)]
-        gone = [min(feigned, key=lambda c: _sureness(fit, half, c))] if feigned else []
-    if not gone:
-        return Refined(problem, fit, weights, half)
-    kept = [c for c in fit.chosen if c not in gone]
-    values = np.concatenate([np.empty(0), *(fit.of(c) for c in kept)])
-    whole = last_step(problem, kept, values, weights)
+    unsure = [c for c in rare if _sureness(fit, half, c) < 1.0]
+    if unsure:
+        return _sure_of(problem, _less(problem, fit, weights, unsure), weights, needed)
+    asked = [c for c in fit.chosen if c.effect not in JUDGED_ALONE and c not in needed]
+    feigned = [c for c in asked if _sureness(fit, half, c) < 1.0 <= _sureness(fit, alone, c)]
+    most = (1 + problem.thresholds.selection.final_fit.feigned) * fit.cost
+    for c in sorted(feigned, key=lambda c: _sureness(fit, half, c)):
+        less = _less(problem, fit, weights, [c])
+        if less.cost <= most:
+            return _sure_of(problem, less, weights, needed)
+        needed |= {c}
+    return Refined(problem, fit, weights, half)
+
+
+def _less(problem: Problem, fit: Fit, weights: np.ndarray, gone: Sequence[Candidate]) -> Fit:
+    """The last step without some effects, and without what is insignificant then."""
+    rest = fit.without(gone)
+    whole = last_step(problem, rest.chosen, rest.values, weights)
     less = _significant(problem, whole, weights)
-    if less.chosen != whole.chosen:
-        whole = last_step(problem, less.chosen, less.values, weights)
-    return _sure_of(problem, whole, weights)
+    return whole if less.chosen == whole.chosen else last_step(problem, less.chosen, less.values, weights)
 
 
 def _sureness(fit: Fit, half: np.ndarray, candidate: Candidate) -> float:

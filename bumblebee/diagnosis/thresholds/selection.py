@@ -112,6 +112,9 @@ class FinalFit:
     """The same by weighing."""
     same: float = 0.1
     """Mean square change of a window's prediction, in the noise's, below which whitening anew changes nothing."""
+    feigned: float = 0.2
+    """Share by which the cost may grow without an effect that another integrator would have found as well: where every
+    joint of a stiff robot errs, steps move sizes by more than windows bear, and yet no integrator makes them."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,9 @@
 """Intervals cover: fits of the true effect alone over several datasets, against their own standard errors."""
 
+import copy
+from dataclasses import replace
+
+import mujoco
 import numpy as np
 import pytest
 
@@ -7,11 +11,12 @@ from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.estimation.covariance import interval
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.estimation.integrator_error import moves
+from bumblebee.diagnosis.estimation.integrator_error import damping_rates, moves
 from bumblebee.diagnosis.report.effect_entries import _parameters
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection import final_fit as refining
 from bumblebee.diagnosis.selection.final_fit import refine
+from bumblebee.diagnosis.simulation import residuals, vary
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.errors import BadInput
 from tests.diagnosis import arm
@@ -63,6 +68,35 @@ def test_what_another_integrator_would_find_is_within_the_interval() -> None:
     assert 0 < move[0] < last.half[0]
     plain = interval(last.problem, last.fit, last.weights)
     assert last.half == pytest.approx(np.hypot(plain, 1.96 * move))
+
+
+@pytest.mark.parametrize("kv", [24, 32])
+def test_an_explicit_servo_that_shakes_is_no_other_simulator(kv: float) -> None:
+    """A stiff damper on a light link: explicit steps of 1 ms swing it, and stay finite in windows of 0.2 s."""
+    stiff = arm.XML.replace('kp="30" kv="2" forcerange="-20 20"', f'kp="60" kv="{kv}" forcerange="-5000 5000"')
+    rollouts = arm.simulate({("coulomb_friction", "j2"): 0.6}, count=3, seconds=4.0, seed=100)
+    session = arm.session_of(rollouts, stiff)
+    problem = arm.problem_of(session, [0, 1, 2], 24)
+    every = all_candidates(session.plant, session.rollouts, [])
+    chosen = [next(c for c in every if (c.effect, c.where) == ("coulomb_friction", "j2"))]
+    weights = window_weights(problem.residual([[]])[0])
+    fit = gauss_newton(problem, chosen, [0.6], weights)
+    explicit = copy.copy(vary(problem.plant, fit.effects).model)
+    explicit.opt.integrator = int(mujoco.mjtIntegrator.mjINT_EULER)
+    model = replace(vary(problem.plant, fit.effects), model=explicit)
+    raw = residuals(problem.plant, problem.layout, problem.windows, [model], problem.fine)[0]
+    assert np.isfinite(raw).all()
+    swung = ((problem.whitener(raw) - fit.residual) ** 2).mean(axis=1)
+    assert np.mean(swung > 1e3) > 0.4
+    assert moves(problem, fit, weights)[0] < 0.05
+
+
+def test_how_fast_a_servo_damps_a_joint_is_its_damping_over_the_inertia() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><body><joint name="j" type="slide" axis="1 0 0"/><geom size=".1" mass="2"/></body>'
+        '</worldbody><actuator><position joint="j" kp="100" kv="50"/></actuator></mujoco>'
+    )
+    assert damping_rates(model, np.zeros((3, 1))) == pytest.approx(25.0)
 
 
 def test_what_the_windows_say_nothing_of_has_no_end() -> None:

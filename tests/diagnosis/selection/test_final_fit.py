@@ -88,6 +88,27 @@ def test_what_another_integrator_would_have_found_goes_but_not_what_the_windows_
     assert last.fit.values[0] == pytest.approx(0.6, rel=0.1)
 
 
+def test_what_the_others_cannot_make_up_for_stays_however_far_another_integrator_would_move_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of two frictions of two joints neither is an integrator's; an armature that is not there still is."""
+    truth = {("coulomb_friction", "j1"): 0.8, ("coulomb_friction", "j2"): 0.6}
+    session = arm.session_of(arm.simulate(truth, count=2, seconds=4.0, seed=100))
+    problem = arm.problem_of(session, [0, 1], 24)
+    every = all_candidates(session.plant, session.rollouts, [])
+    chosen = [next(c for c in every if (c.effect, c.where) == name) for name in (*truth, ("armature", "j3"))]
+    begun = gauss_newton(problem, chosen, [0.8, 0.6, 0.0061], window_weights(problem.residual([[]])[0]), iterations=0)
+
+    def half(share: float) -> Callable[[Problem, Fit, np.ndarray], np.ndarray]:
+        return lambda _, fit, weights: share * np.abs(fit.values - [c.nominal[0] for c in fit.chosen])
+
+    monkeypatch.setattr(refining, "half_widths", half(10.0))
+    monkeypatch.setattr(refining, "interval", half(0.5))
+    last = refine(replace(problem, thresholds=_sure_of_all(problem)), begun, np.random.default_rng(0))
+    assert [(c.effect, c.where) for c in last.fit.chosen] == list(truth)
+    assert last.fit.values == pytest.approx([0.8, 0.6], rel=0.1)
+
+
 def _sure_of_all(problem: Problem) -> Thresholds:
     """Thresholds by which no effect is insignificant, whatever it is."""
     selection = problem.thresholds.selection
