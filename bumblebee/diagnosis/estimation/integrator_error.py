@@ -66,7 +66,10 @@ def _differences(problem: Problem, fit: Fit) -> Iterator[np.ndarray]:
         raw = residuals(problem.plant, problem.layout, problem.windows, [other], problem.fine)[0]
         good = np.isfinite(raw).all(axis=(1, 2))
         if int(other.model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_EULER):
-            good &= damping_rates(other.model, problem.windows.qpos) * problem.fine < 1.0
+            logged = problem.windows.qpos
+            own = other.model.nq == logged.shape[1]  # a gap or a shaft adds joints that no log has
+            model = other.model if own else problem.plant.model
+            good &= damping_rates(model, logged) * problem.fine < 1.0
         if good.mean() >= problem.thresholds.estimation.integrator_error.finite:
             yield np.where(good[:, None], problem.whitener(raw) - residual, 0.0)
 

@@ -91,6 +91,17 @@ def test_an_explicit_servo_that_shakes_is_no_other_simulator(kv: float) -> None:
     assert moves(problem, fit, weights)[0] < 0.05
 
 
+@pytest.mark.parametrize("kind", ["backlash", "series_elasticity"])
+def test_a_model_with_joints_of_its_own_is_asked_of_other_integrators_too(kind: str) -> None:
+    """Gaps and shafts have coordinates that no log has."""
+    session = arm.session_of(arm.simulate({}, count=2, seconds=4.0))
+    problem = arm.problem_of(session, [0, 1], 12)
+    chosen = [next(c for c in all_candidates(session.plant, session.rollouts, []) if c.effect == kind)]
+    fit = gauss_newton(problem, chosen, chosen[0].moved(0, 1.0), np.ones(12), iterations=0)
+    assert vary(problem.plant, fit.effects).model.nq > session.plant.model.nq
+    assert np.isfinite(moves(problem, fit, np.ones(12))).all()
+
+
 def test_how_fast_a_servo_damps_a_joint_is_its_damping_over_the_inertia() -> None:
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><worldbody><body><joint name="j" type="slide" axis="1 0 0"/><geom size=".1" mass="2"/></body>'
