@@ -172,7 +172,9 @@ def start_with_gain_grid(run: SearchState) -> bool:
     rules = run.problem.thresholds.comparison
     if not gain.passes(rules.validation):
         return False
-    usual = fit_all_joints(run.problem, run.candidates, run.fit, run.say, fit.power(run.problem))
+    # What leaves as much as would call for another beginning is none.
+    below = min(fit.power(run.problem), run.config.far)
+    usual = fit_all_joints(run.problem, run.candidates, run.fit, run.say, below)
     if usual is not None and compare(run.problem, run.holdout, fit, usual).passes(rules.together):
         begin_with(run, usual)
         return True
