@@ -28,7 +28,6 @@ from bumblebee.diagnosis.report import (
     law_notes,
     loss_entries,
     surface_notes,
-    unrefuted,
     unseen_notes,
 )
 from bumblebee.diagnosis.residuals import Problem, window_weights
@@ -97,14 +96,10 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
     rounded, steps = _steps_of_encoders(material.session, found)
     lost, losses = loss_entries(found.search.loss)
     effects, steps, notes = standing(found.judging, found.last.fit.effects, steps)
-    stand, steps, errors, refuted = unrefuted(material.session, [*effects, *losses], steps, config)
-    if not stand:
-        effects, losses, lost = [], [], []
     if found.last.fit.chosen and not effects:
         found, entries = _nothing(material, found), []
     effects = [*effects, *steps, *losses]
     entries = [*entries, *(rounded if steps else []), *lost]
-    notes += refuted
     if found.beyond is not None:
         notes = [
             *(
@@ -120,7 +115,7 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
         *surface_notes(material.session, effects, config.thresholds.report.verdicts),
         *unseen_notes(material.session, effects, config.horizon, config.thresholds.report.verdicts),
     ]
-    told = document(material, config, found.search, found.last, found.beyond, Findings(effects, entries, notes, errors))
+    told = document(material, config, found.search, found.last, found.beyond, Findings(effects, entries, notes))
     return Diagnosis(told, effects, material.session, found.search, found.last.problem)
 
 

@@ -3,7 +3,6 @@
 from bumblebee.diagnosis.report.document import Findings, document
 from bumblebee.diagnosis.report.effect_entries import effect_entries, law_notes, loss_entries
 from bumblebee.diagnosis.report.example_windows import examples
-from bumblebee.diagnosis.report.held_out_errors import unrefuted
 from bumblebee.diagnosis.report.html import (
     error_rows,
     figure,
@@ -57,7 +56,6 @@ __all__ = [
     "summary",
     "surface_notes",
     "table",
-    "unrefuted",
     "unseen_notes",
     "warning",
 ]

@@ -9,12 +9,19 @@ from bumblebee.diagnosis.dataset import Session, varied
 from bumblebee.diagnosis.discrepancy import Discovery
 from bumblebee.diagnosis.prepare import Material
 from bumblebee.diagnosis.report.discrepancy_entries import NOT_TESTED, structure_table, unexplained
-from bumblebee.diagnosis.report.held_out_errors import PrintedErrors
 from bumblebee.diagnosis.report.notes import LONE, factor_notes, latency_notes, mount_notes, unexplained_error
+from bumblebee.diagnosis.report.prediction_error import (
+    block_of,
+    floor_block,
+    horizon_whiteners,
+    horizon_windows,
+    window_residuals,
+)
+from bumblebee.diagnosis.report.removed_error import Ends
 from bumblebee.diagnosis.report.what_matters import what_matters
 from bumblebee.diagnosis.residuals import NAMES
 from bumblebee.diagnosis.selection import Refined, Search, detectable
-from bumblebee.diagnosis.simulation import joint_units, mixed_notes
+from bumblebee.diagnosis.simulation import joint_units, mixed_notes, vary
 from bumblebee.diagnosis.thresholds.report import Verdicts
 from bumblebee.sim.effects import Effect
 
@@ -29,8 +36,6 @@ class Findings:
     entries: Sequence[dict[str, Any]]
     """Of the effects, as the contract has them."""
     notes: Sequence[str]
-    errors: PrintedErrors
-    """With and without the effects."""
 
 
 def document(
@@ -43,7 +48,7 @@ def document(
 ) -> dict[str, Any]:
     """Which rollouts took which part, the effects, the error with them, what is left and what to know."""
     session, rules = material.session, config.thresholds.report
-    errors = findings.errors
+    errors, ends = _errors(session, findings.effects, config)
     told = (
         {"schema": 1, "train": session.ids(session.train)}
         | {"holdout": session.ids(session.holdout), "accept": session.ids(session.accept)}
@@ -53,7 +58,7 @@ def document(
         | ({} if beyond is None else {"structure": structure_table(beyond, rules.measured_curve)})
         | {
             "units": joint_units(session.plant),
-            "error": errors.block,
+            "error": errors,
             "unidentifiable": [{"where": [name], "why": _STILL} for name in material.still],
             "smallest_detectable": detectable(found),
             "set_aside": session.set_aside,
@@ -62,7 +67,7 @@ def document(
         }
     )
     lone = [] if session.holdout else [LONE]
-    told["summary"] = what_matters(told, errors.ends, errors.removed, rules.matters, config.seed)
+    told["summary"] = what_matters(told, ends, rules.matters, config.seed)
     return told | {"warnings": [*session.warnings, *lone, *unexplained_error(told, rules.verdicts)]}
 
 
@@ -105,3 +110,21 @@ def _settings(material: Material, config: DiagnosisConfig, bound: float, last: R
 def _driven(session: Session) -> list[str]:
     """Names of the joints with an actuator."""
     return [name for name, a in zip(session.plant.joints, session.plant.actuator, strict=True) if a >= 0]
+
+
+def _errors(session: Session, effects: Sequence[Effect], config: DiagnosisConfig) -> tuple[dict[str, Any], Ends]:
+    """The contract's block: of the declared and of the corrected model, and what sensor noise alone leaves.
+
+    Beside it the residuals of both.
+    """
+    ids = session.holdout or session.train
+    cuts = horizon_windows(session, ids, config.report_windows, config.thresholds.report.prediction_error)
+    before, after = vary(session.plant, []), vary(session.plant, effects)
+    whiteners = horizon_whiteners(cuts, after, session.sigma, session.steps[1], config.seed)
+    fine = session.steps[0]
+    ends = Ends(cuts, window_residuals(cuts, before, fine), window_residuals(cuts, after, fine))
+    return {
+        "before": block_of(cuts, whiteners, ends.before, config.seed),
+        "after": block_of(cuts, whiteners, ends.after, config.seed),
+        "floor": floor_block(cuts, whiteners, session.sigma, config.seed),
+    }, ends

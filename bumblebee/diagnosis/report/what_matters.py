@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bumblebee.diagnosis.report.notes import told_horizon
-from bumblebee.diagnosis.report.removed_error import Ends, effectors
+from bumblebee.diagnosis.report.removed_error import Ends, effectors, removed
 from bumblebee.diagnosis.simulation import of_joint
 from bumblebee.diagnosis.thresholds.report import Matters
 
@@ -21,23 +21,21 @@ LEFT = "the remaining chi-square"
 be most of it; what is left in a joint's own units is another share."""
 
 
-def what_matters(
-    document: Mapping[str, Any], ends: Ends, gone: Mapping[str, list[dict[str, Any]]], rule: Matters, seed: int = 0
-) -> dict[str, Any]:
+def what_matters(document: Mapping[str, Any], ends: Ends, rule: Matters, seed: int = 0) -> dict[str, Any]:
     """The block of `diagnosis.json`.
 
     Args:
         document: the rest of it, with errors, effects and structure.
         ends: residuals of the windows of its error block.
-        gone: what is gone of the removable error, by horizon.
         rule: thresholds.
         seed: of the bootstrap.
     """
     horizon = told_horizon(document["error"]["before"])
+    gone = removed(ends, document["error"], rule, seed)
     return {
         "horizon": horizon,
         "rollouts": len(document["holdout"]),
-        "removed": dict(gone),
+        "removed": gone,
         "left": left_over(document["error"], horizon, document.get("units", {})),
         "ends": effectors(ends, horizon, seed)[: rule.effectors] if horizon else [],
         "structure": structure(document, rule),

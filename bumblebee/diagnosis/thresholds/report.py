@@ -109,16 +109,6 @@ class Verdicts:
 
 
 @dataclass(frozen=True)
-class Refuted:
-    """Of the held-out errors that withdraw a correction; what is said of errors goes by `Verdicts`."""
-
-    growth: float = 1.02
-    """Times the error before by which the error after has to be larger."""
-    above_floor: float = 3.0
-    """Times the noise floor above which an error that began there has to be: no interval says how sure it is."""
-
-
-@dataclass(frozen=True)
 class Listing:
     """Of how much page and terminal list."""
 
@@ -143,5 +133,4 @@ class ReportThresholds:
     matters: Matters = field(default_factory=Matters)
     example_windows: ExampleWindows = field(default_factory=ExampleWindows)
     verdicts: Verdicts = field(default_factory=Verdicts)
-    refuted: Refuted = field(default_factory=Refuted)
     listing: Listing = field(default_factory=Listing)
