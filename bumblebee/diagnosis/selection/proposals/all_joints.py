@@ -52,13 +52,12 @@ def is_whole(c: Candidate) -> bool:
 def fit_all_joints(
     problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None], below: float = np.inf
 ) -> Fit | None:
-    """A fit of the usual effects, from the declared values on, that are sure together; None where none is.
-
-    Or where their median chi-square is not `below`.
+    """A fit of the usual effects, from the declared values on, that are sure together.
 
     Or from those that were `found` on, together with the others, if this leads nearer to the data. The long way is
     gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot with large
-    residuals still masses and centres of mass follow, all at once.
+    residuals still masses and centres of mass follow, all at once. None where nothing is sure, or where the joints'
+    effects do not bring those windows' median chi-square `below` what else there is.
     """
     rule = problem.thresholds.selection.proposals.all_joints
     usual = usual_effects(candidates, problem.plant.torque_input)
