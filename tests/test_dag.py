@@ -83,6 +83,7 @@ NO_RESULT = {
 _PAGE = "draws the page for people, which no later stage reads"
 _NETWORK = "of learning/ppo.py it takes the algorithm; the task of policies and their motions are not its own"
 _CONTRACT = "of an exported policy it reads the contract and the hash, of which this is no part"
+_DRAWN = ("example_windows", "gain_by_horizon", "headline", "html", "left_table", "page", "svg", "terminal")
 NO_RESULT_OF = {
     "ingest": {
         **{f"bumblebee/measured/{name}.py": _PAGE for name in ("gate_words", "overview", "overview_plots")},
@@ -95,7 +96,7 @@ NO_RESULT_OF = {
         **{
             f"bumblebee/diagnosis/report/{name}.py": _PAGE
             # html also rounds the numbers in notes
-            for name in ("example_windows", "headline", "html", "left_table", "page", "svg", "terminal")
+            for name in _DRAWN
         },
         "bumblebee/diagnosis/gap/": "another command writes it",
         "bumblebee/diagnosis/places.py": "refuses a folder that is in use",

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from bumblebee.diagnosis.report.gain_by_horizon import gain_by_horizon, leaves_floor, whole_model
 from bumblebee.diagnosis.report.html import number
 from bumblebee.diagnosis.report.what_matters import BESIDE, CARRY, LEFT, WIDE
 from bumblebee.diagnosis.thresholds.report import Matters, ReportThresholds
@@ -22,25 +23,16 @@ def headline(document: Mapping[str, Any], rules: ReportThresholds) -> list[str]:
     told, rule = document.get("summary"), rules.matters
     if not told or told["horizon"] is None:
         return []
-    lines = [_removed(document, told), _left(told, rule), _structure(told, rule)]
+    lines = [_removed(document, told, rules), _left(told, rule), _structure(told, rule)]
     return [line for line in [*lines, trusted(document, rules)] if line]
 
 
-def _removed(document: Mapping[str, Any], told: Mapping[str, Any]) -> str:
+def _removed(document: Mapping[str, Any], told: Mapping[str, Any], rules: ReportThresholds) -> str:
     """How much of the removable error is gone, at the horizon that is told first and at the others."""
-    horizon, parts = told["horizon"], []
+    horizon = told["horizon"]
     count = told["rollouts"]
     on = f"on {count} held-out rollout{'s' if count > 1 else ''}" if count else "on the fitted rollout"
-    for entry in told["removed"].get(horizon, []):
-        size = f"{sized(entry['before'], entry['unit'])} RMS"
-        if entry["share"] is None:
-            parts.append(f"the declared model's error of the {entry['what']} ({size}) is at the noise floor")
-        elif not document["effects"]:
-            parts.append(f"nothing was removed of the error of the {entry['what']} ({size})")
-        elif entry["share"] < 0:
-            parts.append(f"the error of the {entry['what']} is larger: {_change(entry)}")
-        else:
-            parts.append(f"{_percent(entry)} of the removable error of the {entry['what']} is gone: {_change(entry)}")
+    parts = [_gone(entry, bool(document["effects"]), rules) for entry in told["removed"].get(horizon, [])]
     if not parts:
         return ""
     others = [
@@ -50,6 +42,22 @@ def _removed(document: Mapping[str, Any], told: Mapping[str, Any]) -> str:
     ]
     after = f" ({'; '.join(others)})" if others else ""
     return f"After {horizon} s {on}, {' and '.join(parts)}{after}."
+
+
+def _gone(entry: Mapping[str, Any], corrected: bool, rules: ReportThresholds) -> str:
+    """What became of the error of one kind of joint."""
+    what, size = entry["what"], f"{sized(entry['before'], entry['unit'])} RMS"
+    if entry["share"] is None and entry["floor"] is not None:
+        larger = f", the corrected model's is larger ({sized(entry['after'], entry['unit'])})"
+        more = larger if leaves_floor(entry, rules) else ""
+        return f"the declared model's error of the {what} ({size}) is at the noise floor{more}"
+    if not corrected:
+        return f"nothing was removed of the error of the {what} ({size})"
+    if entry["share"] is None:
+        return f"the error of the {what} goes from {_change(entry)}, and no noise floor is known"
+    if entry["share"] < 0:
+        return f"the error of the {what} is larger: {_change(entry)}"
+    return f"{_percent(entry)} of the removable error of the {what} is gone: {_change(entry)}"
 
 
 def _change(entry: Mapping[str, Any]) -> str:
@@ -114,25 +122,28 @@ def _on(entry: Mapping[str, Any]) -> str:
 
 def trusted(document: Mapping[str, Any], rules: ReportThresholds) -> str:
     """One sentence on what may be read from the effects."""
-    rule, most = rules.matters, rules.listing.effects
     told = document["summary"]
-    groups = {group: [t for t in told["trust"] if t["group"] == group] for group in GROUPS}
     if not told["trust"]:
         return ""
-    better = [name for name, entries in told["removed"].items() if all(_surely_better(e) for e in entries)]
-    whole = f"Trust the corrected model as a whole (better after {', '.join(better)} s)"
-    if not better:
-        whole = "Do not trust the corrected model: at no horizon is it surely better"
-    carry = groups[CARRY]
-    known = [t for t in carry if not t["wide"] and not t["alike"]]
-    text = f"{whole}; its gain comes from {_listed(_named(carry), most) or 'no single effect'}"
-    sizes = _listed(_named(known), most) if known else "none"
-    rest, wide = len(told["trust"]) - len(known), sum(t["wide"] for t in told["trust"])
-    text += f"; read as sizes by themselves {sizes}"
-    alike = sum(t["alike"] for t in told["trust"])
-    why = [f"{wide} have intervals wider than {rule.wide:g}-fold or with the declared value in them"] if wide else []
+    gain = gain_by_horizon(told["removed"], rules)
+    text = whole_model(gain)
+    if not gain.nothing_to_gain:
+        carry = [t for t in told["trust"] if t["group"] == CARRY]
+        text += f"; its gain comes from {_listed(_named(carry), rules.listing.effects) or 'no single effect'}"
+    return f"{text}; {_readable(told['trust'], rules)}."
+
+
+def _readable(trust: Sequence[Mapping[str, Any]], rules: ReportThresholds) -> str:
+    """Which effects are sizes by themselves, and why the others are not."""
+    known = [t for t in trust if t["group"] == CARRY and not t["wide"] and not t["alike"]]
+    text = f"read as sizes by themselves {_listed(_named(known), rules.listing.effects) or 'none'}"
+    if len(known) == len(trust):
+        return text
+    wide, alike = (sum(t[why] for t in trust) for why in ("wide", "alike"))
+    fold = f"{rules.matters.wide:g}-fold"
+    why = [f"{wide} have intervals wider than {fold} or with the declared value in them"] if wide else []
     why += [f"{alike} look like another effect"] if alike else []
-    return text + (f"; take the other {rest} only together{_in_brackets(why)}." if rest else ".")
+    return f"{text}; take the other {len(trust) - len(known)} only together{_in_brackets(why)}"
 
 
 def _in_brackets(texts: Sequence[str]) -> str:
@@ -143,19 +154,18 @@ def _named(effects: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f"{e['effect']} on {', '.join(e['where']) or 'the whole robot'}" for e in effects]
 
 
-def effect_groups(document: Mapping[str, Any], rule: Matters) -> list[tuple[str, list[dict[str, Any]]]]:
+def effect_groups(document: Mapping[str, Any], rules: ReportThresholds) -> list[tuple[str, list[dict[str, Any]]]]:
     """Title and effects of every group that has any; effects that differ by their joint alone as one."""
-    effects = document["effects"]
-    if not document.get("summary"):
+    effects, told = document["effects"], document.get("summary")
+    if not told:
         return [("Effects", list(effects))] if effects else []
-    out = []
-    for group, title in GROUPS.items():
-        width = f": interval wider than {rule.wide:g}-fold, or with the declared value in it" if group == WIDE else ""
-        pairs = zip(effects, document["summary"]["trust"], strict=True)
-        mine = [e | {"wide": t["wide"] and group != WIDE} for e, t in pairs if t["group"] == group]
-        if mine:
-            out.append((title + width, _together(mine)))
-    return out
+    titles = dict(GROUPS)
+    fold = f"{rules.matters.wide:g}-fold"
+    titles[WIDE] = f"{GROUPS[WIDE]}: interval wider than {fold}, or with the declared value in it"
+    groups: dict[str, list[dict[str, Any]]] = {title: [] for title in titles.values()}
+    for effect, trust in zip(effects, told["trust"], strict=True):
+        groups[titles[trust["group"]]].append(effect | {"wide": trust["wide"] and trust["group"] != WIDE})
+    return [(title, _together(mine)) for title, mine in groups.items() if mine]
 
 
 def experiments(effects: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -190,13 +200,6 @@ def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
 def _shown(effect: Mapping[str, Any]) -> str:
     sizes = [x for p in effect["parameters"].values() for x in (p["value"], *(p["ci95"] or ()), p["nominal"])]
     return f"{100 * effect['explains']:.0f} " + " ".join("-" if x is None else f"{x:.4g}" for x in sizes)
-
-
-def _surely_better(entry: Mapping[str, Any]) -> bool:
-    """Better on data that took no part, with its whole interval where there is one."""
-    if entry["share"] is None:
-        return entry["after"] <= entry["before"]
-    return (entry["ci95"][0] if entry["ci95"] else entry["share"]) > 0
 
 
 def _listed(names: Sequence[str], most: int) -> str:

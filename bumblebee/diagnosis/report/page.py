@@ -72,7 +72,7 @@ def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
 
 def _effects(document: dict[str, Any], rules: ReportThresholds) -> str:
     """The effects under what may be read from them."""
-    groups = effect_groups(document, rules.matters)
+    groups = effect_groups(document, rules)
     if not groups:
         return "<p>None.</p>"
     titled, rows = bool(document.get("summary")), []

@@ -34,7 +34,7 @@ def summary(document: dict[str, Any], rules: ReportThresholds | None = None) -> 
 def _grouped(document: dict[str, Any], rules: ReportThresholds) -> list[str]:
     """The effects under what may be read from them."""
     lines = []
-    for title, effects in effect_groups(document, rules.matters):
+    for title, effects in effect_groups(document, rules):
         lines.append(f"{title[:1].lower()}{title[1:]}:")
         lines += [line for e in effects for line in _effect(e, rules.listing)]
     asked = experiments(document["effects"])

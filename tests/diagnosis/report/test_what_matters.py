@@ -78,7 +78,7 @@ def test_page_and_terminal_begin_with_it_and_end_with_the_tests() -> None:
     for out, tested in ((page, "Unexplained residual"), (text, "unexplained:")):
         order = [out.index(word) for word in ("of the removable error", "What is left", "only together", tested)]
         assert order == sorted(order)
-    titles = [title for title, _ in effect_groups(made, RULE)]
+    titles = [title for title, _ in effect_groups(made, ReportThresholds())]
     assert [title.split(":")[0] for title in titles] == [
         "Carry the gain", "Needed beside the others, no gain of their own shown", "Not to be trusted alone"
     ]  # fmt: skip
@@ -117,7 +117,7 @@ def test_effects_of_like_size_on_several_joints_are_one_line() -> None:
     made = document()
     made["effects"] = [effect("encoder_quantisation", name, [1e-3, 1e-3], 0.0, 0.0) for name in "abc"]
     made["summary"]["trust"] = trust(made["effects"], RULE)
-    ((_, listed),) = effect_groups(made, RULE)
+    ((_, listed),) = effect_groups(made, ReportThresholds())
     assert [e["where"] for e in listed] == [["a", "b", "c"]] and len(made["effects"][0]["where"]) == 1
 
 
@@ -125,7 +125,47 @@ def test_a_model_that_is_worse_is_not_called_better() -> None:
     made = document()
     made["summary"]["removed"]["0.2"][0] |= {"after": 0.15, "share": -0.5, "ci95": [-0.9, -0.1]}
     first, *_, trusted = headline(made, ReportThresholds())
-    assert "the error of the joints is larger: 5.7° to 8.6° RMS" in first and trusted.startswith("Do not trust")
+    assert "the error of the joints is larger: 5.7° to 8.6° RMS" in first
+    assert trusted.startswith("Do not trust the corrected model: at no horizon is it surely better; it is worse than")
+
+
+def entry(share: float | None, ends: list | None, after: float = 0.05, what: str = "joints") -> dict:
+    """One kind of joint at one horizon; without a share the declared model is at the noise floor."""
+    floor = 0.002 if share is not None else 0.1
+    return {"what": what, "unit": "rad", "before": 0.1, "after": after, "floor": floor, "share": share, "ci95": ends}
+
+
+GAINED, LOST, UNSURE = entry(0.5, [0.4, 0.6]), entry(-0.2, [-0.3, -0.1], 0.12), entry(0.1, [-0.5, 0.6])
+AT_FLOOR, LEFT_FLOOR = entry(None, None), entry(None, None, 0.2)
+SLIDES, LOST_SLIDES = GAINED | {"what": "slides"}, LOST | {"what": "slides"}
+VERDICTS = {
+    "better": ([[GAINED], [GAINED]], "Trust the corrected model as a whole (better after 0.2, 1.0 s)"),
+    "unsure": ([[GAINED], [UNSURE]], "Trust the corrected model as a whole (better after 0.2 s; not surely after 1.0"),
+    "worse": ([[GAINED], [LOST]], "for the horizons at which it is better, 0.2 s: after 1.0 s it is worse than the"),
+    "slides": ([[GAINED, SLIDES], [GAINED, LOST_SLIDES]], "better, 0.2 s: after 1.0 s (slides) it is worse than the"),
+    "floor": ([[GAINED], [AT_FLOOR]], "better after 0.2 s; the declared model is at the noise floor after 1.0 s)"),
+    "off it": ([[GAINED], [LEFT_FLOOR]], "Trust the corrected model only for the horizons at which it is better, 0.2"),
+    "nothing": ([[AT_FLOOR], [AT_FLOOR]], "nothing to gain: the declared model is at the noise floor after 0.2, 1.0 s"),
+    "no gain": ([[AT_FLOOR], [UNSURE]], "at no horizon is it surely better; the declared model is at"),
+    "one kind": ([[LOST, SLIDES]], "surely better for both joints and slides; it is worse than the declared one after "
+                 "0.2 s (joints)"),
+    "one run": ([[entry(0.5, None)], [entry(-0.5, None, 0.15)]], "at which it is better, 0.2 s: after 1.0 s it is"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", VERDICTS)
+def test_the_model_is_trusted_at_the_horizons_at_which_it_is_better(name: str) -> None:
+    entries, words = VERDICTS[name]
+    made = document()
+    made["summary"]["removed"] = dict(zip(("0.2", "1.0"), entries, strict=False))
+    assert words in headline(made, ReportThresholds())[-1]
+
+
+def test_an_error_that_left_the_noise_floor_is_said_to_be_larger() -> None:
+    made = document()
+    made["summary"]["removed"]["0.2"] = [LEFT_FLOOR]
+    first = headline(made, ReportThresholds())[0]
+    assert "(5.7° RMS) is at the noise floor, the corrected model's is larger (11°)" in first
 
 
 def test_an_error_below_the_expected_noise_is_no_better_than_one_at_it() -> None:
