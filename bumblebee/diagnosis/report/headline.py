@@ -16,6 +16,8 @@ GROUPS = {
     WIDE: "Not to be trusted alone",
 }
 """Group of effects -> its title."""
+FITTED = "Found on the fitted windows, no gain on held-out data shown"
+"""Title of the first two groups in one, where the corrected model is better at no horizon."""
 
 
 def headline(document: Mapping[str, Any], rules: ReportThresholds) -> list[str]:
@@ -121,13 +123,15 @@ def _on(entry: Mapping[str, Any]) -> str:
 
 
 def trusted(document: Mapping[str, Any], rules: ReportThresholds) -> str:
-    """One sentence on what may be read from the effects."""
+    """One sentence on what may be read from the effects; of a gain only where there is one at some horizon."""
     told = document["summary"]
     if not told["trust"]:
         return ""
     gain = gain_by_horizon(told["removed"], rules)
     text = whole_model(gain)
-    if not gain.nothing_to_gain:
+    if not gain.better and not gain.nothing_to_gain:
+        return f"{text}."
+    if gain.better:
         carry = [t for t in told["trust"] if t["group"] == CARRY]
         text += f"; its gain comes from {_listed(_named(carry), rules.listing.effects) or 'no single effect'}"
     return f"{text}; {_readable(told['trust'], rules)}."
@@ -159,7 +163,7 @@ def effect_groups(document: Mapping[str, Any], rules: ReportThresholds) -> list[
     effects, told = document["effects"], document.get("summary")
     if not told:
         return [("Effects", list(effects))] if effects else []
-    titles = dict(GROUPS)
+    titles = dict(GROUPS) if gain_by_horizon(told["removed"], rules).better else dict.fromkeys(GROUPS, FITTED)
     fold = f"{rules.matters.wide:g}-fold"
     titles[WIDE] = f"{GROUPS[WIDE]}: interval wider than {fold}, or with the declared value in it"
     groups: dict[str, list[dict[str, Any]]] = {title: [] for title in titles.values()}

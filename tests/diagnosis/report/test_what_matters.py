@@ -126,7 +126,10 @@ def test_a_model_that_is_worse_is_not_called_better() -> None:
     made["summary"]["removed"]["0.2"][0] |= {"after": 0.15, "share": -0.5, "ci95": [-0.9, -0.1]}
     first, *_, trusted = headline(made, ReportThresholds())
     assert "the error of the joints is larger: 5.7° to 8.6° RMS" in first
-    assert trusted.startswith("Do not trust the corrected model: at no horizon is it surely better; it is worse than")
+    assert trusted == (
+        "Do not trust the corrected model: at no horizon is it surely better; "
+        "it is worse than the declared one after 0.2 s."
+    )
 
 
 def entry(share: float | None, ends: list | None, after: float = 0.05, what: str = "joints") -> dict:
@@ -166,6 +169,18 @@ def test_an_error_that_left_the_noise_floor_is_said_to_be_larger() -> None:
     made["summary"]["removed"]["0.2"] = [LEFT_FLOOR]
     first = headline(made, ReportThresholds())[0]
     assert "(5.7° RMS) is at the noise floor, the corrected model's is larger (11°)" in first
+
+
+@pytest.mark.parametrize("entries", [[UNSURE], [LOST], [AT_FLOOR]])
+def test_without_a_gain_nothing_is_said_to_come_from_an_effect(entries: list) -> None:
+    made = document()
+    made["summary"]["removed"]["0.2"] = entries
+    titles = [title.split(":")[0] for title, _ in effect_groups(made, ReportThresholds())]
+    assert titles == ["Found on the fitted windows, no gain on held-out data shown", "Not to be trusted alone"]
+    for text in (summary(made), render_report(made, [])):
+        assert "arry the gain" not in text and "gain comes from" not in text and "gain of their own" not in text
+        assert "ound on the fitted windows, no gain on held-out data shown" in text
+    assert ("only together" in headline(made, ReportThresholds())[-1]) is (entries == [AT_FLOOR])
 
 
 def test_an_error_below_the_expected_noise_is_no_better_than_one_at_it() -> None:
