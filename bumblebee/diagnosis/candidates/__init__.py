@@ -12,6 +12,7 @@ from bumblebee.diagnosis.candidates.candidate import (
 from bumblebee.diagnosis.candidates.enumerate import all_candidates, still_joints
 from bumblebee.diagnosis.candidates.exclusion import is_chosen, is_like, possible_beside
 from bumblebee.diagnosis.candidates.formula import Formula, formula
+from bumblebee.diagnosis.candidates.short_term import short_term
 from bumblebee.diagnosis.candidates.signal_scales import scales_of
 from bumblebee.diagnosis.candidates.traits import (
     ABRUPT,
@@ -55,6 +56,7 @@ __all__ = [
     "possible_beside",
     "rough",
     "scales_of",
+    "short_term",
     "shortlisted",
     "still_joints",
     "without",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bumblebee.diagnosis.budget import Budget
-from bumblebee.diagnosis.candidates import formula
+from bumblebee.diagnosis.candidates import formula, short_term
 from bumblebee.diagnosis.comparison import criterion, drop_beside, refitted, simulated_without
 from bumblebee.diagnosis.discrepancy.catalogue_terms import in_terms, related, stiffer_than_the_drive
 from bumblebee.diagnosis.discrepancy.missing_torque import fitted_scene
@@ -29,7 +29,7 @@ class DiscrepancyModel:
 
     def __str__(self) -> str:
         """The discrepancy model in a line."""
-        return " + ".join(f"{v:.3g} {t}" for t, v in self.terms.items())[:100]
+        return short_term(" + ".join(f"{v:.3g} {t}" for t, v in self.terms.items()), 100)
 
 
 def best_model(problem: Problem, fit: Fit, left: LackOfFit, joint: str, budget: Budget) -> DiscrepancyModel | None:

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+from bumblebee.diagnosis.candidates import short_term
 from bumblebee.diagnosis.report.headline import effect_groups, experiments, headline
 from bumblebee.diagnosis.report.html import error_rows, figure, html_page, items, number, probability, table, warning
 from bumblebee.diagnosis.report.left_table import what_is_left_table
 from bumblebee.diagnosis.report.notes import unexplained_error, what_is_left, worse_horizons
 from bumblebee.diagnosis.report.svg import NAMES, curve_picture, line_picture
 from bumblebee.diagnosis.simulation import named, of_joint
-from bumblebee.diagnosis.thresholds.report import ReportThresholds, Verdicts
+from bumblebee.diagnosis.thresholds.report import Listing, ReportThresholds, Verdicts
 
 
 def render_report(
@@ -77,7 +78,7 @@ def _effects(document: dict[str, Any], rules: ReportThresholds) -> str:
         return "<p>None.</p>"
     titled, rows = bool(document.get("summary")), []
     for title, effects in groups:
-        rows += [*([[escape(title)]] if titled else []), *(_effect(e) for e in effects)]
+        rows += [*([[escape(title)]] if titled else []), *(_effect(e, rules.listing) for e in effects)]
     head = ["effect", "explains", "value [95 % interval]", "declared", "p", "not distinguishable from"]
     text = (
         "<p class='note'>explains: share of the excess chi-square over the best fit that returns when this effect "
@@ -88,10 +89,10 @@ def _effects(document: dict[str, Any], rules: ReportThresholds) -> str:
     return table(head, rows, (4,)) + text + told
 
 
-def _effect(e: dict[str, Any]) -> list[str]:
+def _effect(e: dict[str, Any], rule: Listing) -> list[str]:
     place, share = escape(", ".join(e["where"]) or "whole robot"), 100 * e["explains"]
     bar = f"<span class='share'><span class='bar' style='width:{0.04 * share:.2f}rem'></span>{share:.0f} %</span>"
-    values, declared = _values(e)
+    values, declared = _values(e, rule)
     wide = "<br><span class='note'>size uncertain</span>" if e.get("wide") else ""
     name = f"<b>{escape(e['effect'])}</b><br><span class='place'>{place}</span>"
     return [
@@ -104,12 +105,12 @@ def _effect(e: dict[str, Any]) -> list[str]:
     ]
 
 
-def _values(effect: dict[str, Any]) -> tuple[str, str]:
+def _values(effect: dict[str, Any], rule: Listing) -> tuple[str, str]:
     """Values with intervals, and the declared ones."""
     parameters = effect["parameters"]
     if effect["effect"] == "discovered":
         terms = [
-            f"{_with_ends(t['coefficient'], t['ci95'])} &middot; <code>{escape(_short(t['term']))}</code>"
+            f"{_with_ends(t['coefficient'], t['ci95'])} &middot; <code>{escape(_short(t['term'], rule.term))}</code>"
             for t in parameters["terms"]
         ]
         return "<br>".join(terms), "-"
@@ -119,8 +120,8 @@ def _values(effect: dict[str, Any]) -> tuple[str, str]:
     return "<br>".join(lines), "<br>".join(number(p["nominal"]) for p in parameters.values())
 
 
-def _short(term: str) -> str:
-    return term if len(term) <= 60 else f"{term[:40]} ... (see effects.yaml)"
+def _short(term: str, most: int) -> str:
+    return term if len(term) <= most else f"{short_term(term, most)} (see effects.yaml)"
 
 
 def _with_ends(value: float, ends: Sequence[float | None] | None) -> str:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from bumblebee.diagnosis.candidates import short_term
 from bumblebee.diagnosis.report.headline import effect_groups, experiments, headline
 from bumblebee.diagnosis.report.notes import nothing_seen, what_is_left, worse_horizons
 from bumblebee.diagnosis.simulation import motion_error, named, of_joint, pick, rows
@@ -46,7 +47,7 @@ def _grouped(document: dict[str, Any], rules: ReportThresholds) -> list[str]:
 def _effect(effect: dict[str, Any], rule: Listing) -> list[str]:
     place, lines = ", ".join(effect["where"]) or "whole robot", []
     if effect["effect"] == "discovered":
-        values = [(t["term"][:48], t | {"value": t["coefficient"], "unit": "", "nominal": None})
+        values = [(short_term(t["term"], rule.term), t | {"value": t["coefficient"], "unit": "", "nominal": None})
                   for t in effect["parameters"]["terms"]]  # fmt: skip
     else:
         values = list(effect["parameters"].items())

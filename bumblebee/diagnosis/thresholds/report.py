@@ -118,6 +118,8 @@ class Listing:
     """Smallest detectable changes on the page."""
     equivalent: int = 4
     """Effects that cannot be told from one, in the terminal."""
+    term: int = 60
+    """Characters of a term of a law in terminal and page; the whole of it is in effects.yaml."""
     motions: int = 5
     """Worst motions in the terminal."""
 
