@@ -89,7 +89,7 @@ def _pictures(report: Gap) -> list[str]:
                 f"{e['joint']}: measured and model",
                 height=220 if n == 0 else 130,
             ),
-            escape(f"{e['joint']}, simulated from the measured state in {e['rollout']} at {e['start']:.2f} s"),
+            escape(f"{e['joint']}, simulated from the measured state at {e['start']:.2f} s of {e['rollout']}"),
         )
         for n, e in enumerate(report.examples)
     ]

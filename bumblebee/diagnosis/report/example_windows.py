@@ -16,8 +16,8 @@ def examples(
 ) -> list[dict[str, Any]]:
     """One window each of the `count` joints where the effects matter most (without effects: where the model errs most).
 
-    Each has rollout, start [s], joint, unit, time [s], measured, target (position targets only), before and, with
-    effects, after, all as lists over the window's ticks.
+    Each has rollout, start [s since the rollout's first stamp], joint, unit, time [s since the start], measured, target
+    (position targets only), before and, with effects, after, all as lists over the window's ticks.
     """
     rule = rule or ExampleWindows()
     plant, layout, ids = session.plant, session.layout, session.holdout or session.train
@@ -43,10 +43,11 @@ def _example(session: Session, windows: Any, left: np.ndarray, w: int, j: int) -
     rollout = session.rollouts[windows.rollout[w]]
     start, time = int(windows.start[w]), windows.out_time[w]
     measured = windows.measured[w, :, session.layout.slices["joint_pos"]][..., j]
-    ticks = np.searchsorted(rollout.time, rollout.time[start] + time + 1e-9) - 1
+    # Differences of stamps: added to seconds since 1970, a nanosecond is lost.
+    ticks = np.searchsorted(rollout.time - rollout.time[start], time + 1e-9) - 1
     entry = {
         "rollout": rollout.rollout_id,
-        "start": float(rollout.time[start]),
+        "start": float(rollout.time[start] - rollout.time[0]),
         "joint": plant.joints[j],
         "unit": unit_of(session, j),
         "time": time.tolist(),

@@ -66,7 +66,7 @@ def _pictures(examples: Sequence[dict[str, Any]]) -> list[str]:
             f"{e['joint']}: measured, declared model, corrected model",
             240 if n == 0 else 130,
         )
-        text = f"{e['joint']}, simulated from the measured state in {e['rollout']} at {e['start']:.2f} s"
+        text = f"{e['joint']}, simulated from the measured state at {e['start']:.2f} s of {e['rollout']}"
         parts.append(figure(picture, escape(text)))
     return parts
 
