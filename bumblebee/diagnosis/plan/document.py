@@ -6,7 +6,7 @@ import numpy as np
 
 from bumblebee.diagnosis.plan.config import Gain
 from bumblebee.diagnosis.plan.plan import Plan
-from bumblebee.diagnosis.plan.predicted import classes, intervals, narrows, separates, usual, words_of
+from bumblebee.diagnosis.plan.predicted import classes, intervals, narrows, pairs, separates, usual, words_of
 from bumblebee.diagnosis.simulation import joint_units
 
 
@@ -113,8 +113,11 @@ def notes(plan: Plan) -> list[str]:
         names = ", ".join(plan.basis.unasked)
         out.append(f"no candidate of this model stands for what was found, and the plan does not ask about it: {names}")
     open_ = [row for row in classes(plan) if row["class"] in {f.name for f in plan.basis.found.values()}]
-    pairs = (sorted((words_of(r["if"]), words_of(r["not"]))) for r in open_ if not r["resolved"]["after"])
-    left = list(dict.fromkeys(" and ".join(pair) for pair in pairs))
+    left = [
+        " and ".join(sorted((words_of(r["if"]), words_of(r["not"]))))
+        for r in pairs(open_)
+        if not r["resolved"]["after"]
+    ]
     if left:
         more = "; ..." if len(left) > 6 else ""
         out.append(

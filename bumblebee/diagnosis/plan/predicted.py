@@ -39,6 +39,23 @@ def classes(plan: Plan) -> list[dict[str, Any]]:
     return rows
 
 
+def pairs(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Of the rows of `classes` one for each two effects, the direction that is harder to tell, hardest first.
+
+    Two effects are told apart where they are in both directions: either one if it is there and the other is fitted.
+    """
+    found: dict[frozenset[str], list[dict[str, Any]]] = {}
+    for row in rows:
+        found.setdefault(frozenset((words_of(row["if"]), words_of(row["not"]))), []).append(row)
+    out = []
+    for both in found.values():
+        hardest = min(both, key=lambda row: (row["resolved"]["after"], row["chi2"]["after"]))
+        out.append(
+            hardest | {"resolved": {when: all(r["resolved"][when] for r in both) for when in hardest["resolved"]}}
+        )
+    return sorted(out, key=lambda row: (row["resolved"]["after"], row["chi2"]["after"]))
+
+
 def _cosine(left: float, alone: float) -> float | None:
     """Of the angle between what is there and what the rival can do; None where the data feel neither."""
     return float(np.sqrt(max(0.0, 1.0 - left / alone))) if alone > 1e-6 else None

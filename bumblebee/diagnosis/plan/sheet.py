@@ -7,7 +7,7 @@ from typing import Any
 from bumblebee.diagnosis.plan.document import run_names
 from bumblebee.diagnosis.plan.drawing import panels
 from bumblebee.diagnosis.plan.plan import Plan
-from bumblebee.diagnosis.plan.predicted import words_of
+from bumblebee.diagnosis.plan.predicted import pairs, words_of
 from bumblebee.diagnosis.report import number, table
 
 _STYLE = """@page{size:A4;margin:13mm}:root{color-scheme:light}
@@ -92,9 +92,9 @@ def _run_table(told: dict[str, Any]) -> str:
 def _expected(plan: Plan, told: dict[str, Any]) -> list[str]:
     """What the plan is expected to tell, in tables."""
     parts = []
-    pairs = told["predicted"]["classes"]
-    if pairs:
-        parts += ["<h3>What it is expected to tell apart</h3>", _pair_table(pairs, 8)]
+    asked = pairs(told["predicted"]["classes"])
+    if asked:
+        parts += ["<h3>What it is expected to tell apart</h3>", _pair_table(asked, 8)]
     if told["predicted"]["intervals"]:
         rows = [
             [
@@ -114,14 +114,8 @@ def _expected(plan: Plan, told: dict[str, Any]) -> list[str]:
     return parts
 
 
-def _pair_table(pairs: Sequence[dict[str, Any]], most: int) -> str:
-    """The pairs that change most; both directions as one, by the harder one."""
-    rows: dict[frozenset[str], dict[str, Any]] = {}
-    for row in pairs:
-        key = frozenset((words_of(row["if"]), words_of(row["not"])))
-        if key not in rows or row["chi2"]["after"] < rows[key]["chi2"]["after"]:
-            rows[key] = row
-    shown = sorted(rows.values(), key=lambda r: r["chi2"]["after"])
+def _pair_table(shown: Sequence[dict[str, Any]], most: int) -> str:
+    """The first of `predicted.pairs`."""
     cells = [
         [
             escape(words_of(r["if"])),

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from bumblebee.diagnosis.plan.predicted import words_of
+from bumblebee.diagnosis.plan.predicted import pairs, words_of
 
 
 def summary(told: dict[str, Any]) -> str:
@@ -14,10 +14,10 @@ def summary(told: dict[str, Any]) -> str:
     for run in told["runs"]:
         shares = ", ".join(f"{k} {100 * run['reached'][k]['share']:.0f} %" for k in ("travel", "speed", "torque"))
         lines.append(f"  {run['run']}  {run['gains']}  {run['motion']}  ({shares})")
-    pairs = told["predicted"]["classes"]
-    if pairs:
-        before, after = (sum(row["resolved"][when] for row in pairs) for when in ("before", "after"))
-        lines.append(f"pairs told apart: {before} of {len(pairs)} now, {after} expected")
+    asked = pairs(told["predicted"]["classes"])
+    if asked:
+        before, after = (sum(row["resolved"][when] for row in asked) for when in ("before", "after"))
+        lines.append(f"pairs told apart: {before} of {len(asked)} now, {after} expected")
     for row in told["predicted"]["intervals"]:
         width = row["half_width"]
         if width["before"] is not None:
