@@ -163,7 +163,8 @@ def compensate(
     effects: Annotated[Path, typer.Argument(metavar="EFFECTS.yaml", help="What the diagnosis found.")],
     out: Annotated[Path, typer.Option("--out", help="File for the compensation, JSON.")],
     model: Annotated[
-        Path | None, typer.Option("--model", help="MJCF that the policy was trained on; the declared G1 by default.")
+        Path | None,
+        typer.Option("--model", help="MJCF of the G1 that the policy was trained on; the declared one by default."),
     ] = None,
     leave_out: Annotated[bool, typer.Option("--leave-out", help="Go on without what cannot be undone.")] = False,
     unproven: Annotated[
@@ -171,12 +172,14 @@ def compensate(
     ] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """What a policy's runner can undo at the joints, without training."""
+    """What a policy's runner can undo at the joints of the G1, without training; no other robot has such a runner."""
     from bumblebee.deploy.compensation_evidence import require_proven
     from bumblebee.deploy.compensation_file import claim_compensation, table_of, write_compensation
     from bumblebee.deploy.compensation_plan import compensate_file
+    from bumblebee.deploy.compensation_robot import require_g1
 
     claim_compensation(out, overwrite, [path for path in (effects, model) if path])
+    require_g1(effects, model)
     if not unproven:
         require_proven(effects)
     compensation = compensate_file(effects, model, leave_out=leave_out)

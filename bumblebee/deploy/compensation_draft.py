@@ -13,6 +13,10 @@ from bumblebee.robot.facts import g1_bodies, joint_names, joints
 from bumblebee.robot.model import gains
 from bumblebee.sim.effects import Effect
 
+ONLY_G1 = (
+    "Only policies of the G1 have a runner that compensates; for another robot use the corrected model.xml itself."
+)
+
 
 @dataclass(frozen=True, eq=False)
 class DeclaredRobot:
@@ -33,9 +37,8 @@ class DeclaredRobot:
         """From the model that the policy was trained on; one without the G1's joints is a `BadInput`."""
         have = {model.joint(i).name for i in range(model.njnt)} | {model.body(i).name for i in range(model.nbody)}
         if missing := [name for name in (*joint_names(), *g1_bodies()) if name not in have]:
-            raise BadInput(
-                where, "a model of the G1", f"one without {missing[0]} ({len(missing)} joints, bodies missing)"
-            )
+            came = f"one without {missing[0]} ({len(missing)} joints, bodies missing)"
+            raise BadInput(where, "a model of the G1", came, ONLY_G1)
         table = joints()
         return cls(
             model=model,

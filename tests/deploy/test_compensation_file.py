@@ -125,10 +125,26 @@ def test_the_command_writes_the_file_and_shows_what_is_done(tmp_path: Path, caps
 def test_a_model_of_another_robot_is_refused(tmp_path: Path) -> None:
     (tmp_path / "arm.xml").write_text("<mujoco><worldbody/></mujoco>")
     write_effects(tmp_path / "effects.yaml", EFFECTS)
-    with pytest.raises(BadInput, match=r"arm.xml: expected a model of the G1"):
+    with pytest.raises(BadInput, match=r"arm.xml: expected a model of the G1, .*Only policies of the G1"):
         run(["compensate", str(tmp_path / "effects.yaml"), "--out", str(tmp_path / "c.json"), "--model",
              str(tmp_path / "arm.xml")])  # fmt: skip
     assert not (tmp_path / "c.json").exists()
+
+
+def test_effects_of_another_robot_are_refused_before_all_else(tmp_path: Path) -> None:
+    """By the joints that they name, or, where they are of the whole robot, by those of the diagnosis beside them."""
+    path, out = tmp_path / "effects.yaml", tmp_path / "c.json"
+    write_effects(path, [Effect("coulomb_friction", ("elbow",), {"frictionloss": 0.1})])
+    line = r"yaml: expected joints and bodies of the G1, came 'elbow', of another robot. Only policies of the G1 have"
+    for options in ([], ["--leave-out"]):
+        with pytest.raises(BadInput, match=line):
+            run(["compensate", str(path), "--out", str(out), *options])
+    write_effects(path, [Effect("command_delay", (), {"delay": 0.01})])
+    (tmp_path / "diagnosis.json").write_text(json.dumps({"units": {"shoulder": {}, "elbow": {}}, "effects": [1]}))
+    with pytest.raises(BadInput, match=r"diagnosis.json: expected joints and bodies of the G1, came 'shoulder'"):
+        run(["compensate", str(path), "--out", str(out), "--unproven"])
+    (tmp_path / "diagnosis.json").write_text(json.dumps({"units": {KNEE: {}}, "effects": []}))
+    assert run(["compensate", str(path), "--out", str(out)]) == 0
 
 
 def test_one_policy_runs_with_and_without_and_the_log_of_the_one_with_is_set_aside(
