@@ -23,7 +23,7 @@ from bumblebee.diagnosis.comparison import (
     wald,
 )
 from bumblebee.diagnosis.discrepancy.catalogue_alternative import Offers, catalogue_swap
-from bumblebee.diagnosis.discrepancy.form import DiscrepancyModel, best_model, refitted_model
+from bumblebee.diagnosis.discrepancy.form import DiscrepancyModel, best_model, refitted_model, short_texts
 from bumblebee.diagnosis.discrepancy.residual_tests import JointActivity, JointLackOfFit, LackOfFit, lack_of_fit
 from bumblebee.diagnosis.discrepancy.single_law import single_functions
 from bumblebee.diagnosis.estimation import Fit, resolved
@@ -122,10 +122,10 @@ def _with_models(
             break
         tried.append(worst.joint)
         means.say(f"looking for a discrepancy model of {worst.joint}")
-        model = best_model(state.problem, state.fit, state.left, worst.joint, means.budget)
+        model = best_model(state.problem, state.fit, state.left, worst.joint, means.budget, means.say)
         if model is None:
             continue
-        after, is_swap = _validated(state, model, worst, means.offers)
+        after, is_swap = _validated(state, model, worst, means)
         if after is None:
             unconfirmed[worst.joint] = model.terms
             continue
@@ -148,7 +148,7 @@ def _swapped_for_single_functions(state: _State, means: _Means) -> tuple[_State,
     for joint in dict.fromkeys(c.where for c in state.fit.chosen if c.where in state.problem.plant.joints):
         if not means.budget.has_time_for(f"one basis function instead of the catalogue effects on {joint}"):
             break
-        model = _swap_for_one_function(state, joint, means.offers)
+        model = _swap_for_one_function(state, joint, means)
         if model is not None:
             state = state.around(model.fit)
             kinds[joint] = model.kind
@@ -157,17 +157,19 @@ def _swapped_for_single_functions(state: _State, means: _Means) -> tuple[_State,
 
 
 def _validated(
-    state: _State, model: DiscrepancyModel, worst: JointLackOfFit, offers: Offers
+    state: _State, model: DiscrepancyModel, worst: JointLackOfFit, means: _Means
 ) -> tuple[_State | None, bool]:
     """The state with a discrepancy model, or with effects of the catalogue in a swap (then True); None if refused."""
     problem, holdout, fit = state.problem, state.holdout, state.fit
     rule = problem.thresholds.discrepancy.discover
     if not _is_worth_it(problem, holdout, fit, model, state.left.sought.bound):
         return None, False
-    swapped = catalogue_swap(problem, holdout, fit, model.fit, worst.joint, offers)
+    means.say(f"discrepancy model of {worst.joint}: against effects of the catalogue")
+    swapped = catalogue_swap(problem, holdout, fit, model.fit, worst.joint, means.offers)
     if swapped is not None:
         gains = compare(problem, holdout, fit, swapped).passes(problem.thresholds.comparison.validation)
         return (state.around(swapped), True) if gains else (None, False)
+    means.say(f"discrepancy model of {worst.joint}: what it leaves")
     new = state.around(model.fit)
     redundant = problem.thresholds.comparison.elimination.redundant_z
     excess = new.left.joints[problem.plant.joints.index(worst.joint)].excess
@@ -200,7 +202,7 @@ def _surety(problem: Problem, fit: Fit, before: Fit) -> float:
     return wald(problem, fit, window_weights(fit.clean(problem)), own)
 
 
-def _swap_for_one_function(state: _State, joint: str, offers: Offers) -> DiscrepancyModel | None:
+def _swap_for_one_function(state: _State, joint: str, means: _Means) -> DiscrepancyModel | None:
     """One basis function that explains a joint better than the effects on it, with no more numbers; or None.
 
     Nor may other effects of the catalogue do what it does.
@@ -208,6 +210,7 @@ def _swap_for_one_function(state: _State, joint: str, offers: Offers) -> Discrep
     problem, holdout, fit, left = state.problem, state.holdout, state.fit, state.left
     swaps = single_functions(problem, fit, left.scene, left.library, joint)
     for gone, one in itertools.islice(swaps, problem.thresholds.discrepancy.discover.swaps):
+        means.say(f"{short_texts([one])} on {joint} instead of {', '.join(c.effect for c in gone)}")
         bare = simulated_without(problem, fit, gone)
         model = refitted_model(problem, bare, joint, [one])
         rule = problem.thresholds.comparison.window_by_window
@@ -215,6 +218,6 @@ def _swap_for_one_function(state: _State, joint: str, offers: Offers) -> Discrep
             continue
         if _surety(problem, model.fit, fit) < left.sought.bound:
             continue
-        if catalogue_swap(problem, holdout, bare, model.fit, joint, offers) is None:
+        if catalogue_swap(problem, holdout, bare, model.fit, joint, means.offers) is None:
             return model
     return None

@@ -36,14 +36,15 @@ def prepared(**truth: float | tuple[float, float]) -> tuple[Session, Problem, Pr
     return session, problems[0], problems[1]
 
 
-def discovered(chosen: tuple[Candidate, ...] = (), **truth: float) -> Discovery:
+def discovered(chosen: tuple[Candidate, ...] = (), lines: list[str] | None = None, **truth: float) -> Discovery:
     """What is discovered beside the catalogue's effects `chosen`, fitted from their first trial."""
     session, problem, judge = prepared(**truth)
     ones = np.ones(len(problem.windows))
     start = np.concatenate([c.start for c in chosen]) if chosen else []
     fit = gauss_newton(problem, chosen, start, window_weights(gauss_newton(problem, (), (), ones).clean(problem)))
     activity = JointActivity(scales_of(session.plant, session.rollouts).torque)
-    return discover(problem, Holdout(judge), fit, activity)
+    say = (lambda text: None) if lines is None else lines.append
+    return discover(problem, Holdout(judge), fit, activity, say)
 
 
 def test_a_cubic_spring_is_found_with_its_form_and_size() -> None:
@@ -52,6 +53,21 @@ def test_a_cubic_spring_is_found_with_its_form_and_size() -> None:
     assert (form.where, form.texts) == ("pole", ("q^3",))
     assert found.fit.of(form)[0] == pytest.approx(-0.6, rel=0.02)
     assert not unexplained(found, ReportThresholds())["significant"]
+
+
+def test_every_refit_on_the_way_to_a_model_is_told() -> None:
+    lines: list[str] = []
+    discovered((), lines, cubic=0.6)
+    begin, end = (lines.index(text) for text in ("looking for a discrepancy model of pole", lines[-1]))
+    told = [line.removeprefix("discrepancy model of pole: ") for line in lines[begin + 1 : end]]
+    assert told[0] == "refit with q^3" and told[-2:] == ["against effects of the catalogue", "what it leaves"]
+    assert lines[-1].startswith("discovered on pole: ")
+
+
+def test_every_swap_for_one_basis_function_is_told() -> None:
+    lines: list[str] = []
+    discovered((Candidate("joint_spring", "pole", (0.0, 0.0), (0.02, 0.02), (0, 1)),), lines, cubic=0.6)
+    assert lines[0] == "q^2, q^3 on pole instead of joint_spring" and "instead of catalogue effects" in lines[-1]
 
 
 def test_a_complete_model_leaves_nothing() -> None:
