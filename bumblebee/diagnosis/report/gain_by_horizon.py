@@ -9,20 +9,33 @@ from bumblebee.diagnosis.thresholds.report import ReportThresholds
 _BETTER, _WORSE, _FLOOR, _OPEN = "better", "worse", "at the noise floor", "open"
 
 
+Kinds = Mapping[str, tuple[str, ...]]
+"""Horizon [s], as the block `summary` writes it -> kinds of joints: "joints", or "hinges" and "slides"."""
+
+
 @dataclass(frozen=True)
 class GainByHorizon:
-    """Horizons [s], as the block `summary` writes them, each in one of the four."""
+    """Every kind of joint at every horizon is in one of the four."""
 
-    better: tuple[str, ...]
-    """Surely better for some kind of joint; every other kind is so too, or at the noise floor before."""
-    worse: Mapping[str, tuple[str, ...]]
-    """Surely worse, with the kinds of joints that are."""
-    floor: tuple[str, ...]
-    """The declared model is at the noise floor."""
-    open: tuple[str, ...]
+    better: Kinds
+    """Surely better."""
+    worse: Kinds
+    """Surely worse."""
+    floor: Kinds
+    """The declared model is at the noise floor, and the corrected one too."""
+    open: Kinds
     """Neither is sure."""
-    kinds: tuple[str, ...]
-    """Kinds of joints that the block tells apart: "joints", or "hinges" and "slides"."""
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of joints that the block tells apart."""
+        every = (self.better, self.worse, self.floor, self.open)
+        return tuple(dict.fromkeys(kind for part in every for kinds in part.values() for kind in kinds))
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is worse nowhere, and at some horizon better for all kinds that are not at the noise floor."""
+        return not self.worse and any(name not in self.open for name in self.better)
 
     @property
     def nothing_to_gain(self) -> bool:
@@ -32,21 +45,13 @@ class GainByHorizon:
 
 def gain_by_horizon(removed: Mapping[str, Sequence[Mapping[str, Any]]], rules: ReportThresholds) -> GainByHorizon:
     """From the entries of each horizon in `summary.removed`."""
-    verdicts = {name: [_verdict(entry, rules) for entry in entries] for name, entries in removed.items() if entries}
+    verdicts = {name: {e["what"]: _verdict(e, rules) for e in entries} for name, entries in removed.items()}
 
-    def are(*allowed: str) -> list[str]:
-        return [name for name, found in verdicts.items() if set(found) <= set(allowed)]
+    def are(verdict: str) -> Kinds:
+        kinds = {name: tuple(kind for kind, v in found.items() if v == verdict) for name, found in verdicts.items()}
+        return {name: some for name, some in kinds.items() if some}
 
-    floor = are(_FLOOR)
-    better = [name for name in are(_BETTER, _FLOOR) if name not in floor]
-    worse = {
-        name: tuple(entry["what"] for entry, verdict in zip(removed[name], found, strict=True) if verdict == _WORSE)
-        for name, found in verdicts.items()
-        if _WORSE in found
-    }
-    rest = [name for name in verdicts if name not in (*floor, *better, *worse)]
-    kinds = dict.fromkeys(entry["what"] for entries in removed.values() for entry in entries)
-    return GainByHorizon(tuple(better), worse, tuple(floor), tuple(rest), tuple(kinds))
+    return GainByHorizon(are(_BETTER), are(_WORSE), are(_FLOOR), are(_OPEN))
 
 
 def _verdict(entry: Mapping[str, Any], rules: ReportThresholds) -> str:
@@ -72,32 +77,28 @@ def leaves_floor(entry: Mapping[str, Any], rules: ReportThresholds) -> bool:
 
 
 def whole_model(gain: GainByHorizon) -> str:
-    """Whether to trust the corrected model as a whole, at some horizons, or not; without a full stop."""
-    floor = [f"the declared model is at the noise floor after {_seconds(gain.floor)}"] if gain.floor else []
-    rest = [f"not surely after {_seconds(gain.open)}"] if gain.open else []
-    if gain.better and not gain.worse:
-        said = "; ".join([f"better after {_seconds(gain.better)}", *rest, *floor])
+    """Whether to trust the corrected model as a whole, only where it is better, or not; without a full stop."""
+    floor = [f"the declared model is at the noise floor {_after(gain, gain.floor)}"] if gain.floor else []
+    rest = [f"not surely better {_after(gain, gain.open)}"] if gain.open else []
+    worse = [f"it is worse than the declared one {_after(gain, gain.worse)}"] if gain.worse else []
+    if gain.whole:
+        said = "; ".join([f"better {_after(gain, gain.better)}", *rest, *floor])
         return f"Trust the corrected model as a whole ({said})"
     if gain.better:
-        aside = f" ({'; '.join([*rest, *floor])})" if rest or floor else ""
-        return (
-            f"Trust the corrected model only for the horizons at which it is better, {_seconds(gain.better)}{aside}: "
-            f"after {_worse(gain)} it is worse than the declared one"
-        )
+        others = ", ".join([*worse, *rest, *floor])
+        return f"Trust the corrected model only where it is better, {_after(gain, gain.better)}: {others}"
     if gain.nothing_to_gain:
         return f"There is nothing to gain: {floor[0]}"
-    both = f" for both {' and '.join(gain.kinds)}" if len(gain.kinds) > 1 else ""
-    worse = [f"it is worse than the declared one after {_worse(gain)}"] if gain.worse else []
-    said = [f"at no horizon is it surely better{both}", *worse, *floor]
-    return f"Do not trust the corrected model: {'; '.join(said)}"
+    return f"Do not trust the corrected model: {'; '.join(['at no horizon is it surely better', *worse, *floor])}"
 
 
-def _seconds(horizons: Sequence[str]) -> str:
-    return f"{', '.join(horizons)} s"
-
-
-def _worse(gain: GainByHorizon) -> str:
-    """The horizons, with the kinds of joints where not all are worse."""
-    if all(len(kinds) == len(gain.kinds) for kinds in gain.worse.values()):
-        return _seconds(list(gain.worse))
-    return ", ".join(f"{name} s ({' and '.join(kinds)})" for name, kinds in gain.worse.items())
+def _after(gain: GainByHorizon, where: Kinds) -> str:
+    """The horizons, with the kinds of joints where not all are meant."""
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for name, kinds in where.items():
+        alike.setdefault(kinds, []).append(name)
+    parts = [
+        f"{', '.join(names)} s" + ("" if set(kinds) == set(gain.kinds) else f" ({' and '.join(kinds)})")
+        for kinds, names in alike.items()
+    ]
+    return f"after {', '.join(parts)}"
