@@ -110,7 +110,7 @@ def _values(effect: dict[str, Any], rule: Listing) -> tuple[str, str]:
     parameters = effect["parameters"]
     if effect["effect"] == "discovered":
         terms = [
-            f"{_with_ends(t['coefficient'], t['ci95'])} &middot; <code>{escape(_short(t['term'], rule.term))}</code>"
+            f"{_with_ends(t['coefficient'], t['ci95'])} &middot; {_short(t['term'], rule.term)}"
             for t in parameters["terms"]
         ]
         return "<br>".join(terms), "-"
@@ -121,7 +121,8 @@ def _values(effect: dict[str, Any], rule: Listing) -> tuple[str, str]:
 
 
 def _short(term: str, most: int) -> str:
-    return term if len(term) <= most else f"{short_term(term, most)} (see effects.yaml)"
+    more = "" if len(term) <= most else " <span class='note'>(see effects.yaml)</span>"
+    return f"<code>{escape(short_term(term, most))}</code>{more}"
 
 
 def _with_ends(value: float, ends: Sequence[float | None] | None) -> str:

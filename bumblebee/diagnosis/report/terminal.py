@@ -54,9 +54,10 @@ def _effect(effect: dict[str, Any], rule: Listing) -> list[str]:
     for name, p in values:
         ends = ", ".join("" if x is None else f"{x:.4g}" for x in p["ci95"])
         between = f" [{ends}]" if ends != ", " else ""
+        unit = f" {p['unit']}" if p["unit"] else ""
         declared = "" if p["nominal"] is None else f" (declared {p['nominal']:.4g})"
         lines.append(
-            f"  {effect['effect']:<18} {place:<28} {name} = {p['value']:.4g}{between} {p['unit']}{declared},"
+            f"  {effect['effect']:<18} {place:<28} {name} = {p['value']:.4g}{between}{unit}{declared},"
             f" explains {100 * effect['explains']:.0f} %{', size uncertain' if effect.get('wide') else ''}"
         )
     if effect["equivalent"]:
