@@ -6,7 +6,7 @@ more than a formula, so a discrepancy model must be clearly better than the best
 that took no part in either fit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,7 +76,15 @@ def with_catalogue_effects(found: Search, fit: Fit) -> Search:
     return replace(found, fit=joint, steps=steps)
 
 
-def catalogue_swap(problem: Problem, holdout: Holdout, fit: Fit, model: Fit, joint: str, offers: Offers) -> Fit | None:
+def catalogue_swap(
+    problem: Problem,
+    holdout: Holdout,
+    fit: Fit,
+    model: Fit,
+    joint: str,
+    offers: Offers,
+    say: Callable[[str], None] = lambda text: None,
+) -> Fit | None:
     """`fit` with one or two more effects of the catalogue that do what a discrepancy model does; None where none can.
 
     Args:
@@ -86,10 +94,11 @@ def catalogue_swap(problem: Problem, holdout: Holdout, fit: Fit, model: Fit, joi
         model: the fit with it.
         joint: where it is.
         offers: the catalogue's candidates conditional on `fit`.
+        say: told of progress.
     """
     rule, swapped = problem.thresholds.discrepancy.catalogue_alternative, fit
     for _ in range(rule.rounds):
-        new = _one_more(problem, swapped, joint, offers)
+        new = _one_more(problem, swapped, joint, offers, say)
         if new is None:
             return None
         swapped = new
@@ -104,7 +113,7 @@ def catalogue_swap(problem: Problem, holdout: Holdout, fit: Fit, model: Fit, joi
     return None
 
 
-def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers) -> Fit | None:
+def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers, say: Callable[[str], None]) -> Fit | None:
     """The best of the catalogue's effects conditional on `fit`, if any is worth its parameters."""
     rule = problem.thresholds.discrepancy.catalogue_alternative
     open_ = [c for c in offers.on(problem.plant, joint, rule) if not is_chosen(c, fit.chosen)]
@@ -117,16 +126,25 @@ def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers) -> Fit | N
     weights = window_weights(fit.clean(problem))
     tests = score_tests(problem, columns, fit, weights)
     order = [k for k in np.argsort(-tests.gain) if tests.gain[k] > 0][: rule.trials]
-    trials = [try_one(problem, fit, looked[k], tests.steps[k], weights) for k in order]
+    trials = []
+    for k in order:
+        say(f"instead of a discrepancy model of {joint}: {_with_place(looked[k])} tried")
+        trials.append(try_one(problem, fit, looked[k], tests.steps[k], weights))
     tried = sorted((t for t in trials if t is not None), key=lambda t: t.cost + 2 * len(t.candidate.free))[: rule.fits]
     fits = []
     for t in tried:
+        say(f"instead of a discrepancy model of {joint}: refit with {_with_place(t.candidate)}")
         new = refitted(problem, (*fit.chosen, t.candidate), np.concatenate((fit.values, t.values)), fit)
         new = drop_beside(problem, new, t.candidate)
         if _is_sure(problem, fit, new, t.candidate):
             fits.append(new)
     best = max(fits, key=lambda f: criterion(problem, f), default=None)
     return best if best is not None and criterion(problem, best) > criterion(problem, fit) else None
+
+
+def _with_place(candidate: Candidate) -> str:
+    """An effect and its place, for messages."""
+    return f"{candidate.effect} on {candidate.where or 'the whole robot'}"
 
 
 def _is_sure(problem: Problem, fit: Fit, new: Fit, candidate: Candidate) -> bool:

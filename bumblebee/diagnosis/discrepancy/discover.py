@@ -164,8 +164,7 @@ def _validated(
     rule = problem.thresholds.discrepancy.discover
     if not _is_worth_it(problem, holdout, fit, model, state.left.sought.bound):
         return None, False
-    means.say(f"discrepancy model of {worst.joint}: against effects of the catalogue")
-    swapped = catalogue_swap(problem, holdout, fit, model.fit, worst.joint, means.offers)
+    swapped = catalogue_swap(problem, holdout, fit, model.fit, worst.joint, means.offers, means.say)
     if swapped is not None:
         gains = compare(problem, holdout, fit, swapped).passes(problem.thresholds.comparison.validation)
         return (state.around(swapped), True) if gains else (None, False)
@@ -218,6 +217,6 @@ def _swap_for_one_function(state: _State, joint: str, means: _Means) -> Discrepa
             continue
         if _surety(problem, model.fit, fit) < left.sought.bound:
             continue
-        if catalogue_swap(problem, holdout, bare, model.fit, joint, means.offers) is None:
+        if catalogue_swap(problem, holdout, bare, model.fit, joint, means.offers, means.say) is None:
             return model
     return None

@@ -122,8 +122,9 @@ def _climbed(refits: _Refits, base: Fit, one: Found, model: DiscrepancyModel) ->
 
 
 def short_texts(found: Sequence[Found]) -> str:
-    """The terms of basis functions, each cut to what a line of progress holds."""
-    return ", ".join(short_term(text, 40) for one in found for text in one.function.texts)
+    """The terms of basis functions, a curve as one, each cut to what a line of progress holds."""
+    texts = [text for one in found for text in joined(list(one.function.texts), one.verdict.size)[0]]
+    return ", ".join(short_term(text, 40) for text in texts)
 
 
 def refitted_model(problem: Problem, base: Fit, joint: str, strange: Sequence[Found]) -> DiscrepancyModel | None:

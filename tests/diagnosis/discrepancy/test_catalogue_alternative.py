@@ -21,17 +21,22 @@ OFFERS = Offers([SPRING, VISCOUS, COULOMB])
 TABLE = "curve(v, -2, 1, -0.05, 1, 0.05, -1, 2, -1)"
 
 
-def taking(terms: dict[str, float], **truth: float | tuple[float, float]) -> Fit | None:
+def taking(terms: dict[str, float], lines: list[str] | None = None, **truth: float | tuple[float, float]) -> Fit | None:
     """What is swapped in for a discrepancy model on the pole, nothing having been found before it."""
     _, problem, judge = prepared(**truth)
     nothing = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     form = refitted(problem, (formula("pole", terms),), np.array(list(terms.values())))
     assert criterion(problem, form) > criterion(problem, nothing)
-    return catalogue_swap(problem, Holdout(judge), nothing, form, "pole", OFFERS)
+    return catalogue_swap(
+        problem, Holdout(judge), nothing, form, "pole", OFFERS, ([] if lines is None else lines).append
+    )
 
 
 def test_a_catalogue_effect_is_swapped_in_for_a_table_that_follows_it() -> None:
-    named = taking({TABLE: 0.05}, friction=(0.0, 0.05))
+    lines: list[str] = []
+    named = taking({TABLE: 0.05}, lines, friction=(0.0, 0.05))
+    assert "instead of a discrepancy model of pole: coulomb_friction on pole tried" in lines
+    assert "instead of a discrepancy model of pole: refit with coulomb_friction on pole" in lines
     assert named is not None
     assert [c.effect for c in named.chosen] == ["coulomb_friction"]
     assert named.values[0] == pytest.approx(0.05, rel=0.05)

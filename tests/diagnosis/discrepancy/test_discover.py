@@ -1,6 +1,7 @@
 """Beyond the catalogue from end to end: what no effect names is found, refitted and kept; nothing else is."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -13,7 +14,9 @@ from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.dataset.session import Session, make_session
 from bumblebee.diagnosis.discrepancy.catalogue_terms import quantities_of, related, stiffer_than_the_drive
 from bumblebee.diagnosis.discrepancy.discover import Discovery, discover
+from bumblebee.diagnosis.discrepancy.form import short_texts
 from bumblebee.diagnosis.discrepancy.residual_tests import JointActivity
+from bumblebee.diagnosis.discrepancy.term_library import BasisFunction
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.report.discrepancy_entries import discovered_entry, structure_table, unexplained
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
@@ -60,7 +63,7 @@ def test_every_refit_on_the_way_to_a_model_is_told() -> None:
     discovered((), lines, cubic=0.6)
     begin, end = (lines.index(text) for text in ("looking for a discrepancy model of pole", lines[-1]))
     told = [line.removeprefix("discrepancy model of pole: ") for line in lines[begin + 1 : end]]
-    assert told[0] == "refit with q^3" and told[-2:] == ["against effects of the catalogue", "what it leaves"]
+    assert told[0] == "refit with q^3" and told[-1] == "what it leaves"
     assert lines[-1].startswith("discovered on pole: ")
 
 
@@ -68,6 +71,13 @@ def test_every_swap_for_one_basis_function_is_told() -> None:
     lines: list[str] = []
     discovered((Candidate("joint_spring", "pole", (0.0, 0.0), (0.02, 0.02), (0, 1)),), lines, cubic=0.6)
     assert lines[0] == "q^2, q^3 on pole instead of joint_spring" and "instead of catalogue effects" in lines[-1]
+
+
+def test_a_curve_is_one_text_in_a_line_of_progress() -> None:
+    texts = tuple(f"curve(v, -1.2345, {int(k == 0)}, 0.0123, {int(k == 1)}, 2.3456, {int(k == 2)})" for k in range(3))
+    verdict = SimpleNamespace(size=np.array([0.54321, -0.25, 0.125]))
+    one = SimpleNamespace(function=BasisFunction(texts, ("velocity",), 3), verdict=verdict)
+    assert short_texts([one]) == "curve(v, -1.2345, 0.54321, 0.0123, ...)"
 
 
 def test_a_complete_model_leaves_nothing() -> None:
