@@ -5,15 +5,16 @@ alone explains a twentieth, and what stands for the others' share has a strange 
 after two effects (after one, where they are hundreds of times the noise), and the last explained little or they are
 very large, the usual ones of all joints are fitted together from the declared values on, or from those found. The
 drives' strengths are free only where the data need them: a servo's strength, its joint's inertia and its friction go by
-one common factor nearly as a torque drive's do (`declared_scale`). Of a small robot whose residuals stay large masses
-and centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows that
-took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It begins so only in
-the place of gains far from the declared ones (`gain_grid`): a load at the end of an arm weakens all drives as far as
-these can tell.
+one common factor nearly as a torque drive's do (`declared_scale`). Of a small robot a load on one link is asked first,
+by itself and then beside them (`link_load`): it weakens all drives as far as these can tell. Where residuals stay large
+masses and centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows
+that took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It begins so
+only in the place of gains far from the declared ones (`gain_grid`).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial, reduce
 
 import numpy as np
 
@@ -23,30 +24,27 @@ from bumblebee.diagnosis.candidates import (
     USUAL_OF_ROBOT,
     USUAL_OF_TORQUE,
     Candidate,
-    clipped,
-    effects_at,
     is_chosen,
 )
 from bumblebee.diagnosis.comparison import Holdout, certainty, compare, drop_unsure, evidence
-from bumblebee.diagnosis.estimation import Fit, columns_at, cost_of, gauss_newton, project
+from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, by_misfit, make_problem, screening_windows, window_weights
+from bumblebee.diagnosis.selection.proposals.large_residual_fit import absent, large_residual_fit
+from bumblebee.diagnosis.selection.proposals.link_load import is_whole, link_load
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
 _STRENGTH = "motor_strength"
 _GAIN = "kp"
+_Begun = tuple[Sequence[Candidate], np.ndarray]
+"""Effects and the values (P,) that their fit begins with."""
 
 
 def usual_effects(candidates: Sequence[Candidate], torque: bool = False) -> list[Candidate]:
     """Of `candidates` those that every joint of a real robot has; `torque`: whose drives are told torques."""
     kinds = USUAL_OF_TORQUE if torque else USUAL
     return [c for c in candidates if (c.effect in kinds and c.where) or (c.effect in USUAL_OF_ROBOT and not c.where)]
-
-
-def is_whole(c: Candidate) -> bool:
-    """Whether a mass takes the moments along, as another link of the same shape would; other effects do."""
-    return c.effect != "link_mass" or c.step[1] != 0
 
 
 def fit_all_joints(
@@ -66,12 +64,10 @@ def fit_all_joints(
     some = problem.part(screening_windows(problem, rule.windows))
     small = problem.plant.model.nv <= rule.small_robot and not problem.plant.floating
     steps = rule.steps_of_small if small else rule.steps
-    fit = _simplest(some, _sets(usual, candidates), steps)
+    loads = link_load(some, candidates) if small else ()
+    fit = _simplest(some, loads, _sets(usual, candidates, loads), steps)
     if found.chosen:
-        there = {(c.effect, c.where) for c in found.chosen}
-        chosen = [*found.chosen, *(c for c in usual if (c.effect, c.where) not in there)]
-        values = np.concatenate((found.values, *(c.nominal for c in chosen[len(found.chosen) :])))
-        fit = _better(some, fit, _large_residual_fit(some, chosen, values, steps))
+        fit = _better(some, fit, large_residual_fit(some, *_beside(found, usual), steps))
     say(f"{len(fit.chosen)} usual effects together: chi-square {fit.power(some):.3g}")
     if fit.power(some) >= below:
         return None
@@ -82,24 +78,35 @@ def fit_all_joints(
     return _sure_by_misfit(problem, fit)
 
 
-def _sets(usual: Sequence[Candidate], candidates: Sequence[Candidate]) -> list[list[Candidate]]:
-    """Usual effects at the declared strength of every drive; with strengths; with servos' `kp` in their place."""
+def _sets(usual: Sequence[Candidate], candidates: Sequence[Candidate], loads: Sequence[Fit]) -> list[list[_Begun]]:
+    """Usual effects at every drive's declared strength; beside a load; with strengths; with servos' `kp` for those.
+
+    A centre of mass begins where it is declared: alone it may have taken the place of what a joint lacks.
+    """
     declared = [c for c in usual if c.effect != _STRENGTH]
     gains = [c for c in candidates if c.effect == _GAIN]
+    beside = [_beside(loads[0], [*load.chosen[1:], *declared]) for load in loads]
     sets = [declared, list(usual), [*declared, *gains] if gains else []]
-    return [s for k, s in enumerate(sets) if s and s not in sets[:k]]
+    first, *rest = [[(s, absent(s))] for k, s in enumerate(sets) if s and s not in sets[:k]]
+    return [first, beside, *rest]
 
 
-def _simplest(problem: Problem, sets: Sequence[Sequence[Candidate]], steps: int) -> Fit:
-    """The fit from the declared values on of the first set that leaves little, or of one that leaves much less."""
-    best = None
-    for chosen in sets:
-        fit = _large_residual_fit(problem, chosen, np.concatenate([c.nominal for c in chosen]), steps)
-        best = fit if best is None else _better(problem, best, fit)
-        if best.power(problem) < problem.thresholds.selection.proposals.all_joints.still_off:
+def _beside(fit: Fit, others: Sequence[Candidate]) -> _Begun:
+    """The effects of a fit where they are, and others from where they are absent."""
+    there = {(c.effect, c.where) for c in fit.chosen}
+    more = [c for c in others if (c.effect, c.where) not in there]
+    return [*fit.chosen, *more], np.concatenate((fit.values, absent(more)))
+
+
+def _simplest(problem: Problem, loads: Sequence[Fit], sets: Sequence[Sequence[_Begun]], steps: int) -> Fit:
+    """A load alone that leaves little, else the first sets that do, or what leaves much less than all before it."""
+    rule, better = problem.thresholds.selection.proposals.all_joints, partial(_better, problem)
+    fits = list(loads)
+    for several in sets:
+        if fits and reduce(better, fits).power(problem) < rule.still_off:
             break
-    assert best is not None
-    return best
+        fits += [large_residual_fit(problem, *begun, steps) for begun in several]
+    return reduce(better, fits)
 
 
 def _better(problem: Problem, simple: Fit, other: Fit) -> Fit:
@@ -114,53 +121,9 @@ def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Ca
     bodies = [c for c in bodies if not is_chosen(c, fit.chosen)]
     if not bodies or fit.power(problem) < rule.still_off:
         return fit
-    values = np.concatenate((fit.values, *(c.nominal for c in bodies)))
-    larger = _large_residual_fit(problem, [*fit.chosen, *bodies], values, rule.steps_with_links)
+    larger = large_residual_fit(problem, *_beside(fit, bodies), rule.steps_with_links)
     say(f"{len(larger.chosen)} with {bodies[0].effect} on all links: chi-square {larger.power(problem):.3g}")
     return _better(problem, fit, larger)
-
-
-def _large_residual_fit(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int) -> Fit:
-    """A fit from values (P,) with large residuals: Levenberg's and Marquardt's steps, windows weighed anew at each."""
-    rule = problem.thresholds.selection.proposals.all_joints
-    weights = window_weights(problem.residual([effects_at(chosen, values)])[0])
-    fit = gauss_newton(problem, chosen, values, weights, iterations=0, coarse=True)
-    damping, moving = rule.damping, np.flatnonzero(fit.scales)
-    at = np.tile(fit.values, (len(moving), 1))
-    for _ in range(steps):
-        weights = window_weights(fit.clean(problem))
-        cost = cost_of(problem, fit.residual, weights)[0]
-        while damping < rule.most_damping:
-            trial = _moved(problem, fit, weights, damping)
-            residual = problem.residual([effects_at(chosen, trial)])[0]
-            new, nuisance = cost_of(problem, residual, weights)
-            if new < cost:
-                break
-            damping *= rule.more_damping
-        else:
-            break
-        columns = columns_at(problem, chosen, trial, fit.scales, True, fit.columns, at)
-        fit = Fit(fit.chosen, trial, nuisance, residual, columns, new)
-        damping = max(rule.less_damping * damping, rule.damping)
-        if new > rule.settled * cost:
-            break
-    return fit
-
-
-def _moved(problem: Problem, fit: Fit, weights: np.ndarray, damping: float) -> np.ndarray:
-    """Values (P,) after one step; what the data hardly tell stays within ten changes that matter of where it is."""
-    rule = problem.thresholds.selection.proposals.all_joints
-    basis, _ = project(problem, fit.columns, weights)
-    flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
-    normal, count = flat @ flat.T, len(problem.nuisance)
-    own = np.arange(len(normal))
-    power = max(float((weights[:, None] * fit.clean(problem) ** 2).mean()), 1.0)
-    normal[own[:count], own[:count]] += problem.prior
-    normal[own[count:], own[count:]] += damping * normal[own[count:], own[count:]] + power / rule.free**2
-    move = np.linalg.solve(normal, flat @ (fit.residual * np.sqrt(weights)[:, None]).ravel())[count:]
-    values = fit.values.copy()
-    values[fit.scales > 0] += move * fit.scales[fit.scales > 0]
-    return clipped(fit.chosen, values)
 
 
 def _sure_of(problem: Problem, fit: Fit) -> Fit | None:

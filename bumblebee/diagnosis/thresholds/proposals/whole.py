@@ -31,6 +31,8 @@ class AllJoints:
     """Rounds of fitting on all windows and taking out what is not sure there."""
     small_robot: int = 12
     """Degrees of freedom up to which a robot is small; of these the links are asked, too."""
+    load_leaves: float = 0.5
+    """Share of the declared model's median chi-square below which a load on one link is worth a place beside others."""
     still_off: float = 2.0
     """Median chi-square beside the joints' effects, from which on they are, and strengths and gains before them."""
 

@@ -1,0 +1,57 @@
+"""A fit that begins far from the data, where slopes at the beginning lead astray: Levenberg's and Marquardt's steps."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates import Candidate, clipped, effects_at
+from bumblebee.diagnosis.estimation import Fit, columns_at, cost_of, gauss_newton, project
+from bumblebee.diagnosis.residuals import Problem, window_weights
+
+
+def absent(chosen: Sequence[Candidate]) -> np.ndarray:
+    """Values (P,) at which the effects are absent; what shapes them is at its start: a mass takes its moments along."""
+    return np.concatenate([c.moved(0, 0) for c in chosen]) if chosen else np.empty(0)
+
+
+def large_residual_fit(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int) -> Fit:
+    """A fit from values (P,) with large residuals: Levenberg's and Marquardt's steps, windows weighed anew at each."""
+    rule = problem.thresholds.selection.proposals.all_joints
+    weights = window_weights(problem.residual([effects_at(chosen, values)])[0])
+    fit = gauss_newton(problem, chosen, values, weights, iterations=0, coarse=True)
+    damping, moving = rule.damping, np.flatnonzero(fit.scales)
+    at = np.tile(fit.values, (len(moving), 1))
+    for _ in range(steps):
+        weights = window_weights(fit.clean(problem))
+        cost = cost_of(problem, fit.residual, weights)[0]
+        while damping < rule.most_damping:
+            trial = _moved(problem, fit, weights, damping)
+            residual = problem.residual([effects_at(chosen, trial)])[0]
+            new, nuisance = cost_of(problem, residual, weights)
+            if new < cost:
+                break
+            damping *= rule.more_damping
+        else:
+            break
+        columns = columns_at(problem, chosen, trial, fit.scales, True, fit.columns, at)
+        fit = Fit(fit.chosen, trial, nuisance, residual, columns, new)
+        damping = max(rule.less_damping * damping, rule.damping)
+        if new > rule.settled * cost:
+            break
+    return fit
+
+
+def _moved(problem: Problem, fit: Fit, weights: np.ndarray, damping: float) -> np.ndarray:
+    """Values (P,) after one step; what the data hardly tell stays within ten changes that matter of where it is."""
+    rule = problem.thresholds.selection.proposals.all_joints
+    basis, _ = project(problem, fit.columns, weights)
+    flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
+    normal, count = flat @ flat.T, len(problem.nuisance)
+    own = np.arange(len(normal))
+    power = max(float((weights[:, None] * fit.clean(problem) ** 2).mean()), 1.0)
+    normal[own[:count], own[:count]] += problem.prior
+    normal[own[count:], own[count:]] += damping * normal[own[count:], own[count:]] + power / rule.free**2
+    move = np.linalg.solve(normal, flat @ (fit.residual * np.sqrt(weights)[:, None]).ravel())[count:]
+    values = fit.values.copy()
+    values[fit.scales > 0] += move * fit.scales[fit.scales > 0]
+    return clipped(fit.chosen, values)

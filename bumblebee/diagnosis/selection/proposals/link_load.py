@@ -1,0 +1,42 @@
+"""One link heavier than declared, asked by itself: a tool or a load that the model does not have.
+
+A load at the end of an arm makes all its servos late and low, as gains of half would, and far from the declared model
+no slope says which. Each link's mass is fitted alone, its moments with it, and then the best with its centre of mass.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.estimation import Fit, typical_power
+from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.selection.proposals.large_residual_fit import absent, large_residual_fit
+
+
+def link_load(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Fit, ...]:
+    """The mass of the link that leaves least, and the same with its centre of mass, if it leaves much still.
+
+    None where no link takes away much of what the declared model leaves.
+    """
+    rule = problem.thresholds.selection.proposals.all_joints
+    masses = [c for c in candidates if c.effect == "link_mass" and is_whole(c)]
+    alone = [large_residual_fit(problem, [c], absent([c]), rule.steps) for c in masses]
+    most = rule.load_leaves * typical_power(problem.residual([[]])[0])
+    best = min(alone, key=lambda fit: fit.power(problem), default=None)
+    if best is None or best.power(problem) >= most:
+        return ()
+    return (best,) if best.power(problem) < rule.still_off else (best, *_with_centre(problem, best, candidates))
+
+
+def is_whole(c: Candidate) -> bool:
+    """Whether a mass takes the moments along, as another link of the same shape would; other effects do."""
+    return c.effect != "link_mass" or c.step[1] != 0
+
+
+def _with_centre(problem: Problem, fit: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
+    """The same with the centre of mass free, where there is one."""
+    rule = problem.thresholds.selection.proposals.all_joints
+    centres = [c for c in candidates if (c.effect, c.where) == ("link_com", fit.chosen[0].where)]
+    values = [np.concatenate((fit.values, absent([c]))) for c in centres]
+    return [large_residual_fit(problem, [*fit.chosen, c], v, rule.steps) for c, v in zip(centres, values, strict=True)]
