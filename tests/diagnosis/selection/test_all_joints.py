@@ -109,7 +109,9 @@ def _run_with_one_effect(power: float, whitened_at: float) -> Any:
         fit=SimpleNamespace(chosen=("one",)),
         rule=thresholds.selection.forward,
         config=SearchConfig(),
-        problem=SimpleNamespace(thresholds=thresholds),
+        problem=SimpleNamespace(
+            thresholds=thresholds, plant=SimpleNamespace(model=SimpleNamespace(nv=29), floating=True)
+        ),
         holdout=None,
         candidates=[],
         say=lambda text: None,

@@ -62,7 +62,7 @@ def fit_all_joints(
     if not usual:
         return None
     some = problem.part(screening_windows(problem, rule.windows))
-    small = problem.plant.model.nv <= rule.small_robot and not problem.plant.floating
+    small = _is_small(problem)
     steps = rule.steps_of_small if small else rule.steps
     loads = link_load(some, candidates) if small else ()
     fit = _simplest(some, loads, _sets(usual, candidates, loads), steps)
@@ -76,6 +76,12 @@ def fit_all_joints(
     if fit.power(some) < rule.still_off:
         return _sure_of(problem, drop_unsure(some, fit, window_weights(fit.clean(some))))
     return _sure_by_misfit(problem, fit)
+
+
+def _is_small(problem: Problem) -> bool:
+    """Whether a robot's links can be asked all at once."""
+    most = problem.thresholds.selection.proposals.all_joints.small_robot
+    return problem.plant.model.nv <= most and not problem.plant.floating
 
 
 def _sets(usual: Sequence[Candidate], candidates: Sequence[Candidate], loads: Sequence[Fit]) -> list[list[_Begun]]:
@@ -188,12 +194,13 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
 
     Only if the last of these explained little, or they are very large: else the next may explain the rest. Where the
     windows were whitened far from here they are whitened anew first, and that may be all there is to it. If no effect
-    helps any more (`stuck`), very large residuals are enough.
+    helps any more (`stuck`), large residuals of a small robot are enough, or very large ones.
     """
     power = run.power()
     enough = 1 if power >= run.rule.many_at_once else run.rule.many_after
     early = len(run.fit.chosen) < enough or (run.fall >= run.rule.many_little and power < run.config.far)
-    if run.tried_many or run.given or power < run.config.many or (power < run.config.far if stuck else early):
+    far = run.config.many if _is_small(run.problem) else run.config.far
+    if run.tried_many or run.given or power < run.config.many or (power < far if stuck else early):
         return False
     if run.power() < run.rule.whiten_anew * run.whitened_at:
         _start_anew(run, *whitened_anew(run.problem, run.holdout, run.fit))
