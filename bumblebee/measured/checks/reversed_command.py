@@ -51,8 +51,7 @@ class _Torque:
         rollout, gains = view.rollout, servo_gains(view.model)
         self.by_target = by_target
         self.command = view.values("joint_target" if by_target else "joint_torque_cmd")
-        pairs = np.array([gains.get(name, (0.0, 0.0)) for name in rollout.joints]) * _gears(view)[:, None] ** 2
-        self.kp, self.kd = pairs.T
+        self.kp, self.kd = np.array([gains.get(name, (0.0, 0.0)) for name in rollout.joints]).T
         self.limit = _limits(view)
         self.known = self.kp > 0 if by_target else np.ones(len(rollout.joints), dtype=bool)
 
@@ -70,11 +69,6 @@ def _drives(view: View) -> list[int]:
         if int(model.actuator_trntype[a]) == int(mujoco.mjtTrn.mjTRN_JOINT):
             on.setdefault(int(model.actuator_trnid[a, 0]), a)
     return [on.get(j, -1) for j in view.joint_ids()]
-
-
-def _gears(view: View) -> np.ndarray:
-    """(J,) of the drives; 1 for none."""
-    return np.array([view.model.actuator_gear[a, 0] if a >= 0 else 1.0 for a in _drives(view)])
 
 
 def _limits(view: View) -> np.ndarray:
