@@ -57,7 +57,9 @@ def diagnose(
     held: Annotated[
         str | None, typer.Option("--hold-out", help="Rollouts that take no part: NAME=VALUE[,VALUE] of a condition.")
     ] = None,
-    max_windows: Annotated[int, typer.Option(min=8, help="Windows that take part in the fit.")] = 120,
+    max_windows: Annotated[
+        int | None, typer.Option(min=8, help="Windows that take part in the fit; 120, and 40 with --quick.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the perturbed starts.")] = 0,
 ) -> None:
     """Find which effect the model lacks, add it, and report the error before and after."""
@@ -66,19 +68,21 @@ def diagnose(
     from bumblebee.diagnosis.diagnose import diagnose
     from bumblebee.diagnosis.output import write_diagnosis
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
-    from bumblebee.diagnosis.quick import first_look, told
+    from bumblebee.diagnosis.quick import QuickConfig, first_look, told
     from bumblebee.diagnosis.report import examples, plot, summary
 
     held_out = read_held_out(held) if held else None
     if quick:
         if out is not None:
             raise BadInput("--out", "no folder with --quick, which writes nothing", str(out))
-        print(told(first_look(open_session(model, dataset, None, held_out), DiagnosisConfig(seed=seed), say=_teller())))
+        work = QuickConfig() if max_windows is None else QuickConfig(windows=max_windows)
+        session = open_session(model, dataset, None, held_out)
+        print(told(first_look(session, DiagnosisConfig(seed=seed), work, _teller())))
         return
     if out is None:
         raise BadInput("--out", "a folder for the diagnosis, or --quick", "neither")
     claim_folder(out, DIAGNOSIS, overwrite, inputs_of(model, dataset))
-    config = DiagnosisConfig(max_windows=max_windows, seed=seed)
+    config = DiagnosisConfig(seed=seed) if max_windows is None else DiagnosisConfig(seed=seed, max_windows=max_windows)
     session = open_session(model, dataset, config.thresholds.dataset, held_out)
     result = diagnose(session, config, _teller())
     print(summary(result.document, result.problem.thresholds.report))  # said first: the disk may fail now

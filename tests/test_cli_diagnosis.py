@@ -58,6 +58,18 @@ def test_a_first_look_writes_nothing(data: Path, capsys: pytest.CaptureFixture[s
     assert run("diagnose", data / "model.xml", data / "set") == 2
 
 
+def test_a_first_look_takes_as_many_windows_as_are_asked_for(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    time = np.arange(500) / 50
+    q, v = 0.2 * np.sin(3 * time)[:, None], 0.6 * np.cos(3 * time)[:, None]
+    for name in ("a", "b"):
+        place = data / "long" / "rollouts" / f"{name}.parquet"
+        write_rollout(place, Rollout(name, ("j",), 50.0, time, q, v, joint_target=q))
+    command = ("diagnose", data / "model.xml", data / "long", "--quick")
+    for options, count in ((("--max-windows", "8"), 8), ((), 40)):
+        assert run(*command, *options) == 0
+        assert f"] {count} windows of 0.2 s" in capsys.readouterr().out
+
+
 def test_replay_and_gap_end_well(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Both write the error block, by horizon."""
     assert run("replay", data / "model.xml", data / "set", "--out", data / "errors.json") == 0

@@ -48,6 +48,8 @@ class FirstLook:
     """(effect, place, parameter) -> unit."""
     notes: list[str]
     """Of the dataset (what was set aside), and models and steps of the search that failed."""
+    warnings: tuple[str, ...] = ()
+    """What must not be overlooked in the dataset."""
 
 
 def first_look(
@@ -69,7 +71,8 @@ def first_look(
         for p in CATALOGUE[c.effect].parameters
     }
     notes = [*material.session.notes, *plant.failures.notes(quick.notes)]
-    return FirstLook(config.horizon, _errors(material, quick.joints), found, bound, units, notes)
+    errors = _errors(material, quick.joints)
+    return FirstLook(config.horizon, errors, found, bound, units, notes, material.session.warnings)
 
 
 def _errors(material: Material, most: int) -> list[tuple[str, float, str]]:
@@ -84,7 +87,8 @@ def _errors(material: Material, most: int) -> list[tuple[str, float, str]]:
 
 def told(look: FirstLook) -> str:
     """A first look as text."""
-    lines = [f"declared model, after {look.horizon:g} s, the joints that are furthest off:"]
+    lines = [f"WARNING: {text}" for text in look.warnings]
+    lines += [f"declared model, after {look.horizon:g} s, the joints that are furthest off:"]
     lines += [f"  {joint:<28} {1e3 * error:.3g} m{unit}" for joint, error, unit in look.errors]
     notes = [f"note: {note}" for note in look.notes]
     if not look.leads:

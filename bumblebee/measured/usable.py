@@ -1,5 +1,7 @@
 """Whether a rollout may be learned from, outside the loop, where no intake has looked at it: the contract's checks."""
 
+from dataclasses import dataclass
+
 import mujoco
 
 from bumblebee.errors import BadInput
@@ -7,17 +9,37 @@ from bumblebee.measured.checks import Finding, check_rollout
 from bumblebee.measured.rollout import Rollout
 
 
-def review(rollout: Rollout, model: mujoco.MjModel, file: str = "") -> tuple[BadInput | None, list[str]]:
-    """Why a rollout cannot be used (None: it can), and what a person should know of it, one line each.
+@dataclass(frozen=True)
+class Review:
+    """What the checks say of one rollout."""
+
+    findings: tuple[Finding, ...]
+
+    @property
+    def fatal(self) -> list[Finding]:
+        """Why it cannot be used; empty where it can."""
+        return [finding for finding in self.findings if finding.fatal]
+
+    @property
+    def refused(self) -> BadInput | None:
+        """The first reason, as an error; None where it can be used."""
+        return refusal(self.fatal[0]) if self.fatal else None
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a person should know of it, one line each."""
+        return [finding.message for finding in self.findings if not finding.fatal]
+
+
+def review(rollout: Rollout, model: mujoco.MjModel, file: str = "") -> Review:
+    """What the checks say of a rollout.
 
     Args:
         rollout: as read.
         model: the declared model.
         file: the name that the lines carry; the rollout's own by default.
     """
-    findings = check_rollout(rollout, model, file=file)
-    fatal = next((finding for finding in findings if finding.fatal), None)
-    return None if fatal is None else refusal(fatal), [f.message for f in findings if not f.fatal]
+    return Review(tuple(check_rollout(rollout, model, file=file)))
 
 
 def refusal(finding: Finding) -> BadInput:

@@ -29,3 +29,11 @@ def test_a_model_that_lacks_nothing_gets_no_lead() -> None:
     assert "no effect of the catalogue is sure alone" in told(look)
     failed = replace(look, notes=["not tried: armature on j1"])
     assert told(failed).endswith("note: not tried: armature on j1")
+
+
+def test_an_effect_in_one_place_is_one_lead() -> None:
+    """A heavier link is tested by its mass alone and with its inertia: both explain it."""
+    look = first_look(arm.session_of(arm.simulate({("link_mass", "l3"): 1.2}, seed=3)), CONFIG)
+    places = [(lead.candidate.effect, lead.candidate.where) for lead in look.leads]
+    assert ("link_mass", "l3") in places
+    assert len(set(places)) == len(places)

@@ -303,7 +303,7 @@ def test_a_review_names_file_column_row_and_rule() -> None:
     rollout = arm_rollout(0, size=0.8)
     place = rollout.joint_pos.copy()
     place[7, 0] = np.inf
-    refused, _ = review(replace(rollout, joint_pos=place), model_of(rollout), "run7.parquet")
+    refused = review(replace(rollout, joint_pos=place), model_of(rollout), "run7.parquet").refused
     assert str(refused).startswith(f"run7.parquet: column joint_pos[{rollout.joints[0]}], row 7: rule finite")
-    accepted, warnings = review(rollout, model_of(rollout))
-    assert accepted is None and warnings == []
+    good = review(rollout, model_of(rollout))
+    assert good.refused is None and good.warnings == []

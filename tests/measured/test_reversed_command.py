@@ -79,3 +79,17 @@ def test_the_model_tells_a_joint_that_is_truly_reversed(servo: bool, joint: int)
 def test_a_reversed_target_beside_a_tumbling_neighbour_is_refused() -> None:
     refused = [signs(reversed_in(record(seed, True), 0), True) for seed in range(3)]
     assert all(any(f.fatal and "turn" in f.column for f in found) for found in refused)
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_servo_before_a_gear_is_the_servo_behind_it(joint: int) -> None:
+    """Its gains at the joint are those at the motor times the square of the gear; they were, twice."""
+    text = TURNTABLE.replace(
+        "DRIVES", "".join(f'<position joint="{name}" gear="20" kp=".01" kv=".00025"/>' for name in JOINTS)
+    )
+    geared = mujoco.MjModel.from_xml_string(text)
+    for rollout in (record(0, True), reversed_in(record(0, True), joint)):
+        plain, before = (
+            share_for_reversed(View("r", rollout, m, None, Thresholds()), joint, True) for m in (model(True), geared)
+        )
+        assert before == pytest.approx(plain)

@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from bumblebee.diagnosis.dataset.conventions import wrong_conventions
 from bumblebee.diagnosis.dataset.held_out import HeldOut, condition_notes, split_by
 from bumblebee.diagnosis.dataset.noise import estimate_noise
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
@@ -69,8 +70,13 @@ class Session:
 def open_session(
     model: Path, dataset: Path, thresholds: DatasetThresholds | None = None, held_out: HeldOut | None = None
 ) -> Session:
-    """Read and match a model and a dataset; rollouts are held out by motion, or by the condition `held_out`."""
-    rollouts, errors, warnings = [], [], []
+    """Read and match a model and a dataset; rollouts are held out by motion, or by the condition `held_out`.
+
+    Raises:
+        BadInput: no rollout that can be used, or one convention that is wrong in all of them.
+    """
+    rules = thresholds or DatasetThresholds()
+    errors, reviewed = [], []
     files = rollout_files(dataset)
     if not files:
         raise BadInput(Path(dataset) / "rollouts", "at least one *.parquet", "none")
@@ -82,15 +88,18 @@ def open_session(
         except BadInput as error:
             errors.append((file.stem, error))
             continue
-        refused, found = review(rollout, declared, file.name)
-        warnings += [line for line in found if "rule gains" not in line]  # a note tells what is simulated instead
-        if refused is None:
-            rollouts.append(rollout)
-        else:
+        reviewed.append((rollout, review(rollout, declared, file.name)))
+        if (refused := reviewed[-1][1].refused) is not None:
             errors.append((file.stem, refused))
+    wrong, doubts = wrong_conventions(reviewed, dataset, rules.conventions)
+    if wrong is not None:
+        raise wrong
+    rollouts = [rollout for rollout, one in reviewed if one.refused is None]
     if not rollouts:
         raise errors[0][1]
-    session = make_session(spec, rollouts, model, dataset, errors, warnings, thresholds)
+    lines = [line for _, one in reviewed for line in one.warnings if "rule gains" not in line]  # a note tells of gains
+    session = make_session(spec, rollouts, model, dataset, errors, lines, rules)
+    session = replace(session, warnings=(*session.warnings, *doubts))
     return session if held_out is None else hold_out(session, held_out)
 
 

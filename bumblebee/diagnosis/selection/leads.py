@@ -13,6 +13,7 @@ from bumblebee.diagnosis.residuals import Problem
 from bumblebee.diagnosis.selection.forward import begin
 from bumblebee.diagnosis.selection.moves import Terms, refitted
 from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.sim.effects import Effect
 
 
@@ -37,11 +38,18 @@ def leads(
     say: Callable[[str], None],
     count: int,
 ) -> tuple[list[Lead], float]:
-    """The `count` candidates whose trials cost least, the best first; and the z that each had to reach."""
+    """The `count` candidates whose trials cost least, the best first; and the z that each had to reach.
+
+    An effect in one place is one lead, by the candidate whose trial costs least, however many of its parameters are
+    tested together.
+    """
     run = begin(problem, holdout, remake, config, say)
     tried, _ = run.trials()
     found = []
-    for trial in sorted(tried, key=lambda t: t.cost)[:count]:
+    cheapest: dict[tuple[str, str], Trial] = {}
+    for trial in sorted(tried, key=lambda t: t.cost):
+        cheapest.setdefault((trial.candidate.effect, trial.candidate.where), trial)
+    for trial in list(cheapest.values())[:count]:
         start = np.concatenate((run.fit.values, trial.values))
         move = refitted(run.now, run.fit, trial.candidate, [start], Terms(run.bound, (), iterations=2))
         if move is not None:

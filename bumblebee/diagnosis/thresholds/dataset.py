@@ -16,6 +16,22 @@ class Usable:
 
 
 @dataclass(frozen=True)
+class Conventions:
+    """Of a convention (sign, unit, order) that is wrong in all rollouts, told from faults of single recordings."""
+
+    share: float = 0.5
+    """Share of the rollouts that one rule sets aside on one joint, from which on it is a convention."""
+    rollouts: int = 3
+    """Rollouts at least that it sets aside."""
+    moves: float = 0.5
+    """Times their median motion that the joint must have in a rollout that passes, to speak against it."""
+    follow_span: float = 0.1
+    """Time [s] over which changes of a position and its target are compared there, where a sign is in question."""
+    follow_correlation: float = 0.3
+    """Their correlation from which the joint is seen to follow its target."""
+
+
+@dataclass(frozen=True)
 class TimeSteps:
     """Of the steps of the simulation."""
 
@@ -168,6 +184,7 @@ class DatasetThresholds:
     """All of them."""
 
     usable: Usable = field(default_factory=Usable)
+    conventions: Conventions = field(default_factory=Conventions)
     time_steps: TimeSteps = field(default_factory=TimeSteps)
     split: Split = field(default_factory=Split)
     conditions: Conditions = field(default_factory=Conditions)

@@ -1,4 +1,4 @@
-"""How often the declared model, told a joint's command the other way round, predicts that joint better.
+"""How often the declared model, told a joint's command the other way round or in another size, predicts it better.
 
 A joint that swings with its neighbours goes against its own torque for seconds, and no regression that is linear in the
 state takes all of that away. The declared equations of motion know what neighbours, gravity and gears do. So short
@@ -23,8 +23,16 @@ def share_for_reversed(view: View, joint: int, by_target: bool) -> float | None:
     """Share of the stretches that the command reversed predicts better; None where the model cannot tell.
 
     It is 0 or nearly so where the sign is right, whatever swings the joint; 0.7 and more where the command or the joint
-    is reversed. It cannot tell on a floating base, whose contacts no log has, for a servo of unknown gains, and where
-    simulations diverge.
+    is reversed.
+    """
+    return share_for_multiple(view, joint, by_target, -1.0)
+
+
+def share_for_multiple(view: View, joint: int, by_target: bool, factor: float) -> float | None:
+    """Share of the stretches that the joint's command times `factor` predicts better than as logged.
+
+    None where the model cannot tell: on a floating base, whose contacts no log has, for a servo of unknown gains, and
+    where simulations diverge.
     """
     model = view.model
     if view.floating or min(view.joint_ids(), default=-1) < 0 or model.nq != len(view.rollout.joints):
@@ -35,7 +43,7 @@ def share_for_reversed(view: View, joint: int, by_target: bool) -> float | None:
     window = view.window(SPAN)
     starts = np.unique(np.linspace(0, view.rollout.frames - 1 - window, STRETCHES).astype(int))
     moved = view.rollout.joint_vel[starts + window, joint] - view.rollout.joint_vel[starts, joint]
-    plain, other = (_predicted(view, torque, starts, window, joint, sign) for sign in (1.0, -1.0))
+    plain, other = (_predicted(view, torque, starts, window, joint, sign) for sign in (1.0, factor))
     apart = np.abs(plain - other)
     good = np.isfinite(apart)
     if good.mean() < MATTERS or not apart[good].any():
@@ -51,9 +59,8 @@ class _Torque:
         rollout, gains = view.rollout, servo_gains(view.model)
         self.by_target = by_target
         self.command = view.values("joint_target" if by_target else "joint_torque_cmd")
-        pairs = np.array([gains.get(name, (0.0, 0.0)) for name in rollout.joints]) * _gears(view)[:, None] ** 2
-        self.kp, self.kd = pairs.T
-        self.limit = _limits(view)
+        self.kp, self.kd = np.array([gains.get(name, (0.0, 0.0)) for name in rollout.joints]).T
+        self.limit = torque_limits(view)
         self.known = self.kp > 0 if by_target else np.ones(len(rollout.joints), dtype=bool)
 
     def at(self, row: int, place: np.ndarray, speed: np.ndarray, sign: np.ndarray) -> np.ndarray:
@@ -72,13 +79,8 @@ def _drives(view: View) -> list[int]:
     return [on.get(j, -1) for j in view.joint_ids()]
 
 
-def _gears(view: View) -> np.ndarray:
-    """(J,) of the drives; 1 for none."""
-    return np.array([view.model.actuator_gear[a, 0] if a >= 0 else 1.0 for a in _drives(view)])
-
-
-def _limits(view: View) -> np.ndarray:
-    """(J,) largest torques; infinite for none."""
+def torque_limits(view: View) -> np.ndarray:
+    """(J,) largest torques of the drives at the joints [N m, N]; infinite for none."""
     model = view.model
     return np.array(
         [

@@ -12,6 +12,7 @@ from bumblebee.measured.checks.magnitude import check_magnitude
 from bumblebee.measured.checks.order import check_names, check_order
 from bumblebee.measured.checks.response import check_response
 from bumblebee.measured.checks.sign import check_velocity
+from bumblebee.measured.checks.target_scale import check_target_scale
 from bumblebee.measured.checks.thresholds import Thresholds
 from bumblebee.measured.checks.time import check_time
 from bumblebee.measured.checks.units import check_degrees, check_gains
@@ -59,6 +60,7 @@ def _check_all(view: View) -> None:
     no_clock = view.found("time-order") or view.found("time-duplicate") or other_unit
     if no_clock or view.found("finite") or rollout.frames < 4:
         return  # what follows needs numbers and a clock
+    check_target_scale(view)
     check_degrees(view)
     check_frozen(view)
     check_range(view)

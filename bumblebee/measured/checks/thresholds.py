@@ -83,6 +83,23 @@ class Thresholds:
     """Share of the tracking error that may remain under the negative target, to call a joint reversed by it."""
     follow_error: float = 0.08
     """Tracking error [rad] below which nothing is said about following."""
+    scale_slope: float = 3.0
+    """Times the positions from which targets are of another scale; gears of servos begin about there."""
+    scale_correlation: float = 0.95
+    """Correlation of positions and such targets: a servo follows either as well."""
+    scale_through_zero: float = 0.2
+    """Relative difference of the slope with and without an offset: a gear has none."""
+    scale_motion: float = 0.03
+    """Share of the joint's range, as a standard deviation, by which it must move."""
+    scale_within: float = 0.1
+    """Share of the range by which positions may lie beyond it, and targets must to be outside."""
+    scale_outside: float = 0.2
+    """Share of the rows in which the targets must be outside."""
+    scale_model: float = 0.8
+    """Share of short stretches that the declared model must predict better with the targets divided by the slope."""
+    scale_torque: float = 3.0
+    """Where the model cannot tell (a floating base): times its torque limit that the declared servo would have to give
+    in half of the rows."""
     order_motion: float = 0.05
     """Changes over 0.2 s [rad, std] of position and target from which a joint is compared with other joints."""
     order_fit: float = 0.7

@@ -12,35 +12,41 @@ _MM = ": mm?"
 
 
 def check_degrees(view: View) -> None:
-    """Positions or targets that fit the model's ranges, or each other, only after division by 57.3."""
+    """Positions or targets that fit the model's ranges, or each other, only after division by 57.3.
+
+    Targets that are another multiple of the positions are no degrees.
+    """
     ranges = view.ranges()
     for column in ("joint_pos", "joint_target"):
         values = getattr(view.rollout, column)
+        if view.found("target-scale", column):
+            continue
         if values is not None and _fits_only_as_degrees(values, ranges):
             joint = int(np.argmax(_excess(values, ranges).max(axis=0)))
             row = int(np.argmax(_excess(values, ranges)[:, joint]))
-            slide = _is_slide(view, joint)
+            slide = is_slide(view, joint)
             why = "beyond the range" if slide else "within the range only as degrees"
             thousandth = bool((_excess(values * 1e-3, ranges)[:, joint] < 0.1).all())
             _add(view, column, joint, row, f"{values[row, joint]:.4g}, {why}{_MM if slide and thousandth else ''}")
     target, place = view.rollout.joint_target, view.rollout.joint_pos
-    if target is None or view.found("degrees"):
+    if target is None or view.found("degrees") or view.found("target-scale"):
         return
     for column, ratio in (("joint_target", _rms(target) / _rms(place)), ("joint_pos", _rms(place) / _rms(target))):
         if 40 < ratio < 80 and _rms(getattr(view.rollout, column)) > 3:
             joint = int(np.argmax(np.abs(getattr(view.rollout, column)).max(axis=0)))
             other = place if column == "joint_target" else target
             own = _rms(getattr(view.rollout, column)[:, joint]) / _rms(other[:, joint])
-            hint = _MM if _is_slide(view, joint) and 500 < own < 2000 else ""
+            hint = _MM if is_slide(view, joint) and 500 < own < 2000 else ""
             _add(view, column, joint, None, f"values {ratio:.0f} times those of the other column{hint}")
 
 
 def _add(view: View, column: str, joint: int, row: int | None, came: str) -> None:
-    unit = "m, as the joint is a slide" if _is_slide(view, joint) else "radians"
+    unit = "m, as the joint is a slide" if is_slide(view, joint) else "radians"
     view.add(view.label(column, joint), row, "degrees", unit, came, fatal=True)
 
 
-def _is_slide(view: View, joint: int) -> bool:
+def is_slide(view: View, joint: int) -> bool:
+    """Whether a column's joint is a slide of the model."""
     found = view.joint_ids()[joint]
     return found >= 0 and int(view.model.jnt_type[found]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
 

@@ -10,7 +10,8 @@ ANGLES = ("rad", "deg", "turn", "m", "normalised")
 CLOCKS = ("header", "log", "publish")
 LAYOUTS = ("unitree_hg",)
 LEFT_OUT = "_"
-"""In the place of a joint: this element of the file's vectors is left out."""
+"""In the place of a joint: this element of the file's vectors is left out. In the place of a joint's command: nobody
+commands it."""
 
 DRIVE = {"kp": "J", "kd": "J", "target_vel": "J", "feed_forward": "J"}
 """What a low-level command holds beside its target: kp [N m/rad], kd [N m s/rad], velocity target [rad/s], feed-forward
@@ -23,6 +24,10 @@ COMMANDED = ("joint_target", "joint_torque_cmd", "action", *DRIVE)
 """Columns that are in force until the next command; all others are sampled states."""
 
 
+UNCOMMANDED = ("joint_target", "joint_torque_cmd")
+"""Columns in which a joint without an actuator may have `LEFT_OUT` for a name; its values are 0."""
+
+
 @dataclass(frozen=True)
 class ColumnMap:
     """Which columns of a log hold what; a CSV takes the first map of a list whose columns it has."""
@@ -33,6 +38,7 @@ class ColumnMap:
     """Column of the contract, or of `DRIVE` -> names in the file, one a joint or component; or one that holds all.
 
     Of a bag `topic:field`, of HDF5 a data set's path. Without joint_vel velocities are differences of the positions.
+    In `UNCOMMANDED` columns of a CSV `LEFT_OUT` stands for the command of a joint without an actuator.
     """
     time: tuple[str, ...] = ("time",)
     """Name of the column of time stamps; or of two, of whole seconds and of nanoseconds, as ROS stamps are."""
@@ -68,6 +74,12 @@ class ColumnMap:
     """The same, added after the factors."""
     meta: dict[str, Any] = field(default_factory=dict)
     """robot, kp, kd, notes and other metadata of the contract."""
+
+    def uncommanded(self, column: str) -> list[int]:
+        """Places of the joints whose command, in one of `UNCOMMANDED`, is not in the file."""
+        if column not in UNCOMMANDED:
+            return []
+        return [place for place, name in enumerate(self.columns.get(column, ())) if name == LEFT_OUT]
 
     def width(self, column: str) -> int:
         """Values a row of a column of `NAMED`, with the joints that are left out."""

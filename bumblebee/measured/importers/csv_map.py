@@ -14,7 +14,7 @@ import pandas as pd
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import require_real
-from bumblebee.measured.importers.column_map import SECONDS, ColumnMap
+from bumblebee.measured.importers.column_map import LEFT_OUT, SECONDS, ColumnMap
 from bumblebee.measured.importers.mapped import rollouts_of
 from bumblebee.measured.importers.source import Source, open_source, rollout_names
 from bumblebee.measured.rollout import Rollout
@@ -111,7 +111,7 @@ def _body(content: bytes) -> bytes:
 def _wanted(one: ColumnMap) -> list[str]:
     names = [
         *(() if one.hz else one.time),
-        *(name for names in one.columns.values() for name in names),
+        *(name for names in one.columns.values() for name in names if name != LEFT_OUT),
         one.episode,
         one.valid,
     ]
@@ -123,19 +123,23 @@ def _missing(one: ColumnMap, table: pd.DataFrame) -> list[str]:
 
 
 def _numbers(where: str, table: pd.DataFrame, names: tuple[str, ...], width: int) -> np.ndarray:
-    """(T, width); text that is no number is an error, an empty cell becomes NaN."""
+    """(T, width); text that is no number is an error, an empty cell becomes NaN, a column that is not there 0."""
     if len(names) == 1 and table[names[0]].dtype.kind == "O":
         first = table[names[0]].iloc[0]
         if isinstance(first, list | tuple | np.ndarray) or str(first).lstrip().startswith("["):
             return _lists(f"{where}: column {names[0]}", table[names[0]].tolist(), width)
     if len(names) != width:
         raise BadInput(f"{where}: columns {', '.join(names)}", f"{width} columns, or one of lists", str(len(names)))
-    for name in names:
+    there = [place for place, name in enumerate(names) if name != LEFT_OUT]
+    named = [names[place] for place in there]
+    for name in named:
         if table[name].dtype.kind not in "iuf":
             texts = table[name].astype(str)
             row = int(np.argmax(pd.to_numeric(texts, errors="coerce").isna()))
             raise BadInput(f"{where}: column {name}, row {row}", "a number", repr(texts.iloc[row])[:60])
-    return table[list(names)].to_numpy(dtype=np.float64, na_value=np.nan)
+    out = np.zeros((len(table), width))
+    out[:, there] = table[named].to_numpy(dtype=np.float64, na_value=np.nan)
+    return out
 
 
 def _lists(where: str, cells: Sequence[Any], width: int) -> np.ndarray:

@@ -9,7 +9,16 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_yaml
-from bumblebee.measured.importers.column_map import ANGLES, CLOCKS, LAYOUTS, LEFT_OUT, NAMED, SECONDS, ColumnMap
+from bumblebee.measured.importers.column_map import (
+    ANGLES,
+    CLOCKS,
+    LAYOUTS,
+    LEFT_OUT,
+    NAMED,
+    SECONDS,
+    UNCOMMANDED,
+    ColumnMap,
+)
 from bumblebee.measured.importers.unitree import UNITREE
 
 _STATE = "It is not guessed: state it."
@@ -47,7 +56,7 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     kept = [joint for joint in joints if joint != LEFT_OUT]
     if len(set(kept)) < len(kept) or not kept:
         raise BadInput(f"{path}: joints", "names of joints, each once", ", ".join(joints)[:200])
-    columns = _columns(f"{path}: columns", table["columns"])
+    columns = _columns(f"{path}: columns", table["columns"], kind)
     for column, names in columns.items():
         same_order(f"{path}: columns: {column}", joints, names)
     given = {"joints": joints, "columns": columns, "time": ("time",), "episode": _one_name(path, table, "episode")}
@@ -185,7 +194,7 @@ def _one_name(path: Path, table: dict[str, Any], key: str) -> str:
     return names[0]
 
 
-def _columns(where: str, table: Any) -> dict[str, tuple[str, ...]]:
+def _columns(where: str, table: Any, kind: str) -> dict[str, tuple[str, ...]]:
     """Column of the contract -> names in the file."""
     if not isinstance(table, dict):
         raise BadInput(where, "columns of the contract and names in the file", repr(table)[:60])
@@ -194,7 +203,13 @@ def _columns(where: str, table: Any) -> dict[str, tuple[str, ...]]:
         raise BadInput(where, f"columns of the contract ({', '.join(NAMED)})", repr(wrong[0])[:60])
     if "joint_pos" not in table:
         raise BadInput(where, "joint_pos", f"only {', '.join(table) or 'nothing'}")
-    return {column: _names(f"{where}: {column}", names) for column, names in table.items()}
+    columns = {column: _names(f"{where}: {column}", names) for column, names in table.items()}
+    for column, names in columns.items():
+        allowed = kind == "csv" and column in UNCOMMANDED and set(names) != {LEFT_OUT}
+        if LEFT_OUT in names and not allowed:
+            do = f"In a CSV {LEFT_OUT} stands for the command of a joint without an actuator, beside those of others."
+            raise BadInput(f"{where}: {column}", "names in the file", repr(LEFT_OUT), do)
+    return columns
 
 
 def _names(where: str, value: Any) -> tuple[str, ...]:

@@ -66,6 +66,7 @@ def _turned(column: str, value: np.ndarray, chosen: ColumnMap) -> np.ndarray:
         if column == "base_ang_vel":
             value = value * _FACTORS[chosen.gyro_unit]
         value = value * np.array(chosen.scale.get(column, (1.0,))) + np.array(chosen.offset.get(column, (0.0,)))
+    value[:, chosen.uncommanded(column)] = 0.0
     if column == "base_quat" and chosen.quat_order == "xyzw":
         return np.roll(value, 1, axis=1)
     return value

@@ -6,7 +6,8 @@ from pathlib import Path
 import mujoco
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.importers.column_map import LEFT_OUT, ColumnMap
+from bumblebee.measured.checks import driven_joints
+from bumblebee.measured.importers.column_map import LEFT_OUT, UNCOMMANDED, ColumnMap
 
 _TURNED = ("rad", "deg", "turn")
 _LISTED = "Say a unit a joint, a list, with m for slides; for mm say m, and factors of 0.001 under scale."
@@ -16,8 +17,10 @@ def require_joints(path: Path, chosen: ColumnMap, model: mujoco.MjModel | None) 
     """Refuse what the declared model contradicts; without a model nobody can tell.
 
     Raises:
-        BadInput: a joint that the model lacks, or a unit of angles for a slide or of lengths for a hinge.
+        BadInput: a joint that the model lacks, a unit of angles for a slide or of lengths for a hinge, or no command
+            for a joint that an actuator drives.
     """
+    _require_commands(path, chosen, model)
     if model is None:
         return
     _require_names(path, chosen, model)
@@ -31,6 +34,22 @@ def _require_names(path: Path, chosen: ColumnMap, model: mujoco.MjModel) -> None
             near = difflib.get_close_matches(joint, known, 1)
             do = f"The nearest is {near[0]}." if near else f"It has {', '.join(known) or 'none with a name'}."[:300]
             raise BadInput(f"{path}: joints", "joints of the model", repr(joint)[:80], do)
+
+
+def _require_commands(path: Path, chosen: ColumnMap, model: mujoco.MjModel | None) -> None:
+    """A joint whose command is not in the file is none that an actuator drives, which only the model says."""
+    driven = None if model is None else driven_joints(model)
+    for column in UNCOMMANDED:
+        for joint in (chosen.joints[place] for place in chosen.uncommanded(column)):
+            where, came = f"{path}: columns: {column}", repr(LEFT_OUT)
+            if joint == LEFT_OUT:
+                continue
+            if driven is None:
+                expected = f"the declared model beside {came}, which says that {joint} has no actuator"
+                raise BadInput(where, expected, "none", "Give the model: --model.")
+            if joint in driven:
+                do = f"Name it; {came} is for joints without an actuator."
+                raise BadInput(where, f"the column of {joint}, which an actuator of the model drives", came, do)
 
 
 def _require_units(path: Path, chosen: ColumnMap, model: mujoco.MjModel) -> None:

@@ -62,3 +62,38 @@ def test_a_joint_that_the_model_lacks_is_refused_with_the_nearest_and_nothing_is
             tmp_path / "log.csv", "csv", tmp_path / "out", tmp_path / "model.xml", tmp_path / "map.yaml"
         )  # fmt: skip
     assert not (tmp_path / "out").exists()
+
+
+PASSIVE = MAP.replace("[u, w]", "[u, _]") + "angle_unit: [m, deg]\n"
+
+
+def test_nobody_commands_a_joint_without_an_actuator(tmp_path: Path) -> None:
+    """Its target is 0 whatever scale and offset say, and no cell counts as lost."""
+    rollout = read(tmp_path, PASSIVE + "scale: {joint_target: 2}\noffset: {joint_target: [0.1, 0.3]}\n")
+    assert rollout.joint_target is not None
+    np.testing.assert_allclose(rollout.joint_target, np.tile([0.6, 0.0], (20, 1)))
+    np.testing.assert_allclose(rollout.joint_pos[0], [0.5, np.pi / 2])
+    assert "cells without a number" not in rollout.meta["notes"]
+    torques = read(tmp_path, PASSIVE.replace("joint_target", "joint_torque_cmd"))
+    assert torques.joint_torque_cmd is not None
+    np.testing.assert_allclose(torques.joint_torque_cmd, np.tile([0.25, 0.0], (20, 1)))
+
+
+def test_a_driven_joint_without_a_command_is_refused_in_one_line(tmp_path: Path) -> None:
+    driven = r"map\.yaml: columns: joint_target: expected the column of slider, which an actuator of the model drives"
+    with pytest.raises(BadInput, match=driven):
+        read(tmp_path, PASSIVE.replace("[u, _]", "[_, w]"))
+    with pytest.raises(BadInput, match=r"expected the declared model .* wrist has no actuator.*--model"):
+        read(tmp_path, PASSIVE, None)
+
+
+@pytest.mark.parametrize("change", [("[u, _]", "[_, _]"), ("[u, _]", "_"), ("[x, q]", "[x, _]")])
+def test_only_some_commands_may_be_absent(tmp_path: Path, change: tuple[str, str]) -> None:
+    with pytest.raises(BadInput, match=r"columns: joint_\w+: expected names in the file, came '_'"):
+        read(tmp_path, PASSIVE.replace(*change))
+
+
+def test_only_a_csv_may_lack_a_command(tmp_path: Path) -> None:
+    (tmp_path / "map.yaml").write_text(f"{PASSIVE}hz: 50\n")
+    with pytest.raises(BadInput, match=r"columns: joint_target: expected names in the file, came '_'"):
+        read_rollouts(tmp_path / "log.hdf5", "hdf5", mujoco.MjModel.from_xml_string(CART), tmp_path / "map.yaml")
