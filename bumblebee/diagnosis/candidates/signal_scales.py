@@ -26,7 +26,7 @@ class Scales:
     travel: np.ndarray
     """(J,) range of positions [rad]."""
     inertia: np.ndarray
-    """(J,) diagonal of the joint-space inertia [kg m^2]."""
+    """(J,) diagonal of the joint-space inertia [kg m^2], its mean over the poses logged."""
     target_rate: np.ndarray
     """(J,) largest change of the targets a second [rad/s]; 0 where torques are logged."""
     target_turn: np.ndarray
@@ -59,7 +59,7 @@ def scales_of(
         speed=np.maximum(speeds, rule.speed * speeds.max() + 1e-6),
         fastest=np.max([np.quantile(np.abs(r.joint_vel), rule.peak, axis=0) for r in rollouts], axis=0) + 1e-3,
         travel=np.max([np.ptp(r.joint_pos, axis=0) for r in rollouts], axis=0),
-        inertia=_inertia(plant),
+        inertia=_inertia(plant, rollouts, rule.rows),
         target_rate=_steepest(plant, rollouts, 1, rule),
         target_turn=_steepest(plant, rollouts, 2, rule),
         duration=float(max(r.time[-1] - r.time[0] for r in rollouts)),
@@ -87,10 +87,16 @@ def _bias(plant: Plant, rollouts: Sequence[Rollout], rows: int) -> np.ndarray:
     return np.sqrt(np.mean(np.square(found), axis=0))
 
 
-def _inertia(plant: Plant) -> np.ndarray:
-    """Diagonal of the joint-space inertia at the reference pose (J,)."""
-    data = mujoco.MjData(plant.model)
-    mujoco.mj_forward(plant.model, data)
-    full = np.zeros((plant.model.nv, plant.model.nv))
-    mujoco.mj_fullM(plant.model, data, full)
-    return np.diag(full)[plant.dof]
+def _inertia(plant: Plant, rollouts: Sequence[Rollout], rows: int) -> np.ndarray:
+    """Diagonal of the joint-space inertia (J,), its mean over poses of the rollouts.
+
+    In the reference pose of an arm that stands upright its first joint has next to none.
+    """
+    data, found, full = mujoco.MjData(plant.model), [], np.zeros((plant.model.nv, plant.model.nv))
+    for r in rollouts:
+        for k in np.linspace(0, r.frames - 1, rows).astype(int):
+            data.qpos[plant.qpos] = r.joint_pos[k]
+            mujoco.mj_forward(plant.model, data)
+            mujoco.mj_fullM(plant.model, data, full)
+            found.append(np.diag(full)[plant.dof].copy())
+    return np.mean(found, axis=0)

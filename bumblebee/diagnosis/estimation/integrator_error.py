@@ -12,13 +12,11 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
-from scipy.linalg import eigh
 
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.least_squares import project, solve
 from bumblebee.diagnosis.residuals import Problem
-from bumblebee.diagnosis.simulation import Variation, residuals, vary
-from bumblebee.sim.servo import servos_of
+from bumblebee.diagnosis.simulation import Variation, damping_rates, residuals, vary
 
 
 def explained_share(problem: Problem, before: Fit, after: Fit, weights: np.ndarray) -> float:
@@ -66,33 +64,9 @@ def _differences(problem: Problem, fit: Fit) -> Iterator[np.ndarray]:
         raw = residuals(problem.plant, problem.layout, problem.windows, [other], problem.fine)[0]
         good = np.isfinite(raw).all(axis=(1, 2))
         if int(other.model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_EULER):
-            logged = problem.windows.qpos
-            own = other.model.nq == logged.shape[1]  # a gap or a shaft adds joints that no log has
-            model = other.model if own else problem.plant.model
-            good &= damping_rates(model, logged) * problem.fine < 1.0
+            good &= damping_rates(problem.plant, other, problem.windows.qpos) * problem.fine < 1.0
         if good.mean() >= problem.thresholds.estimation.integrator_error.finite:
             yield np.where(good[:, None], problem.whitener(raw) - residual, 0.0)
-
-
-def damping_rates(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
-    """The fastest rate (W,) [1/s] at which servos damp a model in configurations (W, nq).
-
-    Explicit steps of more than its inverse shake: a joint is turned round by its damping before it flies away, and what
-    they change is no simulator's error.
-    """
-    kinds = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
-    joints = [j for j in range(model.njnt) if int(model.jnt_type[j]) in kinds]
-    servos, data, inertia = servos_of(model, joints), mujoco.MjData(model), np.zeros((model.nv, model.nv))
-    damping, rates = np.zeros(model.nv), np.zeros(len(qpos))
-    damping[servos.dof] = np.maximum(-servos.bias[:, 2], 0.0)
-    if not damping.any():
-        return rates
-    for w, pose in enumerate(qpos):
-        data.qpos[:] = pose
-        mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fullM(model, data, inertia)
-        rates[w] = eigh(np.diag(damping), inertia, eigvals_only=True, subset_by_index=[model.nv - 1, model.nv - 1])[0]
-    return rates
 
 
 def _others(variation: Variation) -> list[Variation]:

@@ -11,8 +11,19 @@ from bumblebee.diagnosis.residuals.imu_tilt import angles, retilted, tilt_column
 from bumblebee.diagnosis.residuals.initial_state import restarted, start_moves
 from bumblebee.diagnosis.residuals.nuisances import nuisance_columns
 from bumblebee.diagnosis.residuals.whitening import NoisyWindows, Stepped, Whitener, fit_whitener
-from bumblebee.diagnosis.simulation import Layout, Plant, Recall, Windows, residuals, select, vary
+from bumblebee.diagnosis.simulation import (
+    Layout,
+    Plant,
+    Recall,
+    Variation,
+    Windows,
+    damping_rates,
+    residuals,
+    select,
+    vary,
+)
 from bumblebee.diagnosis.thresholds import Thresholds
+from bumblebee.diagnosis.thresholds.residuals import Sensitivities
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
@@ -36,6 +47,8 @@ class Problem:
     """Step [s] for sensitivities that coarse ones do not do for."""
     coarse: float
     """Step [s] for sensitivities of many candidates."""
+    coarsest: float
+    """The same where no servo damps a joint within it."""
     whitener: Whitener = field(repr=False)
     nuisance: np.ndarray = field(repr=False)
     """(5 or 6, W, M) whitened: numerical differences, and last the start noise's curvature."""
@@ -204,9 +217,10 @@ def make_problem(
     `steps` [s] are for residuals and for sensitivities, `finest` for residuals of the last fit, if these are shorter.
     The windows start as measured; the problem's start where the readings after that say they did.
     """
-    thresholds, (fine, coarse) = thresholds or Thresholds(), steps
+    thresholds, (fine, coarsest) = thresholds or Thresholds(), steps
     rules = thresholds.residuals
     variation, read = vary(plant, effects), windows
+    coarse = fine if _damped_within(plant, variation, windows, coarsest, rules.sensitivities) else coarsest
     # What a start's move does to a late servo shows in fine steps alone; else its delay would come out too short.
     step = coarse if plant.floating or rough(e.effect for e in effects) else fine
     noisy = NoisyWindows(plant, layout, read, variation, sigma, step, rules.whitening)
@@ -222,9 +236,16 @@ def make_problem(
     columns = _columns(whitener, raw)
     finest, read = fine if finest is None else finest, select(read, keep)
     return Problem(
-        plant, layout, windows, sigma, fine, finest, fine, coarse, whitener, columns, read, tilt_of(effects),
-        thresholds=thresholds,
+        plant, layout, windows, sigma, fine, finest, fine, coarse, coarsest, whitener, columns, read,
+        tilt_of(effects), thresholds=thresholds,
     )  # fmt: skip
+
+
+def _damped_within(plant: Plant, variation: Variation, windows: Windows, step: float, rule: Sensitivities) -> bool:
+    """Whether servos bring a joint to rest within `step` [s]: then it shows neither inertia nor damping."""
+    some = np.unique(np.linspace(0, len(windows) - 1, rule.poses).round().astype(int))
+    rates = damping_rates(plant, variation, windows.qpos[some])
+    return bool(np.median(rates) * step > rule.damped)
 
 
 def _refuse_divergent(keep: np.ndarray, span: float, least: float) -> None:

@@ -46,7 +46,7 @@ def _around(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:
     share = problem.thresholds.selection.final_fit.changed
     if fit.cost < share * cost_of(problem, problem.residual([[]])[0], window_weights(fit.clean(problem)))[0]:
         plant, layout, windows = problem.plant, problem.layout, problem.read
-        steps, rules = (problem.finest, problem.coarse), problem.thresholds
+        steps, rules = (problem.finest, problem.coarsest), problem.thresholds
         try:
             made = make_problem(plant, layout, windows, problem.sigma, steps, fit.effects, rng, thresholds=rules)
             return replace(made, between=problem.between)

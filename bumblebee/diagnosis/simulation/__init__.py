@@ -29,6 +29,7 @@ from bumblebee.diagnosis.simulation.readings import (
     simulated_readings,
     smallest_moves,
 )
+from bumblebee.diagnosis.simulation.servo_damping import damping_rates
 from bumblebee.diagnosis.simulation.setpoints import begin_setpoints, setpoints_of
 from bumblebee.diagnosis.simulation.simulate import (
     Starts,
@@ -75,6 +76,7 @@ __all__ = [
     "choose_starts",
     "command_inputs",
     "cut",
+    "damping_rates",
     "declared_values",
     "difference",
     "effects_in_words",

@@ -72,6 +72,17 @@ class Outliers:
 
 
 @dataclass(frozen=True)
+class Sensitivities:
+    """Of the steps that sensitivities of many candidates are simulated in."""
+
+    damped: float = 2.0
+    """Steps times the rate at which servos damp a joint, from which on they are too coarse: 0 to 1.2 on robots whose
+    models have their rotors, 0.7 to 30 on models from drawings, which have none."""
+    poses: int = 50
+    """Windows whose starts are asked for it."""
+
+
+@dataclass(frozen=True)
 class ResidualThresholds:
     """All of them."""
 
@@ -80,3 +91,4 @@ class ResidualThresholds:
     nuisances: Nuisances = field(default_factory=Nuisances)
     covariance: EmpiricalCovariance = field(default_factory=EmpiricalCovariance)
     outliers: Outliers = field(default_factory=Outliers)
+    sensitivities: Sensitivities = field(default_factory=Sensitivities)

@@ -11,7 +11,7 @@ from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.estimation.covariance import interval
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
-from bumblebee.diagnosis.estimation.integrator_error import damping_rates, moves
+from bumblebee.diagnosis.estimation.integrator_error import moves
 from bumblebee.diagnosis.report.effect_entries import _parameters
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection import final_fit as refining
@@ -100,14 +100,6 @@ def test_a_model_with_joints_of_its_own_is_asked_of_other_integrators_too(kind: 
     fit = gauss_newton(problem, chosen, chosen[0].moved(0, 1.0), np.ones(12), iterations=0)
     assert vary(problem.plant, fit.effects).model.nq > session.plant.model.nq
     assert np.isfinite(moves(problem, fit, np.ones(12))).all()
-
-
-def test_how_fast_a_servo_damps_a_joint_is_its_damping_over_the_inertia() -> None:
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><worldbody><body><joint name="j" type="slide" axis="1 0 0"/><geom size=".1" mass="2"/></body>'
-        '</worldbody><actuator><position joint="j" kp="100" kv="50"/></actuator></mujoco>'
-    )
-    assert damping_rates(model, np.zeros((3, 1))) == pytest.approx(25.0)
 
 
 def test_what_the_windows_say_nothing_of_has_no_end() -> None:

@@ -29,6 +29,7 @@ from bumblebee.diagnosis.candidates import (
 from bumblebee.diagnosis.comparison import Holdout, certainty, compare, drop_unsure, evidence
 from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, by_misfit, make_problem, screening_windows, window_weights
+from bumblebee.diagnosis.selection.proposals.joint_damping import one_damping
 from bumblebee.diagnosis.selection.proposals.large_residual_fit import absent, large_residual_fit
 from bumblebee.diagnosis.selection.proposals.link_load import is_whole, link_load
 from bumblebee.diagnosis.selection.state import SearchState
@@ -73,6 +74,9 @@ def fit_all_joints(
         return None
     for kind in USUAL_OF_BODIES if small else ():
         fit = _with_links(some, fit, [c for c in candidates if c.effect == kind and is_whole(c)], say)
+    chosen, values = one_damping(some, fit)
+    if len(chosen) < len(fit.chosen):
+        fit = large_residual_fit(some, chosen, values, rule.steps_with_links)
     if fit.power(some) < rule.still_off:
         return _sure_of(problem, drop_unsure(some, fit, window_weights(fit.clean(some))))
     return _sure_by_misfit(problem, fit)
@@ -182,7 +186,7 @@ def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
     """
     p = problem
     try:
-        steps, rng = (p.fine, p.coarse), np.random.default_rng(0)
+        steps, rng = (p.fine, p.coarsest), np.random.default_rng(0)
         made = make_problem(p.plant, p.layout, p.read, p.sigma, steps, effects, rng, p.finest, p.thresholds)
     except BadInput:  # it diverges in more than half of the windows
         return problem.relinearised(effects)

@@ -42,7 +42,11 @@ def large_residual_fit(problem: Problem, chosen: Sequence[Candidate], values: np
 
 
 def _moved(problem: Problem, fit: Fit, weights: np.ndarray, damping: float) -> np.ndarray:
-    """Values (P,) after one step; what the data hardly tell stays within ten changes that matter of where it is."""
+    """Values (P,) after one step; what the data hardly tell stays within ten changes that matter of where it is.
+
+    What would leave its bounds is held there and the others are solved for anew: their step was meant beside a friction
+    or an inertia below zero.
+    """
     rule = problem.thresholds.selection.proposals.all_joints
     basis, _ = project(problem, fit.columns, weights)
     flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
@@ -51,7 +55,15 @@ def _moved(problem: Problem, fit: Fit, weights: np.ndarray, damping: float) -> n
     power = max(float((weights[:, None] * fit.clean(problem) ** 2).mean()), 1.0)
     normal[own[:count], own[:count]] += problem.prior
     normal[own[count:], own[count:]] += damping * normal[own[count:], own[count:]] + power / rule.free**2
-    move = np.linalg.solve(normal, flat @ (fit.residual * np.sqrt(weights)[:, None]).ravel())[count:]
-    values = fit.values.copy()
-    values[fit.scales > 0] += move * fit.scales[fit.scales > 0]
-    return clipped(fit.chosen, values)
+    wanted = flat @ (fit.residual * np.sqrt(weights)[:, None]).ravel()
+    moving, move, held = np.flatnonzero(fit.scales), np.zeros(len(normal)), np.zeros(len(normal), dtype=bool)
+    while True:
+        move[~held] = np.linalg.solve(normal[~held][:, ~held], (wanted - normal[:, held] @ move[held])[~held])
+        values = fit.values.copy()
+        values[moving] += move[count:] * fit.scales[moving]
+        inside = clipped(fit.chosen, values)
+        beyond = np.concatenate((np.zeros(count, dtype=bool), inside[moving] != values[moving])) & ~held
+        if not beyond.any():
+            return inside
+        move[count:][beyond[count:]] = ((inside - fit.values)[moving] / fit.scales[moving])[beyond[count:]]
+        held |= beyond

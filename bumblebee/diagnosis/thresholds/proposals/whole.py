@@ -33,6 +33,8 @@ class AllJoints:
     """Degrees of freedom up to which a robot is small; of these the links are asked, too."""
     load_leaves: float = 0.5
     """Share of the declared model's median chi-square below which a load on one link is worth a place beside others."""
+    one_damping: float = 0.05
+    """Share by which the cost may grow where kd and a joint's viscous friction become one."""
     still_off: float = 2.0
     """Median chi-square beside the joints' effects, from which on they are, and strengths and gains before them."""
 
