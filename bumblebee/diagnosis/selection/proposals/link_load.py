@@ -1,7 +1,8 @@
 """One link heavier than declared, asked by itself: a tool or a load that the model does not have.
 
 A load at the end of an arm makes all its servos late and low, as gains of half would, and far from the declared model
-no slope says which. Each link's mass is fitted alone, its moments with it, and then the best with its centre of mass.
+no slope says which. Each link's mass is fitted alone, with its moments and without, then the best with its centre of
+mass.
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ def link_load(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Fit, .
     None where no link takes away much of what the declared model leaves.
     """
     rule = problem.thresholds.selection.proposals.all_joints
-    masses = [c for c in candidates if c.effect == "link_mass" and is_whole(c)]
+    masses = [c for c in candidates if c.effect == "link_mass"]
     alone = [large_residual_fit(problem, [c], absent([c]), rule.steps) for c in masses]
     most = rule.load_leaves * typical_power(problem.residual([[]])[0])
     best = min(alone, key=lambda fit: fit.power(problem), default=None)
