@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.estimation import Fit, typical_power
-from bumblebee.diagnosis.residuals import Problem
+from bumblebee.diagnosis.estimation import Fit, gauss_newton
+from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.proposals.large_residual_fit import absent, large_residual_fit
 
 
@@ -23,7 +23,8 @@ def link_load(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Fit, .
     rule = problem.thresholds.selection.proposals.all_joints
     masses = [c for c in candidates if c.effect == "link_mass"]
     alone = [large_residual_fit(problem, [c], absent([c]), rule.steps) for c in masses]
-    most = rule.load_leaves * typical_power(problem.residual([[]])[0])
+    declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
+    most = rule.load_leaves * declared.power(problem)
     best = min(alone, key=lambda fit: fit.power(problem), default=None)
     if best is None or best.power(problem) >= most:
         return ()
