@@ -6,7 +6,6 @@ import pytest
 from bumblebee.diagnosis.candidates import all_candidates
 from bumblebee.diagnosis.comparison import Holdout
 from bumblebee.diagnosis.config import SearchConfig
-from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints
 from bumblebee.diagnosis.selection.proposals.gain_grid import gains_by_grid, start_with_gain_grid
 from bumblebee.diagnosis.selection.proposals.link_load import link_load
 from bumblebee.diagnosis.selection.state import SearchState
@@ -50,16 +49,7 @@ def test_a_load_is_one_mass_with_or_without_friction_on_all_joints(run: SearchSt
     assert run.power() < 2.0
 
 
-def test_there_is_no_load_on_a_robot_like_its_model() -> None:
-    run = _begun({})
+@pytest.mark.parametrize("friction", [False, True])
+def test_there_is_no_load_on_a_robot_like_its_model_or_with_friction_alone(friction: bool) -> None:
+    run = _begun({("coulomb_friction", j): v for j, v in FRICTION.items()} if friction else {})
     assert link_load(run.problem, run.candidates) == ()
-
-
-def test_a_mass_that_stands_for_friction_gives_way_to_it() -> None:
-    run = _begun({("coulomb_friction", j): v for j, v in FRICTION.items()})
-    assert link_load(run.problem, run.candidates)
-    fit = fit_all_joints(run.problem, run.candidates, run.fit, lambda text: None)
-    assert fit is not None and not [c for c in fit.chosen if c.effect == "link_mass"]
-    for c in fit.chosen:
-        if c.effect == "coulomb_friction":
-            assert fit.of(c)[0] == pytest.approx(FRICTION[c.where], rel=0.1)
