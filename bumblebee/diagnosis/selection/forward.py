@@ -15,7 +15,7 @@ from bumblebee.diagnosis.comparison import Holdout, Step
 from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
-from bumblebee.diagnosis.selection.proposals.all_joints import start_with_all_joints
+from bumblebee.diagnosis.selection.proposals.all_joints import start_far_off, start_with_all_joints
 from bumblebee.diagnosis.selection.proposals.backlash import backlash_trials
 from bumblebee.diagnosis.selection.proposals.declared_scale import keep_declared_scale
 from bumblebee.diagnosis.selection.proposals.drive_grid import drive_trials
@@ -144,6 +144,9 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         if all(t.candidate.effect in SATURATIONS for t in tried):  # a limit alone does not say that slopes are none
             more, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
             tried += more
+        far = partial(start_far_off, run, min((t.cost for t in tried), default=np.inf))
+        if attempt(_ALL_JOINTS, far, _no):
+            continue
         many = not _explains_much(tried, run)
         if many and attempt(_ALL_JOINTS, partial(start_with_all_joints, run), _no):
             continue

@@ -53,7 +53,7 @@ class SearchState:
         self.rejected: list[str] = []
         self.loss: Loss | None = None
         self.given = 0
-        self.tried_many, self.patience = False, config.patience
+        self.tried_many, self.asked_far, self.patience = False, False, config.patience
         self.fall, self.whitened_at = 1.0, self.power()
         self.candidates, _ = remake([])
 

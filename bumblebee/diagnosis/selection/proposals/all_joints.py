@@ -24,10 +24,11 @@ from bumblebee.diagnosis.candidates import (
     USUAL_OF_ROBOT,
     USUAL_OF_TORQUE,
     Candidate,
+    clipped,
     is_chosen,
 )
 from bumblebee.diagnosis.comparison import Holdout, certainty, compare, drop_unsure, evidence
-from bumblebee.diagnosis.estimation import Fit, gauss_newton
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, by_misfit, make_problem, screening_windows, window_weights
 from bumblebee.diagnosis.selection.proposals.joint_damping import one_damping
 from bumblebee.diagnosis.selection.proposals.large_residual_fit import absent, large_residual_fit
@@ -38,6 +39,7 @@ from bumblebee.sim.effects import Effect
 
 _STRENGTH = "motor_strength"
 _GAIN = "kp"
+_ROTOR = "armature"
 _Begun = tuple[Sequence[Candidate], np.ndarray]
 """Effects and the values (P,) that their fit begins with."""
 
@@ -115,8 +117,23 @@ def _simplest(problem: Problem, loads: Sequence[Fit], sets: Sequence[Sequence[_B
     for several in sets:
         if fits and reduce(better, fits).power(problem) < rule.still_off:
             break
-        fits += [large_residual_fit(problem, *begun, steps) for begun in several]
+        fits += [_from_both_ends(problem, begun, steps) for begun in several]
     return reduce(better, fits)
+
+
+def _from_both_ends(problem: Problem, begun: _Begun, steps: int) -> Fit:
+    """The fit from where it begins or, if it leaves much, from rotors much heavier than the links.
+
+    A joint that hardly has an inertia follows its servo at once, and next to none does not differ from none.
+    """
+    rule = problem.thresholds.selection.proposals.all_joints
+    chosen, values = begun
+    fit = large_residual_fit(problem, chosen, values, steps)
+    heavy = np.concatenate([(rule.rotors if c.effect == _ROTOR else 0.0) * np.array(c.step) for c in chosen])
+    if fit.power(problem) < rule.still_off or not heavy.any():
+        return fit
+    other = large_residual_fit(problem, chosen, clipped(chosen, values + heavy), steps)
+    return min(fit, other, key=lambda f: f.power(problem))
 
 
 def _better(problem: Problem, simple: Fit, other: Fit) -> Fit:
@@ -215,6 +232,27 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
     fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
     rule = run.problem.thresholds.comparison.together
     if fit is None or not compare(run.problem, run.holdout, run.fit, fit).passes(rule):
+        return False
+    begin_with(run, fit)
+    return True
+
+
+def start_far_off(run: SearchState, least: float) -> bool:
+    """Begin with the usual effects of all joints of a small robot that is far from the data; whether it did.
+
+    Only before anything is found, where they leave next to nothing, and where no single effect comes near: the cheapest
+    that was tried costs `least`. One effect after the other leads into a by-way where every joint errs by factors.
+    """
+    rule, declared = run.problem.thresholds.selection.proposals.all_joints, run.power()
+    if run.asked_far or run.fit.chosen or declared < run.config.far or not _is_small(run.problem):
+        return False
+    run.asked_far = True
+    fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
+    if fit is None or fit.power(run.problem) >= max(rule.still_off, rule.next_to_nothing * declared):
+        return False
+    if cost_of(run.problem, fit.residual, run.weights)[0] >= rule.nearer * least:
+        return False
+    if not compare(run.problem, run.holdout, run.fit, fit).passes(run.problem.thresholds.comparison.together):
         return False
     begin_with(run, fit)
     return True

@@ -33,6 +33,12 @@ class AllJoints:
     """Degrees of freedom up to which a robot is small; of these the links are asked, too."""
     load_leaves: float = 0.5
     """Share of the declared model's median chi-square below which a load on one link is worth a place beside others."""
+    rotors: float = 30.0
+    """Steps of the armatures from which the way is gone a second time: three times the links' inertia."""
+    next_to_nothing: float = 0.02
+    """Share of the declared model's median chi-square that they must leave less of, to begin the search with them."""
+    nearer: float = 0.3
+    """Share of the cost that the best single effect leaves, which they must leave less of."""
     one_damping: float = 0.05
     """Share by which the cost may grow where kd and a joint's viscous friction become one."""
     still_off: float = 2.0
