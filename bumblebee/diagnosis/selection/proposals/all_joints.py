@@ -8,8 +8,9 @@ drives' strengths are free only where the data need them: a servo's strength, it
 one common factor nearly as a torque drive's do (`declared_scale`). Of a small robot a load on one link is asked first,
 by itself and then beside them (`link_load`): it weakens all drives as far as these can tell. Where residuals stay large
 masses and centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows
-that took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It begins so
-only in the place of gains far from the declared ones (`gain_grid`).
+that took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It begins so in
+the place of gains far from the declared ones (`gain_grid`), and on a small robot far from the data where they leave
+next to nothing and no single effect comes near.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,7 +33,7 @@ from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, by_misfit, make_problem, screening_windows, window_weights
 from bumblebee.diagnosis.selection.proposals.joint_damping import one_damping
 from bumblebee.diagnosis.selection.proposals.large_residual_fit import absent, large_residual_fit
-from bumblebee.diagnosis.selection.proposals.link_load import is_whole, link_load
+from bumblebee.diagnosis.selection.proposals.link_load import link_load
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
@@ -48,6 +49,11 @@ def usual_effects(candidates: Sequence[Candidate], torque: bool = False) -> list
     """Of `candidates` those that every joint of a real robot has; `torque`: whose drives are told torques."""
     kinds = USUAL_OF_TORQUE if torque else USUAL
     return [c for c in candidates if (c.effect in kinds and c.where) or (c.effect in USUAL_OF_ROBOT and not c.where)]
+
+
+def is_whole(c: Candidate) -> bool:
+    """Whether a mass takes the moments along, as another link of the same shape would; other effects do."""
+    return c.effect != "link_mass" or c.step[1] != 0
 
 
 def fit_all_joints(
@@ -91,13 +97,10 @@ def _is_small(problem: Problem) -> bool:
 
 
 def _sets(usual: Sequence[Candidate], candidates: Sequence[Candidate], loads: Sequence[Fit]) -> list[list[_Begun]]:
-    """Usual effects at every drive's declared strength; beside a load; with strengths; with servos' `kp` for those.
-
-    A centre of mass begins where it is declared: alone it may have taken the place of what a joint lacks.
-    """
+    """Usual effects at every drive's declared strength; beside a load; with strengths; with servos' `kp` for those."""
     declared = [c for c in usual if c.effect != _STRENGTH]
     gains = [c for c in candidates if c.effect == _GAIN]
-    beside = [_beside(loads[0], [*load.chosen[1:], *declared]) for load in loads]
+    beside = [_beside_load(load, declared) for load in loads]
     sets = [declared, list(usual), [*declared, *gains] if gains else []]
     first, *rest = [[(s, absent(s))] for k, s in enumerate(sets) if s and s not in sets[:k]]
     return [first, beside, *rest]
@@ -108,6 +111,16 @@ def _beside(fit: Fit, others: Sequence[Candidate]) -> _Begun:
     there = {(c.effect, c.where) for c in fit.chosen}
     more = [c for c in others if (c.effect, c.where) not in there]
     return [*fit.chosen, *more], np.concatenate((fit.values, absent(more)))
+
+
+def _beside_load(load: Fit, others: Sequence[Candidate]) -> _Begun:
+    """The mass where it is, and others from where they are absent.
+
+    Its centre among these: fitted without them it may have taken the place of what a joint lacks.
+    """
+    mass, *centre = load.chosen
+    more = [*centre, *others]
+    return [mass, *more], np.concatenate((load.of(mass), absent(more)))
 
 
 def _simplest(problem: Problem, loads: Sequence[Fit], sets: Sequence[Sequence[_Begun]], steps: int) -> Fit:
@@ -122,7 +135,7 @@ def _simplest(problem: Problem, loads: Sequence[Fit], sets: Sequence[Sequence[_B
 
 
 def _from_both_ends(problem: Problem, begun: _Begun, steps: int) -> Fit:
-    """The fit from where it begins or, if it leaves much, from rotors much heavier than the links.
+    """The fit from where it begins or, if a small robot's leaves much, from rotors much heavier than the links.
 
     A joint that hardly has an inertia follows its servo at once, and next to none does not differ from none.
     """
@@ -130,7 +143,7 @@ def _from_both_ends(problem: Problem, begun: _Begun, steps: int) -> Fit:
     chosen, values = begun
     fit = large_residual_fit(problem, chosen, values, steps)
     heavy = np.concatenate([(rule.rotors if c.effect == _ROTOR else 0.0) * np.array(c.step) for c in chosen])
-    if fit.power(problem) < rule.still_off or not heavy.any():
+    if fit.power(problem) < rule.still_off or not heavy.any() or not _is_small(problem):
         return fit
     other = large_residual_fit(problem, chosen, clipped(chosen, values + heavy), steps)
     return min(fit, other, key=lambda f: f.power(problem))

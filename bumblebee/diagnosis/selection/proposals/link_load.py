@@ -16,24 +16,22 @@ from bumblebee.diagnosis.selection.proposals.large_residual_fit import absent, l
 
 
 def link_load(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Fit, ...]:
-    """The mass of the link that leaves least, and the same with its centre of mass, if it leaves much still.
+    """The mass of the link that leaves least, with its moments and without, and that with its centre of mass.
 
-    None where no link takes away much of what the declared model leaves.
+    One that leaves little stands alone. None where no link takes away much of what the declared model leaves.
     """
     rule = problem.thresholds.selection.proposals.all_joints
-    masses = [c for c in candidates if c.effect == "link_mass"]
-    alone = [large_residual_fit(problem, [c], absent([c]), rule.steps) for c in masses]
     declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
-    most = rule.load_leaves * declared.power(problem)
-    best = min(alone, key=lambda fit: fit.power(problem), default=None)
-    if best is None or best.power(problem) >= most:
+    masses = [c for c in candidates if c.effect == "link_mass"]
+    fits = [large_residual_fit(problem, [c], absent([c]), rule.steps) for c in masses]
+    best = min(fits, key=lambda fit: fit.power(problem), default=declared)
+    if best.power(problem) >= rule.load_leaves * declared.power(problem):
         return ()
-    return (best,) if best.power(problem) < rule.still_off else (best, *_with_centre(problem, best, candidates))
-
-
-def is_whole(c: Candidate) -> bool:
-    """Whether a mass takes the moments along, as another link of the same shape would; other effects do."""
-    return c.effect != "link_mass" or c.step[1] != 0
+    if best.power(problem) < rule.still_off:
+        return (best,)
+    where = best.chosen[0].where
+    kinds = sorted((fit for fit in fits if fit.chosen[0].where == where), key=lambda fit: -fit.values[1])
+    return (*kinds, *_with_centre(problem, best, candidates))
 
 
 def _with_centre(problem: Problem, fit: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
