@@ -95,8 +95,10 @@ def _inertia(plant: Plant, rollouts: Sequence[Rollout], rows: int) -> np.ndarray
     data, found, full = mujoco.MjData(plant.model), [], np.zeros((plant.model.nv, plant.model.nv))
     for r in rollouts:
         for k in np.linspace(0, r.frames - 1, rows).astype(int):
-            data.qpos[plant.qpos] = r.joint_pos[k]
-            mujoco.mj_forward(plant.model, data)
+            data.qpos[plant.qpos] = r.joint_pos[k] - plant.offset
+            mujoco.mj_kinematics(plant.model, data)
+            mujoco.mj_comPos(plant.model, data)
+            mujoco.mj_makeM(plant.model, data)
             mujoco.mj_fullM(plant.model, data, full)
             found.append(np.diag(full)[plant.dof].copy())
     return np.mean(found, axis=0)

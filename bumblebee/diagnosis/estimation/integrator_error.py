@@ -64,7 +64,7 @@ def _differences(problem: Problem, fit: Fit) -> Iterator[np.ndarray]:
         raw = residuals(problem.plant, problem.layout, problem.windows, [other], problem.fine)[0]
         good = np.isfinite(raw).all(axis=(1, 2))
         if int(other.model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_EULER):
-            good &= damping_rates(problem.plant, other, problem.windows.qpos) * problem.fine < 1.0
+            good &= damping_rates(problem.plant, other, problem.windows) * problem.fine < 1.0
         if good.mean() >= problem.thresholds.estimation.integrator_error.finite:
             yield np.where(good[:, None], problem.whitener(raw) - residual, 0.0)
 
@@ -76,6 +76,7 @@ def _others(variation: Variation) -> list[Variation]:
 
 
 def _with_integrator(variation: Variation, integrator: mujoco.mjtIntegrator) -> Variation:
-    model = copy.copy(variation.model)
-    model.opt.integrator = int(integrator)
-    return replace(variation, model=model)
+    models = [copy.copy(model) for model in variation.models]
+    for model in models:
+        model.opt.integrator = int(integrator)
+    return replace(variation, model=models[0], others=tuple(models[1:]))

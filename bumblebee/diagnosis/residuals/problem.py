@@ -48,7 +48,7 @@ class Problem:
     coarse: float
     """Step [s] for sensitivities of many candidates."""
     coarsest: float
-    """The same where no servo damps a joint within it."""
+    """The longest such step: `coarse` where no servo damps a joint within it."""
     whitener: Whitener = field(repr=False)
     nuisance: np.ndarray = field(repr=False)
     """(5 or 6, W, M) whitened: numerical differences, and last the start noise's curvature."""
@@ -244,7 +244,7 @@ def make_problem(
 def _damped_within(plant: Plant, variation: Variation, windows: Windows, step: float, rule: Sensitivities) -> bool:
     """Whether servos bring a joint to rest within `step` [s]: then it shows neither inertia nor damping."""
     some = np.unique(np.linspace(0, len(windows) - 1, rule.poses).round().astype(int))
-    rates = damping_rates(plant, variation, windows.qpos[some])
+    rates = damping_rates(plant, variation, select(windows, some))
     return bool(np.median(rates) * step > rule.damped)
 
 

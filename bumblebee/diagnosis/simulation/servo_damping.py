@@ -6,17 +6,23 @@ from scipy.linalg import eigh
 
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.variation import Variation
+from bumblebee.diagnosis.simulation.windows import Windows
 from bumblebee.sim.servo import servos_of
 
 
-def damping_rates(plant: Plant, variation: Variation, qpos: np.ndarray) -> np.ndarray:
-    """The fastest rate (W,) [1/s] at which servos damp a variation of `plant` in its configurations (W, nq).
+def damping_rates(plant: Plant, variation: Variation, windows: Windows) -> np.ndarray:
+    """The fastest rate (W,) [1/s] at which servos damp a variation of `plant` where windows start.
 
     Explicit steps of more than its inverse shake: a joint is turned round by its damping before it flies away, and what
     they change is no simulator's error. Infinite where a joint has no inertia.
     """
-    own = variation.model.nq == qpos.shape[1]  # a gap or a shaft adds joints that no log has
-    return _rates(variation.model if own else plant.model, qpos)
+    own = variation.model.nq == windows.qpos.shape[1]  # a gap or a shaft adds joints that no log has
+    models = variation.models if own else tuple(p.model for p in plant.every)
+    out = np.empty(len(windows))
+    for number in np.unique(windows.condition):
+        mine = windows.condition == number
+        out[mine] = _rates(models[number], windows.qpos[mine])
+    return out
 
 
 def _rates(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:

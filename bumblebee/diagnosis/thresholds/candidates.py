@@ -24,7 +24,7 @@ class SignalScales:
     peak: float = 0.995
     """Quantile that is the largest torque or speed: a single reading may be wrong."""
     rows: int = 50
-    """Rows of a rollout at which gravity is asked for on joints without a drive."""
+    """Rows of a rollout at which inertia is asked for, and gravity on joints without a drive."""
 
 
 @dataclass(frozen=True)

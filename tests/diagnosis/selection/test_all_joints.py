@@ -142,3 +142,64 @@ def test_windows_that_were_whitened_far_from_here_are_whitened_anew_first(
     assert all_joints.start_with_all_joints(run) is not begins  # of many effects nothing came
     assert bool(tried) is begins
     assert run.tried_many is begins
+
+
+FAR = {"power": 400.0, "left": 5.0, "cost": 10.0, "least": 100.0}
+"""Of 400 less than 2 % left, at a tenth of what the best effect by itself leaves."""
+
+
+@pytest.mark.parametrize(
+    ("changed", "begins"),
+    [
+        ({}, True),
+        ({"power": 20.0, "left": 0.9}, False),  # near enough for one effect after the other
+        ({"left": 9.0}, False),
+        ({"cost": 40.0}, False),
+        ({"asked_far": True}, False),
+        ({"chosen": ("one",)}, False),
+        ({"nv": 29}, False),
+        ({"pays": False}, False),
+    ],
+)
+def test_a_small_robot_far_from_the_data_begins_with_all_joints_where_they_leave_next_to_nothing(
+    monkeypatch: pytest.MonkeyPatch, changed: dict[str, Any], begins: bool
+) -> None:
+    case = {**FAR, "asked_far": False, "chosen": (), "nv": 4, "pays": True, **changed}
+    run = _run_with_one_effect(case["power"], case["power"])
+    run.fit, run.weights, run.asked_far = SimpleNamespace(chosen=case["chosen"]), None, case["asked_far"]
+    run.problem.plant = SimpleNamespace(model=SimpleNamespace(nv=case["nv"]), floating=False)
+    fit, begun = SimpleNamespace(power=lambda problem: case["left"], residual=None), []
+    monkeypatch.setattr(all_joints, "fit_all_joints", lambda *_: fit)
+    monkeypatch.setattr(all_joints, "cost_of", lambda *_: (case["cost"], None))
+    monkeypatch.setattr(all_joints, "compare", lambda *_: SimpleNamespace(passes=lambda rule: case["pays"]))
+    monkeypatch.setattr(all_joints, "begin_with", lambda run, fit: begun.append(fit))
+    assert all_joints.start_far_off(run, case["least"]) is begins
+    assert bool(begun) is begins
+    assert not all_joints.start_far_off(run, case["least"])  # it is asked once, and only then
+
+
+@pytest.mark.parametrize(("nv", "asked"), [(4, True), (29, False)])
+def test_a_small_robot_that_nothing_brings_nearer_is_asked_for_all_joints_sooner(
+    monkeypatch: pytest.MonkeyPatch, nv: int, asked: bool
+) -> None:
+    tried: list[float] = []
+    monkeypatch.setattr(all_joints, "fit_all_joints", lambda *_: tried.append(10.0))
+    run = _run_with_one_effect(10.0, 10.0)
+    run.problem.plant = SimpleNamespace(model=SimpleNamespace(nv=nv), floating=False)
+    assert not all_joints.start_with_all_joints(run, stuck=True)
+    assert bool(tried) is asked
+
+
+def test_an_armature_is_found_from_the_other_end_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    session, problem, _ = _opened({})
+    rotor = next(c for c in all_candidates(session.plant, session.rollouts, []) if c.effect == "armature")
+    begun: list[float] = []
+
+    def fitted(problem: Problem, chosen: Any, values: np.ndarray, steps: int) -> Any:
+        begun.append(float(values[0]))
+        left = 5.0 if len(begun) == 1 else 1.0
+        return SimpleNamespace(values=values, power=lambda problem: left)
+
+    monkeypatch.setattr(all_joints, "large_residual_fit", fitted)
+    fit = all_joints._from_both_ends(problem, ([rotor], np.array(rotor.nominal)), 20)
+    assert begun[0] == rotor.nominal[0] < begun[1] == fit.values[0]

@@ -39,6 +39,16 @@ def test_friction_where_there_is_more_else_a_lower_gain(
     assert values == pytest.approx([value])
 
 
+def test_the_gain_counts_with_the_drives_strength(problem: tuple[Problem, list[Candidate]]) -> None:
+    """Half the strength is half the damping: half of that again is 1 N m s less than the drive's 2."""
+    kinds = ("motor_strength", "kd", "viscous_friction")
+    chosen = [next(c for c in problem[1] if (c.effect, c.where) == (kind, "j2")) for kind in kinds]
+    fit = gauss_newton(problem[0], chosen, [0.5, 0.5, 1.6], np.ones(len(problem[0].windows)), iterations=0)
+    left, values = one_damping(problem[0], fit)
+    assert [c.effect for c in left] == ["motor_strength", "viscous_friction"]
+    assert values == pytest.approx([0.5, 0.6])
+
+
 def test_both_stay_where_one_does_not_do_as_well(
     problem: tuple[Problem, list[Candidate]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,10 +1,13 @@
 """How fast servos damp a joint, and what it does to the steps of sensitivities."""
 
 import re
+from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
+from bumblebee.diagnosis.estimation.integrator_error import _with_integrator
 from bumblebee.diagnosis.simulation.servo_damping import _fastest, damping_rates
 from bumblebee.diagnosis.simulation.variation import vary
 from bumblebee.sim.effects import single
@@ -21,12 +24,30 @@ def test_a_joint_without_inertia_is_damped_at_once() -> None:
 
 def test_an_armature_slows_it_down_and_a_gap_is_asked_as_if_closed() -> None:
     session = arm.session_of(arm.simulate({}, count=1, seconds=2.0))
-    plant, qpos = session.plant, np.zeros((1, session.plant.model.nq))
+    problem = arm.problem_of(session, [0], 4)
     plain, slow, gap = (
-        damping_rates(plant, vary(plant, effects), qpos)[0]
+        damping_rates(session.plant, vary(session.plant, effects), problem.windows)
         for effects in ([], [single("armature", "j3", 5.0)], [single("backlash", "j3", 0.02)])
     )
-    assert slow < plain == gap
+    assert (slow < plain).all()
+    assert gap == pytest.approx(plain)
+
+
+def test_windows_are_asked_under_the_condition_that_they_were_recorded_under() -> None:
+    rollouts = [
+        replace(rollout, rollout_id=f"r{k}")
+        for k, rollout in enumerate(
+            [*arm.simulate({}, count=1, seconds=2.0), *arm.simulate({}, count=1, seconds=2.0, gains=(1.0, 3.0))]
+        )
+    ]
+    session = arm.session_of(rollouts)
+    windows = arm.problem_of(session, [0, 1], 6).windows
+    assert set(windows.condition) == {0, 1}
+    rates = damping_rates(session.plant, vary(session.plant, []), windows)
+    soft, stiff = (rates[windows.condition == number] for number in (0, 1))
+    assert stiff.min() > 2.0 * soft.max()
+    euler = _with_integrator(vary(session.plant, []), mujoco.mjtIntegrator.mjINT_EULER)
+    assert {int(model.opt.integrator) for model in euler.models} == {int(mujoco.mjtIntegrator.mjINT_EULER)}
 
 
 def test_sensitivities_are_simulated_in_fine_steps_where_a_joint_comes_to_rest_within_a_coarse_one() -> None:

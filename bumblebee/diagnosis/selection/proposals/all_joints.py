@@ -10,7 +10,7 @@ by itself and then beside them (`link_load`): it weakens all drives as far as th
 masses and centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows
 that took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It begins so in
 the place of gains far from the declared ones (`gain_grid`), and on a small robot far from the data where they leave
-next to nothing and no single effect comes near.
+next to nothing and no effect that was tried by itself comes near.
 """
 
 from collections.abc import Callable, Sequence
@@ -59,7 +59,7 @@ def is_whole(c: Candidate) -> bool:
 def fit_all_joints(
     problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None], below: float = np.inf
 ) -> Fit | None:
-    """A fit of the usual effects, from the declared values on, that are sure together.
+    """A fit of a load, the usual effects or both, from the declared values on, that are sure together.
 
     Or from those that were `found` on, together with the others, if this leads nearer to the data. The long way is
     gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot with large
@@ -77,7 +77,7 @@ def fit_all_joints(
     fit = _simplest(some, loads, _sets(usual, candidates, loads), steps)
     if found.chosen:
         fit = _better(some, fit, large_residual_fit(some, *_beside(found, usual), steps))
-    say(f"{len(fit.chosen)} usual effects together: chi-square {fit.power(some):.3g}")
+    say(f"{len(fit.chosen)} usual effects and loads together: chi-square {fit.power(some):.3g}")
     if fit.power(some) >= below:
         return None
     for kind in USUAL_OF_BODIES if small else ():
@@ -177,9 +177,12 @@ def _sure_of(problem: Problem, fit: Fit) -> Fit | None:
         fit = gauss_newton(problem, fit.chosen, fit.values, weights, 2, coarse=True, damping=rule.damping, known=known)
         sure = drop_unsure(problem, fit, window_weights(fit.clean(problem)))
         if sure.chosen == fit.chosen:
-            break
+            return fit
         known, fit = fit, sure
-    return fit
+    if not fit.chosen:
+        return None
+    weights = window_weights(problem.residual([fit.effects])[0])  # so far by slopes alone
+    return gauss_newton(problem, fit.chosen, fit.values, weights, 0, coarse=True, known=known)
 
 
 def _sure_by_misfit(problem: Problem, fit: Fit) -> Fit | None:
@@ -253,8 +256,8 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
 def start_far_off(run: SearchState, least: float) -> bool:
     """Begin with the usual effects of all joints of a small robot that is far from the data; whether it did.
 
-    Only before anything is found, where they leave next to nothing, and where no single effect comes near: the cheapest
-    that was tried costs `least`. One effect after the other leads into a by-way where every joint errs by factors.
+    Only before anything is found, where they leave next to nothing, and where no effect that was tried by itself comes
+    near: the cheapest costs `least`. One effect after the other leads into a by-way where every joint errs by factors.
     """
     rule, declared = run.problem.thresholds.selection.proposals.all_joints, run.power()
     if run.asked_far or run.fit.chosen or declared < run.config.far or not _is_small(run.problem):

@@ -27,7 +27,8 @@ def one_damping(problem: Problem, fit: Fit) -> tuple[list[Candidate], np.ndarray
             continue
         gain, friction = chosen[mine[_KIND]], chosen[mine[_FRICTION]]
         joint = int(problem.plant.model.joint(where).id)
-        declared = -float(servos_of(problem.plant.model, [joint]).bias[0, 2])
+        strength = next((float(fit.of(c)[0]) for c in chosen if (c.effect, c.where) == ("motor_strength", where)), 1.0)
+        declared = -strength * float(servos_of(problem.plant.model, [joint]).bias[0, 2])
         nominal = friction.nominal[0]
         more = (float(values[mine[_KIND]][0]) - 1.0) * declared + float(values[mine[_FRICTION]][0]) - nominal
         left, value = (friction, nominal + more) if more >= 0 or declared <= 0 else (gain, 1.0 + more / declared)

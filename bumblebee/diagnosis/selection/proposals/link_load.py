@@ -24,6 +24,7 @@ def link_load(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Fit, .
     declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
     masses = [c for c in candidates if c.effect == "link_mass"]
     fits = [large_residual_fit(problem, [c], absent([c]), rule.steps) for c in masses]
+    fits = [fit for fit in fits if fit.values[0] > fit.chosen[0].nominal[0]]
     best = min(fits, key=lambda fit: fit.power(problem), default=declared)
     if best.power(problem) >= rule.load_leaves * declared.power(problem):
         return ()

@@ -31,18 +31,19 @@ class AllJoints:
     """Rounds of fitting on all windows and taking out what is not sure there."""
     small_robot: int = 12
     """Degrees of freedom up to which a robot is small; of these the links are asked, too."""
+    still_off: float = 2.0
+    """Median chi-square that is much: a load alone leaves less, or it is set beside others; strengths and gains follow,
+    the way is gone from the other end, and masses of all links come in."""
     load_leaves: float = 0.5
     """Share of the declared model's median chi-square below which a load on one link is worth a place beside others."""
     rotors: float = 30.0
-    """Steps of the armatures from which the way is gone a second time: three times the links' inertia."""
+    """Armatures, in their steps, from which the way is gone a second time: heavier than the links."""
     next_to_nothing: float = 0.02
-    """Share of the declared model's median chi-square that they must leave less of, to begin the search with them."""
+    """Share of the declared model's median chi-square that all joints' effects leave less of where they come first."""
     nearer: float = 0.3
-    """Share of the cost that the best single effect leaves, which they must leave less of."""
+    """Share of the cost that the best effect by itself leaves, which all joints' must leave less of."""
     one_damping: float = 0.05
     """Share by which the cost may grow where kd and a joint's viscous friction become one."""
-    still_off: float = 2.0
-    """Median chi-square beside the joints' effects, from which on they are, and strengths and gains before them."""
 
 
 @dataclass(frozen=True)
