@@ -2,6 +2,7 @@
 
 from bumblebee.diagnosis.candidates.candidate import (
     Candidate,
+    absent,
     clipped,
     effects_at,
     is_simulated,
@@ -43,6 +44,7 @@ __all__ = [
     "USUAL_OF_TORQUE",
     "Candidate",
     "Formula",
+    "absent",
     "all_candidates",
     "clipped",
     "effects_at",

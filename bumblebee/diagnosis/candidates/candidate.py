@@ -111,3 +111,8 @@ def clipped(chosen: Sequence[Candidate], values: np.ndarray) -> np.ndarray:
         part = slice(at, at + len(c.nominal))
         out[part], at = c.clip(values[part]), part.stop
     return out
+
+
+def absent(chosen: Sequence[Candidate]) -> np.ndarray:
+    """Values (P,) at which the effects are absent; what shapes them is at its start: a mass takes its moments along."""
+    return np.concatenate([c.moved(0, 0) for c in chosen]) if chosen else np.empty(0)

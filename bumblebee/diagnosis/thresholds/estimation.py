@@ -24,6 +24,24 @@ class Jacobian:
 
 
 @dataclass(frozen=True)
+class LevenbergMarquardt:
+    """Of a fit that begins far from the data."""
+
+    damping: float = 1e-3
+    """The least damping, as a share of each parameter's own normal equation."""
+    most_damping: float = 100.0
+    """Damping from which on no step is left to try."""
+    more_damping: float = 10.0
+    """Factor on the damping after a step that was no better."""
+    less_damping: float = 0.1
+    """The same after one that was."""
+    settled: float = 0.995
+    """Share of the cost that a step must leave less of, or it is the last."""
+    free: float = 10.0
+    """Changes that matter within which what the data hardly tell stays in one step."""
+
+
+@dataclass(frozen=True)
 class ResponseSurface:
     """Of the last step of a fit whose cost is rough."""
 
@@ -51,5 +69,6 @@ class EstimationThresholds:
 
     covariance: Covariance = field(default_factory=Covariance)
     jacobian: Jacobian = field(default_factory=Jacobian)
+    levenberg_marquardt: LevenbergMarquardt = field(default_factory=LevenbergMarquardt)
     response_surface: ResponseSurface = field(default_factory=ResponseSurface)
     integrator_error: IntegratorError = field(default_factory=IntegratorError)

@@ -200,6 +200,6 @@ def test_an_armature_is_found_from_the_other_end_too(monkeypatch: pytest.MonkeyP
         left = 5.0 if len(begun) == 1 else 1.0
         return SimpleNamespace(values=values, power=lambda problem: left)
 
-    monkeypatch.setattr(all_joints, "large_residual_fit", fitted)
+    monkeypatch.setattr(all_joints, "levenberg_marquardt", fitted)
     fit = all_joints._from_both_ends(problem, ([rotor], np.array(rotor.nominal)), 20)
     assert begun[0] == rotor.nominal[0] < begun[1] == fit.values[0]

@@ -1,33 +1,20 @@
 """A load that the model does not have is named by its link and its mass, not as gains of all servos."""
 
-import numpy as np
 import pytest
 
-from bumblebee.diagnosis.candidates import all_candidates
-from bumblebee.diagnosis.comparison import Holdout
-from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.selection.proposals.gain_grid import gains_by_grid, start_with_gain_grid
 from bumblebee.diagnosis.selection.proposals.link_load import link_load
 from bumblebee.diagnosis.selection.state import SearchState
 from tests.diagnosis import arm
+from tests.diagnosis.selection.begun import begun
 
 MASS = 3.7  # of 0.7 kg
 FRICTION = dict(zip(arm.JOINTS, (2.0, 3.0, 0.8), strict=True))
 
 
-def _begun(truth: dict[tuple[str, str], float]) -> SearchState:
-    session = arm.session_of(arm.simulate(truth, count=4, seconds=6.0))
-    problem, other = arm.problem_of(session, [0, 1, 2], 60), arm.problem_of(session, [3], 20)
-
-    def remake(effects: list) -> tuple[list, np.ndarray]:
-        return all_candidates(session.plant, session.rollouts, effects), np.full(3, 5.0)
-
-    return SearchState(problem, Holdout(other), remake, SearchConfig(), lambda text: None)
-
-
 @pytest.fixture(scope="module")
 def run() -> SearchState:
-    return _begun({("link_mass", "l3"): MASS})
+    return begun({("link_mass", "l3"): MASS})
 
 
 def test_gains_of_all_servos_would_explain_a_load(run: SearchState) -> None:
@@ -39,7 +26,7 @@ def test_gains_of_all_servos_would_explain_a_load(run: SearchState) -> None:
 def test_a_load_is_one_mass_with_or_without_friction_on_all_joints(run: SearchState, friction: bool) -> None:
     dry = FRICTION if friction else {}
     if friction:
-        run = _begun({("link_mass", "l3"): MASS, **{("coulomb_friction", j): v for j, v in dry.items()}})
+        run = begun({("link_mass", "l3"): MASS, **{("coulomb_friction", j): v for j, v in dry.items()}})
     assert start_with_gain_grid(run)
     found = {(c.effect, c.where): float(run.fit.of(c)[0]) for c in run.fit.chosen}
     assert found["link_mass", "l3"] == pytest.approx(MASS, rel=0.02)
@@ -51,5 +38,5 @@ def test_a_load_is_one_mass_with_or_without_friction_on_all_joints(run: SearchSt
 
 @pytest.mark.parametrize("friction", [False, True])
 def test_there_is_no_load_on_a_robot_like_its_model_or_with_friction_alone(friction: bool) -> None:
-    run = _begun({("coulomb_friction", j): v for j, v in FRICTION.items()} if friction else {})
+    run = begun({("coulomb_friction", j): v for j, v in FRICTION.items()} if friction else {})
     assert link_load(run.problem, run.candidates) == ()

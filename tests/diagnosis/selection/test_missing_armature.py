@@ -2,15 +2,12 @@
 
 import re
 
-import numpy as np
 import pytest
 
-from bumblebee.diagnosis.candidates import all_candidates
-from bumblebee.diagnosis.comparison import Holdout
-from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.selection.proposals.gain_grid import gains_by_grid, start_with_gain_grid
 from bumblebee.diagnosis.selection.state import SearchState
 from tests.diagnosis import arm
+from tests.diagnosis.selection.begun import begun
 
 ARMATURE = dict(zip(arm.JOINTS, (0.4, 0.6, 0.15), strict=True))
 FRICTION = dict(zip(arm.JOINTS, (2.0, 3.0, 0.8), strict=True))
@@ -20,20 +17,9 @@ TRUTH = {
 }
 
 
-def _begun(truth: dict[tuple[str, str], float], xml: str = arm.XML) -> SearchState:
-    """A search on rollouts of the arm with `truth`, declared as `xml`."""
-    session = arm.session_of(arm.simulate(truth, count=4, seconds=6.0), xml)
-    problem, other = arm.problem_of(session, [0, 1, 2], 60), arm.problem_of(session, [3], 20)
-
-    def remake(effects: list) -> tuple[list, np.ndarray]:
-        return all_candidates(session.plant, session.rollouts, effects), np.full(3, 5.0)
-
-    return SearchState(problem, Holdout(other), remake, SearchConfig(), lambda text: None)
-
-
 @pytest.fixture(scope="module")
 def run() -> SearchState:
-    return _begun(TRUTH)
+    return begun(TRUTH)
 
 
 def test_servos_far_from_the_declared_ones_would_explain_it(run: SearchState) -> None:
@@ -53,7 +39,7 @@ def test_the_search_begins_with_armatures_and_friction_at_the_declared_gains(run
 
 def test_gains_that_are_far_off_stay_gains() -> None:
     xml = re.sub(r'kp="(\d+)"', lambda m: f'kp="{30 * int(m[1])}"', arm.XML)
-    run = _begun({}, re.sub(r'kv="(\d+)"', lambda m: f'kv="{10 * int(m[1])}"', xml))
+    run = begun({}, re.sub(r'kv="(\d+)"', lambda m: f'kv="{10 * int(m[1])}"', xml))
     assert start_with_gain_grid(run)
     found = {(c.effect, c.where): float(run.fit.of(c)[0]) for c in run.fit.chosen}
     for joint in arm.JOINTS:

@@ -25,14 +25,14 @@ from bumblebee.diagnosis.candidates import (
     USUAL_OF_ROBOT,
     USUAL_OF_TORQUE,
     Candidate,
+    absent,
     clipped,
     is_chosen,
 )
 from bumblebee.diagnosis.comparison import Holdout, certainty, compare, drop_unsure, evidence
-from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, levenberg_marquardt
 from bumblebee.diagnosis.residuals import Problem, by_misfit, make_problem, screening_windows, window_weights
 from bumblebee.diagnosis.selection.proposals.joint_damping import one_damping
-from bumblebee.diagnosis.selection.proposals.large_residual_fit import absent, large_residual_fit
 from bumblebee.diagnosis.selection.proposals.link_load import link_load
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.errors import BadInput
@@ -76,7 +76,7 @@ def fit_all_joints(
     loads = link_load(some, candidates) if small else ()
     fit = _simplest(some, loads, _sets(usual, candidates, loads), steps)
     if found.chosen:
-        fit = _better(some, fit, large_residual_fit(some, *_beside(found, usual), steps))
+        fit = _better(some, fit, levenberg_marquardt(some, *_beside(found, usual), steps))
     say(f"{len(fit.chosen)} usual effects and loads together: chi-square {fit.power(some):.3g}")
     if fit.power(some) >= below:
         return None
@@ -84,7 +84,7 @@ def fit_all_joints(
         fit = _with_links(some, fit, [c for c in candidates if c.effect == kind and is_whole(c)], say)
     chosen, values = one_damping(some, fit)
     if len(chosen) < len(fit.chosen):
-        fit = large_residual_fit(some, chosen, values, rule.steps_with_links)
+        fit = levenberg_marquardt(some, chosen, values, rule.steps_with_links)
     if fit.power(some) < rule.still_off:
         return _sure_of(problem, drop_unsure(some, fit, window_weights(fit.clean(some))))
     return _sure_by_misfit(problem, fit)
@@ -102,8 +102,8 @@ def _sets(usual: Sequence[Candidate], candidates: Sequence[Candidate], loads: Se
     gains = [c for c in candidates if c.effect == _GAIN]
     beside = [_beside_load(load, declared) for load in loads]
     sets = [declared, list(usual), [*declared, *gains] if gains else []]
-    first, *rest = [[(s, absent(s))] for k, s in enumerate(sets) if s and s not in sets[:k]]
-    return [first, beside, *rest]
+    begun: list[list[_Begun]] = [[(s, absent(s))] for k, s in enumerate(sets) if s and s not in sets[:k]]
+    return [begun[0], beside, *begun[1:]]
 
 
 def _beside(fit: Fit, others: Sequence[Candidate]) -> _Begun:
@@ -141,11 +141,11 @@ def _from_both_ends(problem: Problem, begun: _Begun, steps: int) -> Fit:
     """
     rule = problem.thresholds.selection.proposals.all_joints
     chosen, values = begun
-    fit = large_residual_fit(problem, chosen, values, steps)
+    fit = levenberg_marquardt(problem, chosen, values, steps)
     heavy = np.concatenate([(rule.rotors if c.effect == _ROTOR else 0.0) * np.array(c.step) for c in chosen])
     if fit.power(problem) < rule.still_off or not heavy.any() or not _is_small(problem):
         return fit
-    other = large_residual_fit(problem, chosen, clipped(chosen, values + heavy), steps)
+    other = levenberg_marquardt(problem, chosen, clipped(chosen, values + heavy), steps)
     return min(fit, other, key=lambda f: f.power(problem))
 
 
@@ -161,28 +161,23 @@ def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Ca
     bodies = [c for c in bodies if not is_chosen(c, fit.chosen)]
     if not bodies or fit.power(problem) < rule.still_off:
         return fit
-    larger = large_residual_fit(problem, *_beside(fit, bodies), rule.steps_with_links)
+    larger = levenberg_marquardt(problem, *_beside(fit, bodies), rule.steps_with_links)
     say(f"{len(larger.chosen)} with {bodies[0].effect} on all links: chi-square {larger.power(problem):.3g}")
     return _better(problem, fit, larger)
 
 
 def _sure_of(problem: Problem, fit: Fit) -> Fit | None:
     """The same effects fitted on all windows, less those that are not sure there."""
-    rule = problem.thresholds.selection.proposals.all_joints
     known = None
-    for _ in range(rule.rounds):
+    for _ in range(problem.thresholds.selection.proposals.all_joints.rounds):
         if not fit.chosen:
             return None
-        weights = window_weights(problem.residual([fit.effects])[0])
-        fit = gauss_newton(problem, fit.chosen, fit.values, weights, 2, coarse=True, damping=rule.damping, known=known)
+        fit = _fitted(problem, fit, 2, known)
         sure = drop_unsure(problem, fit, window_weights(fit.clean(problem)))
         if sure.chosen == fit.chosen:
             return fit
         known, fit = fit, sure
-    if not fit.chosen:
-        return None
-    weights = window_weights(problem.residual([fit.effects])[0])  # so far by slopes alone
-    return gauss_newton(problem, fit.chosen, fit.values, weights, 0, coarse=True, known=known)
+    return _fitted(problem, fit, 0, known) if fit.chosen else None  # what was dropped last, by slopes alone
 
 
 def _sure_by_misfit(problem: Problem, fit: Fit) -> Fit | None:
@@ -190,15 +185,16 @@ def _sure_by_misfit(problem: Problem, fit: Fit) -> Fit | None:
 
     By the noise's measure hardly any effect would be sure there.
     """
-    rule = problem.thresholds.selection.proposals.all_joints
+    other = by_misfit(problem, _fitted(problem, fit, 0).clean(problem))
+    sure = _sure_of(other, _fitted(other, fit, 2))
+    return None if sure is None else _fitted(problem, sure, 0)
 
-    def fitted(here: Problem, fit: Fit, iterations: int) -> Fit:
-        weights = window_weights(here.residual([fit.effects])[0])
-        return gauss_newton(here, fit.chosen, fit.values, weights, iterations, coarse=True, damping=rule.damping)
 
-    other = by_misfit(problem, fitted(problem, fit, 0).clean(problem))
-    sure = _sure_of(other, fitted(other, fit, 2))
-    return None if sure is None else fitted(problem, sure, 0)
+def _fitted(problem: Problem, fit: Fit, iterations: int, known: Fit | None = None) -> Fit:
+    """The same effects fitted from where they are, windows weighed by what is left there."""
+    weights = window_weights(problem.residual([fit.effects])[0])
+    least = problem.thresholds.estimation.levenberg_marquardt.damping
+    return gauss_newton(problem, fit.chosen, fit.values, weights, iterations, coarse=True, damping=least, known=known)
 
 
 def whitened_anew(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Problem, Holdout, Fit]:

@@ -12,7 +12,7 @@ from bumblebee.diagnosis.estimation import Fit, cost_of
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.sim.servo import servos_of
 
-_KIND, _FRICTION = "kd", "viscous_friction"
+_GAIN, _FRICTION, _STRENGTH = "kd", "viscous_friction", "motor_strength"
 
 
 def one_damping(problem: Problem, fit: Fit) -> tuple[list[Candidate], np.ndarray]:
@@ -21,16 +21,16 @@ def one_damping(problem: Problem, fit: Fit) -> tuple[list[Candidate], np.ndarray
     chosen, values = list(fit.chosen), [fit.of(c) for c in fit.chosen]
     weights = window_weights(fit.clean(problem))
     cost = cost_of(problem, fit.residual, weights)[0]
-    for where in sorted({c.where for c in chosen if c.effect == _KIND}):
-        mine = {c.effect: k for k, c in enumerate(chosen) if c.where == where and c.effect in (_KIND, _FRICTION)}
+    for where in sorted({c.where for c in chosen if c.effect == _GAIN}):
+        mine = {c.effect: k for k, c in enumerate(chosen) if c.where == where and c.effect in (_GAIN, _FRICTION)}
         if len(mine) < 2:
             continue
-        gain, friction = chosen[mine[_KIND]], chosen[mine[_FRICTION]]
+        gain, friction = chosen[mine[_GAIN]], chosen[mine[_FRICTION]]
         joint = int(problem.plant.model.joint(where).id)
-        strength = next((float(fit.of(c)[0]) for c in chosen if (c.effect, c.where) == ("motor_strength", where)), 1.0)
+        strength = next((float(fit.of(c)[0]) for c in chosen if (c.effect, c.where) == (_STRENGTH, where)), 1.0)
         declared = -strength * float(servos_of(problem.plant.model, [joint]).bias[0, 2])
         nominal = friction.nominal[0]
-        more = (float(values[mine[_KIND]][0]) - 1.0) * declared + float(values[mine[_FRICTION]][0]) - nominal
+        more = (float(values[mine[_GAIN]][0]) - 1.0) * declared + float(values[mine[_FRICTION]][0]) - nominal
         left, value = (friction, nominal + more) if more >= 0 or declared <= 0 else (gain, 1.0 + more / declared)
         kept = [k for k in range(len(chosen)) if k not in mine.values()]
         less, those = [*(chosen[k] for k in kept), left], [*(values[k] for k in kept), left.clip([value])]

@@ -9,10 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.estimation import Fit, gauss_newton
+from bumblebee.diagnosis.candidates import Candidate, absent
+from bumblebee.diagnosis.estimation import Fit, gauss_newton, levenberg_marquardt
 from bumblebee.diagnosis.residuals import Problem, window_weights
-from bumblebee.diagnosis.selection.proposals.large_residual_fit import absent, large_residual_fit
 
 
 def link_load(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Fit, ...]:
@@ -23,7 +22,7 @@ def link_load(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Fit, .
     rule = problem.thresholds.selection.proposals.all_joints
     declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
     masses = [c for c in candidates if c.effect == "link_mass"]
-    fits = [large_residual_fit(problem, [c], absent([c]), rule.steps) for c in masses]
+    fits = [levenberg_marquardt(problem, [c], absent([c]), rule.steps) for c in masses]
     fits = [fit for fit in fits if fit.values[0] > fit.chosen[0].nominal[0]]
     best = min(fits, key=lambda fit: fit.power(problem), default=declared)
     if best.power(problem) >= rule.load_leaves * declared.power(problem):
@@ -40,4 +39,4 @@ def _with_centre(problem: Problem, fit: Fit, candidates: Sequence[Candidate]) ->
     rule = problem.thresholds.selection.proposals.all_joints
     centres = [c for c in candidates if (c.effect, c.where) == ("link_com", fit.chosen[0].where)]
     values = [np.concatenate((fit.values, absent([c]))) for c in centres]
-    return [large_residual_fit(problem, [*fit.chosen, c], v, rule.steps) for c, v in zip(centres, values, strict=True)]
+    return [levenberg_marquardt(problem, [*fit.chosen, c], v, rule.steps) for c, v in zip(centres, values, strict=True)]

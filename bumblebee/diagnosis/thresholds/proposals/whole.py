@@ -15,18 +15,6 @@ class AllJoints:
     """The same of a small robot: where every joint lacks its armature and friction the way is that long."""
     steps_with_links: int = 5
     """The same with the links' effects, which begin from the joints'."""
-    damping: float = 1e-3
-    """The least damping, as a share of each parameter's own normal equation."""
-    most_damping: float = 100.0
-    """Damping from which on no step is left to try."""
-    more_damping: float = 10.0
-    """Factor on the damping after a step that was no better."""
-    less_damping: float = 0.1
-    """The same after one that was."""
-    settled: float = 0.995
-    """Share of the cost that a step must leave less of, or it is the last."""
-    free: float = 10.0
-    """Changes that matter within which what the data hardly tell stays in one step."""
     rounds: int = 3
     """Rounds of fitting on all windows and taking out what is not sure there."""
     small_robot: int = 12

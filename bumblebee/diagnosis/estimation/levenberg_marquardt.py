@@ -1,22 +1,20 @@
-"""A fit that begins far from the data, where slopes at the beginning lead astray: Levenberg's and Marquardt's steps."""
+"""A fit that begins far from the data, where slopes lead astray: Levenberg's and Marquardt's steps within bounds."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, clipped, effects_at
-from bumblebee.diagnosis.estimation import Fit, columns_at, cost_of, gauss_newton, project
+from bumblebee.diagnosis.estimation.fit import Fit
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.estimation.jacobian import columns_at
+from bumblebee.diagnosis.estimation.least_squares import cost_of, project
 from bumblebee.diagnosis.residuals import Problem, window_weights
 
 
-def absent(chosen: Sequence[Candidate]) -> np.ndarray:
-    """Values (P,) at which the effects are absent; what shapes them is at its start: a mass takes its moments along."""
-    return np.concatenate([c.moved(0, 0) for c in chosen]) if chosen else np.empty(0)
-
-
-def large_residual_fit(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int) -> Fit:
+def levenberg_marquardt(problem: Problem, chosen: Sequence[Candidate], values: np.ndarray, steps: int) -> Fit:
     """A fit from values (P,) with large residuals: Levenberg's and Marquardt's steps, windows weighed anew at each."""
-    rule = problem.thresholds.selection.proposals.all_joints
+    rule = problem.thresholds.estimation.levenberg_marquardt
     weights = window_weights(problem.residual([effects_at(chosen, values)])[0])
     fit = gauss_newton(problem, chosen, values, weights, iterations=0, coarse=True)
     damping, moving = rule.damping, np.flatnonzero(fit.scales)
@@ -47,7 +45,7 @@ def _moved(problem: Problem, fit: Fit, weights: np.ndarray, damping: float) -> n
     What would leave its bounds is held there and the others are solved for anew: their step was meant beside a friction
     or an inertia below zero.
     """
-    rule = problem.thresholds.selection.proposals.all_joints
+    rule = problem.thresholds.estimation.levenberg_marquardt
     basis, _ = project(problem, fit.columns, weights)
     flat = (basis * np.sqrt(weights)[:, None]).reshape(len(basis), -1)
     normal, count = flat @ flat.T, len(problem.nuisance)

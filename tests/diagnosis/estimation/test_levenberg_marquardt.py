@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.candidates import all_candidates
-from bumblebee.diagnosis.estimation import gauss_newton
+from bumblebee.diagnosis.candidates import absent, all_candidates
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.estimation.levenberg_marquardt import _moved, levenberg_marquardt
 from bumblebee.diagnosis.residuals import window_weights
-from bumblebee.diagnosis.selection.proposals.large_residual_fit import _moved, absent, large_residual_fit
 from tests.diagnosis import arm
 
 
@@ -30,5 +30,5 @@ def test_it_ends_at_the_truth() -> None:
     session = arm.session_of(arm.simulate(truth, count=2, seconds=4.0))
     problem = arm.problem_of(session, [0, 1], 30)
     chosen = [c for c in all_candidates(session.plant, session.rollouts, []) if c.effect == "coulomb_friction"]
-    fit = large_residual_fit(problem, chosen, absent(chosen), 20)
+    fit = levenberg_marquardt(problem, chosen, absent(chosen), 20)
     assert fit.values == pytest.approx(np.array(list(truth.values())), rel=0.1)

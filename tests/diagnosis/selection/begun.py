@@ -1,0 +1,20 @@
+"""A search at its beginning, on rollouts of the arm."""
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates import all_candidates
+from bumblebee.diagnosis.comparison import Holdout
+from bumblebee.diagnosis.config import SearchConfig
+from bumblebee.diagnosis.selection.state import SearchState
+from tests.diagnosis import arm
+
+
+def begun(truth: dict[tuple[str, str], float], xml: str = arm.XML) -> SearchState:
+    """With `truth` {(effect, place): value}, declared as `xml`; three rollouts to fit and one to accept by."""
+    session = arm.session_of(arm.simulate(truth, count=4, seconds=6.0), xml)
+    problem, other = arm.problem_of(session, [0, 1, 2], 60), arm.problem_of(session, [3], 20)
+
+    def remake(effects: list) -> tuple[list, np.ndarray]:
+        return all_candidates(session.plant, session.rollouts, effects), np.full(3, 5.0)
+
+    return SearchState(problem, Holdout(other), remake, SearchConfig(), lambda text: None)
