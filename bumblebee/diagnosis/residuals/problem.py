@@ -242,9 +242,9 @@ def make_problem(
 
 
 def _damped_within(plant: Plant, variation: Variation, windows: Windows, step: float, rule: Sensitivities) -> bool:
-    """Whether servos bring a joint to rest within `step` [s]: then it shows neither inertia nor damping."""
+    """Whether damping brings a joint to rest within `step` [s]: then it shows neither inertia nor damping."""
     some = np.unique(np.linspace(0, len(windows) - 1, rule.poses).round().astype(int))
-    rates = damping_rates(plant, variation, select(windows, some))
+    rates = damping_rates(plant, variation, select(windows, some), joints=True)
     return bool(np.median(rates) * step > rule.damped)
 
 

@@ -1,4 +1,4 @@
-"""How fast servos damp a robot: a joint without inertia comes to rest within a step, and no step shows how."""
+"""How fast a robot is damped: a joint without inertia comes to rest within a step, and no step shows how."""
 
 import mujoco
 import numpy as np
@@ -7,30 +7,30 @@ from scipy.linalg import eigh
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows
-from bumblebee.sim.servo import servos_of
+from bumblebee.sim.servo import ON_JOINT
+
+_KINDS = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 
 
-def damping_rates(plant: Plant, variation: Variation, windows: Windows) -> np.ndarray:
+def damping_rates(plant: Plant, variation: Variation, windows: Windows, joints: bool = False) -> np.ndarray:
     """The fastest rate (W,) [1/s] at which servos damp a variation of `plant` where windows start.
 
     Explicit steps of more than its inverse shake: a joint is turned round by its damping before it flies away, and what
-    they change is no simulator's error. Infinite where a joint has no inertia.
+    they change is no simulator's error. The joints' own damping (`joints`) brings a robot to rest, too, but every
+    integrator of MuJoCo's takes it implicitly. Infinite where a joint has no inertia.
     """
     own = variation.model.nq == windows.qpos.shape[1]  # a gap or a shaft adds joints that no log has
     models = variation.models if own else tuple(p.model for p in plant.every)
     out = np.empty(len(windows))
     for number in np.unique(windows.condition):
         mine = windows.condition == number
-        out[mine] = _rates(models[number], windows.qpos[mine])
+        out[mine] = _rates(models[number], windows.qpos[mine], joints)
     return out
 
 
-def _rates(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
-    kinds = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
-    joints = [j for j in range(model.njnt) if int(model.jnt_type[j]) in kinds]
-    servos, data, inertia = servos_of(model, joints), mujoco.MjData(model), np.zeros((model.nv, model.nv))
-    damping, rates = np.zeros(model.nv), np.zeros(len(qpos))
-    damping[servos.dof] = np.maximum(-servos.bias[:, 2], 0.0)
+def _rates(model: mujoco.MjModel, qpos: np.ndarray, joints: bool) -> np.ndarray:
+    damping = _of_servos(model) + (model.dof_damping if joints else 0.0)
+    data, inertia, rates = mujoco.MjData(model), np.zeros((model.nv, model.nv)), np.zeros(len(qpos))
     if not damping.any():
         return rates
     for w, pose in enumerate(qpos):
@@ -39,6 +39,16 @@ def _rates(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
         mujoco.mj_fullM(model, data, inertia)
         rates[w] = _fastest(np.diag(damping), inertia)
     return rates
+
+
+def _of_servos(model: mujoco.MjModel) -> np.ndarray:
+    """Damping (nv,) of all actuators on each hinge or slide together, [N m s/rad] or [N s/m]."""
+    damping = np.zeros(model.nv)
+    for a in range(model.nu):
+        if model.actuator_trntype[a] in ON_JOINT and model.jnt_type[model.actuator_trnid[a, 0]] in _KINDS:
+            dof = model.jnt_dofadr[model.actuator_trnid[a, 0]]
+            damping[dof] -= model.actuator_gear[a, 0] ** 2 * model.actuator_biasprm[a, 2]
+    return np.maximum(damping, 0.0)
 
 
 def _fastest(damping: np.ndarray, inertia: np.ndarray) -> float:

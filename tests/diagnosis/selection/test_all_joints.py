@@ -1,11 +1,13 @@
 """Parameters that are wrong on all joints at once are found together and by name."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.comparison.backward_elimination import certainty
 from bumblebee.diagnosis.comparison.compare import compare
@@ -16,10 +18,12 @@ from bumblebee.diagnosis.dataset.session import Session
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
-from bumblebee.diagnosis.selection.proposals import all_joints
-from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints
+from bumblebee.diagnosis.selection.proposals.all_joints import fit as fit_module
+from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints, start
+from bumblebee.diagnosis.selection.proposals.all_joints.begun import sets_of_large, usual_effects
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.diagnosis.thresholds import Thresholds
+from bumblebee.sim.servo import servos_of
 from tests.diagnosis import arm
 
 TRUTH = {
@@ -125,8 +129,8 @@ def test_one_effect_is_enough_to_begin_where_residuals_are_hundreds_of_times_the
     monkeypatch: pytest.MonkeyPatch, power: float, begins: bool
 ) -> None:
     tried: list[float] = []
-    monkeypatch.setattr(all_joints, "fit_all_joints", lambda *_: tried.append(power))
-    assert not all_joints.start_with_all_joints(_run_with_one_effect(power, power))  # nothing came of it
+    monkeypatch.setattr(start, "fit_all_joints", lambda *_: tried.append(power))
+    assert not start.start_with_all_joints(_run_with_one_effect(power, power))  # nothing came of it
     assert bool(tried) is begins
 
 
@@ -135,11 +139,11 @@ def test_windows_that_were_whitened_far_from_here_are_whitened_anew_first(
     monkeypatch: pytest.MonkeyPatch, left: float, begins: bool
 ) -> None:
     tried: list[float] = []
-    monkeypatch.setattr(all_joints, "fit_all_joints", lambda *_: tried.append(left))
-    monkeypatch.setattr(all_joints, "whitened_anew", lambda *_: (None, None, None))
-    monkeypatch.setattr(all_joints, "_start_anew", lambda run, *_: setattr(run, "power", lambda: left))
+    monkeypatch.setattr(start, "fit_all_joints", lambda *_: tried.append(left))
+    monkeypatch.setattr(start, "whitened_anew", lambda *_: (None, None, None))
+    monkeypatch.setattr(start, "_start_anew", lambda run, *_: setattr(run, "power", lambda: left))
     run = _run_with_one_effect(400.0, 5000.0)
-    assert all_joints.start_with_all_joints(run) is not begins  # of many effects nothing came
+    assert start.start_with_all_joints(run) is not begins  # of many effects nothing came
     assert bool(tried) is begins
     assert run.tried_many is begins
 
@@ -157,11 +161,13 @@ FAR = {"power": 400.0, "left": 5.0, "cost": 10.0, "least": 100.0}
         ({"cost": 40.0}, False),
         ({"asked_far": True}, False),
         ({"chosen": ("one",)}, False),
-        ({"nv": 29}, False),
+        ({"nv": 29}, True),
+        ({"left": 9.0, "nv": 29}, True),  # a large robot's windows are whitened further from the truth
+        ({"left": 21.0, "nv": 29}, False),
         ({"pays": False}, False),
     ],
 )
-def test_a_small_robot_far_from_the_data_begins_with_all_joints_where_they_leave_next_to_nothing(
+def test_a_robot_far_from_the_data_begins_with_all_joints_where_they_leave_next_to_nothing(
     monkeypatch: pytest.MonkeyPatch, changed: dict[str, Any], begins: bool
 ) -> None:
     case = {**FAR, "asked_far": False, "chosen": (), "nv": 4, "pays": True, **changed}
@@ -169,13 +175,13 @@ def test_a_small_robot_far_from_the_data_begins_with_all_joints_where_they_leave
     run.fit, run.weights, run.asked_far = SimpleNamespace(chosen=case["chosen"]), None, case["asked_far"]
     run.problem.plant = SimpleNamespace(model=SimpleNamespace(nv=case["nv"]), floating=False)
     fit, begun = SimpleNamespace(power=lambda problem: case["left"], residual=None), []
-    monkeypatch.setattr(all_joints, "fit_all_joints", lambda *_: fit)
-    monkeypatch.setattr(all_joints, "cost_of", lambda *_: (case["cost"], None))
-    monkeypatch.setattr(all_joints, "compare", lambda *_: SimpleNamespace(passes=lambda rule: case["pays"]))
-    monkeypatch.setattr(all_joints, "begin_with", lambda run, fit: begun.append(fit))
-    assert all_joints.start_far_off(run, case["least"]) is begins
+    monkeypatch.setattr(start, "fit_all_joints", lambda *_: fit)
+    monkeypatch.setattr(start, "cost_of", lambda *_: (case["cost"], None))
+    monkeypatch.setattr(start, "compare", lambda *_: SimpleNamespace(passes=lambda rule: case["pays"]))
+    monkeypatch.setattr(start, "begin_with", lambda run, fit: begun.append(fit))
+    assert start.start_far_off(run, case["least"]) is begins
     assert bool(begun) is begins
-    assert not all_joints.start_far_off(run, case["least"])  # it is asked once, and only then
+    assert not start.start_far_off(run, case["least"])  # it is asked once, and only then
 
 
 @pytest.mark.parametrize(("nv", "asked"), [(4, True), (29, False)])
@@ -183,10 +189,10 @@ def test_a_small_robot_that_nothing_brings_nearer_is_asked_for_all_joints_sooner
     monkeypatch: pytest.MonkeyPatch, nv: int, asked: bool
 ) -> None:
     tried: list[float] = []
-    monkeypatch.setattr(all_joints, "fit_all_joints", lambda *_: tried.append(10.0))
+    monkeypatch.setattr(start, "fit_all_joints", lambda *_: tried.append(10.0))
     run = _run_with_one_effect(10.0, 10.0)
     run.problem.plant = SimpleNamespace(model=SimpleNamespace(nv=nv), floating=False)
-    assert not all_joints.start_with_all_joints(run, stuck=True)
+    assert not start.start_with_all_joints(run, stuck=True)
     assert bool(tried) is asked
 
 
@@ -200,6 +206,27 @@ def test_an_armature_is_found_from_the_other_end_too(monkeypatch: pytest.MonkeyP
         left = 5.0 if len(begun) == 1 else 1.0
         return SimpleNamespace(values=values, power=lambda problem: left)
 
-    monkeypatch.setattr(all_joints, "levenberg_marquardt", fitted)
-    fit = all_joints._from_both_ends(problem, ([rotor], np.array(rotor.nominal)), 20)
+    monkeypatch.setattr(fit_module, "levenberg_marquardt", fitted)
+    fit = fit_module._from_both_ends(problem, ([rotor], np.array(rotor.nominal)), 20)
     assert begun[0] == rotor.nominal[0] < begun[1] == fit.values[0]
+
+
+def test_a_large_robot_without_rotors_begins_with_those_that_its_servos_are_tuned_for() -> None:
+    session, problem, _ = _opened({})
+    usual = usual_effects(all_candidates(session.plant, session.rollouts, []))
+    bare = [_declared(c, 0.0) if c.effect == "armature" else c for c in usual]
+    (chosen, values), *_ = sets_of_large(problem, bare)[0]
+    assert {c.effect for c in usual} - {c.effect for c in chosen} == {"motor_strength", "kd"}
+    found = dict(zip([(c.effect, c.where) for c in chosen], values, strict=True))
+    servo = servos_of(session.plant.model, [int(session.plant.model.joint(j).id) for j in arm.JOINTS])
+    for joint, kp, kd in zip(arm.JOINTS, -servo.bias[:, 1], -servo.bias[:, 2], strict=True):
+        assert found["armature", joint] == pytest.approx(kd**2 / (4 * kp))
+    declared = [c for c in chosen if c.effect == "armature"]
+    (chosen, values), *_ = sets_of_large(problem, usual)[0]
+    for c in (c for c in usual if c.effect == "armature"):
+        assert values[list(chosen).index(c)] == c.nominal[0]  # a rotor that is declared stays
+    assert declared and all(v == 0 for (kind, _), v in found.items() if kind == "coulomb_friction")
+
+
+def _declared(candidate: Candidate, value: float) -> Candidate:
+    return replace(candidate, nominal=(value,))

@@ -6,7 +6,7 @@ import pytest
 from bumblebee.diagnosis.candidates import Candidate, all_candidates
 from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem
-from bumblebee.diagnosis.selection.proposals.joint_damping import one_damping
+from bumblebee.diagnosis.selection.proposals.all_joints.joint_damping import one_damping
 from tests.diagnosis import arm
 
 KD = 4.0  # of the servo on j2

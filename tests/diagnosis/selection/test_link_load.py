@@ -2,8 +2,8 @@
 
 import pytest
 
+from bumblebee.diagnosis.selection.proposals.all_joints.link_load import link_load
 from bumblebee.diagnosis.selection.proposals.gain_grid import gains_by_grid, start_with_gain_grid
-from bumblebee.diagnosis.selection.proposals.link_load import link_load
 from bumblebee.diagnosis.selection.state import SearchState
 from tests.diagnosis import arm
 from tests.diagnosis.selection.begun import begun

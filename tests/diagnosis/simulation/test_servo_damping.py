@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.estimation.integrator_error import _with_integrator
-from bumblebee.diagnosis.simulation.servo_damping import _fastest, damping_rates
+from bumblebee.diagnosis.simulation.servo_damping import _fastest, _rates, damping_rates
 from bumblebee.diagnosis.simulation.variation import vary
 from bumblebee.sim.effects import single
 from tests.diagnosis import arm
@@ -31,6 +31,21 @@ def test_an_armature_slows_it_down_and_a_gap_is_asked_as_if_closed() -> None:
     )
     assert (slow < plain).all()
     assert gap == pytest.approx(plain)
+
+
+def test_a_joints_own_damping_and_a_second_drive_count() -> None:
+    one = '<motor joint="j1"/>'
+    xml = (
+        '<mujoco><worldbody><body><joint name="j1" axis="0 1 0" damping="{}"/>'
+        '<geom type="sphere" size=".1" pos="0 0 .5" mass="1"/></body></worldbody><actuator>{}</actuator></mujoco>'
+    )
+    servo = '<position joint="j1" kp="10" kv="2"/>'
+    qpos = np.zeros((1, 1))
+    made = {key: mujoco.MjModel.from_xml_string(xml.format(*key)) for key in ((0, one), (3, one), (0, servo * 2))}
+    own = float(made[0, one].dof_M0[0])
+    assert _rates(made[0, one], qpos, True) == 0.0 == _rates(made[3, one], qpos, False)
+    assert _rates(made[3, one], qpos, True) == pytest.approx(3.0 / own)
+    assert _rates(made[0, servo * 2], qpos, False) == pytest.approx(4.0 / own)
 
 
 def test_windows_are_asked_under_the_condition_that_they_were_recorded_under() -> None:

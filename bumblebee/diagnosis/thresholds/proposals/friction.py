@@ -43,5 +43,7 @@ class FrictionFamily:
     """Fall of the cost, in the residual's power, that the screening windows must promise."""
     tried: int = 3
     """Members tried at their size for each that is taken."""
+    few_joints: int = 8
+    """Joints with friction up to which all are asked; of more, those of the shortlist that lack most torque."""
     iterations: int = 3
     """Of the joint refit."""

@@ -28,6 +28,10 @@ class AllJoints:
     """Armatures, in their steps, from which the way is gone a second time: heavier than the links."""
     next_to_nothing: float = 0.02
     """Share of the declared model's median chi-square that all joints' effects leave less of where they come first."""
+    little_of_large: float = 0.05
+    """The same of a large robot, whose windows are whitened around a model that is further from the truth."""
+    no_rotor: float = 0.05
+    """Share of the rotor that a servo would damp critically, below which a large robot's joint has none declared."""
     nearer: float = 0.3
     """Share of the cost that the best effect by itself leaves, which all joints' must leave less of."""
     one_damping: float = 0.05

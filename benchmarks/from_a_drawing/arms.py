@@ -1,43 +1,23 @@
-"""Arms whose declared model comes from a drawing: right masses and lengths, no rotor inertia, no friction.
+"""Arms of 2 to 6 joints that stand upright, their drives position servos or motors under a loop of the lab's own.
 
-    python -m benchmarks.from_a_drawing --limit 24 --workers 2 --out results.jsonl
-    python -m benchmarks.from_a_drawing --table results.jsonl
-
-Most models of real arms are made so. Every joint then errs at once and by factors, where the sealed benchmark
-(`benchmarks.undeclared`) lacks one effect of a size that can just be seen. Drawn are the links, the drives (position
-servos, or motors under a loop of the lab's own whose torque is logged), rotors of .2 to 5 times the joint's inertia,
-dry and viscous friction, noise and rates; half of the arms have one thing more: late commands, gains that are not the
-declared ones, or a load. The truth is plain MuJoCo at half a millisecond.
+The truth is plain MuJoCo at half a millisecond.
 """
 
-import argparse
-import json
 import math
 import tempfile
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import monotonic
-from typing import Any
 
 import mujoco
 import numpy as np
 
-from benchmarks.undeclared.__main__ import _quiet, commit, read_lines
-from bumblebee.diagnosis.config import DiagnosisConfig
+from benchmarks.from_a_drawing.case import MORE, Case
 from bumblebee.diagnosis.dataset import open_session
-from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.measured.rollout import Rollout, write_rollout
 
-HORIZONS = ("0.02", "0.2", "1.0")
-MORE = ("nothing", "late commands", "other gains", "a load")
 _AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")
 _TRUE_STEP = 5e-4
-_NEAR = 0.15
-"""Relative error of a size that counts as found."""
-_CLOSE = 2.0
-"""Times the noise floor that a solved arm may be off."""
 
 
 @dataclass(frozen=True)
@@ -165,8 +145,8 @@ def rollouts(arm: Arm, seed: int, count: int = 8, seconds: float = 8.0) -> list[
     return made
 
 
-def run(seed: int) -> dict[str, Any]:
-    """One arm, diagnosed: errors on held-out rollouts, sizes found, other names."""
+def case(seed: int) -> Case:
+    """One arm with its logs."""
     arm = draw(seed)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
@@ -174,84 +154,10 @@ def run(seed: int) -> dict[str, Any]:
         (folder / "model.xml").write_text(xml(arm.joints, arm.servo))
         for rollout in rollouts(arm, seed):
             write_rollout(folder / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)
-        began = monotonic()
-        document = diagnose(
-            open_session(folder / "model.xml", folder), replace(DiagnosisConfig(), beyond=False)
-        ).document
-    found = {(e["effect"], *e["where"]): e for e in document["effects"]}
-    sizes: dict[str, list[float]] = {"armature": [], "coulomb_friction": []}
-    for i, joint in enumerate(arm.joints):
-        for kind, key, true in (
-            ("armature", "armature", joint.armature),
-            ("coulomb_friction", "frictionloss", joint.dry),
-        ):
-            entry = found.get((kind, f"joint{i}"))
-            value = entry["parameters"][key]["value"] if entry else 0.0
-            sizes[kind].append(round(value / true - 1.0, 4))
-    errors = {
-        h: [document["error"][k][h]["joint_pos_rmse"]["value"] for k in ("before", "after", "floor")] for h in HORIZONS
+        session = open_session(folder / "model.xml", folder)
+    sizes = {
+        "armature": {f"joint{i}": j.armature for i, j in enumerate(arm.joints)},
+        "coulomb_friction": {f"joint{i}": j.dry for i, j in enumerate(arm.joints)},
     }
-    return {
-        "seed": seed,
-        "joints": len(arm.joints),
-        "servo": arm.servo,
-        "hz": arm.hz,
-        "noise": arm.noise,
-        "more": arm.more,
-        "errors": errors,
-        "sizes": sizes,
-        "named": [[e["effect"], *e["where"], round(e["explains"], 4)] for e in document["effects"]],
-        "seconds": round(monotonic() - began, 1),
-    }
-
-
-def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Medians over arms, shares with their counts."""
-    more = ", ".join(f"{sum(r['more'] == m for r in rows)} with {m} more" for m in MORE)
-    out = [f"{len(rows)} arms: {more}"]
-    for h in HORIZONS:
-        before, after, floor = np.array([r["errors"][h] for r in rows], float).T * 1e3
-        solved = int((after <= _CLOSE * floor).sum())
-        medians = [float(np.median(values)) for values in (before, after, floor)]
-        out.append(
-            f"after {h} s: median declared {medians[0]:.3g}, corrected {medians[1]:.3g}, noise {medians[2]:.3g} mrad; "
-            f"largest corrected {after.max():.3g}; within {_CLOSE:g} times the noise {solved} of {len(rows)}"
-        )
-    for kind in ("armature", "coulomb_friction"):
-        errors = np.abs(np.concatenate([r["sizes"][kind] for r in rows]))
-        near = int((errors <= _NEAR).sum())
-        out.append(f"{kind}: {near} of {len(errors)} within {_NEAR:.0%}, median error {np.median(errors):.1%}")
-    out.append(
-        f"seconds: median {np.median([r['seconds'] for r in rows]):.0f}, most {max(r['seconds'] for r in rows):.0f}"
-    )
-    return "\n".join(out)
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run arms that the file does not hold yet, or print its table."""
-    parser = argparse.ArgumentParser(prog="benchmarks.from_a_drawing", description=__doc__.splitlines()[0])
-    parser.add_argument("--first", type=int, default=0, help="first seed")
-    parser.add_argument("--limit", type=int, default=24, help="seeds from there on")
-    parser.add_argument("--workers", type=int, default=1, help="processes, one core each")
-    parser.add_argument("--out", type=Path, default=Path("from_a_drawing.jsonl"), help="file of results, appended to")
-    parser.add_argument("--table", type=Path, help="print the table of a file of results and end")
-    options = parser.parse_args(arguments)
-    if options.table:
-        print(table(read_lines(options.table)))
-        return
-    done = {row["seed"] for row in read_lines(options.out)} if options.out.exists() else set()
-    left = [seed for seed in range(options.first, options.first + options.limit) if seed not in done]
-    with options.out.open("a") as out, ProcessPoolExecutor(options.workers, initializer=_quiet) as pool:
-        for future in as_completed([pool.submit(run, seed) for seed in left]):
-            row = {"commit": commit()} | future.result()
-            out.write(json.dumps(row) + "\n")
-            out.flush()
-            errors = "; ".join(f"{h} s {' '.join(f'{1e3 * e:.3g}' for e in row['errors'][h])}" for h in HORIZONS[1:])
-            print(
-                f"{row['seed']:3d} {row['joints']} joints, {row['more']}: {errors} mrad [{row['seconds']:.0f} s]",
-                flush=True,
-            )
-
-
-if __name__ == "__main__":
-    main()
+    row = {"robot": "arm", "joints": len(arm.joints), "servo": arm.servo, "hz": arm.hz, "noise": arm.noise}
+    return Case(session, sizes, row | {"more": arm.more})

@@ -1,0 +1,19 @@
+"""Parameters wrong on all joints at once: what every joint of a real robot has, fitted together.
+
+A robot with friction and latency on every joint is found one effect at a time only by a long way round: each effect
+alone explains a twentieth, and what stands for the others' share has a strange name. Where residuals are large still
+after two effects (after one, where they are hundreds of times the noise), and the last explained little or they are
+very large, the usual ones of all joints are fitted together from the declared values on, or from those found. The
+drives' strengths are free only where the data need them: a servo's strength, its joint's inertia and its friction go by
+one common factor nearly as a torque drive's do (`declared_scale`). Of a small robot a load on one link is asked first,
+by itself and then beside them (`link_load`): it weakens all drives as far as these can tell. Where residuals stay large
+masses and centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows
+that took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It begins so in
+the place of gains far from the declared ones (`gain_grid`), and on a small robot far from the data where they leave
+next to nothing and no effect that was tried by itself comes near.
+"""
+
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints
+from bumblebee.diagnosis.selection.proposals.all_joints.start import begin_with, start_far_off, start_with_all_joints
+
+__all__ = ["begin_with", "fit_all_joints", "start_far_off", "start_with_all_joints"]

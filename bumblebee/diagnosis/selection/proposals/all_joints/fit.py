@@ -1,0 +1,116 @@
+"""The fit of all joints' usual effects, from where they are absent on."""
+
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
+
+import numpy as np
+
+from bumblebee.diagnosis.candidates import USUAL_OF_BODIES, Candidate, clipped, is_chosen
+from bumblebee.diagnosis.comparison import drop_unsure
+from bumblebee.diagnosis.estimation import Fit, gauss_newton, levenberg_marquardt
+from bumblebee.diagnosis.residuals import Problem, screening_windows, window_weights
+from bumblebee.diagnosis.selection.proposals.all_joints.begun import (
+    ROTOR,
+    Begun,
+    beside,
+    is_whole,
+    sets_of_large,
+    sets_of_small,
+    usual_effects,
+)
+from bumblebee.diagnosis.selection.proposals.all_joints.joint_damping import one_damping
+from bumblebee.diagnosis.selection.proposals.all_joints.link_load import link_load
+from bumblebee.diagnosis.selection.proposals.all_joints.sure import sure_by_misfit, sure_of
+
+
+def fit_all_joints(
+    problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None], below: float = np.inf
+) -> Fit | None:
+    """A fit of a load, the usual effects or both, from the declared values on, that are sure together.
+
+    Or from those that were `found` on, together with the others, if this leads nearer to the data. The long way is
+    gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot with large
+    residuals still masses and centres of mass follow, all at once. None where nothing is sure, or where the joints'
+    effects do not bring those windows' median chi-square `below` what else there is.
+    """
+    rule = problem.thresholds.selection.proposals.all_joints
+    usual = usual_effects(candidates, problem.plant.torque_input)
+    if not usual:
+        return None
+    some = problem.part(screening_windows(problem, rule.windows))
+    small = is_small(problem)
+    steps = rule.steps_of_small if small else rule.steps
+    loads = link_load(some, candidates) if small else ()
+    sets = sets_of_small(usual, candidates, loads) if small else sets_of_large(some, usual)
+    fit = _simplest(some, loads, sets, steps)
+    if found.chosen:
+        fit = _better(some, fit, levenberg_marquardt(some, *beside(found, usual), steps))
+    say(f"{len(fit.chosen)} usual effects and loads together: chi-square {fit.power(some):.3g}")
+    if fit.power(some) >= below:
+        return None
+    for kind in USUAL_OF_BODIES if small else ():
+        fit = _with_links(some, fit, [c for c in candidates if c.effect == kind and is_whole(c)], say)
+    chosen, values = one_damping(some, fit)
+    if len(chosen) < len(fit.chosen):
+        fit = levenberg_marquardt(some, chosen, values, rule.steps_with_links)
+    if fit.power(some) < rule.still_off:
+        return sure_of(problem, drop_unsure(some, fit, window_weights(fit.clean(some))))
+    return sure_by_misfit(problem, fit)
+
+
+def is_small(problem: Problem) -> bool:
+    """Whether a robot's links can be asked all at once."""
+    most = problem.thresholds.selection.proposals.all_joints.small_robot
+    return problem.plant.model.nv <= most and not problem.plant.floating
+
+
+def _simplest(problem: Problem, loads: Sequence[Fit], sets: Sequence[Sequence[Begun]], steps: int) -> Fit:
+    """A load alone that leaves little, else the first sets that do, or what leaves much less than all before it."""
+    better, enough = partial(_better, problem), _enough(problem)
+    fits = list(loads)
+    for several in sets:
+        if fits and reduce(better, fits).power(problem) < enough:
+            break
+        fits += [_from_both_ends(problem, begun, steps) for begun in several]
+    return reduce(better, fits)
+
+
+def _enough(problem: Problem) -> float:
+    """Median chi-square that leaves nothing to ask for; of a large robot a share of the declared model's, too."""
+    rule = problem.thresholds.selection.proposals.all_joints
+    if is_small(problem):
+        return rule.still_off
+    declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
+    return max(rule.still_off, rule.little_of_large * declared.power(problem))
+
+
+def _from_both_ends(problem: Problem, begun: Begun, steps: int) -> Fit:
+    """The fit from where it begins or, if a small robot's leaves much, from rotors much heavier than the links.
+
+    A joint that hardly has an inertia follows its servo at once, and next to none does not differ from none.
+    """
+    rule = problem.thresholds.selection.proposals.all_joints
+    chosen, values = begun
+    fit = levenberg_marquardt(problem, chosen, values, steps)
+    heavy = np.concatenate([(rule.rotors if c.effect == ROTOR else 0.0) * np.array(c.step) for c in chosen])
+    if fit.power(problem) < rule.still_off or not heavy.any() or not is_small(problem):
+        return fit
+    other = levenberg_marquardt(problem, chosen, clipped(chosen, values + heavy), steps)
+    return min(fit, other, key=lambda f: f.power(problem))
+
+
+def _better(problem: Problem, simple: Fit, other: Fit) -> Fit:
+    """The other fit where it leaves less by far, else the simple one."""
+    fall = problem.thresholds.comparison.together.fall
+    return other if other.power(problem) < (1 - fall) * simple.power(problem) else simple
+
+
+def _with_links(problem: Problem, fit: Fit, bodies: Sequence[Candidate], say: Callable[[str], None]) -> Fit:
+    """The fit with one kind of effect on all links, if its residuals are large and these make them smaller."""
+    rule = problem.thresholds.selection.proposals.all_joints
+    bodies = [c for c in bodies if not is_chosen(c, fit.chosen)]
+    if not bodies or fit.power(problem) < rule.still_off:
+        return fit
+    larger = levenberg_marquardt(problem, *beside(fit, bodies), rule.steps_with_links)
+    say(f"{len(larger.chosen)} with {bodies[0].effect} on all links: chi-square {larger.power(problem):.3g}")
+    return _better(problem, fit, larger)

@@ -1,0 +1,110 @@
+"""When a search begins anew with the usual effects of all joints, and how it goes on from there."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bumblebee.diagnosis.comparison import Holdout, certainty, compare, evidence
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
+from bumblebee.diagnosis.residuals import Problem, make_problem, screening_windows, window_weights
+from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_small
+from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.errors import BadInput
+from bumblebee.sim.effects import Effect
+
+
+def whitened_anew(problem: Problem, holdout: Holdout, fit: Fit) -> tuple[Problem, Holdout, Fit]:
+    """Windows to fit and to judge whitened anew around a fit that is far from the declared model, and fitted there."""
+    problem = _whitened_around(problem, fit.effects)
+    if holdout.problem is not None:
+        holdout = replace(holdout, problem=_whitened_around(holdout.problem, fit.effects))
+    weights = window_weights(problem.residual([fit.effects])[0])
+    fit = gauss_newton(problem, fit.chosen, fit.values, weights, iterations=2, coarse=True)
+    problem = problem.held_to(fit.power(problem))
+    again = gauss_newton(problem, fit.chosen, fit.values, weights, iterations=2, coarse=True, known=fit)
+    return problem, holdout, again
+
+
+def _whitened_around(problem: Problem, effects: Sequence[Effect]) -> Problem:
+    """The problem whitened anew, its windows restarted, around a model with `effects`; only its nuisances if it falls.
+
+    Far from the declared model, starts that were moved to where it says that they were are not nearer to the truth.
+    """
+    p = problem
+    try:
+        steps, rng = (p.fine, p.coarsest), np.random.default_rng(0)
+        made = make_problem(p.plant, p.layout, p.read, p.sigma, steps, effects, rng, p.finest, p.thresholds)
+    except BadInput:  # it diverges in more than half of the windows
+        return problem.relinearised(effects)
+    return replace(made, between=problem.between)
+
+
+def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
+    """Begin anew with the usual effects of all joints, where some effects leave large residuals; whether it did.
+
+    Only if the last of these explained little, or they are very large: else the next may explain the rest. Where the
+    windows were whitened far from here they are whitened anew first, and that may be all there is to it. If no effect
+    helps any more (`stuck`), large residuals of a small robot are enough, or very large ones.
+    """
+    power = run.power()
+    enough = 1 if power >= run.rule.many_at_once else run.rule.many_after
+    early = len(run.fit.chosen) < enough or (run.fall >= run.rule.many_little and power < run.config.far)
+    far = run.config.many if is_small(run.problem) else run.config.far
+    if run.tried_many or run.given or power < run.config.many or (power < far if stuck else early):
+        return False
+    if run.power() < run.rule.whiten_anew * run.whitened_at:
+        _start_anew(run, *whitened_anew(run.problem, run.holdout, run.fit))
+        run.say(f"whitened anew around what was found: chi-square {run.power():.3g}")
+        if run.power() < run.config.many:
+            return True
+    run.tried_many = True
+    fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
+    rule = run.problem.thresholds.comparison.together
+    if fit is None or not compare(run.problem, run.holdout, run.fit, fit).passes(rule):
+        return False
+    begin_with(run, fit)
+    return True
+
+
+def start_far_off(run: SearchState, least: float) -> bool:
+    """Begin with the usual effects of all joints of a small robot that is far from the data; whether it did.
+
+    Only before anything is found, where they leave next to nothing, and where no effect that was tried by itself comes
+    near: the cheapest costs `least`. One effect after the other leads into a by-way where every joint errs by factors.
+    """
+    rule, declared = run.problem.thresholds.selection.proposals.all_joints, run.power()
+    if run.asked_far or run.fit.chosen or declared < run.config.far:
+        return False
+    run.asked_far = True
+    fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
+    little = rule.next_to_nothing if is_small(run.problem) else rule.little_of_large
+    if fit is None or fit.power(run.problem) >= max(rule.still_off, little * declared):
+        return False
+    if cost_of(run.problem, fit.residual, run.weights)[0] >= rule.nearer * least:
+        return False
+    if not compare(run.problem, run.holdout, run.fit, fit).passes(run.problem.thresholds.comparison.together):
+        return False
+    begin_with(run, fit)
+    return True
+
+
+def begin_with(run: SearchState, fit: Fit) -> None:
+    """Begin anew with many effects at once, which are not fitted so again."""
+    _start_anew(run, *whitened_anew(run.problem, run.holdout, fit))
+    z = certainty(run.problem, run.fit, run.weights)
+    run.steps = [evidence(c, float(least), len(run.candidates)) for c, least in zip(run.fit.chosen, z, strict=True)]
+    run.say(f"begun anew with {len(run.fit.chosen)} effects together: chi-square {run.power():.3g}")
+    run.tried_many, run.given = True, len(run.fit.chosen)
+    run.patience = min(run.patience, run.rule.many_patience)
+
+
+def _start_anew(run: SearchState, problem: Problem, holdout: Holdout, fit: Fit) -> None:
+    """Go on from a fit to windows that were whitened around it; what was tried in vain before may be tried again."""
+    run.problem, run.holdout, run.fit = problem, holdout, fit
+    run.keep = screening_windows(problem, run.config.screen_windows)
+    run.weights = window_weights(fit.clean(problem))
+    run.whitened_at = run.power()
+    run.closed.clear()
+    run.hopeless.clear()
+    run.rescreen()

@@ -1,0 +1,36 @@
+"""What is sure of many effects that were fitted together, on all windows."""
+
+from bumblebee.diagnosis.comparison import drop_unsure
+from bumblebee.diagnosis.estimation import Fit, gauss_newton
+from bumblebee.diagnosis.residuals import Problem, by_misfit, window_weights
+
+
+def sure_of(problem: Problem, fit: Fit) -> Fit | None:
+    """The same effects fitted on all windows, less those that are not sure there."""
+    known = None
+    for _ in range(problem.thresholds.selection.proposals.all_joints.rounds):
+        if not fit.chosen:
+            return None
+        fit = _fitted(problem, fit, 2, known)
+        sure = drop_unsure(problem, fit, window_weights(fit.clean(problem)))
+        if sure.chosen == fit.chosen:
+            return fit
+        known, fit = fit, sure
+    return _fitted(problem, fit, 0, known) if fit.chosen else None  # what was dropped last, by slopes alone
+
+
+def sure_by_misfit(problem: Problem, fit: Fit) -> Fit | None:
+    """The same where the windows stay far from the noise: what is sure is asked by what is left, not by the noise.
+
+    By the noise's measure hardly any effect would be sure there.
+    """
+    other = by_misfit(problem, _fitted(problem, fit, 0).clean(problem))
+    sure = sure_of(other, _fitted(other, fit, 2))
+    return None if sure is None else _fitted(problem, sure, 0)
+
+
+def _fitted(problem: Problem, fit: Fit, iterations: int, known: Fit | None = None) -> Fit:
+    """The same effects fitted from where they are, windows weighed by what is left there."""
+    weights = window_weights(problem.residual([fit.effects])[0])
+    least = problem.thresholds.estimation.levenberg_marquardt.damping
+    return gauss_newton(problem, fit.chosen, fit.values, weights, iterations, coarse=True, damping=least, known=known)
