@@ -30,7 +30,17 @@ _PARAMETER = {"armature": "armature", "coulomb_friction": "frictionloss"}
 
 
 def run(seed: int, robot: str = "arm", policy: Path | None = None) -> dict[str, Any]:
-    """One robot, diagnosed: errors on held-out rollouts, sizes found relative to the true ones, what was named."""
+    """One robot, diagnosed: errors on held-out rollouts, sizes found relative to the true ones, what was named.
+
+    A robot that fell at once, or a diagnosis that ended in an error, is a row of its own with `failed`.
+    """
+    try:
+        return _run(seed, robot, policy)
+    except Exception as error:  # of this robot, not of the run
+        return {"seed": seed, "robot": robot, "failed": f"{type(error).__name__}: {error}"[:300]}
+
+
+def _run(seed: int, robot: str, policy: Path | None) -> dict[str, Any]:
     case = arms.case(seed) if robot == "arm" else humanoid.case(seed, robot, policy)
     began = monotonic()
     document = diagnose(case.session, replace(DiagnosisConfig(), beyond=False)).document
@@ -69,7 +79,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     if options.robot == "track" and options.policy is None:
         parser.error("--robot track: --policy expected, the folder of an exported policy; none came")
-    done = {(row["robot"], row["seed"]) for row in read_lines(options.out)} if options.out.exists() else set()
+    done = (
+        {(row.get("robot", "arm"), row["seed"]) for row in read_lines(options.out)} if options.out.exists() else set()
+    )
     seeds = range(options.first, options.first + options.limit)
     left = [seed for seed in seeds if (options.robot, seed) not in done]
     with options.out.open("a") as out, ProcessPoolExecutor(options.workers, initializer=_quiet) as pool:
@@ -82,6 +94,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def brief(row: dict[str, Any]) -> str:
     """One line for the terminal."""
+    if "failed" in row:
+        return f"{row['robot']} {row['seed']}: {row['failed']}"
     errors = "; ".join(f"{h} s {' '.join(f'{1e3 * e:.3g}' for e in row['errors'][h])}" for h in HORIZONS[1:])
     return (
         f"{row['robot']} {row['seed']}: {row['joints']} joints, {row['more']}: {errors} mrad [{row['seconds']:.0f} s]"

@@ -16,9 +16,18 @@ _CLOSE = 2.0
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Medians over robots with their intervals, shares with their counts."""
+    """Of each kind of robot medians with their intervals, shares with their counts."""
+    kinds = dict.fromkeys(row.get("robot", "arm") for row in rows)
+    return "\n\n".join(_of_one([row for row in rows if row.get("robot", "arm") == kind], kind) for kind in kinds)
+
+
+def _of_one(rows: Sequence[dict[str, Any]], robot: str) -> str:
+    failed = [row for row in rows if "failed" in row]
+    rows = [row for row in rows if "failed" not in row]
+    if not rows:
+        return f"{robot}: {len(failed)} failed, none diagnosed"
     more = ", ".join(f"{sum(r['more'] == m for r in rows)} with {m} more" for m in MORE)
-    out = [f"{len(rows)} robots: {more}"]
+    out = [f"{robot}, {len(rows)} diagnosed, {len(failed)} failed: {more}"]
     for h in HORIZONS:
         before, after, floor = np.array([r["errors"][h] for r in rows], float).T * 1e3
         medians = ", ".join(

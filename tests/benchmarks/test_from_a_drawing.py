@@ -40,8 +40,10 @@ def _row(seed: int, after: float, armature: float) -> dict:
 
 
 def test_the_table_counts_what_was_found() -> None:
-    text = table([_row(0, 0.0015, 0.5), _row(1, 0.01, 0.05)])
-    assert "2 robots" in text and "2 with a load more" in text
+    fell = {"robot": "track", "seed": 2, "failed": "BadInput: no rollouts"}
+    text = table([_row(0, 0.0015, 0.5), _row(1, 0.01, 0.05), fell])
+    assert "stand, 2 diagnosed, 0 failed" in text and "2 with a load more" in text
+    assert "track: 1 failed, none diagnosed" in text and brief(fell) == "track 2: BadInput: no rollouts"
     assert "largest corrected 10; within 2 times the noise 50 %" in text
     assert "armature within 15%: 75 %" in text and "coulomb_friction within 15%: 100 %" in text
     assert "most 11" in text

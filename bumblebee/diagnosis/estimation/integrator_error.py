@@ -64,7 +64,8 @@ def _differences(problem: Problem, fit: Fit) -> Iterator[np.ndarray]:
         raw = residuals(problem.plant, problem.layout, problem.windows, [other], problem.fine)[0]
         good = np.isfinite(raw).all(axis=(1, 2))
         if int(other.model.opt.integrator) == int(mujoco.mjtIntegrator.mjINT_EULER):
-            good &= damping_rates(problem.plant, other, problem.windows) * problem.fine < 1.0
+            explicit = bool(other.model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP))
+            good &= damping_rates(problem.plant, other, problem.windows, joints=explicit) * problem.fine < 1.0
         if good.mean() >= problem.thresholds.estimation.integrator_error.finite:
             yield np.where(good[:, None], problem.whitener(raw) - residual, 0.0)
 

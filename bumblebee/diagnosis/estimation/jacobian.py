@@ -60,13 +60,9 @@ def _aside(chosen: Sequence[Candidate], values: np.ndarray, i: int, step: float)
 
 def _near(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:
     """(P, P) whether a parameter can change much of what another does: in one place, or if either has no one place."""
-    places = [c.where for c in chosen for _ in c.nominal]
-    return np.array([[a == b or not _local(problem, {a, b}) for b in places] for a in places], dtype=bool)
-
-
-def _local(problem: Problem, places: set[str]) -> bool:
-    """Whether all places are joints and bodies, not the whole robot or the ground."""
-    return places <= {*problem.plant.joints, *problem.plant.bodies}
+    places = np.array([c.where for c in chosen for _ in c.nominal])
+    local = np.isin(places, [*problem.plant.joints, *problem.plant.bodies])
+    return (places[:, None] == places) | ~(local[:, None] & local)
 
 
 def taken_over(
@@ -81,20 +77,18 @@ def taken_over(
     at = np.full((len(moving), len(values)), np.nan)
     if known is None:
         return columns, at
-    owner = [c for c in chosen for _ in c.nominal]
-    ends = np.cumsum([len(c.nominal) for c in chosen]).tolist()
     changed = {c.where for c in set(chosen) ^ set(known.chosen)}
-    if not _local(problem, changed):
+    local = {*problem.plant.joints, *problem.plant.bodies}
+    if not changed <= local:
         return columns, at
-    row = {int(i): k for k, i in enumerate(np.flatnonzero(known.scales))}
+    rows = {int(i): k for k, i in enumerate(np.flatnonzero(known.scales))}
+    owner = [(c, f) for c in chosen for f in range(len(c.nominal))]
+    start = {c: part.start for c, part in zip(known.chosen, known.slices, strict=True)}
+    there = np.array([c in start for c, _ in owner], dtype=bool)
+    stood = np.array([known.values[start[c] + f] if c in start else np.nan for c, f in owner])
     for k, i in enumerate(moving):
-        c = owner[i]
-        if c not in known.chosen or c.where in changed or not _local(problem, {c.where}):
-            continue
-        first = ends[chosen.index(c)] - len(c.nominal)
-        columns[k] = known.columns[row[known.slices[known.chosen.index(c)].start + int(i) - first]]
-        at[k] = values
-        for other, end in zip(chosen, ends, strict=True):
-            if other in known.chosen:
-                at[k, end - len(other.nominal) : end] = known.of(other)
+        c, f = owner[i]
+        if c in start and c.where not in changed and c.where in local:
+            columns[k] = known.columns[rows[start[c] + f]]
+            at[k] = np.where(there, stood, values)
     return columns, at

@@ -48,7 +48,7 @@ class Problem:
     coarse: float
     """Step [s] for sensitivities of many candidates."""
     coarsest: float
-    """The longest such step: `coarse` where no servo damps a joint within it."""
+    """The longest such step: `coarse` where nothing damps a joint within it."""
     whitener: Whitener = field(repr=False)
     nuisance: np.ndarray = field(repr=False)
     """(5 or 6, W, M) whitened: numerical differences, and last the start noise's curvature."""

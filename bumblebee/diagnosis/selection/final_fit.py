@@ -123,7 +123,11 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
         fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
     if holdout is not None:
         fit = _confirmed(problem, fit, weights, holdout)
-    return _sure_of(problem, fit, weights)
+    last = _sure_of(problem, fit, weights)
+    if last.fit.chosen == fit.chosen or not _is_many(problem, last.fit):
+        return last
+    fit = last_step(problem, last.fit.chosen, last.fit.values, weights)
+    return Refined(problem, fit, weights, half_widths(problem, fit, weights))
 
 
 def _confirmed(problem: Problem, fit: Fit, weights: np.ndarray, holdout: Holdout) -> Fit:
@@ -177,11 +181,21 @@ def _sure_of(problem: Problem, fit: Fit, weights: np.ndarray, needed: frozenset[
 
 
 def _less(problem: Problem, fit: Fit, weights: np.ndarray, gone: Sequence[Candidate]) -> Fit:
-    """The last step without some effects, and without what is insignificant then."""
+    """The last step without some effects, and without what is insignificant then; of many effects a refit by slopes.
+
+    A last step simulates every parameter to either side: where one effect after the other goes it is made at the end.
+    """
     rest = fit.without(gone)
+    if _is_many(problem, rest):
+        return _refit_near(problem, fit, weights)(rest.chosen, rest.values)
     whole = last_step(problem, rest.chosen, rest.values, weights)
     less = _significant(problem, whole, weights)
     return whole if less.chosen == whole.chosen else last_step(problem, less.chosen, less.values, weights)
+
+
+def _is_many(problem: Problem, fit: Fit) -> bool:
+    """Whether a fit has so many effects that a last step takes minutes."""
+    return len(fit.chosen) > problem.thresholds.selection.final_fit.many
 
 
 def _sureness(fit: Fit, half: np.ndarray, candidate: Candidate) -> float:

@@ -16,8 +16,8 @@ def damping_rates(plant: Plant, variation: Variation, windows: Windows, joints: 
     """The fastest rate (W,) [1/s] at which servos damp a variation of `plant` where windows start.
 
     Explicit steps of more than its inverse shake: a joint is turned round by its damping before it flies away, and what
-    they change is no simulator's error. The joints' own damping (`joints`) brings a robot to rest, too, but every
-    integrator of MuJoCo's takes it implicitly. Infinite where a joint has no inertia.
+    they change is no simulator's error. The joints' own damping (`joints`) brings a robot to rest, too; Euler's steps
+    take it implicitly unless that is switched off. Infinite where a joint has no inertia.
     """
     own = variation.model.nq == windows.qpos.shape[1]  # a gap or a shaft adds joints that no log has
     models = variation.models if own else tuple(p.model for p in plant.every)

@@ -76,8 +76,8 @@ class Sensitivities:
     """Of the steps that sensitivities of many candidates are simulated in."""
 
     damped: float = 2.0
-    """Steps times the rate at which servos damp a joint, from which on they are too coarse: 0 to 1.2 on robots whose
-    models have their rotors, 0.7 to 30 on models from drawings, which have none."""
+    """Steps times the rate at which a joint is damped, from which on they are too coarse. By servos: 0 to 1.2 on robots
+    whose models have their rotors, 0.7 to 30 on models from drawings, which have none."""
     poses: int = 50
     """Windows whose starts are asked for it."""
 

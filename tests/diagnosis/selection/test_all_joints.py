@@ -1,5 +1,6 @@
 """Parameters that are wrong on all joints at once are found together and by name."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -7,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
 from bumblebee.diagnosis.comparison.backward_elimination import certainty
 from bumblebee.diagnosis.comparison.compare import compare
@@ -20,7 +20,7 @@ from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
 from bumblebee.diagnosis.selection.proposals.all_joints import fit as fit_module
 from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints, start
-from bumblebee.diagnosis.selection.proposals.all_joints.begun import sets_of_large, usual_effects
+from bumblebee.diagnosis.selection.proposals.all_joints.begun import likely_values, sets_of_large, usual_effects
 from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.sim.servo import servos_of
@@ -108,6 +108,7 @@ def _run_with_one_effect(power: float, whitened_at: float) -> Any:
     thresholds = Thresholds()
     return SimpleNamespace(
         tried_many=False,
+        asked_far=False,
         given=0,
         fall=0.9,
         fit=SimpleNamespace(chosen=("one",)),
@@ -148,7 +149,7 @@ def test_windows_that_were_whitened_far_from_here_are_whitened_anew_first(
     assert run.tried_many is begins
 
 
-FAR = {"power": 400.0, "left": 5.0, "cost": 10.0, "least": 100.0}
+FAR = {"power": 400.0, "left": 5.0, "cost": 10.0, "least": 100.0, "before": 110.0}
 """Of 400 less than 2 % left, at a tenth of what the best effect by itself leaves."""
 
 
@@ -164,6 +165,8 @@ FAR = {"power": 400.0, "left": 5.0, "cost": 10.0, "least": 100.0}
         ({"nv": 29}, True),
         ({"left": 9.0, "nv": 29}, True),  # a large robot's windows are whitened further from the truth
         ({"left": 21.0, "nv": 29}, False),
+        ({"before": 400.0, "nv": 29}, False),  # one effect leaves a quarter
+        ({"before": 400.0}, True),
         ({"pays": False}, False),
     ],
 )
@@ -172,7 +175,8 @@ def test_a_robot_far_from_the_data_begins_with_all_joints_where_they_leave_next_
 ) -> None:
     case = {**FAR, "asked_far": False, "chosen": (), "nv": 4, "pays": True, **changed}
     run = _run_with_one_effect(case["power"], case["power"])
-    run.fit, run.weights, run.asked_far = SimpleNamespace(chosen=case["chosen"]), None, case["asked_far"]
+    run.fit = SimpleNamespace(chosen=case["chosen"], cost=case["before"])
+    run.weights, run.asked_far = None, case["asked_far"]
     run.problem.plant = SimpleNamespace(model=SimpleNamespace(nv=case["nv"]), floating=False)
     fit, begun = SimpleNamespace(power=lambda problem: case["left"], residual=None), []
     monkeypatch.setattr(start, "fit_all_joints", lambda *_: fit)
@@ -211,22 +215,52 @@ def test_an_armature_is_found_from_the_other_end_too(monkeypatch: pytest.MonkeyP
     assert begun[0] == rotor.nominal[0] < begun[1] == fit.values[0]
 
 
-def test_a_large_robot_without_rotors_begins_with_those_that_its_servos_are_tuned_for() -> None:
-    session, problem, _ = _opened({})
+def _large() -> Thresholds:
+    """Thresholds by which every robot is large."""
+    some = Thresholds()
+    rules = some.selection.proposals
+    whole = replace(rules.all_joints, small_robot=0)
+    return replace(some, selection=replace(some.selection, proposals=replace(rules, all_joints=whole)))
+
+
+DRAWN = re.sub(r'armature="[.0-9]+"', 'armature="0"', arm.XML)
+ROTORS = {("armature", j): v for j, v in zip(arm.JOINTS, (0.5, 0.6, 0.3), strict=True)}
+
+
+def test_a_large_robots_rotors_and_friction_begin_at_likely_sizes_where_none_are_declared() -> None:
+    session = arm.session_of(arm.simulate({}, count=1, seconds=2.0, xml=DRAWN), DRAWN)
+    problem = arm.problem_of(session, [0], 4)
     usual = usual_effects(all_candidates(session.plant, session.rollouts, []))
-    bare = [_declared(c, 0.0) if c.effect == "armature" else c for c in usual]
-    (chosen, values), *_ = sets_of_large(problem, bare)[0]
-    assert {c.effect for c in usual} - {c.effect for c in chosen} == {"motor_strength", "kd"}
-    found = dict(zip([(c.effect, c.where) for c in chosen], values, strict=True))
-    servo = servos_of(session.plant.model, [int(session.plant.model.joint(j).id) for j in arm.JOINTS])
-    for joint, kp, kd in zip(arm.JOINTS, -servo.bias[:, 1], -servo.bias[:, 2], strict=True):
-        assert found["armature", joint] == pytest.approx(kd**2 / (4 * kp))
-    declared = [c for c in chosen if c.effect == "armature"]
-    (chosen, values), *_ = sets_of_large(problem, usual)[0]
-    for c in (c for c in usual if c.effect == "armature"):
-        assert values[list(chosen).index(c)] == c.nominal[0]  # a rotor that is declared stays
-    assert declared and all(v == 0 for (kind, _), v in found.items() if kind == "coulomb_friction")
+    first, strengths, gains = sets_of_large(usual, all_candidates(session.plant, session.rollouts, []))
+    assert {c.effect for c in strengths} == {"motor_strength"} and {c.effect for c in gains} == {"kp"}
+    assert {c.effect for c in usual} - {c.effect for c in first} == {"motor_strength"}
+    model = session.plant.model
+    values = dict(zip([(c.effect, c.where) for c in first], likely_values(problem, first), strict=True))
+    servo = servos_of(model, [int(model.joint(j).id) for j in arm.JOINTS])
+    for k, joint in enumerate(arm.JOINTS):
+        damping = -servo.bias[k, 2] + model.dof_damping[servo.dof[k]]
+        assert values["armature", joint] == pytest.approx(damping**2 / (-4 * servo.bias[k, 1]))
+        limit = servo.limit[k]
+        assert values["coulomb_friction", joint] == pytest.approx(0.01 * limit if np.isfinite(limit) else 0.0)
+        assert values["viscous_friction", joint] == model.dof_damping[servo.dof[k]]
+    declared = [replace(c, nominal=(0.02,)) if c.effect == "armature" else c for c in first]
+    kept = dict(zip([(c.effect, c.where) for c in declared], likely_values(problem, declared), strict=True))
+    assert all(kept["armature", joint] == 0.02 for joint in arm.JOINTS)
 
 
-def _declared(candidate: Candidate, value: float) -> Candidate:
-    return replace(candidate, nominal=(value,))
+def test_a_large_robot_from_a_drawing_with_half_the_damping_is_found() -> None:
+    """Of a kd that is too large friction cannot be less than none; another start leaves `below` too."""
+    softer = re.sub(r'kv="(\d+)"', lambda m: f'kv="{int(m[1]) / 2}"', DRAWN)
+    rollouts = arm.simulate({**TRUTH, **ROTORS}, count=3, seconds=5.0, xml=softer)
+    session = arm.session_of(rollouts, DRAWN)
+    windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, [0, 1], 0.2, 40))
+    rng = np.random.default_rng(0)
+    problem = make_problem(
+        session.plant, session.layout, windows, session.sigma, session.steps, [], rng, thresholds=_large()
+    )
+    declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
+    fit = fit_all_joints(problem, all_candidates(session.plant, session.rollouts, []), declared, str, below=30.0)
+    assert fit is not None and fit.power(problem) < 30.0
+    found = {(c.effect, c.where): float(fit.of(c)[0]) for c in fit.chosen}
+    for place, rotor in ROTORS.items():
+        assert found[place] == pytest.approx(rotor, rel=0.1), place

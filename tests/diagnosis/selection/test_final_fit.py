@@ -88,10 +88,14 @@ def test_what_another_integrator_would_have_found_goes_but_not_what_the_windows_
     assert last.fit.values[0] == pytest.approx(0.6, rel=0.1)
 
 
+@pytest.mark.parametrize(("many", "made_of"), [(30, [3, 2, 2, 2]), (1, [3, 2])])
 def test_what_the_others_cannot_make_up_for_stays_however_far_another_integrator_would_move_it(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, many: int, made_of: list[int]
 ) -> None:
-    """Of two frictions of two joints neither is an integrator's; an armature that is not there still is."""
+    """Of two frictions of two joints neither is an integrator's; an armature that is not there still is.
+
+    Of many effects what goes is followed by a refit by slopes, and the last step comes once, at the end.
+    """
     truth = {("coulomb_friction", "j1"): 0.8, ("coulomb_friction", "j2"): 0.6}
     session = arm.session_of(arm.simulate(truth, count=2, seconds=4.0, seed=100))
     problem = arm.problem_of(session, [0, 1], 24)
@@ -104,15 +108,20 @@ def test_what_the_others_cannot_make_up_for_stays_however_far_another_integrator
 
     monkeypatch.setattr(refining, "half_widths", half(10.0))
     monkeypatch.setattr(refining, "interval", half(0.5))
-    last = refine(replace(problem, thresholds=_sure_of_all(problem)), begun, np.random.default_rng(0))
+    made: list[int] = []
+    real = refining.last_step
+    monkeypatch.setattr(refining, "last_step", lambda p, c, *rest: made.append(len(c)) or real(p, c, *rest))
+    last = refine(replace(problem, thresholds=_sure_of_all(problem, many)), begun, np.random.default_rng(0))
     assert [(c.effect, c.where) for c in last.fit.chosen] == list(truth)
     assert last.fit.values == pytest.approx([0.8, 0.6], rel=0.1)
+    assert made == made_of
 
 
-def _sure_of_all(problem: Problem) -> Thresholds:
+def _sure_of_all(problem: Problem, many: int = 30) -> Thresholds:
     """Thresholds by which no effect is insignificant, whatever it is."""
     selection = problem.thresholds.selection
-    return replace(problem.thresholds, selection=replace(selection, final_fit=replace(selection.final_fit, sure=-1.0)))
+    final = replace(selection.final_fit, sure=-1.0, many=many)
+    return replace(problem.thresholds, selection=replace(selection, final_fit=final))
 
 
 def test_where_nothing_is_significant_in_the_end_nothing_is_named(

@@ -1,17 +1,13 @@
 """A joint's friction is the sum of the members that are worth their numbers."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 import pytest
 
-from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.diagnose import diagnose
-from bumblebee.diagnosis.selection.proposals import friction_family
 from bumblebee.diagnosis.selection.proposals.friction_family import complete_frictions
-from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.measured.rollout import Rollout
 from tests.diagnosis import arm
 from tests.diagnosis.selection.test_swap import begun, names
@@ -120,22 +116,3 @@ def test_the_drag_is_in_the_model() -> None:
     data.qvel[0] = -2.0
     mujoco.mj_forward(model, data)
     assert data.qfrc_damper[0] == pytest.approx(DRAG * 4.0)
-
-
-@pytest.mark.parametrize(("joints", "asked"), [(3, ["j0", "j1", "j2"]), (12, ["j7", "j2"])])
-def test_of_many_joints_with_friction_those_are_asked_that_lack_most_torque(
-    monkeypatch: pytest.MonkeyPatch, joints: int, asked: list[str]
-) -> None:
-    monkeypatch.setattr(friction_family, "restless", lambda *args: ["j7", "base", "j2"])
-    run = SimpleNamespace(
-        problem=SimpleNamespace(thresholds=Thresholds()),
-        fit=SimpleNamespace(
-            chosen=[SimpleNamespace(effect="coulomb_friction", where=f"j{k}") for k in range(joints)]
-            + [SimpleNamespace(effect="armature", where="base")]
-        ),
-        answers=SimpleNamespace(white=None),
-        small=None,
-        small_fit=lambda: SimpleNamespace(clean=lambda problem: None),
-        config=SearchConfig(),
-    )
-    assert friction_family._worth_asking(run) == asked

@@ -17,8 +17,8 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate, is_chosen
 from bumblebee.diagnosis.comparison import columns_without, compare, criterion, refitted_without, wald
 from bumblebee.diagnosis.selection.moves import Move, Terms, refitted
+from bumblebee.diagnosis.selection.proposals.rubbing_joints import worth_asking
 from bumblebee.diagnosis.selection.score_tests import score_tests
-from bumblebee.diagnosis.selection.screening import restless
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import try_one
 
@@ -36,7 +36,8 @@ MEMBERS = (
 def complete_frictions(run: SearchState) -> bool:
     """On every joint with a friction the sum of the family that explains it best; whether anything has changed."""
     changed = False
-    for where in _worth_asking(run):
+    rubbing = list(dict.fromkeys(c.where for c in run.fit.chosen if c.effect in MEMBERS))
+    for where in worth_asking(run, rubbing):
         for _ in MEMBERS:
             move = _next_member(run, where) or _by_direction(run, where)
             if move is None:
@@ -45,19 +46,6 @@ def complete_frictions(run: SearchState) -> bool:
             _drop_members(run, where)
             changed = True
     return changed
-
-
-def _worth_asking(run: SearchState) -> list[str]:
-    """The joints with a friction; where these are many, those of them that lack most torque.
-
-    Among six members on each of thirty joints one is always worth its number by chance, and each costs a refit.
-    """
-    rule = run.problem.thresholds.selection.proposals.friction_family
-    rubbing = list(dict.fromkeys(c.where for c in run.fit.chosen if c.effect in MEMBERS))
-    if len(rubbing) <= rule.few_joints or run.answers is None:
-        return rubbing
-    left = run.small_fit().clean(run.small)
-    return [w for w in restless(run.small, run.answers.white, left, run.config.shortlist) if w in rubbing]
 
 
 def _next_member(run: SearchState, where: str) -> Move | None:

@@ -7,6 +7,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates import SHAPED, Candidate, is_chosen
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.selection.moves import Terms, refitted
+from bumblebee.diagnosis.selection.proposals.rubbing_joints import worth_asking
 from bumblebee.diagnosis.selection.score_tests import score_tests
 from bumblebee.diagnosis.selection.state import SearchState
 
@@ -15,8 +16,8 @@ def add_stribeck_friction(run: SearchState) -> bool:
     """Try Stribeck friction conditional on each dry friction that was found; whether one was accepted."""
     rule = run.problem.thresholds.selection.proposals.stribeck
     dry = [c for c in run.fit.chosen if c.effect == "coulomb_friction"]
-    found = False
-    for c in dry:
+    asked, found = worth_asking(run, [c.where for c in dry]), False
+    for c in (c for c in dry if c.where in asked):
         kinds = [o for o in run.candidates if (o.effect, o.where) == ("stribeck_friction", c.where)]
         if not kinds or is_chosen(kinds[0], run.fit.chosen):
             continue

@@ -20,8 +20,10 @@ class AllJoints:
     small_robot: int = 12
     """Degrees of freedom up to which a robot is small; of these the links are asked, too."""
     still_off: float = 2.0
-    """Median chi-square that is much: a load alone leaves less, or it is set beside others; strengths and gains follow,
-    the way is gone from the other end, and masses of all links come in."""
+    """Median chi-square that is much: of a small robot a load alone leaves less, or it is set beside others; strengths
+    and gains follow, the way is gone from the other end, and masses of all links come in."""
+    off_of_large: float = 4.0
+    """Median chi-square of a large robot from which on the noise does not measure what is sure."""
     load_leaves: float = 0.5
     """Share of the declared model's median chi-square below which a load on one link is worth a place beside others."""
     rotors: float = 30.0
@@ -30,10 +32,13 @@ class AllJoints:
     """Share of the declared model's median chi-square that all joints' effects leave less of where they come first."""
     little_of_large: float = 0.05
     """The same of a large robot, whose windows are whitened around a model that is further from the truth."""
-    no_rotor: float = 0.05
-    """Share of the rotor that a servo would damp critically, below which a large robot's joint has none declared."""
+    enough_of_large: float = 0.05
+    """The same share, above which a large robot's strengths and kp are asked, too."""
+    likely_dry: float = 0.01
+    """Share of a drive's limit at which a large robot's dry friction begins; gears of robots have .5 to 5 %."""
     nearer: float = 0.3
-    """Share of the cost that the best effect by itself leaves, which all joints' must leave less of."""
+    """Share of the cost that the best effect by itself leaves, which all joints' must leave less of; share of the
+    declared model's below which a large robot's best effect comes first."""
     one_damping: float = 0.05
     """Share by which the cost may grow where kd and a joint's viscous friction become one."""
 

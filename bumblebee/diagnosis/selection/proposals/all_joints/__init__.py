@@ -9,8 +9,9 @@ one common factor nearly as a torque drive's do (`declared_scale`). Of a small r
 by itself and then beside them (`link_load`): it weakens all drives as far as these can tell. Where residuals stay large
 masses and centres of mass of all links follow. What is not sure is taken out again, and the rest has to pay on windows
 that took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It begins so in
-the place of gains far from the declared ones (`gain_grid`), and on a small robot far from the data where they leave
-next to nothing and no effect that was tried by itself comes near.
+the place of gains far from the declared ones (`gain_grid`), and on a robot far from the data where they leave next to
+nothing and no effect that was tried by itself comes near. A large robot's rotors and friction begin at likely sizes
+where the model, made from a drawing, has none (`begun`).
 """
 
 from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints

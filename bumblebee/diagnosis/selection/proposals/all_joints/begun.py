@@ -1,6 +1,6 @@
 """Where a fit of all joints begins: which usual effects, beside what, and at which values."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from bumblebee.sim.servo import servos_of
 
 _STRENGTH = "motor_strength"
 _GAIN = "kp"
-_DAMPING = "kd"
 ROTOR = "armature"
 Begun = tuple[Sequence[Candidate], np.ndarray]
 """Effects and the values (P,) that their fit begins with."""
@@ -47,33 +46,46 @@ def sets_of_small(
     return [begun[0], loaded, *begun[1:]]
 
 
-def sets_of_large(problem: Problem, usual: Sequence[Candidate]) -> list[list[Begun]]:
-    """Friction, rotors and offsets from rotors that fit the servos; then every usual effect from where it is absent.
+def sets_of_large(usual: Sequence[Candidate], candidates: Sequence[Candidate]) -> tuple[list[Candidate], ...]:
+    """Usual effects at every drive's declared strength; then what comes beside them: strengths, and servos' `kp`."""
+    strengths = [c for c in usual if c.effect == _STRENGTH]
+    gains = [c for c in candidates if c.effect == _GAIN]
+    return [c for c in usual if c.effect != _STRENGTH], strengths, gains
 
-    Servos' kd and strengths come later: a robot of thirty joints takes half a minute a step.
+
+def likely_values(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:
+    """Values (P,) from which a large robot's fit begins: rotors and friction of likely sizes where none is declared.
+
+    From none at all the way leads past the truth: a joint without a rotor follows its servo at once, and one that
+    hardly moves is held by any viscous friction that is large enough. A servo is tuned for what it moves: a rotor
+    begins as kd^2 / (4 kp), which kp and the joint's whole damping would damp critically, dry friction at a share of
+    the drive's limit. All else is absent.
     """
-    first = [c for c in usual if c.effect not in (_STRENGTH, _DAMPING)]
-    return [[(first, _with_rotors(problem, first))], [(list(usual), absent(usual))]]
-
-
-def _with_rotors(problem: Problem, chosen: Sequence[Candidate]) -> np.ndarray:
-    """Values (P,) from which a fit begins: effects absent, but for the rotors that a drawing left out.
-
-    A servo is tuned for the inertia that it moves: where kp and kd would damp a joint of kd^2 / (4 kp) critically, a
-    rotor declared to be next to nothing begins with that.
-    """
-    model, least = problem.plant.model, problem.thresholds.selection.proposals.all_joints.no_rotor
     values = []
     for c in chosen:
         value = np.array(absent([c]))
-        if c.effect == ROTOR:
-            servo = servos_of(model, [int(model.joint(c.where).id)])
-            stiffness, damping = -float(servo.bias[0, 1]), -float(servo.bias[0, 2])
-            tuned = damping**2 / (4 * stiffness) if stiffness > 0 < damping else 0.0
-            if value[0] < least * tuned:
-                value[0] = tuned
+        if value[0] == 0 and c.effect in _LIKELY:
+            value[0] = _LIKELY[c.effect](problem, int(problem.plant.model.joint(c.where).id))
         values.append(value)
     return clipped(chosen, np.concatenate(values))
+
+
+def _rotor(problem: Problem, joint: int) -> float:
+    """Inertia [kg m^2], of a slide [kg], that a joint's servo would damp critically; 0 without one."""
+    model = problem.plant.model
+    bias = servos_of(model, [joint]).bias[0]
+    stiffness, damping = -float(bias[1]), max(-float(bias[2]), 0.0) + float(model.dof_damping[model.jnt_dofadr[joint]])
+    return damping**2 / (4 * stiffness) if stiffness > 0 else 0.0
+
+
+def _dry(problem: Problem, joint: int) -> float:
+    """Dry friction [N m], of a slide [N]; 0 where the drive has no limit."""
+    limit = float(servos_of(problem.plant.model, [joint]).limit[0])
+    share = problem.thresholds.selection.proposals.all_joints.likely_dry
+    return share * limit if np.isfinite(limit) else 0.0
+
+
+_LIKELY: dict[str, Callable[[Problem, int], float]] = {ROTOR: _rotor, "coulomb_friction": _dry}
 
 
 def beside(fit: Fit, others: Sequence[Candidate]) -> Begun:

@@ -1,4 +1,4 @@
-"""The fit of all joints' usual effects, from where they are absent on."""
+"""The fit of all joints' usual effects, from where they are absent on; of a large robot from likely sizes."""
 
 from collections.abc import Callable, Sequence
 from functools import partial, reduce
@@ -14,6 +14,7 @@ from bumblebee.diagnosis.selection.proposals.all_joints.begun import (
     Begun,
     beside,
     is_whole,
+    likely_values,
     sets_of_large,
     sets_of_small,
     usual_effects,
@@ -26,7 +27,7 @@ from bumblebee.diagnosis.selection.proposals.all_joints.sure import sure_by_misf
 def fit_all_joints(
     problem: Problem, candidates: Sequence[Candidate], found: Fit, say: Callable[[str], None], below: float = np.inf
 ) -> Fit | None:
-    """A fit of a load, the usual effects or both, from the declared values on, that are sure together.
+    """A fit of a load, the usual effects or both that are sure together.
 
     Or from those that were `found` on, together with the others, if this leads nearer to the data. The long way is
     gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot with large
@@ -40,9 +41,7 @@ def fit_all_joints(
     some = problem.part(screening_windows(problem, rule.windows))
     small = is_small(problem)
     steps = rule.steps_of_small if small else rule.steps
-    loads = link_load(some, candidates) if small else ()
-    sets = sets_of_small(usual, candidates, loads) if small else sets_of_large(some, usual)
-    fit = _simplest(some, loads, sets, steps)
+    fit = _of_small(some, usual, candidates) if small else _of_large(some, usual, candidates, below)
     if found.chosen:
         fit = _better(some, fit, levenberg_marquardt(some, *beside(found, usual), steps))
     say(f"{len(fit.chosen)} usual effects and loads together: chi-square {fit.power(some):.3g}")
@@ -53,7 +52,7 @@ def fit_all_joints(
     chosen, values = one_damping(some, fit)
     if len(chosen) < len(fit.chosen):
         fit = levenberg_marquardt(some, chosen, values, rule.steps_with_links)
-    if fit.power(some) < rule.still_off:
+    if fit.power(some) < (rule.still_off if small else rule.off_of_large):
         return sure_of(problem, drop_unsure(some, fit, window_weights(fit.clean(some))))
     return sure_by_misfit(problem, fit)
 
@@ -64,28 +63,36 @@ def is_small(problem: Problem) -> bool:
     return problem.plant.model.nv <= most and not problem.plant.floating
 
 
-def _simplest(problem: Problem, loads: Sequence[Fit], sets: Sequence[Sequence[Begun]], steps: int) -> Fit:
+def _of_small(problem: Problem, usual: Sequence[Candidate], candidates: Sequence[Candidate]) -> Fit:
     """A load alone that leaves little, else the first sets that do, or what leaves much less than all before it."""
-    better, enough = partial(_better, problem), _enough(problem)
-    fits = list(loads)
-    for several in sets:
-        if fits and reduce(better, fits).power(problem) < enough:
+    rule, better = problem.thresholds.selection.proposals.all_joints, partial(_better, problem)
+    fits = list(link_load(problem, candidates))
+    for several in sets_of_small(usual, candidates, fits):
+        if fits and reduce(better, fits).power(problem) < rule.still_off:
             break
-        fits += [_from_both_ends(problem, begun, steps) for begun in several]
+        fits += [_from_both_ends(problem, begun, rule.steps_of_small) for begun in several]
     return reduce(better, fits)
 
 
-def _enough(problem: Problem) -> float:
-    """Median chi-square that leaves nothing to ask for; of a large robot a share of the declared model's, too."""
+def _of_large(problem: Problem, usual: Sequence[Candidate], candidates: Sequence[Candidate], below: float) -> Fit:
+    """The usual effects at the declared strengths; where much is left beside strengths, and beside servos' kp.
+
+    Much is more than a share of what the declared model leaves, or not `below` what else there is. Each step takes half
+    a minute on a robot of thirty joints: strengths and kp begin from the fit without them.
+    """
     rule = problem.thresholds.selection.proposals.all_joints
-    if is_small(problem):
-        return rule.still_off
-    declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
-    return max(rule.still_off, rule.little_of_large * declared.power(problem))
+    declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0])).power(problem)
+    enough = min(max(rule.still_off, rule.enough_of_large * declared), below)
+    first, *drives = sets_of_large(usual, candidates)
+    best = fit = levenberg_marquardt(problem, first, likely_values(problem, first), rule.steps)
+    for more in drives:
+        if more and best.power(problem) >= enough:
+            best = _better(problem, best, levenberg_marquardt(problem, *beside(fit, more), rule.steps_with_links))
+    return best
 
 
 def _from_both_ends(problem: Problem, begun: Begun, steps: int) -> Fit:
-    """The fit from where it begins or, if a small robot's leaves much, from rotors much heavier than the links.
+    """The fit from where it begins or, if that leaves much, from rotors much heavier than the links.
 
     A joint that hardly has an inertia follows its servo at once, and next to none does not differ from none.
     """
@@ -93,7 +100,7 @@ def _from_both_ends(problem: Problem, begun: Begun, steps: int) -> Fit:
     chosen, values = begun
     fit = levenberg_marquardt(problem, chosen, values, steps)
     heavy = np.concatenate([(rule.rotors if c.effect == ROTOR else 0.0) * np.array(c.step) for c in chosen])
-    if fit.power(problem) < rule.still_off or not heavy.any() or not is_small(problem):
+    if fit.power(problem) < rule.still_off or not heavy.any():
         return fit
     other = levenberg_marquardt(problem, chosen, clipped(chosen, values + heavy), steps)
     return min(fit, other, key=lambda f: f.power(problem))

@@ -53,6 +53,8 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
     far = run.config.many if is_small(run.problem) else run.config.far
     if run.tried_many or run.given or power < run.config.many or (power < far if stuck else early):
         return False
+    if run.asked_far and not run.fit.chosen:
+        return False  # nothing has changed since
     if run.power() < run.rule.whiten_anew * run.whitened_at:
         _start_anew(run, *whitened_anew(run.problem, run.holdout, run.fit))
         run.say(f"whitened anew around what was found: chi-square {run.power():.3g}")
@@ -68,17 +70,21 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
 
 
 def start_far_off(run: SearchState, least: float) -> bool:
-    """Begin with the usual effects of all joints of a small robot that is far from the data; whether it did.
+    """Begin with the usual effects of all joints of a robot that is far from the data; whether it did.
 
     Only before anything is found, where they leave next to nothing, and where no effect that was tried by itself comes
     near: the cheapest costs `least`. One effect after the other leads into a by-way where every joint errs by factors.
+    A large robot, of which it takes minutes, is not asked where one effect leaves as little.
     """
     rule, declared = run.problem.thresholds.selection.proposals.all_joints, run.power()
+    small = is_small(run.problem)
     if run.asked_far or run.fit.chosen or declared < run.config.far:
+        return False
+    if not small and least <= rule.nearer * run.fit.cost:
         return False
     run.asked_far = True
     fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
-    little = rule.next_to_nothing if is_small(run.problem) else rule.little_of_large
+    little = rule.next_to_nothing if small else rule.little_of_large
     if fit is None or fit.power(run.problem) >= max(rule.still_off, little * declared):
         return False
     if cost_of(run.problem, fit.residual, run.weights)[0] >= rule.nearer * least:

@@ -1,13 +1,14 @@
 """What is sure of many effects that were fitted together, on all windows."""
 
+import numpy as np
+
 from bumblebee.diagnosis.comparison import drop_unsure
-from bumblebee.diagnosis.estimation import Fit, gauss_newton
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, by_misfit, window_weights
 
 
-def sure_of(problem: Problem, fit: Fit) -> Fit | None:
-    """The same effects fitted on all windows, less those that are not sure there."""
-    known = None
+def sure_of(problem: Problem, fit: Fit, known: Fit | None = None) -> Fit | None:
+    """The same effects fitted on all windows, less those that are not sure there; `known` is a fit of these windows."""
     for _ in range(problem.thresholds.selection.proposals.all_joints.rounds):
         if not fit.chosen:
             return None
@@ -24,8 +25,11 @@ def sure_by_misfit(problem: Problem, fit: Fit) -> Fit | None:
 
     By the noise's measure hardly any effect would be sure there.
     """
-    other = by_misfit(problem, _fitted(problem, fit, 0).clean(problem))
-    sure = sure_of(other, _fitted(other, fit, 2))
+    residual = problem.residual([fit.effects])[0]
+    _, nuisance = cost_of(problem, residual, window_weights(residual))
+    other = by_misfit(problem, residual - np.tensordot(nuisance, problem.nuisance, axes=1))
+    fitted = _fitted(other, fit, 2)
+    sure = sure_of(other, fitted, fitted)
     return None if sure is None else _fitted(problem, sure, 0)
 
 
