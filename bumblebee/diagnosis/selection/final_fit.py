@@ -140,10 +140,15 @@ def _confirmed(problem: Problem, fit: Fit, weights: np.ndarray, holdout: Holdout
 
 
 def _refit_near(problem: Problem, known: Fit, weights: np.ndarray) -> Callable[[Sequence[Candidate], np.ndarray], Fit]:
-    """Fits of some effects from their values (P,), by the sensitivities of a `known` fit of more."""
+    """Fits of some effects from their values (P,), by the sensitivities of a `known` fit of more.
+
+    Where these are many they hold wherever the fit goes.
+    """
+    many = _is_many(problem, known)
 
     def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
-        return gauss_newton(problem, chosen, values, weights, iterations=1, coarse=True, known=known)
+        held = chosen if many else ()
+        return gauss_newton(problem, chosen, values, weights, iterations=1, coarse=True, known=known, held=held)
 
     return refit
 

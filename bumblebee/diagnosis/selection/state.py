@@ -217,14 +217,19 @@ class SearchState:
             self.rescreen()
 
     def prune(self) -> None:
-        """Drop effects that the others have made needless."""
+        """Drop effects that the others have made needless; of many each is asked by the slopes that there are."""
+        known, many = self.fit, len(self.fit.chosen) > self.problem.thresholds.selection.final_fit.many
 
-        def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
-            return gauss_newton(self.problem, chosen, values, self.weights, iterations=2, coarse=True, known=self.fit)
+        def refit(chosen: Sequence[Candidate], values: np.ndarray, by_slopes: bool = many) -> Fit:
+            held = chosen if by_slopes else ()
+            p = self.problem
+            return gauss_newton(p, chosen, values, self.weights, iterations=2, coarse=True, known=known, held=held)
 
         # Without one of its effects a joint may swing away in so few windows that 400 of 1,700 showed none of it.
         wide = self.holdout.widely()
         self.fit = drop_insignificant(self.problem, self.fit, self.weights, self.bound, refit, wide, self.say)
+        if many and self.fit.chosen != known.chosen:
+            self.fit = refit(self.fit.chosen, self.fit.values, by_slopes=False)
         for c in [c for c in reversed(self.fit.chosen) if c.effect in JUDGED_ALONE]:
             if not is_still_confirmed(self.problem, self.fit, c, wide):
                 self.say(f"needless: {c.effect} on {c.where}")
