@@ -144,8 +144,7 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         if all(t.candidate.effect in SATURATIONS for t in tried):  # a limit alone does not say that slopes are none
             more, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
             tried += more
-        far = partial(start_far_off, run, min((t.cost for t in tried), default=np.inf))
-        if attempt(_ALL_JOINTS, far, _no):
+        if attempt(_ALL_JOINTS, partial(start_far_off, run, tried), _no):
             continue
         many = not _explains_much(tried, run)
         if many and attempt(_ALL_JOINTS, partial(start_with_all_joints, run), _no):

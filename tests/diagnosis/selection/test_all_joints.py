@@ -165,7 +165,9 @@ FAR = {"power": 400.0, "left": 5.0, "cost": 10.0, "least": 100.0, "before": 110.
         ({"nv": 29}, True),
         ({"left": 9.0, "nv": 29}, True),  # a large robot's windows are whitened further from the truth
         ({"left": 21.0, "nv": 29}, False),
-        ({"before": 400.0, "nv": 29}, False),  # one effect leaves a quarter
+        ({"before": 200.0, "nv": 29}, False),  # one joint's effect leaves half
+        ({"before": 200.0, "nv": 29, "where": ""}, True),
+        ({"before": 400.0, "nv": 29, "where": ""}, False),  # the whole robot's leaves a quarter
         ({"before": 400.0}, True),
         ({"pays": False}, False),
     ],
@@ -173,19 +175,20 @@ FAR = {"power": 400.0, "left": 5.0, "cost": 10.0, "least": 100.0, "before": 110.
 def test_a_robot_far_from_the_data_begins_with_all_joints_where_they_leave_next_to_nothing(
     monkeypatch: pytest.MonkeyPatch, changed: dict[str, Any], begins: bool
 ) -> None:
-    case = {**FAR, "asked_far": False, "chosen": (), "nv": 4, "pays": True, **changed}
+    case = {**FAR, "asked_far": False, "chosen": (), "nv": 4, "pays": True, "where": "j1", **changed}
     run = _run_with_one_effect(case["power"], case["power"])
     run.fit = SimpleNamespace(chosen=case["chosen"], cost=case["before"])
     run.weights, run.asked_far = None, case["asked_far"]
     run.problem.plant = SimpleNamespace(model=SimpleNamespace(nv=case["nv"]), floating=False)
+    tried = [SimpleNamespace(cost=case["least"], candidate=SimpleNamespace(where=case["where"]))]
     fit, begun = SimpleNamespace(power=lambda problem: case["left"], residual=None), []
     monkeypatch.setattr(start, "fit_all_joints", lambda *_: fit)
     monkeypatch.setattr(start, "cost_of", lambda *_: (case["cost"], None))
     monkeypatch.setattr(start, "compare", lambda *_: SimpleNamespace(passes=lambda rule: case["pays"]))
     monkeypatch.setattr(start, "begin_with", lambda run, fit: begun.append(fit))
-    assert start.start_far_off(run, case["least"]) is begins
+    assert start.start_far_off(run, tried) is begins
     assert bool(begun) is begins
-    assert not start.start_far_off(run, case["least"])  # it is asked once, and only then
+    assert not start.start_far_off(run, tried)  # it is asked once, and only then
 
 
 @pytest.mark.parametrize(("nv", "asked"), [(4, True), (29, False)])

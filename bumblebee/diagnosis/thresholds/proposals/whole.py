@@ -38,7 +38,7 @@ class AllJoints:
     """Share of a drive's limit at which a large robot's dry friction begins; gears of robots have .5 to 5 %."""
     nearer: float = 0.3
     """Share of the cost that the best effect by itself leaves, which all joints' must leave less of; share of the
-    declared model's below which a large robot's best effect comes first."""
+    declared model's below which an effect of the whole of a large robot comes first."""
     one_damping: float = 0.05
     """Share by which the cost may grow where kd and a joint's viscous friction become one."""
 

@@ -10,6 +10,7 @@ from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, make_problem, screening_windows, window_weights
 from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints, is_small
 from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
@@ -69,30 +70,35 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
     return True
 
 
-def start_far_off(run: SearchState, least: float) -> bool:
+def start_far_off(run: SearchState, tried: Sequence[Trial]) -> bool:
     """Begin with the usual effects of all joints of a robot that is far from the data; whether it did.
 
-    Only before anything is found, where they leave next to nothing, and where no effect that was tried by itself comes
-    near: the cheapest costs `least`. One effect after the other leads into a by-way where every joint errs by factors.
-    A large robot, of which it takes minutes, is not asked where one effect leaves as little.
+    Only before anything is found, where they leave next to nothing, and where no effect that was `tried` by itself
+    comes near. One effect after the other leads into a by-way where every joint errs by factors.
     """
     rule, declared = run.problem.thresholds.selection.proposals.all_joints, run.power()
     small = is_small(run.problem)
-    if run.asked_far or run.fit.chosen or declared < run.config.far:
-        return False
-    if not small and least <= rule.nearer * run.fit.cost:
+    if run.asked_far or run.fit.chosen or declared < run.config.far or not (small or _is_worth_minutes(run, tried)):
         return False
     run.asked_far = True
     fit = fit_all_joints(run.problem, run.candidates, run.fit, run.say)
     little = rule.next_to_nothing if small else rule.little_of_large
     if fit is None or fit.power(run.problem) >= max(rule.still_off, little * declared):
         return False
+    least = min((t.cost for t in tried), default=np.inf)
     if cost_of(run.problem, fit.residual, run.weights)[0] >= rule.nearer * least:
         return False
     if not compare(run.problem, run.holdout, run.fit, fit).passes(run.problem.thresholds.comparison.together):
         return False
     begin_with(run, fit)
     return True
+
+
+def _is_worth_minutes(run: SearchState, tried: Sequence[Trial]) -> bool:
+    """Whether all joints of a large robot may err: no effect of one place explains much, none of all leaves little."""
+    place = (1 - run.rule.most_of_it) * run.fit.cost
+    whole = run.problem.thresholds.selection.proposals.all_joints.nearer * run.fit.cost
+    return all(t.cost > (place if t.candidate.where else whole) for t in tried)
 
 
 def begin_with(run: SearchState, fit: Fit) -> None:
