@@ -77,8 +77,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.table:
         print(table(read_lines(options.table)))
         return
-    if options.robot == "track" and options.policy is None:
-        parser.error("--robot track: --policy expected, the folder of an exported policy; none came")
+    if options.robot == "track" and not (options.policy and (options.policy / "policy.onnx").is_file()):
+        came = "none came" if options.policy is None else f"none in {options.policy}"
+        parser.error(f"--robot track: --policy expected, a folder with policy.onnx and contract.json; {came}")
     done = (
         {(row.get("robot", "arm"), row["seed"]) for row in read_lines(options.out)} if options.out.exists() else set()
     )

@@ -1,5 +1,7 @@
 """Robots from drawings: what is declared lacks rotors and friction, what is true has them, and the table counts."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -50,8 +52,13 @@ def test_the_table_counts_what_was_found() -> None:
     assert brief(_row(0, 0.0015, 0.5)).startswith("stand 0: 2 joints, a load: 0.2 s 30 1.5 1")
 
 
-def test_a_robot_that_tracks_needs_a_policy(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("given", "came"), [([], "none came"), (["--policy", "nowhere"], "none in nowhere")])
+def test_a_robot_that_tracks_needs_a_policy(
+    capsys: pytest.CaptureFixture[str], given: list[str], came: str, tmp_path: Path
+) -> None:
+    """Before anything is run: a robot that failed for it would be a row of the results."""
+    out = tmp_path / "results.jsonl"
     with pytest.raises(SystemExit) as stopped:
-        main(["--robot", "track"])
-    assert stopped.value.code == 2
-    assert "--policy expected" in capsys.readouterr().err
+        main(["--robot", "track", "--out", str(out), *given])
+    assert stopped.value.code == 2 and not out.exists()
+    assert came in capsys.readouterr().err

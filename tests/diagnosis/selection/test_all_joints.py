@@ -203,6 +203,18 @@ def test_a_small_robot_that_nothing_brings_nearer_is_asked_for_all_joints_sooner
     assert bool(tried) is asked
 
 
+def test_what_left_too_much_to_begin_with_is_asked_again_where_nothing_helps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The beginning asks for next to nothing; where no effect helps it is enough that all joints pay."""
+    begun: list[Any] = []
+    monkeypatch.setattr(start, "fit_all_joints", lambda *_: "a fit")
+    monkeypatch.setattr(start, "compare", lambda *_: SimpleNamespace(passes=lambda rule: True))
+    monkeypatch.setattr(start, "begin_with", lambda run, fit: begun.append(fit))
+    run = _run_with_one_effect(100.0, 100.0)
+    run.fit, run.asked_far = SimpleNamespace(chosen=()), True
+    assert start.start_with_all_joints(run, stuck=True)
+    assert begun == ["a fit"]
+
+
 def test_an_armature_is_found_from_the_other_end_too(monkeypatch: pytest.MonkeyPatch) -> None:
     session, problem, _ = _opened({})
     rotor = next(c for c in all_candidates(session.plant, session.rollouts, []) if c.effect == "armature")

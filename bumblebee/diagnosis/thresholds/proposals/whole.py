@@ -35,7 +35,8 @@ class AllJoints:
     enough_of_large: float = 0.05
     """The same share, above which a large robot's strengths and kp are asked, too."""
     likely_dry: float = 0.01
-    """Share of a drive's limit at which a large robot's dry friction begins; gears of robots have .5 to 5 %."""
+    """Share of a drive's limit at which a large robot's dry friction begins; the robots of
+    `benchmarks.from_a_drawing` have .5 to 5 %."""
     nearer: float = 0.3
     """Share of the cost that the best effect by itself leaves, which all joints' must leave less of; share of the
     declared model's below which an effect of the whole of a large robot comes first."""

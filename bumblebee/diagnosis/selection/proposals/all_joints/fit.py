@@ -77,8 +77,8 @@ def _of_small(problem: Problem, usual: Sequence[Candidate], candidates: Sequence
 def _of_large(problem: Problem, usual: Sequence[Candidate], candidates: Sequence[Candidate], below: float) -> Fit:
     """The usual effects at the declared strengths; where much is left beside strengths, and beside servos' kp.
 
-    Much is more than a share of what the declared model leaves, or not `below` what else there is. Each step takes half
-    a minute on a robot of thirty joints: strengths and kp begin from the fit without them.
+    Much is more than a share of what the declared model leaves, or not `below` what else there is. A step of the
+    G1 takes ten to twenty seconds of one core: strengths and kp begin from the fit without them.
     """
     rule = problem.thresholds.selection.proposals.all_joints
     declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0])).power(problem)

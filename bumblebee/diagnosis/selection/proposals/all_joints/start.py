@@ -54,8 +54,6 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
     far = run.config.many if is_small(run.problem) else run.config.far
     if run.tried_many or run.given or power < run.config.many or (power < far if stuck else early):
         return False
-    if run.asked_far and not run.fit.chosen:
-        return False  # nothing has changed since
     if run.power() < run.rule.whiten_anew * run.whitened_at:
         _start_anew(run, *whitened_anew(run.problem, run.holdout, run.fit))
         run.say(f"whitened anew around what was found: chi-square {run.power():.3g}")
