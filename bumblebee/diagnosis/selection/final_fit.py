@@ -70,7 +70,8 @@ def _settled(problem: Problem, fit: Fit, rng: np.random.Generator) -> tuple[Prob
         residual = problem.residual([fit.effects])[0]
         _, nuisance = cost_of(problem, residual, window_weights(residual))
         weights = window_weights(residual - np.tensordot(nuisance, problem.nuisance, axes=1))
-        fit = gauss_newton(problem, fit.chosen, before, weights, iterations=3, coarse=True)
+        held = _held_slopes(problem, fit)
+        fit = gauss_newton(problem, fit.chosen, before, weights, iterations=3, coarse=True, held=held)
         fit, weights = _weighed(problem, fit)
         anew = problem.whitener is not last.whitener
         if not anew or _is_near(problem, fit, before) or _is_still(problem, fit, weights, before, rule.still):
@@ -86,10 +87,10 @@ def _is_near(problem: Problem, fit: Fit, before: np.ndarray) -> bool:
 
 def _weighed(problem: Problem, fit: Fit) -> tuple[Fit, np.ndarray]:
     """The fit with its windows weighed (W,) by what it leaves of them itself, to where that changes little."""
-    rule = problem.thresholds.selection.final_fit
+    rule, held = problem.thresholds.selection.final_fit, _held_slopes(problem, fit)
     for _ in range(rule.weighed):
         before, weights = fit.values, window_weights(fit.clean(problem))
-        fit = gauss_newton(problem, fit.chosen, before, weights, iterations=2, coarse=True, known=fit)
+        fit = gauss_newton(problem, fit.chosen, before, weights, iterations=2, coarse=True, known=fit, held=held)
         if _is_still(problem, fit, weights, before, rule.steady):
             break
     return fit, weights
@@ -140,14 +141,10 @@ def _confirmed(problem: Problem, fit: Fit, weights: np.ndarray, holdout: Holdout
 
 
 def _refit_near(problem: Problem, known: Fit, weights: np.ndarray) -> Callable[[Sequence[Candidate], np.ndarray], Fit]:
-    """Fits of some effects from their values (P,), by the sensitivities of a `known` fit of more.
-
-    Where these are many they hold wherever the fit goes.
-    """
-    many = _is_many(problem, known)
+    """Fits of some effects from their values (P,), by the sensitivities of a `known` fit of more."""
+    held = _held_slopes(problem, known)
 
     def refit(chosen: Sequence[Candidate], values: np.ndarray) -> Fit:
-        held = chosen if many else ()
         return gauss_newton(problem, chosen, values, weights, iterations=1, coarse=True, known=known, held=held)
 
     return refit
@@ -201,6 +198,11 @@ def _less(problem: Problem, fit: Fit, weights: np.ndarray, gone: Sequence[Candid
 def _is_many(problem: Problem, fit: Fit) -> bool:
     """Whether a fit has so many effects that a last step takes minutes."""
     return len(fit.chosen) > problem.thresholds.selection.final_fit.many
+
+
+def _held_slopes(problem: Problem, fit: Fit) -> Sequence[Candidate]:
+    """Effects whose sensitivities, simulated once, hold wherever the fit goes: all where there are many, else none."""
+    return fit.chosen if _is_many(problem, fit) else ()
 
 
 def _sureness(fit: Fit, half: np.ndarray, candidate: Candidate) -> float:

@@ -113,7 +113,8 @@ class FinalFit:
     same: float = 0.1
     """Mean square change of a window's prediction, in the noise's, below which whitening anew changes nothing."""
     many: int = 30
-    """Effects above which what goes is followed by a refit by the slopes that there are, and all of it by one anew."""
+    """Effects above which slopes are simulated once a round of whitening and hold there, and what goes is followed by a
+    refit by the slopes that there are; all of it by one last step."""
     feigned: float = 0.2
     """Share by which the cost may grow without an effect that another integrator would have found as well: where every
     joint of a stiff robot errs, steps move sizes by more than windows bear, and yet no integrator makes them."""

@@ -1,11 +1,14 @@
 """A search at its beginning, on rollouts of the arm."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from bumblebee.diagnosis.candidates import all_candidates
 from bumblebee.diagnosis.comparison import Holdout
 from bumblebee.diagnosis.config import SearchConfig
 from bumblebee.diagnosis.selection.state import SearchState
+from bumblebee.diagnosis.thresholds import Thresholds
 from tests.diagnosis import arm
 
 
@@ -18,3 +21,11 @@ def begun(truth: dict[tuple[str, str], float], xml: str = arm.XML) -> SearchStat
         return all_candidates(session.plant, session.rollouts, effects), np.full(3, 5.0)
 
     return SearchState(problem, Holdout(other), remake, SearchConfig(), lambda text: None)
+
+
+def large_robots() -> Thresholds:
+    """Thresholds by which every robot is large."""
+    some = Thresholds()
+    rules = some.selection.proposals
+    whole = replace(rules.all_joints, small_robot=0)
+    return replace(some, selection=replace(some.selection, proposals=replace(rules, all_joints=whole)))

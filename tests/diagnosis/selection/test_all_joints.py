@@ -25,6 +25,7 @@ from bumblebee.diagnosis.simulation.windows import choose_starts, cut
 from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.sim.servo import servos_of
 from tests.diagnosis import arm
+from tests.diagnosis.selection.begun import large_robots
 
 TRUTH = {
     **{("coulomb_friction", j): v for j, v in zip(arm.JOINTS, (1.2, 2.0, 0.8), strict=True)},
@@ -230,14 +231,6 @@ def test_an_armature_is_found_from_the_other_end_too(monkeypatch: pytest.MonkeyP
     assert begun[0] == rotor.nominal[0] < begun[1] == fit.values[0]
 
 
-def _large() -> Thresholds:
-    """Thresholds by which every robot is large."""
-    some = Thresholds()
-    rules = some.selection.proposals
-    whole = replace(rules.all_joints, small_robot=0)
-    return replace(some, selection=replace(some.selection, proposals=replace(rules, all_joints=whole)))
-
-
 DRAWN = re.sub(r'armature="[.0-9]+"', 'armature="0"', arm.XML)
 ROTORS = {("armature", j): v for j, v in zip(arm.JOINTS, (0.5, 0.6, 0.3), strict=True)}
 
@@ -271,7 +264,7 @@ def test_a_large_robot_from_a_drawing_with_half_the_damping_is_found() -> None:
     windows = cut(session.plant, session.layout, rollouts, choose_starts(rollouts, [0, 1], 0.2, 40))
     rng = np.random.default_rng(0)
     problem = make_problem(
-        session.plant, session.layout, windows, session.sigma, session.steps, [], rng, thresholds=_large()
+        session.plant, session.layout, windows, session.sigma, session.steps, [], rng, thresholds=large_robots()
     )
     declared = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     fit = fit_all_joints(problem, all_candidates(session.plant, session.rollouts, []), declared, str, below=30.0)

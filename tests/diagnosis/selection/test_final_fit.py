@@ -117,6 +117,32 @@ def test_what_the_others_cannot_make_up_for_stays_however_far_another_integrator
     assert made == made_of
 
 
+def test_slopes_of_many_effects_hold_in_a_round_and_lead_to_the_same_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    truth = {("coulomb_friction", "j1"): 0.8, ("coulomb_friction", "j2"): 0.6}
+    session = arm.session_of(arm.simulate(truth, count=2, seconds=4.0, seed=100))
+    problem = arm.problem_of(session, [0, 1], 24)
+    every = all_candidates(session.plant, session.rollouts, [])
+    chosen = [next(c for c in every if (c.effect, c.where) == name) for name in truth]
+    begun = gauss_newton(problem, chosen, [0.5, 0.4], window_weights(problem.residual([[]])[0]), iterations=0)
+    simulated: list[int] = []
+    real = Problem.differences
+
+    def counted(self: Problem, effects: list, moved: list, coarse: bool) -> np.ndarray:
+        simulated.append(len(moved))
+        return real(self, effects, moved, coarse)
+
+    monkeypatch.setattr(Problem, "differences", counted)
+    fits, counts = [], []
+    for many in (30, 1):
+        simulated.clear()
+        fits.append(refine(replace(problem, thresholds=_sure_of_all(problem, many)), begun, np.random.default_rng(0)))
+        counts.append(sum(simulated))
+    one, held = fits
+    assert held.fit.chosen == one.fit.chosen == tuple(chosen)
+    assert np.all(np.abs(held.fit.values - one.fit.values) < 0.1 * one.half)
+    assert counts[1] < 0.8 * counts[0]
+
+
 def _sure_of_all(problem: Problem, many: int = 30) -> Thresholds:
     """Thresholds by which no effect is insignificant, whatever it is."""
     selection = problem.thresholds.selection

@@ -21,6 +21,7 @@ from bumblebee.diagnosis.selection.proposals.all_joints.begun import (
 )
 from bumblebee.diagnosis.selection.proposals.all_joints.joint_damping import one_damping
 from bumblebee.diagnosis.selection.proposals.all_joints.link_load import link_load
+from bumblebee.diagnosis.selection.proposals.all_joints.loads import with_loads
 from bumblebee.diagnosis.selection.proposals.all_joints.sure import sure_by_misfit, sure_of
 
 
@@ -75,16 +76,17 @@ def _of_small(problem: Problem, usual: Sequence[Candidate], candidates: Sequence
 
 
 def _of_large(problem: Problem, usual: Sequence[Candidate], candidates: Sequence[Candidate], below: float) -> Fit:
-    """The usual effects at the declared strengths; where much is left beside strengths, and beside servos' kp.
+    """The usual effects at the declared strengths and loads; where much is left beside strengths, and beside kp.
 
     Much is more than a share of what the declared model leaves, or not `below` what else there is. A step of the
-    G1 takes ten to twenty seconds of one core: strengths and kp begin from the fit without them.
+    G1 takes ten to twenty seconds of one core: all but the first set begin from the fit without them.
     """
     rule = problem.thresholds.selection.proposals.all_joints
     declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0])).power(problem)
     enough = min(max(rule.still_off, rule.enough_of_large * declared), below)
     first, *drives = sets_of_large(usual, candidates)
-    best = fit = levenberg_marquardt(problem, first, likely_values(problem, first), rule.steps)
+    fit = levenberg_marquardt(problem, first, likely_values(problem, first), rule.steps)
+    best = fit = with_loads(problem, fit, candidates)
     for more in drives:
         if more and best.power(problem) >= enough:
             best = _better(problem, best, levenberg_marquardt(problem, *beside(fit, more), rule.steps_with_links))

@@ -1,0 +1,62 @@
+"""Masses that differ are told beside the usual effects of all joints of a large robot, before these share them out."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+
+from bumblebee.diagnosis.candidates import Candidate
+from bumblebee.diagnosis.candidates.enumerate import all_candidates
+from bumblebee.diagnosis.estimation.fit import Fit
+from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
+from bumblebee.diagnosis.estimation.levenberg_marquardt import levenberg_marquardt
+from bumblebee.diagnosis.residuals.problem import Problem, window_weights
+from bumblebee.diagnosis.selection.proposals.all_joints import fit_all_joints
+from bumblebee.diagnosis.selection.proposals.all_joints.begun import likely_values, sets_of_large, usual_effects
+from bumblebee.diagnosis.selection.proposals.all_joints.loads import with_loads
+from tests.diagnosis import arm
+from tests.diagnosis.selection.begun import large_robots
+
+FRICTION = {("coulomb_friction", j): v for j, v in zip(arm.JOINTS, (1.2, 2.0, 0.8), strict=True)}
+
+
+def _problem(masses: dict[str, float]) -> tuple[Problem, list[Candidate]]:
+    truth = {**FRICTION, **{("link_mass", body): mass for body, mass in masses.items()}}
+    session = arm.session_of(arm.simulate(truth, count=3, seconds=5.0))
+    problem = replace(arm.problem_of(session, [0, 1], 40), thresholds=large_robots())
+    return problem, all_candidates(session.plant, session.rollouts, [])
+
+
+def _joints(problem: Problem, candidates: Sequence[Candidate]) -> Fit:
+    first, *_ = sets_of_large(usual_effects(candidates), candidates)
+    return levenberg_marquardt(problem, first, likely_values(problem, first), 9)
+
+
+@pytest.mark.parametrize("masses", [{"l3": 0.9}, {"l2": 1.2}, {"l2": 2.6, "l3": 0.9}])
+def test_links_of_another_mass_are_fitted_beside_all_joints(masses: dict[str, float]) -> None:
+    problem, candidates = _problem(masses)
+    joints = _joints(problem, candidates)
+    fit = with_loads(problem, joints, candidates)
+    found = {c.where: float(fit.of(c)[0]) for c in fit.chosen if c.effect == "link_mass"}
+    assert found.keys() == masses.keys() and fit.power(problem) < joints.power(problem)
+    for body, mass in masses.items():
+        assert found[body] == pytest.approx(mass, rel=0.05), body
+
+
+def test_no_mass_comes_beside_the_joints_of_a_robot_whose_masses_are_right() -> None:
+    problem, candidates = _problem({})
+    joints = _joints(problem, candidates)
+    assert with_loads(problem, joints, candidates) is joints
+    assert with_loads(problem, joints, usual_effects(candidates)) is joints
+
+
+def test_a_load_stays_among_what_is_sure() -> None:
+    problem, candidates = _problem({"l3": 0.9})
+    declared = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
+    fit = fit_all_joints(problem, candidates, declared, lambda text: None)
+    assert fit is not None
+    found = {(c.effect, c.where): float(fit.of(c)[0]) for c in fit.chosen}
+    assert found["link_mass", "l3"] == pytest.approx(0.9, rel=0.05)
+    assert {place for place in found if place[0] == "motor_strength"} == set()
+    for place, friction in FRICTION.items():
+        assert found[place] == pytest.approx(friction, rel=0.1), place
