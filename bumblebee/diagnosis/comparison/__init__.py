@@ -22,7 +22,7 @@ from bumblebee.diagnosis.comparison.submodel import (
     refitted_without,
     simulated_without,
 )
-from bumblebee.diagnosis.comparison.wald import Step, costs_more_than, evidence, wald, z_value, z_values
+from bumblebee.diagnosis.comparison.wald import Step, costs_more_than, evidence, wald, walds, z_value, z_values
 from bumblebee.diagnosis.comparison.withdrawal import standing
 
 __all__ = [
@@ -53,6 +53,7 @@ __all__ = [
     "simulated_without",
     "standing",
     "wald",
+    "walds",
     "z_value",
     "z_values",
 ]

@@ -5,6 +5,7 @@ when it stays all the same. What an effect gained when it was accepted may be an
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,8 +13,8 @@ from bumblebee.diagnosis.candidates import JUDGED_ALONE, SATURATIONS, USUAL_OF_B
 from bumblebee.diagnosis.comparison.compare import compare
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.submodel import moved_without, refitted, refitted_without
-from bumblebee.diagnosis.comparison.wald import costs_more_than, wald
-from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, standard_covariance, typical_power
+from bumblebee.diagnosis.comparison.wald import costs_more_than, walds
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, resolved, standard_covariance, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
 
 Refit = Callable[[Sequence[Candidate], np.ndarray], Fit]
@@ -73,8 +74,8 @@ def drop_insignificant(
     """
 
     def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
-        spared = [c in kept or c.effect in JUDGED_ALONE for c in fit.chosen]
-        return _lowest(fit, [np.inf if s else wald(problem, fit, weights, i) for i, s in enumerate(spared)], bound)
+        asked = [c for c in fit.chosen if c not in kept and c.effect not in JUDGED_ALONE]
+        return _lowest(fit, walds(problem, fit, weights, asked), bound)
 
     def without(fit: Fit, gone: Candidate) -> Fit:
         rest = fit.without([gone])
@@ -86,17 +87,31 @@ def drop_insignificant(
     return eliminate(fit, worst, without, stays, lambda c: say(f"needless: {c.effect} on {c.where}"))
 
 
-def drop_unsure(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
-    """Less what is not sure, the least sure first, the others moved by the slopes at `fit`."""
+def drop_unsure(problem: Problem, fit: Fit, weights: np.ndarray, simulated: bool = False) -> Fit:
+    """Less what is not sure, the least sure first, the others moved by the slopes at `fit`.
+
+    Far from the declared value these may be wrong of the way back: where the others' move is `simulated`, what costs
+    more without it stays.
+    """
     rule = problem.thresholds.comparison.elimination
 
     def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
-        if not fit.chosen:
-            return None
         bounds = [rule.sure_z_of_body if c.effect in USUAL_OF_BODIES else rule.sure_z for c in fit.chosen]
-        return _lowest(fit, certainty(problem, fit, weights) / bounds, 1.0)
+        marks = certainty(problem, fit, weights) / bounds if fit.chosen else []
+        return _lowest(fit, [np.inf if c in kept else m for c, m in zip(fit.chosen, marks, strict=True)], 1.0)
 
-    return eliminate(fit, worst, lambda fit, gone: moved_without(problem, fit, weights, [gone]))
+    def without(fit: Fit, gone: Candidate) -> Fit:
+        less = moved_without(problem, fit, weights, [gone])
+        if not simulated:
+            return less
+        residual = problem.residual([less.effects])[0]
+        cost, nuisance = cost_of(problem, residual, weights)
+        return replace(less, residual=residual, nuisance=nuisance, cost=cost)
+
+    def stays(fit: Fit, less: Fit) -> bool:
+        return simulated and costs_more_than(problem, fit, less, rule.sure_z)
+
+    return eliminate(resolved(problem, fit, weights), worst, without, stays)
 
 
 def certainty(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:
@@ -114,8 +129,7 @@ def drop_beside(problem: Problem, fit: Fit, new: Candidate) -> Fit:
 
     def worst(fit: Fit, kept: set[Candidate]) -> Candidate | None:
         weights = window_weights(fit.clean(problem))
-        marks = [np.inf if stays(c) else wald(problem, fit, weights, i) for i, c in enumerate(fit.chosen)]
-        return _lowest(fit, marks, bound)
+        return _lowest(fit, walds(problem, fit, weights, [c for c in fit.chosen if not stays(c)]), bound)
 
     def stays(c: Candidate) -> bool:
         form = isinstance(c, Formula) and not isinstance(new, Formula)

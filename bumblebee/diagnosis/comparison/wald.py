@@ -1,5 +1,6 @@
 """How many standard errors an effect is from its declared value, in the joint fit."""
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,16 +29,28 @@ def costs_more_than(problem: Problem, fit: Fit, less: Fit, z: float) -> bool:
 
 def wald(problem: Problem, fit: Fit, weights: np.ndarray, index: int) -> float:
     """The z of one chosen effect's free parameters in the joint fit."""
-    candidate, part = fit.chosen[index], fit.slices[index]
-    if candidate.effect in ABRUPT:
-        return _lost(problem, fit, weights, index)
-    free = part.start + np.array(candidate.free)
-    # Windows that feel a limit are too few for a variance between windows.
-    of = expected_covariance if candidate.effect in SATURATIONS else standard_covariance
-    covariance = of(problem, fit, weights)[np.ix_(free, free)]
-    away = fit.values[free] - np.array(candidate.nominal)[list(candidate.free)]
-    value = float(away @ np.linalg.pinv(covariance, rcond=1e-9, hermitian=True) @ away)
-    return z_value(value, len(free), len(weights))
+    return float(walds(problem, fit, weights, [fit.chosen[index]])[index])
+
+
+def walds(problem: Problem, fit: Fit, weights: np.ndarray, asked: Collection[Candidate]) -> np.ndarray:
+    """The z (F,) of the effects that are `asked`, infinite of others; a covariance serves all effects."""
+    of: dict[Callable[..., np.ndarray], np.ndarray] = {}
+    out = np.full(len(fit.chosen), np.inf)
+    for k, (candidate, part) in enumerate(zip(fit.chosen, fit.slices, strict=True)):
+        if candidate not in asked:
+            continue
+        if candidate.effect in ABRUPT:
+            out[k] = _lost(problem, fit, weights, k)
+            continue
+        # Windows that feel a limit are too few for a variance between windows.
+        kind = expected_covariance if candidate.effect in SATURATIONS else standard_covariance
+        if kind not in of:
+            of[kind] = kind(problem, fit, weights)
+        free = part.start + np.array(candidate.free)
+        away = fit.values[free] - np.array(candidate.nominal)[list(candidate.free)]
+        value = float(away @ np.linalg.pinv(of[kind][np.ix_(free, free)], rcond=1e-9, hermitian=True) @ away)
+        out[k] = z_value(value, len(free), len(weights))
+    return out
 
 
 def _lost(problem: Problem, fit: Fit, weights: np.ndarray, index: int) -> float:

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, effects_at
-from bumblebee.diagnosis.comparison import compare, evidence, wald
+from bumblebee.diagnosis.comparison import compare, evidence, walds
 from bumblebee.diagnosis.estimation import gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.proposals.all_joints import begin_with, fit_all_joints
@@ -178,9 +178,8 @@ def start_with_gain_grid(run: SearchState) -> bool:
     if usual is not None and compare(run.problem, run.holdout, fit, usual).passes(rules.together):
         begin_with(run, usual)
         return True
-    for i, c in enumerate(fit.chosen):
-        z = wald(run.problem, fit, weights, i)
-        run.steps.append(evidence(c, z, len(run.candidates)))
+    for c, z in zip(fit.chosen, walds(run.problem, fit, weights, fit.chosen), strict=True):
+        run.steps.append(evidence(c, float(z), len(run.candidates)))
         run.say(f"found {c.effect} on {c.where}, far from the declared: {fit.of(c).round(5)}")
     run.screened_cost = 0.0
     run.renew(fit)

@@ -54,7 +54,8 @@ def fit_all_joints(
     if len(chosen) < len(fit.chosen):
         fit = levenberg_marquardt(some, chosen, values, rule.steps_with_links)
     if fit.power(some) < (rule.still_off if small else rule.off_of_large):
-        return sure_of(problem, drop_unsure(some, fit, window_weights(fit.clean(some))))
+        sure = drop_unsure(some, fit, window_weights(fit.clean(some)), simulated=not small)
+        return sure_of(problem, sure, simulated=not small)
     return sure_by_misfit(problem, fit)
 
 

@@ -7,13 +7,16 @@ from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton
 from bumblebee.diagnosis.residuals import Problem, by_misfit, window_weights
 
 
-def sure_of(problem: Problem, fit: Fit, known: Fit | None = None) -> Fit | None:
-    """The same effects fitted on all windows, less those that are not sure there; `known` is a fit of these windows."""
+def sure_of(problem: Problem, fit: Fit, known: Fit | None = None, simulated: bool = False) -> Fit | None:
+    """The same effects fitted on all windows, less those that are not sure there; `known` is a fit of these windows.
+
+    Whether each one's going is `simulated`: of a large robot's hundred effects too many go by slopes alone.
+    """
     for _ in range(problem.thresholds.selection.proposals.all_joints.rounds):
         if not fit.chosen:
             return None
         fit = _fitted(problem, fit, 2, known)
-        sure = drop_unsure(problem, fit, window_weights(fit.clean(problem)))
+        sure = drop_unsure(problem, fit, window_weights(fit.clean(problem)), simulated)
         if sure.chosen == fit.chosen:
             return fit
         known, fit = fit, sure
