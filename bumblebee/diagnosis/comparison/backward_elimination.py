@@ -14,7 +14,7 @@ from bumblebee.diagnosis.comparison.compare import compare
 from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.comparison.submodel import moved_without, refitted, refitted_without
 from bumblebee.diagnosis.comparison.wald import costs_more_than, walds
-from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, resolved, standard_covariance, typical_power
+from bumblebee.diagnosis.estimation import Fit, cost_of, gauss_newton, standard_covariance, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
 
 Refit = Callable[[Sequence[Candidate], np.ndarray], Fit]
@@ -90,8 +90,9 @@ def drop_insignificant(
 def drop_unsure(problem: Problem, fit: Fit, weights: np.ndarray, simulated: bool = False) -> Fit:
     """Less what is not sure, the least sure first, the others moved by the slopes at `fit`.
 
-    Far from the declared value these may be wrong of the way back: where the others' move is `simulated`, what costs
-    more without it stays.
+    Far from the declared value these may be wrong of the way back, and many that are unsure one by one may be sure
+    together: where the others' moves are `simulated`, an effect without which the cost would be a share above that of
+    all stays.
     """
     rule = problem.thresholds.comparison.elimination
 
@@ -108,10 +109,8 @@ def drop_unsure(problem: Problem, fit: Fit, weights: np.ndarray, simulated: bool
         cost, nuisance = cost_of(problem, residual, weights)
         return replace(less, residual=residual, nuisance=nuisance, cost=cost)
 
-    def stays(fit: Fit, less: Fit) -> bool:
-        return simulated and costs_more_than(problem, fit, less, rule.sure_z)
-
-    return eliminate(resolved(problem, fit, weights), worst, without, stays)
+    most = (1 + rule.unsure_cost) * cost_of(problem, fit.residual, weights)[0]
+    return eliminate(fit, worst, without, lambda fit, less: simulated and less.cost > most)
 
 
 def certainty(problem: Problem, fit: Fit, weights: np.ndarray) -> np.ndarray:

@@ -111,13 +111,13 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
             problem = problem.finely().relinearised([])
             fit = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
         return Refined(problem, fit, window_weights(fit.clean(problem)), np.empty(0))
-    found = fit
+    found, many = fit, _is_many(problem, fit)
     problem, fit, weights = _settled(problem, fit, rng)
-    whole = last_step(problem, fit.chosen, fit.values, weights)
+    whole = fit if many else last_step(problem, fit.chosen, fit.values, weights)
     fit = _significant(problem, whole, weights)
     if holdout is not None:
         fit = drop_unpaid(fit, _refit_near(problem, whole, weights), holdout, problem)
-    if fit.chosen != whole.chosen:
+    if fit.chosen != whole.chosen and not many:
         fit = last_step(problem, fit.chosen, fit.values, weights)
     if holdout is not None and holdout.worse_later(_with_nuisance(problem, found, weights), fit):
         # Short windows alone led it astray.
@@ -125,7 +125,7 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
     if holdout is not None:
         fit = _confirmed(problem, fit, weights, holdout)
     last = _sure_of(problem, fit, weights)
-    if last.fit.chosen == fit.chosen or not _is_many(problem, last.fit):
+    if not many or not last.fit.chosen:
         return last
     fit = last_step(problem, last.fit.chosen, last.fit.values, weights)
     return Refined(problem, fit, weights, half_widths(problem, fit, weights))
@@ -185,7 +185,7 @@ def _sure_of(problem: Problem, fit: Fit, weights: np.ndarray, needed: frozenset[
 def _less(problem: Problem, fit: Fit, weights: np.ndarray, gone: Sequence[Candidate]) -> Fit:
     """The last step without some effects, and without what is insignificant then; of many effects a refit by slopes.
 
-    A last step simulates every parameter to either side: where one effect after the other goes it is made at the end.
+    A last step simulates every parameter to either side: of many effects it is made once, at the end.
     """
     rest = fit.without(gone)
     if _is_many(problem, rest):

@@ -174,6 +174,8 @@ class Elimination:
     """Standard errors that an effect fitted together with many must reach."""
     sure_z_of_body: float = 5.0
     """The same of masses and centres of mass."""
+    unsure_cost: float = 0.2
+    """Share by which the cost may grow without all that is not sure, where what goes is simulated."""
     trifle: float = 0.02
     """Share of a change that matters, below which a value is a trifle."""
     near: float = 4.0
