@@ -19,6 +19,7 @@ from bumblebee.diagnosis.selection.proposals.all_joints.begun import (
     sets_of_small,
     usual_effects,
 )
+from bumblebee.diagnosis.selection.proposals.all_joints.held_joints import held_by_dry_friction
 from bumblebee.diagnosis.selection.proposals.all_joints.joint_damping import one_damping
 from bumblebee.diagnosis.selection.proposals.all_joints.link_load import link_load
 from bumblebee.diagnosis.selection.proposals.all_joints.loads import with_loads
@@ -50,9 +51,10 @@ def fit_all_joints(
         return None
     for kind in USUAL_OF_BODIES if small else ():
         fit = _with_links(some, fit, [c for c in candidates if c.effect == kind and is_whole(c)], say)
-    chosen, values = one_damping(some, fit)
-    if len(chosen) < len(fit.chosen):
-        fit = levenberg_marquardt(some, chosen, values, rule.steps_with_links)
+    for simpler in (one_damping,) if small else (held_by_dry_friction, one_damping):
+        chosen, values = simpler(some, fit)
+        if len(chosen) < len(fit.chosen):
+            fit = levenberg_marquardt(some, chosen, values, rule.steps_with_links)
     if fit.power(some) < (rule.still_off if small else rule.off_of_large):
         sure = drop_unsure(some, fit, window_weights(fit.clean(some)), simulated=not small)
         return sure_of(problem, sure, simulated=not small)
