@@ -43,8 +43,7 @@ class AllJoints:
     """Share of a drive's limit at which a large robot's dry friction begins; the robots of
     `benchmarks.from_a_drawing` have .5 to 5 %."""
     holding: tuple[float, ...] = (0.005, 0.01, 0.02, 0.04)
-    """Shares of a drive's limit that dry friction is tried at where a viscous one larger than the servo's damping
-    holds a joint."""
+    """Shares of a drive's limit that dry friction is tried at where twice the servo's damping or more holds a joint."""
     nearer: float = 0.3
     """Share of the cost that the best effect by itself leaves, which all joints' must leave less of; share of the
     declared model's below which an effect of the whole of a large robot comes first."""
