@@ -11,7 +11,8 @@ masses and centres of mass of all links follow. What is not sure is taken out ag
 that took no part; these and the fitted ones are then whitened anew, and the search goes on from there. It begins so in
 the place of gains far from the declared ones (`gain_grid`), and on a robot far from the data where they leave next to
 nothing and no effect that was tried by itself comes near. A large robot's rotors and friction begin at likely sizes
-where the model, made from a drawing, has none (`begun`).
+where the model, made from a drawing, has none (`begun`); masses of its links come in by slopes (`loads`), and a joint
+that hardly moves is held by dry friction, not by damping (`held_joints`).
 """
 
 from bumblebee.diagnosis.selection.proposals.all_joints.fit import fit_all_joints

@@ -32,9 +32,10 @@ def fit_all_joints(
     """A fit of a load, the usual effects or both that are sure together.
 
     Or from those that were `found` on, together with the others, if this leads nearer to the data. The long way is
-    gone on some of the windows, and what is not sure is taken out by the slopes there. Of a small robot with large
-    residuals still masses and centres of mass follow, all at once. None where nothing is sure, or where the joints'
-    effects do not bring those windows' median chi-square `below` what else there is.
+    gone on some of the windows, and what is not sure is taken out by the slopes there, of a large robot as far as the
+    simulator bears it out. Of a small robot with large residuals still masses and centres of mass follow, all at once.
+    None where nothing is sure, or where the joints' effects do not bring those windows' median chi-square `below` what
+    else there is.
     """
     rule = problem.thresholds.selection.proposals.all_joints
     usual = usual_effects(candidates, problem.plant.torque_input)
