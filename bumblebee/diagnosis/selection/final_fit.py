@@ -119,13 +119,13 @@ def refine(problem: Problem, fit: Fit, rng: np.random.Generator, holdout: Holdou
         fit = drop_unpaid(fit, _refit_near(problem, whole, weights), holdout, problem)
     if fit.chosen != whole.chosen and not many:
         fit = last_step(problem, fit.chosen, fit.values, weights)
-    if holdout is not None and holdout.worse_later(_with_nuisance(problem, found, weights), fit):
-        # Short windows alone led it astray.
+    astray = holdout is not None and holdout.worse_later(_with_nuisance(problem, found, weights), fit)
+    if astray:  # by short windows alone, as another step would be
         fit = gauss_newton(problem, found.chosen, found.values, weights, iterations=0)
     if holdout is not None:
         fit = _confirmed(problem, fit, weights, holdout)
     last = _sure_of(problem, fit, weights)
-    if not many or not last.fit.chosen:
+    if not many or astray or not last.fit.chosen:
         return last
     fit = last_step(problem, last.fit.chosen, last.fit.values, weights)
     return Refined(problem, fit, weights, half_widths(problem, fit, weights))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bumblebee.diagnosis.candidates.enumerate import all_candidates
+from bumblebee.diagnosis.comparison.holdout import Holdout
 from bumblebee.diagnosis.estimation.fit import Fit
 from bumblebee.diagnosis.estimation.gauss_newton import gauss_newton
 from bumblebee.diagnosis.residuals.problem import Problem, make_problem, window_weights
@@ -141,6 +142,20 @@ def test_slopes_of_many_effects_hold_in_a_round_and_lead_to_the_same_fit(monkeyp
     assert held.fit.chosen == one.fit.chosen == tuple(chosen)
     assert np.all(np.abs(held.fit.values - one.fit.values) < 0.1 * one.half)
     assert counts[1] < 0.8 * counts[0]
+
+
+@pytest.mark.parametrize("many", [30, 1])
+def test_what_short_windows_led_astray_stays_as_it_was_found(monkeypatch: pytest.MonkeyPatch, many: int) -> None:
+    truth = {("coulomb_friction", "j1"): 0.8, ("coulomb_friction", "j2"): 0.6}
+    session = arm.session_of(arm.simulate(truth, count=2, seconds=4.0, seed=100))
+    problem = arm.problem_of(session, [0, 1], 24)
+    every = all_candidates(session.plant, session.rollouts, [])
+    chosen = [next(c for c in every if (c.effect, c.where) == name) for name in truth]
+    found = gauss_newton(problem, chosen, [0.7, 0.5], window_weights(problem.residual([[]])[0]), iterations=0)
+    monkeypatch.setattr(Holdout, "worse_later", lambda self, before, after: True)
+    thresholds = _sure_of_all(problem, many)
+    last = refine(replace(problem, thresholds=thresholds), found, np.random.default_rng(0), Holdout())
+    assert last.fit.chosen == tuple(chosen) and last.fit.values == pytest.approx(found.values)
 
 
 def _sure_of_all(problem: Problem, many: int = 30) -> Thresholds:
