@@ -19,6 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from bumblebee import DISTRIBUTION
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_yaml
 from bumblebee.last_line import guarded
@@ -29,7 +30,7 @@ from tasks.lab import AUTO, CLUSTER, FILE, RayLab, read_lab
 ANSWER = 10  # [s] within which the cluster's head must
 JOIN, LOOK_EVERY = 180.0, 2.0  # [s] within which the machines of an allocation must, and between two looks
 LOOK = 120  # [s] within which every machine must; the first process on one takes some
-PACKAGES = ("dvc", "mlflow", "mujoco", "numpy", "rsl-rl-lib", "scikit-learn", "scipy", "torch", "bumblebee")
+PACKAGES = ("dvc", "mlflow", "mujoco", "numpy", "rsl-rl-lib", "scikit-learn", "scipy", "torch", DISTRIBUTION)
 """What decides results. The code of bumblebee travels: a machine may do without it, but have no other version."""
 GIB = 2**30  # [bytes]
 MODULES = {"s3": "dvc_s3", "ssh": "dvc_ssh"}  # of DVC, by the scheme of the remote
@@ -42,7 +43,7 @@ def connect(own: RayLab, where: str) -> Any:
         BadInput: when Ray is not installed, nothing answers, or the cluster refuses this process.
     """
     if find_spec("ray") is None:
-        raise BadInput(where, "the package ray", "none", "pip install 'bumblebee[lab]'")
+        raise BadInput(where, "the package ray", "none", "In the checkout: pip install -e '.[lab]'")
     own = replace(own, address=address_of(own, where))
     host, _, port = own.address.rpartition(":")
     try:
@@ -197,7 +198,7 @@ def _facts(ray: Any, own: RayLab) -> list[dict[str, str]]:
 def _compare(machine: Mapping[str, str], where: str) -> None:
     here = node.facts(PACKAGES, "", "")
     for name in ("Python", *PACKAGES):
-        if machine[name] != here[name] and not (name == "bumblebee" and not machine[name]):
+        if machine[name] != here[name] and not (name == DISTRIBUTION and not machine[name]):
             came = f"{machine[name] or 'none'} on {machine['host']}"
             raise BadInput(
                 where, f"{name} {here[name]} on every machine", came, "Install the same versions everywhere."

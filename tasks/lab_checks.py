@@ -1,6 +1,6 @@
 """Before anything starts: do the lab's databases and its store answer, may we write, and are their versions known?
 
-Every fault is one line that names what to do. `psycopg2` and `boto3` come with `pip install 'bumblebee[lab]'`.
+Every fault is one line that names what to do. `psycopg2` and `boto3` come with the extra `lab`.
 """
 
 import contextlib
@@ -34,7 +34,8 @@ def check_lab(lab: Lab, workspace: Path) -> None:
     """
     for module, package in (("psycopg2", "psycopg2-binary"), ("boto3", "boto3")):
         if find_spec(module) is None:
-            raise BadInput(Path(workspace) / FILE, f"the package {package}", "none", "pip install 'bumblebee[lab]'")
+            do = "In the checkout: pip install -e '.[lab]'"
+            raise BadInput(Path(workspace) / FILE, f"the package {package}", "none", do)
     for name, url in (("prefect", lab.prefect.database), ("mlflow", lab.mlflow.database)):
         _check_database(name, url, f"{Path(workspace) / FILE}: {name}.database")
     _check_store(lab.mlflow, f"{Path(workspace) / FILE}: mlflow.artifacts")

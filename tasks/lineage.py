@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from bumblebee import DISTRIBUTION
 from tasks import lock_file
 
 COMMIT = "BUMBLEBEE_COMMIT"  # variable
@@ -138,7 +139,7 @@ def inputs_of_stage() -> list[dict[str, str]]:
 def versions() -> dict[str, str]:
     """Of Python and of what decides a result."""
     found = {"python": platform.python_version()}
-    for name in ("torch", "mujoco", "rsl-rl-lib", "numpy", "bumblebee"):
+    for name in ("torch", "mujoco", "rsl-rl-lib", "numpy", DISTRIBUTION):
         try:
             found[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:

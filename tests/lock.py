@@ -1,6 +1,6 @@
 """Write requirements.lock and requirements-torch.lock: what pyproject.toml needs, as installed here, with hashes.
 
-Run by `make lock` in an environment that holds everything: `pip install -e .[loop,orchestration,develop]`. The hashes
+Run by `make lock` in an environment that holds everything: `pip install -e '.[loop,orchestration,develop]'`. The hashes
 are those that the index which pip is configured for states, read by pip itself; files on disk are hashed here.
 """
 

@@ -56,7 +56,7 @@ def _no_gpu(blind: str) -> BadInput:
     return BadInput("engine mujoco_warp", "an NVIDIA GPU", f"none that {blind} can use", do)
 
 
-_INSTALL = "Install them in the checkout with `pip install -e '.[gpu]'`."
+_INSTALL = "In the checkout: pip install -e '.[gpu]'"
 
 
 def fitting(model: mujoco.MjModel, num_worlds: int, buffers: Buffers, device: str) -> Any:

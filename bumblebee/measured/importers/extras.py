@@ -17,4 +17,5 @@ def library(kind: str, module: str) -> ModuleType:
         return importlib.import_module(module)
     except ImportError:
         name = module.split(".")[0]
-        raise BadInput(kind, f"the library {name}", "none installed", "pip install 'bumblebee[logs]'") from None
+        do = "In the checkout: pip install -e '.[logs]'"
+        raise BadInput(kind, f"the library {name}", "none installed", do) from None

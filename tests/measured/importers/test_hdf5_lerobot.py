@@ -133,5 +133,5 @@ def test_an_imported_dataset_reads_like_any_other(tmp_path: Path) -> None:
 
 
 def test_a_library_that_is_not_there_is_one_line_that_says_how_to_get_it() -> None:
-    with pytest.raises(BadInput, match=r"pip install 'bumblebee\[logs\]'"):
+    with pytest.raises(BadInput, match=r"pip install -e '\.\[logs\]'"):
         library("hdf5", "bumblebee_has_no_such_library")
