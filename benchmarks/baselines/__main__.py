@@ -173,6 +173,7 @@ def _tell(curve: Path) -> None:
         names, values = lines[0].split(","), lines[-1].split(",")
         row = dict(zip(names, values, strict=False))
         wanted = ("frames", "seconds", "reward", "success", "key_error", "episode_length", "unstable", "action_std")
+        wanted += ("loss_model", "imagined", "alive")
         print(
             "  ".join(f"{name} {row[name]}" for name in (*wanted, "learning_rate", "threshold") if name in row),
             flush=True,
@@ -293,10 +294,12 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def main(work: Callable[[argparse.Namespace], int] = run) -> None:
+def main(
+    work: Callable[[argparse.Namespace], int] = run, read: Callable[[], argparse.Namespace] = lambda: parse()
+) -> None:
     """Run; bad input is one line and status 2."""
     try:
-        raise SystemExit(work(parse()))
+        raise SystemExit(work(read()))
     except BadInput as error:
         print(error, flush=True)
         raise SystemExit(EXIT_BAD_INPUT) from None

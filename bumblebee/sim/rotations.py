@@ -4,6 +4,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+_NONE = 1e-20  # below this the square of a length is none, and has no gradient: that of a root at 0 is infinite
+
 
 def multiply(a: Tensor, b: Tensor) -> Tensor:
     """Hamilton product of (..., 4) with (..., 4)."""
@@ -46,7 +48,8 @@ def _entries(q: Tensor) -> tuple[Tensor, ...]:
 
 def turned(vectors: Tensor, matrices: Tensor) -> Tensor:
     """Vectors (B, N, 3), each turned by its row's matrix (B, 3, 3)."""
-    if vectors.device.type == "cpu" and not torch.compiler.is_compiling():
+    learnt = torch.is_grad_enabled() and (vectors.requires_grad or matrices.requires_grad)
+    if vectors.device.type == "cpu" and not learnt and not torch.compiler.is_compiling():
         # A third of the time that torch takes for so small products.
         return torch.from_numpy(np.matmul(vectors.numpy(), matrices.mT.contiguous().numpy()))
     return turned_in_full(vectors, matrices)
@@ -84,7 +87,7 @@ def length3(v: Tensor) -> Tensor:
     """Lengths (...,) of vectors (..., 3)."""
     # By component: reducing rows of three costs a CPU twice as much.
     x, y, z = v.square().unbind(-1)
-    return (x + y + z).sqrt()
+    return (x + y + z).clamp(min=_NONE).sqrt()
 
 
 def from_rotation_vector(v: Tensor) -> Tensor:

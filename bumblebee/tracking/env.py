@@ -61,13 +61,13 @@ class TrackingEnv(VecEnv):
         action_adapter: ActionAdapter | None = None,
         clip_share: ClipShares | None = None,
     ) -> None:
-        self.library, self.engine, self.action_adapter = library, engine, action_adapter
+        self.library, self.engine, self.action_adapter, self.seed = library, engine, action_adapter, seed
         self.cfg, device = config, engine.device
         self.num_envs, self.num_actions, self.device = engine.num_worlds, library.num_joints, str(device)
         self.dt = engine.control_dt
         self.max_episode_length = round(config.episode_seconds / self.dt)
         self.scale, middle = action_scale().to(device), action_middle(config.action)
-        self._middle = None if middle is None else middle.to(device)
+        self.middle = None if middle is None else middle.to(device)
         self.reward = Reward(config.reward, self.dt, device)
         own, compiled = self.reward, config.compile
         self._earned: Callable[[Step], Tensor] = torch.compile(own.__call__, dynamic=False) if compiled else own
@@ -126,6 +126,21 @@ class TrackingEnv(VecEnv):
         """Index of the clip that each world follows now, (B,)."""
         return self._clip
 
+    @property
+    def frame(self) -> Tensor:
+        """Frame of its clip at which each world is now, (B,)."""
+        return self._frame
+
+    @property
+    def now(self) -> tuple[RobotState, ReferenceFrame]:
+        """The robots now, and the reference at the end of the coming control step; the next step writes over them."""
+        return self._state, self._ref
+
+    @property
+    def limit(self) -> Tensor:
+        """`threshold` [m] as a tensor () that stays where it is."""
+        return self._threshold
+
     def get_observations(self) -> TensorDict:
         """Groups "policy" (B, D), "critic" (B, D + extras), perhaps "student"; the tensors are the caller's to keep."""
         shown = {name: group.noisy for name, group in self.groups.items()} | {"critic": self._privileged}
@@ -136,7 +151,7 @@ class TrackingEnv(VecEnv):
     def step(self, actions: Tensor) -> tuple[TensorDict, Tensor, Tensor, dict[str, Any]]:
         """One control period: observations, rewards (B,), dones (B,) and `extras["time_outs"]` (B,)."""
         with one_thread():
-            middle, adapter = middle_targets(self._ref, self._middle), self.action_adapter
+            middle, adapter = middle_targets(self._ref, self.middle), self.action_adapter
             motor = actions if adapter is None else adapter(self._state, middle, actions)
             self._command.copy_(actions)
             self.engine.step(middle + self.scale * motor)

@@ -121,7 +121,7 @@ def feet_orientation(step: Step) -> Tensor:
     """Feet orientation: sum over the feet of |gravity_xy| in the foot's frame; 0 when both soles are level."""
     ww, xx, yy, zz = step.foot_quat_w.square().unbind(-1)
     # The sine of the tilt: (xz - wy)^2 + (yz + wx)^2 = (xx + yy) (zz + ww).
-    return 2 * ((xx + yy) * (zz + ww)).sqrt().sum(-1)
+    return 2 * ((xx + yy) * (zz + ww)).clamp(min=1e-20).sqrt().sum(-1)  # at 0 the root's gradient is infinite
 
 
 def body_position(step: Step) -> Tensor:

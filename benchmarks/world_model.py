@@ -1,0 +1,106 @@
+"""Train a policy by the world-model learner on one GPU for some minutes, and try it in MuJoCo C.
+
+    python -m benchmarks.motion_pack g1_moves asap_smpl cmu_bvh --out motions.npz
+    python -m benchmarks.world_model --motions motions.npz --minutes 6 --out results/world_model
+
+The task, the motions and the trial are those of `python -m benchmarks.baselines --method ours`, beside which it is run.
+A run goes on from `resume.pt` in its folder, with new episodes; `--call-minutes` ends a call early.
+`--set learner.horizon=32 env.threshold_end=0.4` changes single settings.
+"""
+
+import argparse
+import json
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+
+import torch
+
+from benchmarks.baselines.__main__ import RESUME, SETTINGS, Clock, _tell, main, make_env, training_clips
+from benchmarks.baselines.methods import RANDOMISATIONS, changed, method
+from benchmarks.baselines.trial import Tried, report
+from benchmarks.motion_pack import read_pack
+from bumblebee.baselines.trial import Manner
+from bumblebee.files import save_tensors
+from bumblebee.learning.ppo import CURVE
+from bumblebee.learning.world_model.config import WorldModelConfig
+from bumblebee.learning.world_model.trainer import WorldModelTrainer
+from bumblebee.tracking.config import EnvConfig
+
+_ENDLESS, _FIRST = 10**9, 10
+_SAVE_EVERY, _TELL_EVERY = 120.0, 20.0  # s
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What `--set` changes."""
+
+    env: EnvConfig = field(default_factory=EnvConfig)
+    learner: WorldModelConfig = field(default_factory=WorldModelConfig)
+
+
+def parse(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.world_model", description=__doc__.splitlines()[0])
+    parser.add_argument("--motions", type=Path, required=True, help="file of benchmarks.motion_pack")
+    parser.add_argument("--out", type=Path, required=True, help="folder for results; a run found there goes on")
+    parser.add_argument("--minutes", type=float, default=6.0, help="training in all")
+    parser.add_argument("--call-minutes", type=float, help="end this call after so long")
+    parser.add_argument("--engine", choices=("mujoco", "mujoco_warp"), default="mujoco_warp")
+    parser.add_argument("--worlds", type=int, default=4096)
+    parser.add_argument("--threads", type=int, default=2, help="CPU threads")
+    parser.add_argument("--jobs", type=int, default=12, help="processes that try the policy; 0: none is tried")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--randomisation", choices=tuple(RANDOMISATIONS), default="light")
+    parser.add_argument("--parent", type=Path, help="folder of a policy to start from")
+    parser.add_argument("--set", nargs="*", default=[], metavar="PATH=VALUE")
+    return parser.parse_args(arguments)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Train and try; 0 when done, also if the call was over before."""
+    sizes = {"engine": options.engine, "num_worlds": options.worlds, "physics_hz": 200.0, "threads": options.threads}
+    env = replace(EnvConfig(), **sizes, randomisation=RANDOMISATIONS[options.randomisation])
+    settings = changed(Settings(env), options.set)
+    rows = read_pack(options.motions)
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / SETTINGS).write_text(json.dumps(asdict(settings), indent=1) + "\n")
+    torch.set_num_threads(options.threads)
+    clock = Clock(options.call_minutes)
+    made = make_env(replace(method("ours"), env=settings.env), training_clips(rows), options.seed, 1.0)
+    config = replace(settings.learner, iterations=_ENDLESS, checkpoint_every=_ENDLESS)
+    trainer = WorldModelTrainer(made, config, options.out, options.seed, options.parent)
+    if (options.out / RESUME).exists():
+        trainer.load_state_dict(torch.load(options.out / RESUME, weights_only=True, map_location="cpu"))
+        print(f"goes on after {trainer.iteration} iterations, {trainer._seconds / 60:.1f} min", flush=True)
+
+    marks: list[tuple[int, float]] = []
+
+    def enough() -> bool:
+        marks.append((trainer.iteration, trainer._seconds))
+        if len(marks) > _FIRST:  # the first ones load kernels and record graphs
+            (began, before), (now, seconds) = marks[_FIRST], marks[-1]
+            left = 60 * options.minutes - seconds
+            total = now + max(round(left * (now - began + 1) / (seconds - before + 0.1)), 1)
+            trainer.config = replace(trainer.config, iterations=total)
+        if clock.due("tell", _TELL_EVERY):
+            _tell(options.out / CURVE)
+        if clock.due("save", _SAVE_EVERY):
+            save_tensors(options.out / RESUME, trainer.state_dict())
+        return trainer._seconds >= 60 * options.minutes or clock.over
+
+    trainer.train("world model", enough)
+    save_tensors(options.out / RESUME, trainer.state_dict())
+    trainer.policy().save(options.out)
+    print(f"trained {trainer.frames / 1e6:.1f} M steps in {trainer._seconds / 60:.1f} min", flush=True)
+    if options.jobs and trainer._seconds >= 60 * options.minutes:
+        report(
+            [Tried("world_model", options.out, Manner(settings.env.observation))],
+            options.motions,
+            options.out,
+            options.jobs,
+        )
+    return 0
+
+
+if __name__ == "__main__":
+    main(run, parse)

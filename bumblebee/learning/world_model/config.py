@@ -1,0 +1,55 @@
+"""Settings of the world-model learner, a section of params.yaml."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from bumblebee.ranges import Factor, Few, Positive, Range, Ranged, Rate, Share, Widths
+
+
+@dataclass(frozen=True)
+class WorldModelConfig(Ranged):
+    """Learning through a differentiable model of the robot (Fussell, Bergamin and Holden, SuperTrack, 2021)."""
+
+    iterations: Annotated[int, Range(least=1, most=1_000_000_000)] = 2000
+    """Iterations in all: some control steps of all worlds, then updates of both networks."""
+    steps: Annotated[int, Range(least=1, most=10000)] = 8
+    """Control steps of each world an iteration."""
+    memory: Annotated[int, Range(least=2, most=100000)] = 64
+    """Last control steps of each world that both networks learn from."""
+    window: Annotated[int, Range(least=1, most=1000)] = 24
+    """Control steps that the model predicts in a row when it learns."""
+    horizon: Annotated[int, Range(least=1, most=1000)] = 24
+    """Control steps that the policy imagines in a row when it learns."""
+    model_updates: Few = 6
+    """Gradient steps of the model an iteration."""
+    policy_updates: Few = 4
+    """Gradient steps of the policy an iteration."""
+    model_batch: Annotated[int, Range(least=1, most=10_000_000)] = 1024
+    """Windows of a gradient step of the model."""
+    policy_batch: Annotated[int, Range(least=1, most=10_000_000)] = 2048
+    """Imagined rollouts of a gradient step of the policy."""
+    model_hidden: Widths = (1024, 1024, 1024)
+    """Widths of the model's layers, each with layer normalisation and SiLU."""
+    hidden: Widths = (1024, 512, 256)
+    """Widths of the policy's layers, ELU."""
+    model_rate: Rate = 1e-3
+    """Learning rate of the model at first; it falls to a tenth along a cosine."""
+    policy_rate: Rate = 5e-4
+    """Learning rate of the policy at first; it falls likewise."""
+    gamma: Share = 0.97
+    """Discount a control step."""
+    grad_norm: Positive = 1.0
+    """Gradients are scaled down to this norm."""
+    average: Share = 0.995
+    """Weight of the past in the average of the policy's weights, which is what is tried and exported."""
+    noise: Factor = 0.08
+    """Standard deviation of the exploration, in units of the action; worlds have from none to twice as much."""
+    warm_up: Annotated[int, Range(least=1, most=1_000_000)] = 200
+    """Gradient steps of the model before the policy's first."""
+    checkpoint_every: Annotated[int, Range(least=1, most=1_000_000_000)] = 50
+    """Iterations between checkpoints, from which a killed training goes on."""
+
+    def __post_init__(self) -> None:
+        """Refuse windows that the memory cannot hold."""
+        super().__post_init__()
+        self.require(self.window < self.memory, "window", "fewer steps than `memory`")

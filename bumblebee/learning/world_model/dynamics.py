@@ -1,0 +1,98 @@
+"""The world model: from a state and servo targets to the state one control step later."""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+
+from bumblebee.learning.world_model.body import change_of, difference, features, joint_pos, moved
+
+SPREADS = (0.05, 0.05, 0.05, 0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.6, 0.6, 0.6)
+"""Errors of the root's place [m], turn [rad], velocity [m/s] and angular velocity [rad/s] that count as one."""
+ANGLE, SPEED = 0.1, 1.5
+"""The same for joint angles [rad] and joint velocities [rad/s]."""
+
+
+class Dynamics(nn.Module):
+    """Predicts what one control step changes beyond uniform motion.
+
+    Args:
+        joints: J.
+        hidden: widths of the layers.
+        dt: control period [s].
+        context: entries of the vector that says in what a world differs; 0 where all are alike.
+    """
+
+    def __init__(self, joints: int, hidden: Sequence[int], dt: float, context: int = 0) -> None:
+        super().__init__()
+        self.dt = dt
+        size, layers = 10 + 4 * joints + context, []
+        for width in hidden:
+            layers += [nn.Linear(size, width), nn.LayerNorm(width), nn.SiLU()]
+            size = width
+        last = nn.Linear(size, 12 + 2 * joints)
+        with torch.no_grad():
+            last.weight.mul_(0.1)
+            last.bias.zero_()
+        self.layers = nn.Sequential(*layers, last)
+        self.register_buffer("mean", torch.zeros(10 + 4 * joints + context))
+        self.register_buffer("std", torch.ones(10 + 4 * joints + context))
+        self.register_buffer("scale", torch.ones(12 + 2 * joints))
+        self.register_buffer("spread", torch.tensor([*SPREADS, *[ANGLE] * joints, *[SPEED] * joints]))
+
+    def seen(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
+        """The network's input (B, 10 + 4 J + C) before it is normalised."""
+        angle = joint_pos(body)
+        return torch.cat((features(body), target - angle, before - angle, context), dim=-1)
+
+    def forward(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
+        """The next state (B, 13 + 2 J).
+
+        Args:
+            body: (B, 13 + 2 J).
+            target: (B, J) [rad] that the servos are given for this control step.
+            before: (B, J) [rad] that they had before it; of use where commands are late.
+            context: (B, C).
+        """
+        seen = (self.seen(body, target, before, context) - self.mean) / self.std
+        return moved(body, self.layers(seen.clamp(-10, 10)) * self.scale, self.dt)
+
+    def step(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
+        """`forward`, which may be replaced by a compiled one where windows are predicted."""
+        return self(body, target, before, context)
+
+    @torch.no_grad()
+    def normalise(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor, after: Tensor) -> None:
+        """Take the spreads of inputs and of changes from first transitions (B, ...)."""
+        seen, change = self.seen(body, target, before, context), change_of(body, after, self.dt)
+        self.mean.copy_(seen.mean(0))
+        self.std.copy_(seen.std(0).clamp(min=1e-2))
+        self.scale.copy_(change.square().mean(0).sqrt().clamp(min=1e-5))
+
+    def unrolled(self, body: Tensor, targets: Tensor, before: Tensor, context: Tensor) -> Tensor:
+        """Predictions in a row, each from the last: (K, B, 13 + 2 J).
+
+        Args:
+            body: (B, 13 + 2 J) at first.
+            targets: (K, B, J) [rad].
+            before: (B, J) [rad] before the first.
+            context: (B, C).
+        """
+        states = []
+        for target in targets.unbind():
+            body = self.step(body, target, before, context)
+            before = target
+            states.append(body)
+        return torch.stack(states)
+
+    def loss(self, predicted: Tensor, true: Tensor, valid: Tensor) -> Tensor:
+        """Mean Huber loss of the differences in units of `spread`, in the true root's frame.
+
+        Args:
+            predicted: (K, B, 13 + 2 J).
+            true: (K, B, 13 + 2 J).
+            valid: (K, B) bool, steps before an episode's end.
+        """
+        error = difference(predicted, true) / self.spread
+        cost = torch.nn.functional.smooth_l1_loss(error, torch.zeros_like(error), reduction="none", beta=0.3).mean(-1)
+        return torch.where(valid, cost, 0.0).sum() / valid.sum().clamp(min=1)

@@ -1,0 +1,122 @@
+"""The task inside the world model: what a policy would earn in rollouts that the model imagines, with gradients.
+
+Observation, reward and the ends of episodes are those of `bumblebee.tracking`, worked out from imagined states. The model
+imagines no contact forces: `stumble` sees none. Torques are the declared servos' at the end of the control step.
+"""
+
+from collections.abc import Callable
+from dataclasses import fields
+
+import torch
+from torch import Tensor
+
+from bumblebee.learning.world_model.body import joint_pos, unpacked
+from bumblebee.learning.world_model.dynamics import Dynamics
+from bumblebee.learning.world_model.memory import Starts
+from bumblebee.robot.facts import FEET, KEY_BODIES
+from bumblebee.sim.engine import RobotState
+from bumblebee.sim.servo import servos_of
+from bumblebee.tracking.env import TrackingEnv
+from bumblebee.tracking.forward_kinematics import ForwardKinematics
+from bumblebee.tracking.library import ReferenceFrame, over_robot
+from bumblebee.tracking.observations import middle_targets
+from bumblebee.tracking.rewards import Step
+from bumblebee.tracking.terminations import lying
+from bumblebee.tracking.terms import expanded, see
+
+Act = Callable[[Tensor], Tensor]
+"""Observations (B, D) -> actions (B, J)."""
+
+
+class Imagination:
+    """The task of `env` on states of a world model.
+
+    Args:
+        env: whose settings, references and limits hold; its observation has no history.
+        horizon: control steps of a rollout.
+        gamma: discount a control step.
+    """
+
+    def __init__(self, env: TrackingEnv, horizon: int, gamma: float) -> None:
+        device = torch.device(env.device)
+        self.env, self.horizon, self.gamma = env, horizon, gamma
+        self.terms = expanded((*env.cfg.observation.terms, *env.cfg.observation.now))
+        self.kinematics = ForwardKinematics(env.engine.model, [*KEY_BODIES, *FEET], device)
+        servos = servos_of(env.engine.model, list(range(1, env.engine.model.njnt)))
+        columns = (servos.gain, servos.bias[:, 2], servos.limit)
+        self._kp, self._kd, self._limit = (torch.tensor(c, dtype=torch.float32, device=device) for c in columns)
+        self._ahead = torch.arange(1, horizon + 1, device=device)
+        if env.cfg.compile:
+            self._advance = torch.compile(self._advance, dynamic=False)
+
+    def state(self, body: Tensor) -> tuple[RobotState, Tensor]:
+        """What the task sees of states (B, 13 + 2 J), and the feet's orientations (B, 2, 4)."""
+        place, turn = self.kinematics(body[:, :3], body[:, 3:7], joint_pos(body))
+        return unpacked(body, place[:, : len(KEY_BODIES)]), turn[:, len(KEY_BODIES) :]
+
+    def targets(self, ref: ReferenceFrame, action: Tensor) -> Tensor:
+        """Servo targets (B, J) [rad] of actions (B, J)."""
+        return middle_targets(ref, self.env.middle) + self.env.scale * action
+
+    def references(self, clip: Tensor, frame: Tensor) -> list[ReferenceFrame]:
+        """References of the coming control steps, one lookup for all: `horizon` times (B, ...)."""
+        times = (frame + self._ahead[:, None]).flatten() * self.env.dt
+        every = self.env.library.frames(clip.repeat(self.horizon), times)
+        parts = {f.name: getattr(every, f.name).unflatten(0, (self.horizon, -1)).unbind() for f in fields(every)}
+        return [ReferenceFrame(**dict(zip(parts, each, strict=True))) for each in zip(*parts.values(), strict=True)]
+
+    def step(self, before: RobotState, after: Tensor, target: Tensor, actions: tuple, ref: ReferenceFrame) -> Step:
+        """What the reward of a control step depends on, its state after it (B, 13 + 2 J)."""
+        state, feet = self.state(after)
+        torque = self._kp * (target - state.joint_pos) + self._kd * state.joint_vel
+        return Step(
+            state=state,
+            ref=ref if self.env.cfg.place == "world" else over_robot(ref, state.root_pos_w),
+            torque=torque.clamp(-self._limit, self._limit),
+            joint_acc=(state.joint_vel - before.joint_vel) / self.env.dt,
+            actions=actions,
+            foot_force_w=torch.zeros_like(feet[..., :3]),
+            foot_quat_w=feet,
+            limits=self.env.limits,
+        )
+
+    def returns(self, act: Act, model: Dynamics, starts: Starts) -> tuple[Tensor, Tensor]:
+        """Discounted rewards (B,) a second of perfect tracking, and the share of steps (B,) before an end."""
+        body, before, last, earlier = starts.body, starts.before, starts.action, starts.earlier
+        alive = torch.ones_like(body[:, 0])
+        earned, lived, left = torch.zeros_like(alive), torch.zeros_like(alive), self._left(starts)
+        for index, ref in enumerate(self.references(starts.clip, starts.frame)):
+            after, action, target, reward, lost = self._advance(act, model, body, before, last, earlier, starts.context, ref)
+            alive = alive * (index < left)
+            earned = earned + self.gamma**index * torch.where(alive > 0, reward, 0.0)
+            lived = lived + alive / self.horizon
+            alive = alive * ~lost
+            body, before, last, earlier = after, target, action, last
+        return earned, lived
+
+    def _advance(
+        self,
+        act: Act,
+        model: Dynamics,
+        body: Tensor,
+        before: Tensor,
+        last: Tensor,
+        earlier: Tensor,
+        context: Tensor,
+        ref: ReferenceFrame,
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+        """One imagined control step: next state, action, servo targets, reward, and whose episode it ends."""
+        state, _ = self.state(body)
+        action = act(see(self.terms, state, ref, last))
+        target = self.targets(ref, action)
+        after = model(body, target, before, context)
+        step = self.step(state, after, target, (action, last, earlier), ref)
+        return after, action, target, self.env.reward(step) / self.env.dt, self.lost(step)
+
+    def lost(self, step: Step) -> Tensor:
+        """Robots (B,) bool whose episode ends as a failure with this step."""
+        return lying(step.state, step.ref, step.root_angle) | (step.key_errors.amax(-1) > self.env.limit)
+
+    def _left(self, starts: Starts) -> Tensor:
+        """Control steps (B,) until the clip's end."""
+        return self.env.library.length[starts.clip] - 1 - starts.frame

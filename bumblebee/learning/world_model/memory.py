@@ -1,0 +1,109 @@
+"""The last control steps of all worlds, in tensors that stay where they are."""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Stretches of K control steps of B worlds."""
+
+    bodies: Tensor
+    """(K + 1, B, 13 + 2 J) states, the first before the first step."""
+    targets: Tensor
+    """(K, B, J) [rad] that the servos were given."""
+    before: Tensor
+    """(B, J) [rad] that they had before."""
+    context: Tensor
+    """(B, C)."""
+    valid: Tensor
+    """(K, B) bool: no episode ended in this step or an earlier one of the window."""
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where B imagined rollouts begin."""
+
+    body: Tensor
+    before: Tensor
+    action: Tensor
+    """(B, J) the policy's last output."""
+    earlier: Tensor
+    """(B, J) its output before that."""
+    clip: Tensor
+    frame: Tensor
+    context: Tensor
+
+
+class Memory:
+    """A ring of T control steps of N worlds.
+
+    Args:
+        steps: T.
+        context: (N, C), in what the worlds differ.
+        joints: J.
+    """
+
+    def __init__(self, steps: int, context: Tensor, joints: int) -> None:
+        n, device = len(context), context.device
+        self.steps, self.worlds, self.context = steps, n, context
+        sizes = {"body": 13 + 2 * joints, **dict.fromkeys(("target", "before", "action", "earlier"), joints)}
+        self.columns = {name: torch.zeros(steps, n, size, device=device) for name, size in sizes.items()}
+        self.clip, self.frame = (torch.zeros(steps, n, dtype=torch.long, device=device) for _ in range(2))
+        self.done = torch.ones(steps, n, dtype=torch.bool, device=device)
+        self.oldest = torch.zeros((), dtype=torch.long, device=device)
+        self.added = 0
+
+    @property
+    def full(self) -> bool:
+        """Whether every step of the ring has been written."""
+        return self.added >= self.steps
+
+    def begin(self, clip: Tensor, frame: Tensor, **columns: Tensor) -> None:
+        """Write what is known before a control step, (N, ...) each, over the oldest."""
+        for name, value in columns.items():
+            self.columns[name][self._at] = value
+        self.clip[self._at], self.frame[self._at] = clip, frame
+
+    def end(self, done: Tensor) -> None:
+        """Finish the step with whose episodes it ended (N,) bool; the next one comes after it."""
+        self.done[self._at] = done
+        self.added += 1
+        self.oldest.fill_(self._at)
+
+    @property
+    def _at(self) -> int:
+        return self.added % self.steps
+
+    def windows(self, size: int, batch: int) -> Windows:
+        """Draw stretches of `size` steps."""
+        step = torch.randint(self.steps - size, (batch,), device=self.done.device)
+        world = torch.randint(self.worlds, (batch,), device=self.done.device)
+        rows = torch.stack([self._row(step + k, world) for k in range(size + 1)])  # (K + 1, B)
+        ended = self.done.flatten()[rows[:-1]]
+        return Windows(
+            bodies=self._of("body", rows),
+            targets=self._of("target", rows[:-1]),
+            before=self._of("before", rows[0]),
+            context=self.context[world],
+            valid=ended.cumsum(0) == 0,
+        )
+
+    def starts(self, batch: int) -> Starts:
+        """Draw states to imagine from."""
+        step = torch.randint(self.steps, (batch,), device=self.done.device)
+        world = torch.randint(self.worlds, (batch,), device=self.done.device)
+        rows = self._row(step, world)
+        body, before, action, earlier = (self._of(name, rows) for name in ("body", "before", "action", "earlier"))
+        return Starts(
+            body, before, action, earlier, self.clip.flatten()[rows], self.frame.flatten()[rows], self.context[world]
+        )
+
+    def _row(self, step: Tensor, world: Tensor) -> Tensor:
+        """Flat index of steps counted from the oldest, of a full ring."""
+        return (self.oldest + step) % self.steps * self.worlds + world
+
+    def _of(self, name: str, rows: Tensor) -> Tensor:
+        return self.columns[name].flatten(0, 1)[rows]

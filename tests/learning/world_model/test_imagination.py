@@ -1,0 +1,83 @@
+"""The task is one and the same in the simulator and in imagination."""
+
+import pytest
+import torch
+
+from bumblebee.learning.world_model.body import packed
+from bumblebee.learning.world_model.imagination import Imagination
+from bumblebee.motion.embedded import make_library
+from bumblebee.sim.engine_choice import make_engine
+from bumblebee.tracking.config import EnvConfig, Randomisation
+from bumblebee.tracking.env import TrackingEnv
+from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.model import task_model
+from bumblebee.tracking.terms import see
+
+WORLDS, STEPS = 8, 60
+
+
+@pytest.fixture(scope="module")
+def env() -> TrackingEnv:
+    config = EnvConfig(
+        num_worlds=WORLDS, threads=1, observation_noise=0.0, randomisation=Randomisation(push=0.0, gains=0.0)
+    )
+    engine = make_engine("mujoco", task_model(config), WORLDS, 1)
+    return TrackingEnv(MotionLibrary(make_library()[::12], config.ahead), engine, config, seed=3)
+
+
+def test_observation_reward_and_end_are_those_of_the_environment_over_whole_episodes(env: TrackingEnv) -> None:
+    """With the simulator's own next states, torques and contact forces, everything is equal but for rounding."""
+    imagination = Imagination(env, horizon=1, gamma=1.0)
+    before = torch.zeros(2, WORLDS, env.num_actions)  # the last action and the one before it
+    generator, compared, ended = torch.Generator().manual_seed(0), 0, 0
+    for _ in range(STEPS):
+        state, ref = env.now
+        seen, _ = imagination.state(packed(state))
+        shown = see(imagination.terms, seen, ref, before[0])
+        torch.testing.assert_close(shown, env.groups["policy"].exact, atol=1e-4, rtol=1e-4)
+        action = 0.5 * torch.randn(WORLDS, env.num_actions, generator=generator)
+        target = imagination.targets(ref, action)
+        made: dict[str, torch.Tensor] = {}
+        original = env._earned
+
+        def watched(outcome, made=made, original=original):
+            made.update(after=packed(outcome.state), torque=outcome.torque, force=outcome.foot_force_w)
+            return original(outcome)
+
+        env._earned = watched
+        _, reward, done, extras = env.step(action)
+        env._earned = original
+        step = imagination.step(state, made["after"], target, (action, *before), ref)
+        for name, value in (("torque", made["torque"]), ("foot_force_w", made["force"])):
+            object.__setattr__(step, name, value)
+        torch.testing.assert_close(env.reward(step), reward, atol=1e-5, rtol=1e-4)
+        lost = done & (extras["time_outs"] == 0)
+        assert torch.equal(imagination.lost(step), lost)
+        before = torch.stack((action, before[0])).masked_fill(done[None, :, None], 0.0)
+        compared, ended = compared + WORLDS, ended + int(lost.sum())
+    assert compared == STEPS * WORLDS and ended > 0, "some episodes must end for this to say anything"
+
+
+def test_the_reward_has_gradients_with_respect_to_the_state_also_at_the_reference(env: TrackingEnv) -> None:
+    imagination = Imagination(env, horizon=1, gamma=1.0)
+    frames = torch.zeros(WORLDS, dtype=torch.long)
+    ref = imagination.references(torch.arange(WORLDS) % len(env.library), frames)[0]
+    still = torch.zeros(WORLDS, env.num_actions)
+    parts = (ref.root_pos_w, ref.root_quat_w, torch.zeros(WORLDS, 6), ref.joint_pos, ref.joint_vel)
+    body = torch.cat(parts, dim=-1).requires_grad_()
+    state, _ = imagination.state(body.detach())
+    step = imagination.step(state, body, imagination.targets(ref, still), (still, still, still), ref)
+    (gradient,) = torch.autograd.grad(env.reward(step).sum(), body)
+    assert torch.isfinite(gradient).all() and gradient.abs().sum() > 0
+
+
+def test_servos_torques_are_those_of_the_engine_where_it_holds_still(env: TrackingEnv) -> None:
+    imagination = Imagination(env, horizon=1, gamma=1.0)
+    state, ref = env.now
+    target = imagination.targets(ref, torch.zeros(WORLDS, env.num_actions))
+    step = imagination.step(state, packed(state), target, (target, target, target), ref)
+    model = env.engine.model
+    by_hand = model.actuator_gainprm[:, 0] * (target - state.joint_pos).numpy()
+    by_hand += model.actuator_biasprm[:, 2] * state.joint_vel.numpy()
+    limit = model.actuator_forcerange[:, 1]
+    torch.testing.assert_close(step.torque, torch.tensor(by_hand.clip(-limit, limit), dtype=torch.float32))
