@@ -78,7 +78,7 @@ class Dynamics(nn.Module):
             before: (B, J) [rad] before the first.
             context: (B, C).
         """
-        states = []
+        states, body = [], body.requires_grad_()  # as later steps': compiled once
         for target in targets.unbind():
             body = self.step(body, target, before, context)
             before = target

@@ -35,9 +35,10 @@ class Imagination:
         env: whose settings, references and limits hold; its observation has no history.
         horizon: control steps of a rollout.
         gamma: discount a control step.
+        compiled: whether torch compiles a control step.
     """
 
-    def __init__(self, env: TrackingEnv, horizon: int, gamma: float) -> None:
+    def __init__(self, env: TrackingEnv, horizon: int, gamma: float, compiled: bool = False) -> None:
         device = torch.device(env.device)
         self.env, self.horizon, self.gamma = env, horizon, gamma
         self.terms = expanded((*env.cfg.observation.terms, *env.cfg.observation.now))
@@ -46,7 +47,7 @@ class Imagination:
         columns = (servos.gain, servos.bias[:, 2], servos.limit)
         self._kp, self._kd, self._limit = (torch.tensor(c, dtype=torch.float32, device=device) for c in columns)
         self._ahead = torch.arange(1, horizon + 1, device=device)
-        if env.cfg.compile:
+        if compiled:
             self._advance = torch.compile(self._advance, dynamic=False)
 
     def state(self, body: Tensor) -> tuple[RobotState, Tensor]:
@@ -82,7 +83,8 @@ class Imagination:
 
     def returns(self, act: Act, model: Dynamics, starts: Starts) -> tuple[Tensor, Tensor]:
         """Discounted rewards (B,) a second of perfect tracking, and the share of steps (B,) before an end."""
-        body, before, last, earlier = starts.body, starts.before, starts.action, starts.earlier
+        first = (starts.body, starts.before, starts.action, starts.earlier)
+        body, before, last, earlier = (tensor.requires_grad_() for tensor in first)  # as later steps': compiled once
         alive = torch.ones_like(body[:, 0])
         earned, lived, left = torch.zeros_like(alive), torch.zeros_like(alive), self._left(starts)
         for index, ref in enumerate(self.references(starts.clip, starts.frame)):

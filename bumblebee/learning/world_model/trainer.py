@@ -75,10 +75,10 @@ class WorldModelTrainer:
         drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
         context = torch.tensor(context_of(env.engine.model, drawn, env.num_envs), dtype=torch.float32, device=device)
         self.model = Dynamics(env.num_actions, config.model_hidden, env.dt, context.shape[1]).to(device)
-        if env.cfg.compile:
+        if config.compile:
             self.model.step = torch.compile(self.model.step, dynamic=False)
         self.memory = Memory(config.memory, context, env.num_actions)
-        self.imagination = Imagination(env, config.horizon, config.gamma)
+        self.imagination = Imagination(env, config.horizon, config.gamma, config.compile)
         self.average = deepcopy(self.actor).requires_grad_(False)
         self._rates = {"model": torch.tensor(config.model_rate), "policy": torch.tensor(config.policy_rate)}
         self._rates = {name: rate.to(device) for name, rate in self._rates.items()}
