@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.dataset.conventions import wrong_conventions
+from bumblebee.diagnosis.dataset.declared_contacts import without_contradicted
 from bumblebee.diagnosis.dataset.held_out import HeldOut, condition_notes, split_by
 from bumblebee.diagnosis.dataset.noise import estimate_noise
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
@@ -125,27 +126,32 @@ def make_session(
     failed += unmade
     long = [r for r in long if r.rollout_id not in {name for name, _ in unmade}]
     refuse_unlogged(plant, model)
-    undriven = tuple(undriven_warnings(plant, long, model))
+    undriven = undriven_warnings(plant, long, model)
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)
+    sigma = estimate_noise(long, layout, rules.noise)
+    spec, contradicted, contact_notes = without_contradicted(spec, plant, layout, long, sigma, rules.contacts)
+    if contradicted:
+        plant, _ = make_plants(spec, long, model)
     train, holdout = split(long, rules.split)
     accept = accepting(long, train, holdout, rules.split)
     notes = [f"set aside: {error}" for _, error in failed] + _check_notes(warnings, rules.usable.warnings)
     notes += (
         condition_notes(plant, long, rules.conditions)
         + drive_notes
+        + contact_notes
         + [NO_HEIGHT] * (plant.floating and not has_pos)
         + [JUDGED_TWICE] * bool(set(accept) & set(holdout))
     )
     period = float(np.median(np.diff(long[0].time)))
     steps, search_step = steps_of(period, float(spec.option.timestep), plant.model.nv, rules.time_steps)
-    sigma = estimate_noise(long, layout, rules.noise)
     if not plant.floating:
         long, sigma, more = _refined(plant, layout, long, sigma, rules)
         notes += more
+    told = (*undriven, *contradicted)
     aside = [{"rollout": name, "reason": str(error)} for name, error in failed]
     return Session(
-        spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, undriven, rules
+        spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, told, rules
     )
 
 
