@@ -97,6 +97,5 @@ def test_feet_of_a_floating_base_are_not_asked() -> None:
 
 
 def test_a_base_that_is_overlapped_does_not_turn_a_commands_sign() -> None:
-    deep = arm('<geom type="box" size=".25 .1 .2"/>')
-    view = View("r0", record(arm())[0], mujoco.MjModel.from_xml_string(deep), None, Thresholds())
+    view = View("r0", record(arm())[0], mujoco.MjModel.from_xml_string(arm(BOX)), None, Thresholds())
     assert [share_for_reversed(view, joint, by_target=True) for joint in range(2)] == [0, 0]
