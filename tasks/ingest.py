@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import mujoco
-
 from bumblebee.errors import BadInput
 from bumblebee.io.read import file_hash, read_json
 from bumblebee.measured import gate, gate_words
@@ -135,7 +133,7 @@ def sort_rollouts(
 
     All clusters' rollouts then lie in one folder, and only their metadata tell whose they are.
     """
-    model = mujoco.MjModel.from_xml_path(str(out / "model.xml"))
+    model = load_model(out / "model.xml")
     total = sum(len(incoming_files(folder)) for folder in folders)
     good, bad = out / "rollouts", out / "quarantine"
     with progress(total, "checking rollouts", "files") as bar:

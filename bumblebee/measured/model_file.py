@@ -9,6 +9,7 @@ import mujoco
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_text
+from bumblebee.robot.drives import explicit_drives
 
 LARGEST = 64 << 20  # bytes of the XML itself; the largest public robot models have 1 MB
 MEMORY = 8 << 30  # bytes that a model may ask for its arena
@@ -22,16 +23,23 @@ _MULTIPLIERS = (
 
 
 def load_model(path: Path) -> mujoco.MjModel:
-    """The compiled model of an MJCF file; `BadInput` with MuJoCo's own words where it does not load."""
+    """The compiled model of an MJCF file, its drives in one form (`robot.drives`); `BadInput` as for `load_spec`."""
+    return explicit_drives(load_spec(path))[0].compile()
+
+
+def load_spec(path: Path) -> mujoco.MjSpec:
+    """Read an MJCF file as an editable spec that compiles; `BadInput` with MuJoCo's own words where it does not."""
     path = Path(path)
     text = read_text(path, LARGEST)
     if "\0" in text or "<" not in text:
         raise BadInput(path, "an MJCF model that loads", "a file that is no XML")
     _refuse_multiplied(path, text)
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        spec = mujoco.MjSpec.from_file(str(path))
+        spec.compile()
     except Exception as error:  # ValueError mostly; FatalError and MemoryError from its allocations
         raise BadInput(path, "an MJCF model that loads", str(error)[:300]) from None
+    return spec
 
 
 def _refuse_multiplied(path: Path, text: str) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 import mujoco
 
 from bumblebee.errors import BadInput
+from bumblebee.robot.drives import buffer_length, explicit_drives
 from bumblebee.robot.facts import FEET
 from bumblebee.robot.model import build_spec
 
@@ -50,11 +51,14 @@ def load_spec(path: Path | None = None, physics_hz: float | None = None) -> mujo
         spec = build_spec()
     else:
         try:
-            spec = mujoco.MjSpec.from_file(str(path))
+            spec, _ = explicit_drives(mujoco.MjSpec.from_file(str(path)))
         except (ValueError, OSError) as error:
             came = "no file" if not Path(path).exists() else str(error)
             raise BadInput(path, "a MuJoCo model (MJCF)", came) from None
     add_foot_sensors(spec)
     if physics_hz is not None:
         spec.option.timestep = 1.0 / physics_hz
+        for actuator in spec.actuators:
+            if actuator.nsample:
+                actuator.nsample = buffer_length(actuator.delay, spec.option.timestep)
     return spec

@@ -4,11 +4,11 @@ Delays and terrain change a model's layout and must be there when it is compiled
 to its fields (`tracking.randomisation`).
 """
 
-import math
 from pathlib import Path
 
 import mujoco
 
+from bumblebee.robot.drives import buffer_length
 from bumblebee.sim.sensors import load_spec
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from bumblebee.tracking.terrain import add_terrain
@@ -33,6 +33,5 @@ def add_delays(spec: mujoco.MjSpec, config: Randomisation) -> None:
         return
     for servo in spec.actuators:
         servo.interp = 1  # linear: a delay need not be a whole number of physics steps
-        samples = math.ceil((servo.delay + longest) / spec.option.timestep) + 2
-        servo.nsample = max(servo.nsample, samples)
+        servo.nsample = max(servo.nsample, buffer_length(servo.delay + longest, spec.option.timestep))
         servo.delay = max(servo.delay, 1e-9)  # a delay of 0 would leave the buffer unread

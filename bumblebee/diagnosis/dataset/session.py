@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.diagnosis.dataset.conventions import wrong_conventions
+from bumblebee.diagnosis.dataset.declared_contacts import without_contradicted
 from bumblebee.diagnosis.dataset.held_out import HeldOut, condition_notes, split_by
 from bumblebee.diagnosis.dataset.noise import estimate_noise
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
@@ -18,19 +19,20 @@ from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velo
 from bumblebee.diagnosis.simulation import (
     Layout,
     Plant,
-    fold_dampers,
     layout_of,
-    load_spec,
     make_plants,
     refuse_unlogged,
 )
 from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, Usable
 from bumblebee.errors import BadInput
 from bumblebee.measured.checks import beyond
+from bumblebee.measured.model_file import load_spec
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.measured.usable import review
+from bumblebee.robot.drives import explicit_drives
 
 JUDGED_TWICE = "the held-out rollouts decided which effects were accepted (model selection), never how large they are"
+NO_HEIGHT = "no base_pos: the base's height is estimated from stance, its error is a nuisance parameter"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,7 @@ def open_session(
     if not files:
         raise BadInput(Path(dataset) / "rollouts", "at least one *.parquet", "none")
     spec = load_spec(model)
-    declared = spec.compile()
+    declared = explicit_drives(spec)[0].compile()
     for file in files:
         try:
             rollout = read_rollout(file)
@@ -119,31 +121,37 @@ def make_session(
     """
     rules = thresholds or DatasetThresholds()
     long, failed = _sorted_out(rollouts, dataset, errors, rules.usable)
-    spec, folded = fold_dampers(spec)
+    spec, drive_notes = explicit_drives(spec)
     plant, unmade = make_plants(spec, long, model)
     failed += unmade
     long = [r for r in long if r.rollout_id not in {name for name, _ in unmade}]
     refuse_unlogged(plant, model)
-    undriven = tuple(undriven_warnings(plant, long, model))
+    undriven = undriven_warnings(plant, long, model)
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)
+    sigma = estimate_noise(long, layout, rules.noise)
+    spec, contradicted, contact_notes = without_contradicted(spec, plant, layout, long, sigma, rules.contacts)
+    if contradicted:
+        plant, _ = make_plants(spec, long, model)
     train, holdout = split(long, rules.split)
     accept = accepting(long, train, holdout, rules.split)
     notes = [f"set aside: {error}" for _, error in failed] + _check_notes(warnings, rules.usable.warnings)
     notes += (
         condition_notes(plant, long, rules.conditions)
-        + _model_notes(folded, plant.floating and not has_pos)
+        + drive_notes
+        + contact_notes
+        + [NO_HEIGHT] * (plant.floating and not has_pos)
         + [JUDGED_TWICE] * bool(set(accept) & set(holdout))
     )
     period = float(np.median(np.diff(long[0].time)))
     steps, search_step = steps_of(period, float(spec.option.timestep), plant.model.nv, rules.time_steps)
-    sigma = estimate_noise(long, layout, rules.noise)
     if not plant.floating:
         long, sigma, more = _refined(plant, layout, long, sigma, rules)
         notes += more
+    told = (*undriven, *contradicted)
     aside = [{"rollout": name, "reason": str(error)} for name, error in failed]
     return Session(
-        spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, undriven, rules
+        spec, plant, layout, long, sigma, train, holdout, accept, steps, search_step, notes, aside, told, rules
     )
 
 
@@ -179,18 +187,6 @@ def _check_notes(warnings: Sequence[str], most: int) -> list[str]:
     """What the checks found that does not stop a file; of more than `most` findings the number."""
     notes = [f"check: {text}" for text in warnings[:most]]
     return [*notes, f"{len(warnings) - most} more findings that do not stop a file"] if len(warnings) > most else notes
-
-
-def _model_notes(folded: Sequence[str], no_height: bool) -> list[str]:
-    """On joints whose actuators became one, and on a base whose height is in no log."""
-    notes = []
-    if folded:
-        notes.append(
-            f"position and velocity actuators combined into one servo with one torque limit: {', '.join(folded[:6])}"
-        )
-    if no_height:
-        notes.append("no base_pos: the base's height is estimated from stance, its error is a nuisance parameter")
-    return notes
 
 
 def _refined(

@@ -8,10 +8,11 @@ import numpy as np
 
 from bumblebee.diagnosis.dataset import Session, steps_of
 from bumblebee.diagnosis.plan.config import Gain, PlanConfig
-from bumblebee.diagnosis.simulation import Layout, Plant, fold_dampers, layout_of, make_plant, refuse_unlogged
+from bumblebee.diagnosis.simulation import Layout, Plant, layout_of, make_plant, refuse_unlogged
 from bumblebee.diagnosis.thresholds.plan import SensorNoise, TrackingGains
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
+from bumblebee.robot.drives import explicit_drives
 from bumblebee.sim.effects import is_hidden
 from bumblebee.sim.servo import servos_of
 
@@ -68,7 +69,7 @@ class Machine:
 def make_machine(spec: mujoco.MjSpec, name: str, session: Session | None, config: PlanConfig) -> Machine:
     """The machine of a declared model, with what a dataset's session says of rate, noise and start."""
     rules = config.thresholds
-    spec = session.spec if session else fold_dampers(spec)[0]
+    spec = session.spec if session else explicit_drives(spec)[0]
     joints = session.plant.joints if session else _joints(spec.compile(), name)
     rate = config.rate or (session.rollouts[0].control_hz if session else 50.0)
     torque = _takes_torque(spec, joints, rate, name)

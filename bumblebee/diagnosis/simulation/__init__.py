@@ -12,7 +12,6 @@ from bumblebee.diagnosis.simulation.actuator_history import (
     window_servos,
     yielded,
 )
-from bumblebee.diagnosis.simulation.actuators import fold_dampers
 from bumblebee.diagnosis.simulation.cache import Changes, Recall
 from bumblebee.diagnosis.simulation.collision_culling import out_of_reach, without
 from bumblebee.diagnosis.simulation.condition_plants import make_plants
@@ -20,7 +19,7 @@ from bumblebee.diagnosis.simulation.conditions import Condition, in_words
 from bumblebee.diagnosis.simulation.declared import declared_values, touching
 from bumblebee.diagnosis.simulation.failures import LEFT_OUT, NOT_TRIED, REFUSALS, effects_in_words
 from bumblebee.diagnosis.simulation.joint_path import joint_path
-from bumblebee.diagnosis.simulation.plant import Plant, load_spec, make_plant, plant_by, refuse_unlogged
+from bumblebee.diagnosis.simulation.plant import Plant, make_plant, plant_by, refuse_unlogged
 from bumblebee.diagnosis.simulation.readings import (
     Layout,
     difference,
@@ -80,14 +79,12 @@ __all__ = [
     "declared_values",
     "difference",
     "effects_in_words",
-    "fold_dampers",
     "in_words",
     "inputs_of",
     "joint_path",
     "joint_units",
     "lagged",
     "layout_of",
-    "load_spec",
     "make_plant",
     "make_plants",
     "measured_readings",

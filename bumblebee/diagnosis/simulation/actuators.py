@@ -2,11 +2,6 @@
 
 `motor`, `position`, `general`, `pid` and `dcmotor` keep their gains in different places. A force for a small change of
 input, position and velocity is the same question for all of them.
-
-A joint's position servo and its velocity servo as one: the declared kd then stands where every effect looks for it.
-
-MJCF files of before `position kv=` give a joint a `position` and a `velocity` actuator. A log has one command a joint,
-so the velocity servo is told to stand still and only damps.
 """
 
 from collections.abc import Sequence
@@ -17,10 +12,8 @@ import numpy as np
 
 from bumblebee.diagnosis.thresholds.simulation import DriveProbe
 from bumblebee.errors import BadInput
-from bumblebee.sim.servo import ON_JOINT
 
 _AFFINE = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
-_AFFINE_BIAS = mujoco.mjtBias.mjBIAS_AFFINE
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +78,9 @@ def take_torque(actuator: mujoco.MjsActuator) -> None:
     _without_ranges(actuator)
 
 
-def take_target(actuator: mujoco.MjsActuator, kp: float, kd: float, gain: float) -> None:
-    """Turn a motor of force `gain` a unit of input into a servo of kp [N m/rad], kd [N m s/rad] at the joint."""
+def take_target(actuator: mujoco.MjsActuator, kp: float, kd: float) -> None:
+    """Turn a motor into a servo of kp [N m/rad], kd [N m s/rad] at the joint; its force limit stays."""
     gear = actuator.gear[0]
-    low, high = (float(x) for x in actuator.ctrlrange)
-    if low < high and int(actuator.forcelimited) != int(mujoco.mjtLimited.mjLIMITED_TRUE):
-        actuator.forcerange, actuator.forcelimited = [gain * low, gain * high], int(mujoco.mjtLimited.mjLIMITED_TRUE)
     actuator.set_to_position(kp=kp / gear**2, kv=kd / gear**2)
     _without_ranges(actuator)
 
@@ -99,34 +89,3 @@ def _without_ranges(actuator: mujoco.MjsActuator) -> None:
     """Take what was logged as it is: ranges of the input, and of an activation that is gone, are of the old drive."""
     actuator.ctrllimited = actuator.actlimited = int(mujoco.mjtLimited.mjLIMITED_FALSE)
     actuator.actrange = [0.0, 0.0]
-
-
-def fold_dampers(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, list[str]]:
-    """A copy in which each position servo has the gain of the velocity servos on its joint, and these have none.
-
-    Also the names of the joints; where there are none the spec itself comes back. Actuators keep their number and
-    order. A force limit of the position servo now holds for the sum, as a drive's current limit does; the velocity
-    servo's own is dropped.
-    """
-    pairs = [(i, k) for i, a in enumerate(spec.actuators) if follows_position(a) for k in _dampers_on(spec, a.target)]
-    if not pairs:
-        return spec, []
-    spec = spec.copy()
-    for i, k in pairs:
-        servo, damper = spec.actuators[i], spec.actuators[k]
-        bias = servo.biasprm.copy()
-        bias[2] += damper.biasprm[2] * (damper.gear[0] / servo.gear[0]) ** 2
-        servo.biasprm = bias
-        damper.gainprm, damper.biasprm = 0 * damper.gainprm, 0 * damper.biasprm
-    return spec, sorted({spec.actuators[i].target for i, _ in pairs})
-
-
-def follows_position(a: mujoco.MjsActuator) -> bool:
-    """Whether an actuator on a joint feeds its position back by an affine law."""
-    return a.trntype in ON_JOINT and a.biastype == _AFFINE_BIAS and a.biasprm[1] != 0
-
-
-def _dampers_on(spec: mujoco.MjSpec, joint: str) -> list[int]:
-    """Actuators on a joint that feed back its velocity alone."""
-    there = [(k, a) for k, a in enumerate(spec.actuators) if a.trntype in ON_JOINT and a.target == joint]
-    return [k for k, a in there if a.biastype == _AFFINE_BIAS and a.biasprm[1] == 0 and a.biasprm[2] != 0]

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from bumblebee.diagnosis.simulation.actuators import follows_position
 from bumblebee.errors import BadInput
 from bumblebee.measured.conditions import AddedMass, added_masses
 from bumblebee.measured.rollout import Rollout
+from bumblebee.robot.drives import follows_position
 
 NOMINAL_VOLTAGE = "nominal_voltage"
 """Name of the numeric by which a model declares its supply voltage [V]."""

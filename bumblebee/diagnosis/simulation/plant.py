@@ -9,7 +9,6 @@ actuator that integrates its command, from which a window would have to start.
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -21,8 +20,9 @@ from bumblebee.diagnosis.simulation.failures import Failures
 from bumblebee.diagnosis.thresholds.simulation import DriveProbe, SimulationThresholds
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout
+from bumblebee.robot.drives import ON_JOINT
 from bumblebee.sim.effects import is_hidden
-from bumblebee.sim.servo import ON_JOINT, actuator_of
+from bumblebee.sim.servo import actuator_of
 
 _FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
 _PLACES = {
@@ -108,19 +108,6 @@ class Plant:
         model = self.model
         moving = [b for b in range(1, model.nbody) if model.body_mass[b] > 0 and model.body_weldid[b] != 0]
         return tuple(name for b in moving if (name := model.body(b).name))
-
-
-def load_spec(path: Path) -> mujoco.MjSpec:
-    """Read MJCF as an editable spec; `BadInput` if MuJoCo cannot."""
-    path = Path(path)
-    if not path.is_file():
-        raise BadInput(path, "an MJCF model", "no such file")
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        spec.compile()
-    except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise BadInput(path, "an MJCF model that compiles", str(error)[:200]) from None
-    return spec
 
 
 def make_plant(
@@ -244,7 +231,7 @@ def _set_inputs(spec: mujoco.MjSpec, rollout: Rollout, where: object, rule: Driv
                     f"a motor and position targets in {rollout.rollout_id}",
                 )
             column = rollout.joints.index(name)
-            take_target(actuator, float(kp[column]), float(kd[column]), float(law.gain[a]))
+            take_target(actuator, float(kp[column]), float(kd[column]))
     return torque
 
 

@@ -7,7 +7,7 @@ from scipy.linalg import eigh
 from bumblebee.diagnosis.simulation.plant import Plant
 from bumblebee.diagnosis.simulation.variation import Variation
 from bumblebee.diagnosis.simulation.windows import Windows
-from bumblebee.sim.servo import ON_JOINT
+from bumblebee.robot.drives import ON_JOINT
 
 _KINDS = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
 

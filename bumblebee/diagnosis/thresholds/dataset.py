@@ -161,6 +161,14 @@ class VelocityLatency:
 
 
 @dataclass(frozen=True)
+class DeclaredContacts:
+    """Of contacts that the declared model closes in measured poses."""
+
+    windows: int = 1000
+    """Poses at most, spread over the rollouts, in which closed contacts are looked for."""
+
+
+@dataclass(frozen=True)
 class Extent:
     """Of how much of the logs and of time a diagnosis takes."""
 
@@ -192,4 +200,5 @@ class DatasetThresholds:
     noise: Noise = field(default_factory=Noise)
     smoothing: Smoothing = field(default_factory=Smoothing)
     velocity_latency: VelocityLatency = field(default_factory=VelocityLatency)
+    contacts: DeclaredContacts = field(default_factory=DeclaredContacts)
     extent: Extent = field(default_factory=Extent)

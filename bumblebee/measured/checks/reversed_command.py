@@ -4,7 +4,8 @@ A joint that swings with its neighbours goes against its own torque for seconds,
 state takes all of that away. The declared equations of motion know what neighbours, gravity and gears do. So short
 stretches are simulated from the measured state twice, with the command as logged and with its sign changed; where the
 two differ most, the command matters most, and there one of them is nearer to what was measured in nearly all stretches.
-What the model lacks besides (friction, strength, masses) is in both.
+What the model lacks besides (friction, strength, masses) is in both. Contacts are left out: a declared one may be
+closed where nothing touches, and then decides on both.
 """
 
 import mujoco
@@ -16,6 +17,7 @@ from bumblebee.measured.checks.view import View
 SPAN = 0.06  # s of a stretch: long enough to move beyond the sensors' noise, too short for neighbours to drift off
 STRETCHES = 120  # at most, spread over the file
 STEP = 5e-4  # s of simulation at most
+_COMMAND_ALONE = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION) | int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 MATTERS = 0.5  # share of the stretches, those in which the command's sign changes the prediction most
 
 
@@ -101,7 +103,7 @@ def _predicted(view: View, torque: _Torque, starts: np.ndarray, window: int, joi
     step, flags, integrator = float(model.opt.timestep), int(model.opt.disableflags), int(model.opt.integrator)
     out = np.empty(len(starts))
     try:
-        model.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+        model.opt.disableflags = flags | _COMMAND_ALONE
         model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
         for k, start in enumerate(starts):
             mujoco.mj_resetData(model, data)

@@ -20,7 +20,6 @@
 The others need `sim.effects.hooks` at run time.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -28,6 +27,7 @@ import mujoco
 import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.robot.drives import ON_JOINT, buffer_length
 from bumblebee.sim.effects import native
 from bumblebee.sim.effects.catalogue import CATALOGUE, STICTION_ITERATIONS, STICTION_SOLIMP, STICTION_SOLREF, Effect
 from bumblebee.sim.effects.hinges import add_backlash, add_elasticity, angle_of, joint_of
@@ -50,16 +50,13 @@ def _everywhere(spec: mujoco.MjSpec, kind: str) -> tuple[str, ...]:
     """The places that `where: []` stands for."""
     if not CATALOGUE[kind].whole:
         return ("",)
-    return tuple(dict.fromkeys(a.target for a in spec.actuators if a.trntype in _ON_JOINT))
-
-
-_ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    return tuple(dict.fromkeys(a.target for a in spec.actuators if a.trntype in ON_JOINT))
 
 
 def _drives(spec: mujoco.MjSpec, joint: str) -> list[Any]:
     """Every actuator that drives `joint`; none for a passive one."""
     joint_of(spec, joint)
-    return [a for a in spec.actuators if a.trntype in _ON_JOINT and a.target == joint]
+    return [a for a in spec.actuators if a.trntype in ON_JOINT and a.target == joint]
 
 
 def _servos(spec: mujoco.MjSpec, joint: str) -> list[Any]:
@@ -142,7 +139,7 @@ def _limit(spec: mujoco.MjSpec, name: str, limit: float) -> None:
 def _delay(spec: mujoco.MjSpec, name: str, value: float) -> None:
     for servo in _servos(spec, name):
         servo.delay = value
-        servo.nsample = math.ceil(value / spec.option.timestep) + 2
+        servo.nsample = buffer_length(value, spec.option.timestep)
         servo.interp = 1
 
 

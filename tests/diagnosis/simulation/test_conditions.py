@@ -14,11 +14,11 @@ GAINS = [Setting(kp=0.4), Setting(kp=1.0), Setting(kp=2.5, kd=0.08)]
 LOADS = [Setting(), Setting(load=0.2), Setting(load=0.4, at=0.15)]
 
 
-def errors(session, effects=()) -> np.ndarray:
-    """RMS error (R,) of each rollout after 0.2 s [rad]."""
+def errors(session, effects=(), column: int = 0) -> np.ndarray:
+    """RMS error (R,) of each rollout after 0.2 s [rad], of the joint of a column."""
     starts = choose_starts(session.rollouts, range(len(session.rollouts)), 0.2, 60)
     windows = cut(session.plant, session.layout, session.rollouts, starts)
-    left = residuals(session.plant, session.layout, windows, [vary(session.plant, effects)], 0.001)[0, :, -1, 0]
+    left = residuals(session.plant, session.layout, windows, [vary(session.plant, effects)], 0.001)[0, :, -1, column]
     return np.array([np.sqrt(np.mean(left[windows.rollout == i] ** 2)) for i in range(len(session.rollouts))])
 
 
