@@ -150,6 +150,9 @@ def import_(
     conditions: Annotated[
         Path | None, typer.Option("--conditions", help="Table of gains, loads, labels ... of each log, CSV or YAML.")
     ] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A condition of all logs; repeat for more.")
+    ] = None,
 ) -> None:
     """Turn logs of another layout into a dataset of the contract."""
     from bumblebee.io.write import refuse_existing, refuse_overlap, try_output
@@ -158,7 +161,7 @@ def import_(
     refuse_overlap(dataset, [path for path in (source, model, columns, conditions) if path])
     refuse_existing(dataset)
     try_output(dataset)
-    ids = import_dataset(source, kind, dataset, model, columns, conditions)
+    ids = import_dataset(source, kind, dataset, model, columns, conditions, settings or ())
     print(f"{len(ids)} rollouts: {', '.join(ids[:6])}{' ...' if len(ids) > 6 else ''}")
 
 
