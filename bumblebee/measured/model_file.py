@@ -3,6 +3,7 @@
 import math
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
@@ -12,6 +13,7 @@ from bumblebee.io.read import read_text
 
 LARGEST = 64 << 20  # bytes of the XML itself; the largest public robot models have 1 MB
 MEMORY = 8 << 30  # bytes that a model may ask for its arena
+_AT_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 _MULTIPLIERS = (
     ("replicate", ("count",), 1e5),
     ("composite", ("count",), 1e6),
@@ -56,13 +58,35 @@ def name_assets_in_full(spec: mujoco.MjSpec) -> None:
         spec.compiler.texturedir = str(home / spec.compiler.texturedir)
 
 
-def copy_model(source: Path, target: Path) -> None:
-    """`source` as `target`: the file itself where that loads there, else one with includes in place and full paths."""
+def copy_model(source: Path, target: Path, locked: Sequence[str] = ()) -> None:
+    """`source` as `target`: the file itself where that loads there, else one with includes in place and full paths.
+
+    Joints that are `locked` are not in the copy, nor is what refers to them: actuators, sensors, equalities.
+    """
     shutil.copyfile(source, target)
     try:
         mujoco.MjModel.from_xml_path(str(target))
+        loads = True
     except ValueError:
+        loads = False
+    if locked or not loads:
         spec = mujoco.MjSpec.from_file(str(source))
         name_assets_in_full(spec)
-        spec.compile()
+        spec.compile()  # after that keyframes lose what is deleted, too
+        for joint in locked:
+            _lock(spec, joint)
+        try:
+            spec.compile()
+        except ValueError as error:  # a tendon over it
+            raise BadInput(source, f"a model that loads without {', '.join(locked)}", str(error)[:300]) from None
         target.write_text(spec.to_xml(), encoding="utf-8")
+
+
+def _lock(spec: mujoco.MjSpec, joint: str) -> None:
+    """Delete a joint with its actuators and the sensors and equalities of both."""
+    actuators = [a for a in spec.actuators if a.target == joint and a.trntype in _AT_JOINT]
+    names = {(mujoco.mjtObj.mjOBJ_JOINT, joint), *((mujoco.mjtObj.mjOBJ_ACTUATOR, a.name) for a in actuators)}
+    ties = [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT and joint in (e.name1, e.name2)]
+    sensors = [s for s in spec.sensors if (s.objtype, s.objname) in names]
+    for element in (*sensors, *ties, *actuators, spec.joint(joint)):
+        spec.delete(element)

@@ -93,7 +93,8 @@ def import_dataset(
         for rollout in rollouts:
             write_rollout(folder / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)
         if model_path:
-            copy_model(model_path, folder / "model.xml")
+            locked = read_map(column_map, kind).locked if kind in MAPPED and column_map else ()
+            copy_model(model_path, folder / "model.xml", locked)
     return [rollout.rollout_id for rollout in rollouts]
 
 
