@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from bumblebee import __version__, cli_motions, cli_plan
-from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput, plain
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 
 app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
@@ -77,7 +77,7 @@ def diagnose(
             raise BadInput("--out", "no folder with --quick, which writes nothing", str(out))
         work = QuickConfig() if max_windows is None else QuickConfig(windows=max_windows)
         session = open_session(model, dataset, None, held_out)
-        print(told(first_look(session, DiagnosisConfig(seed=seed), work, _teller())))
+        print(plain(told(first_look(session, DiagnosisConfig(seed=seed), work, _teller()))))
         return
     if out is None:
         raise BadInput("--out", "a folder for the diagnosis, or --quick", "neither")
@@ -85,9 +85,9 @@ def diagnose(
     config = DiagnosisConfig(seed=seed) if max_windows is None else DiagnosisConfig(seed=seed, max_windows=max_windows)
     session = open_session(model, dataset, config.thresholds.dataset, held_out)
     result = diagnose(session, config, _teller())
-    print(summary(result.document, result.problem.thresholds.report))  # said first: the disk may fail now
+    print(plain(summary(result.document, result.problem.thresholds.report)))  # said first: the disk may fail now
     shown = examples(result.session, result.effects, count=1)
-    print(plot(shown[0]) if shown else "", flush=True)
+    print(plain(plot(shown[0])) if shown else "", flush=True)
     write_diagnosis(result, out, overwrite)
     print(f"written: {out / 'diagnosis.json'}, model.xml, effects.yaml, report.html")
 
@@ -130,7 +130,7 @@ def gap(
     if out:
         claim_folder(out, GAP, overwrite, inputs_of(model, dataset))
     report = compare(open_session(model, dataset))
-    print(gap_summary(report.document, report.examples, report.thresholds.report), flush=True)
+    print(plain(gap_summary(report.document, report.examples, report.thresholds.report)), flush=True)
     if out:
         write_gap(report, out, overwrite)
         print(f"written: {out / 'gap.html'}, gap.json")
@@ -199,7 +199,7 @@ def _teller() -> Callable[[str], None]:
     began = time.monotonic()
 
     def say(text: str) -> None:
-        print(f"[{time.monotonic() - began:5.1f} s] {text}", flush=True)
+        print(plain(f"[{time.monotonic() - began:5.1f} s] {text}"), flush=True)
 
     return say
 
