@@ -76,7 +76,7 @@ def _smooth(rollout: Rollout, near: int, sigma_pos: np.ndarray, sigma_vel: np.nd
         inverse = np.linalg.inv(sum(fit.normal for fit in fits) + 1e-9 / noise[0] ** 2 * np.eye(terms))
         fitted = np.einsum("tab,tb->ta", inverse, sum(fit.right for fit in fits))
         missed = sum(fit.missed(fitted) for fit in fits)
-        smooth = missed <= rule.bent * max(float(np.median(missed)), 1.0)
+        smooth = missed <= rule.bent * max(float(np.median(missed)), 2 * shift.shape[1] - terms)
         place[:, j] = rollout.joint_pos[:, j] + np.where(smooth, fitted[:, 0], 0.0)
         speed[:, j] = np.where(smooth, fitted[:, 1] / span, rollout.joint_vel[:, j])
         whole, middle = inside.all(axis=1), len(inside) // 2

@@ -48,6 +48,10 @@ class TimeSteps:
     own: float = 0.5
     """Share of the declared model's squared error that its own, longer step must leave at most, to be kept to: logs of
     a simulation of that model have its step's error in them."""
+    own_horizon: float = 0.2
+    """Length of the windows over which the steps are compared [s]."""
+    own_windows: int = 40
+    """Number of these windows at most."""
 
 
 @dataclass(frozen=True)
@@ -135,8 +139,8 @@ class Smoothing:
     white: float = 0.5
     """Share of their noise that readings must be apart, below which they have the same error."""
     bent: float = 10.0
-    """Times the chi-square that readings have about their fits on the median, above which a motion is no cubic: a stiff
-    servo at a step of its command. There they stay as read."""
+    """Times the chi-square of readings about their fit, that of noise or of the median fit, above which a motion is no
+    cubic: a stiff servo at a step of its command. There they stay as read."""
 
 
 @dataclass(frozen=True)
