@@ -79,7 +79,7 @@ def test_replay_and_gap_end_well(data: Path, capsys: pytest.CaptureFixture[str])
     assert set(errors) == {"0.02", "0.2", "1.0"}
     assert json.loads((data / "gap" / "gap.json").read_text())["error"] == errors
     page = (data / "gap" / "gap.html").read_text()
-    assert "<svg" in page and "http" not in page
+    assert "<svg" in page and "://" not in page
     assert run("gap", data / "model.xml", data / "set", "--out", data / "gap") == 2
 
 
