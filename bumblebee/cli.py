@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from bumblebee import __version__, cli_motions, cli_plan
-from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput, plain
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 
 app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
@@ -53,7 +53,7 @@ def diagnose(
     dataset: Data,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the diagnosis.")] = None,
     overwrite: Overwrite = False,
-    quick: Annotated[bool, typer.Option("--quick", help="A first look: the three best leads; writes nothing.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A first look: the best leads; writes nothing.")] = False,
     held: Annotated[
         str | None, typer.Option("--hold-out", help="Rollouts that take no part: NAME=VALUE[,VALUE] of a condition.")
     ] = None,
@@ -77,7 +77,7 @@ def diagnose(
             raise BadInput("--out", "no folder with --quick, which writes nothing", str(out))
         work = QuickConfig() if max_windows is None else QuickConfig(windows=max_windows)
         session = open_session(model, dataset, None, held_out)
-        print(told(first_look(session, DiagnosisConfig(seed=seed), work, _teller())))
+        print(plain(told(first_look(session, DiagnosisConfig(seed=seed), work, _teller()))))
         return
     if out is None:
         raise BadInput("--out", "a folder for the diagnosis, or --quick", "neither")
@@ -85,9 +85,9 @@ def diagnose(
     config = DiagnosisConfig(seed=seed) if max_windows is None else DiagnosisConfig(seed=seed, max_windows=max_windows)
     session = open_session(model, dataset, config.thresholds.dataset, held_out)
     result = diagnose(session, config, _teller())
-    print(summary(result.document, result.problem.thresholds.report))  # said first: the disk may fail now
+    print(plain(summary(result.document, result.problem.thresholds.report)))  # said first: the disk may fail now
     shown = examples(result.session, result.effects, count=1)
-    print(plot(shown[0]) if shown else "", flush=True)
+    print(plain(plot(shown[0])) if shown else "", flush=True)
     write_diagnosis(result, out, overwrite)
     print(f"written: {out / 'diagnosis.json'}, model.xml, effects.yaml, report.html")
 
@@ -130,7 +130,7 @@ def gap(
     if out:
         claim_folder(out, GAP, overwrite, inputs_of(model, dataset))
     report = compare(open_session(model, dataset))
-    print(gap_summary(report.document, report.examples, report.thresholds.report), flush=True)
+    print(plain(gap_summary(report.document, report.examples, report.thresholds.report)), flush=True)
     if out:
         write_gap(report, out, overwrite)
         print(f"written: {out / 'gap.html'}, gap.json")
@@ -150,6 +150,9 @@ def import_(
     conditions: Annotated[
         Path | None, typer.Option("--conditions", help="Table of gains, loads, labels ... of each log, CSV or YAML.")
     ] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A condition of all logs; repeat for more.")
+    ] = None,
 ) -> None:
     """Turn logs of another layout into a dataset of the contract."""
     from bumblebee.io.write import refuse_existing, refuse_overlap, try_output
@@ -158,7 +161,7 @@ def import_(
     refuse_overlap(dataset, [path for path in (source, model, columns, conditions) if path])
     refuse_existing(dataset)
     try_output(dataset)
-    ids = import_dataset(source, kind, dataset, model, columns, conditions)
+    ids = import_dataset(source, kind, dataset, model, columns, conditions, settings or ())
     print(f"{len(ids)} rollouts: {', '.join(ids[:6])}{' ...' if len(ids) > 6 else ''}")
 
 
@@ -196,7 +199,7 @@ def _teller() -> Callable[[str], None]:
     began = time.monotonic()
 
     def say(text: str) -> None:
-        print(f"[{time.monotonic() - began:5.1f} s] {text}", flush=True)
+        print(plain(f"[{time.monotonic() - began:5.1f} s] {text}"), flush=True)
 
     return say
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from bumblebee.errors import BadInput
+from bumblebee.errors import BadInput, plain
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
 Data = Annotated[Path | None, typer.Argument(metavar="DATASET", help="Folder that holds rollouts/*.parquet.")]
@@ -67,10 +67,10 @@ def plan(
     began = time.monotonic()
     made = make_plan(
         load_spec(model), model.name, config, session, findings,
-        lambda text: print(f"[{time.monotonic() - began:5.1f} s] {text}", flush=True),
+        lambda text: print(plain(f"[{time.monotonic() - began:5.1f} s] {text}"), flush=True),
     )  # fmt: skip
     told = write_plan(made, out, overwrite)
-    print(summary(told))
+    print(plain(summary(told)))
     print(f"written: {out / 'plan.json'}, sheet.html, runs/*.csv, runs/*.parquet")
 
 

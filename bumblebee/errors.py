@@ -3,6 +3,11 @@
 EXIT_BAD_INPUT = 2
 
 
+def plain(text: str) -> str:
+    """`text` with a mark in the place of every sign that could move a terminal; line ends stay."""
+    return "".join(sign if sign.isprintable() or sign == "\n" else "\ufffd" for sign in text)
+
+
 class BadInput(Exception):
     """Input that cannot be used; the text names the place, the expectation, what came and the remedy.
 
@@ -18,7 +23,7 @@ class BadInput(Exception):
         line = f"{where}: expected {expected}, came {came}"
         words = " ".join((f"{line}. {do}" if do else line).split())
         # Names and values come from files: no control character of theirs reaches a terminal or a log.
-        super().__init__("".join(sign if sign.isprintable() else "\ufffd" for sign in words))
+        super().__init__(plain(words))
 
     def __reduce__(self) -> tuple[type["BadInput"], tuple[str, ...]]:
         """What another process makes it from again: an exception is otherwise rebuilt from its text alone."""

@@ -1,7 +1,8 @@
 """A first look: the error of the declared model, and the candidates that explain most of it when each is taken alone.
 
-Fewer windows, one round of the search, each candidate alone. What it names is a lead, not a finding: effects that come
-together, or that pass for one another, are told apart by the diagnosis alone.
+Fewer windows and one round of the search: each candidate alone, and where the model is far off the effects of many
+joints that the search begins with. What it names is a lead, not a finding: effects that come together, or that pass for
+one another, are told apart by the diagnosis alone.
 """
 
 from collections.abc import Callable
@@ -41,7 +42,10 @@ class FirstLook:
     """[s] of the windows."""
     errors: list[tuple[str, float, str]]
     """Joint, RMS position error of the declared model at the end of the windows, unit; the furthest first."""
+    together: list[Lead]
+    """Effects of many joints that were fitted together, as the declared model is far off."""
     leads: list[Lead]
+    """Single effects beside them."""
     bound: float
     """z that a candidate had to reach."""
     units: dict[tuple[str, str, str], str]
@@ -63,16 +67,17 @@ def first_look(
     config = replace(config, max_windows=quick.windows, max_holdout_windows=quick.validation_windows, grow=False)
     with threadpool_limits(1, user_api="blas"):
         material = gather(session, config, np.random.default_rng(config.seed), say)
-        found, bound = leads(material.problem, material.holdout, material.remade, config.search, say, quick.candidates)
+        found = leads(material.problem, material.holdout, material.remade, config.search, say, quick.candidates)
     plant = material.session.plant
     units = {
         (c.effect, c.where, p.name): unit_on(plant, c.effect, c.where, p.unit)
-        for c in (lead.candidate for lead in found)
+        for c in (lead.candidate for lead in (*found.together, *found.alone))
         for p in CATALOGUE[c.effect].parameters
     }
     notes = [*material.session.notes, *plant.failures.notes(quick.notes)]
     errors = _errors(material, quick.joints)
-    return FirstLook(config.horizon, errors, found, bound, units, notes, material.session.warnings)
+    together, alone, warnings = found.together, found.alone, material.session.warnings
+    return FirstLook(config.horizon, errors, together, alone, found.bound, units, notes, warnings)
 
 
 def _errors(material: Material, most: int) -> list[tuple[str, float, str]]:
@@ -91,17 +96,24 @@ def told(look: FirstLook) -> str:
     lines += [f"declared model, after {look.horizon:g} s, the joints that are furthest off:"]
     lines += [f"  {joint:<28} {1e3 * error:.3g} m{unit}" for joint, error, unit in look.errors]
     notes = [f"note: {note}" for note in look.notes]
-    if not look.leads:
-        return "\n".join([*lines, f"no effect of the catalogue is sure alone (z of {look.bound:.2g} asked)", *notes])
-    lines.append("leads, each fitted alone; effects that come together or pass for one another are not told apart:")
-    return "\n".join([*lines, *(_line(look, lead) for lead in look.leads), *notes])
+    if look.together:
+        lines.append(f"leads, fitted together, explain {100 * look.together[0].explains:.0f} %; the model is far off:")
+        lines += [_line(look, lead, "") for lead in look.together]
+    if look.leads:
+        beside = "beside these" if look.together else "alone"
+        said = "effects that come together or pass for one another are not told apart"
+        lines.append(f"leads, each fitted {beside}; {said}:")
+        lines += [_line(look, lead, f", explains {100 * lead.explains:.0f} %") for lead in look.leads]
+    if not look.together and not look.leads:
+        lines.append(f"no effect of the catalogue is sure alone (z of {look.bound:.2g} asked)")
+    return "\n".join([*lines, *notes])
 
 
-def _line(look: FirstLook, lead: Lead) -> str:
+def _line(look: FirstLook, lead: Lead, explains: str) -> str:
     c, parts = lead.candidate, []
     values = dict(zip((p.name for p in CATALOGUE[c.effect].parameters), c.at(lead.values).values(), strict=True))
     for i, (name, value) in enumerate(values.items()):
         if i in c.free:
             parts.append(f"{name} = {value:.4g} {look.units[c.effect, c.where, name]}".rstrip())
     place = c.where or "whole robot"
-    return f"  {c.effect:<20} {place:<28} {', '.join(parts)}, explains {100 * lead.explains:.0f} % (z = {lead.z:.1f})"
+    return f"  {c.effect:<20} {place:<28} {', '.join(parts)}{explains} (z = {lead.z:.1f})"

@@ -10,6 +10,7 @@ rollouts and change no model.
 | temperature | a number | degrees C |
 | heading | a number | rad, about the world's z axis |
 | surface | a text | |
+| targets | positions: targets that are readings of the positions were sent to the drives all the same | |
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,6 +24,8 @@ HEAVIEST = 1e4  # [kg]
 FARTHEST = 100.0  # [m] from a body's frame
 HOTTEST, COLDEST = 1000.0, -273.15  # [degrees C]
 VOLTS = 1e4
+INSISTED = ("targets", "positions")
+"""Condition of rollouts whose targets are commands although they repeat the measured positions."""
 
 Value = float | str
 Refuse = Callable[[str, str, str], Exception]
@@ -67,6 +70,8 @@ def _expected(name: str, value: object) -> str:
     if name in ranges:
         low, high, expected = ranges[name]
         return "" if _is_number(value) and low <= value <= high else expected
+    if name == INSISTED[0]:
+        return "" if value == INSISTED[1] else f"the text {INSISTED[1]}"
     if name == "surface":
         return "" if _is_text(value) else f"a text of at most {LONGEST} characters"
     return "" if _is_text(value) or _is_number(value) else f"a number, or a text of at most {LONGEST} characters"

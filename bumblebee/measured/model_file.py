@@ -3,13 +3,14 @@
 import math
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_text
-from bumblebee.robot.drives import explicit_drives
+from bumblebee.robot.drives import ON_JOINT, explicit_drives
 
 LARGEST = 64 << 20  # bytes of the XML itself; the largest public robot models have 1 MB
 MEMORY = 8 << 30  # bytes that a model may ask for its arena
@@ -64,13 +65,37 @@ def name_assets_in_full(spec: mujoco.MjSpec) -> None:
         spec.compiler.texturedir = str(home / spec.compiler.texturedir)
 
 
-def copy_model(source: Path, target: Path) -> None:
-    """`source` as `target`: the file itself where that loads there, else one with includes in place and full paths."""
+def copy_model(source: Path, target: Path, locked: Sequence[str] = ()) -> None:
+    """`source` as `target`: the file itself where that loads there, else one with includes in place and full paths.
+
+    Joints that are `locked` are not in the copy, nor is what refers to them: actuators, sensors, equalities.
+    """
     shutil.copyfile(source, target)
     try:
         mujoco.MjModel.from_xml_path(str(target))
+        loads = True
     except ValueError:
+        loads = False
+    if locked or not loads:
         spec = mujoco.MjSpec.from_file(str(source))
         name_assets_in_full(spec)
-        spec.compile()
+        if locked:
+            spec, _ = explicit_drives(spec)  # gains by ratios are those of the whole model
+        spec.compile()  # after that keyframes lose what is deleted, too
+        for joint in locked:
+            _lock(spec, joint)
+        try:
+            spec.compile()
+        except ValueError as error:  # a tendon over it
+            raise BadInput(source, f"a model that loads without {', '.join(locked)}", str(error)[:300]) from None
         target.write_text(spec.to_xml(), encoding="utf-8")
+
+
+def _lock(spec: mujoco.MjSpec, joint: str) -> None:
+    """Delete a joint with its actuators and the sensors and equalities of both."""
+    actuators = [a for a in spec.actuators if a.target == joint and a.trntype in ON_JOINT]
+    names = {(mujoco.mjtObj.mjOBJ_JOINT, joint), *((mujoco.mjtObj.mjOBJ_ACTUATOR, a.name) for a in actuators)}
+    ties = [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT and joint in (e.name1, e.name2)]
+    sensors = [s for s in spec.sensors if (s.objtype, s.objname) in names]
+    for element in (*sensors, *ties, *actuators, spec.joint(joint)):
+        spec.delete(element)

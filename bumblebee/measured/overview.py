@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from bumblebee.io.page_policy import policy_tag
 from bumblebee.io.read import file_hash
 from bumblebee.measured import overview_plots as plots
 from bumblebee.measured.gate_words import SHORT
@@ -62,7 +63,7 @@ def write_overview(path: Path, summary: dict[str, Any], findings: pd.DataFrame, 
         _findings(findings),
     ]
     head = (
-        "<!doctype html><html lang=en><head><meta charset=utf-8>"
+        f"<!doctype html><html lang=en><head><meta charset=utf-8>{policy_tag()}"
         "<meta name=viewport content='width=device-width,initial-scale=1'>"
         f"<title>Round {number}: measured</title><style>{STYLE}</style></head>"
     )

@@ -46,4 +46,4 @@ def refusal(finding: Finding) -> BadInput:
     """A fatal finding as an error that names file, column, row and rule."""
     row = "" if finding.row is None else f", row {finding.row}"
     where = f"{finding.file}: column {finding.column}{row}: rule {finding.rule}"
-    return BadInput(where, finding.expected, finding.came)
+    return BadInput(where, finding.expected, finding.came, finding.do)

@@ -4,8 +4,6 @@ Every text is escaped and pictures are `data:` URIs. The page's own policy forbi
 script but its own, the film's player and the map, which it names by their hash; a page with neither runs none.
 """
 
-import base64
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -14,6 +12,7 @@ from itertools import groupby
 from jinja2 import Environment, select_autoescape
 from markupsafe import Markup
 
+from bumblebee.io.page_policy import policy
 from bumblebee.report.filmstrip import Sheet
 
 
@@ -206,10 +205,3 @@ def render(
         script=Markup(script),
         policy=policy(script),
     )
-
-
-def policy(script: str) -> str:
-    """The Content-Security-Policy: nothing from anywhere, and of scripts this one alone (none if empty)."""
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    scripts = f"; script-src 'sha256-{digest}'" if script else ""
-    return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'{scripts}"

@@ -37,3 +37,14 @@ def test_an_effect_in_one_place_is_one_lead() -> None:
     places = [(lead.candidate.effect, lead.candidate.where) for lead in look.leads]
     assert ("link_mass", "l3") in places
     assert len(set(places)) == len(places)
+
+
+def test_gains_that_are_wrong_on_all_joints_are_the_leads() -> None:
+    """The firmware multiplies what it is told by four; no single effect passes for that."""
+    look = first_look(arm.session_of(arm.simulate({("motor_strength", j): 4.0 for j in arm.JOINTS}, seed=3)), CONFIG)
+    found = {(lead.candidate.effect, lead.candidate.where): lead.values[0] for lead in look.together}
+    for name in arm.JOINTS:
+        strength = found.get(("motor_strength", name), 1.0)
+        assert strength * found.get(("kp", name), 1.0) == pytest.approx(4.0, rel=0.1)
+    assert look.together[0].explains > 0.9 and not any(lead.explains > 0.5 for lead in look.leads)
+    assert "fitted together" in told(look) and "no effect" not in told(look)

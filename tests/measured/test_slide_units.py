@@ -19,7 +19,7 @@ def test_the_unit_is_named_by_the_kind_of_joint(limits: str, kind: str) -> None:
     time = np.arange(200) / 50
     metres = 0.03 + 0.02 * np.sin(2 * time)
     place = np.stack((1000 * metres, 0.8 * np.sin(time)), axis=1)
-    target = place if limits else np.stack((metres, 0.8 * np.sin(time)), axis=1)
+    target = np.stack((1000 * metres if limits else metres, 0.8 * np.sin(time)), axis=1) + 1e-4
     rollout = Rollout("r", ("a", "b"), 50.0, time, place, np.gradient(place, time, axis=0), target)
     first = next(finding for finding in check_rollout(rollout, model) if finding.rule == "degrees")
     assert first.column == "joint_pos[a]"

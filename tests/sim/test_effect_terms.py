@@ -39,3 +39,11 @@ def test_friction_is_a_loss_and_other_joints_are_named() -> None:
 def test_anything_else_is_refused(text: str) -> None:
     with pytest.raises(BadInput):
         read_term(text)
+
+
+@pytest.mark.parametrize("name", ["elbow(1)", "a, b", "it's", 'say "j"', "curve(q, 1, 2)", "[0]", "j^2", "back\\slash"])
+def test_a_joint_may_have_any_name(name: str) -> None:
+    values = VALUES | {f"q[{name}]": VALUES["u"]}
+    term = read_term(f"q^2 + q[{name!r}]")
+    assert term.others == (name,)
+    np.testing.assert_allclose(term(values), values["q"] ** 2 + values["u"], rtol=1e-12)

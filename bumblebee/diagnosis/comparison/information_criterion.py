@@ -7,6 +7,7 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate, Formula
 from bumblebee.diagnosis.estimation import Fit
 from bumblebee.diagnosis.residuals import Problem
+from bumblebee.sim.effects import QUOTED, TABLE
 
 
 def criterion(problem: Problem, fit: Fit) -> float:
@@ -32,8 +33,8 @@ def numbers(form: Formula) -> int:
     found: set[str] = set()
     count = 0
     for text in form.texts:
-        tables = re.findall(r"curve\(([^()]*)\)", text)
-        rest = re.sub(r"curve\([^()]*\)", "", text)
-        count += sum(table.count(",") // 2 for table in tables) if tables else 1
+        tables = TABLE.findall(text)
+        rest = QUOTED.sub("", TABLE.sub("", text))
+        count += sum(points.count(",") // 2 for _, points in tables) if tables else 1
         found |= {x for x in re.findall(r"(?<![\w.^])\d+(?:\.\d+)?(?:e-?\d+)?", rest) if float(x) != 1}
     return count + len(found)

@@ -21,8 +21,8 @@ from bumblebee.measured.usable import Review
 class _Convention:
     """What a rule of the checks says about a whole logger."""
 
-    remedy: str
-    """What to set in the map of an import."""
+    remedy: str = ""
+    """What to set in the map of an import; empty where the finding says what to do."""
     by_joint: bool = True
     """Whether each joint has its own; False: the check names the worst joint of a column."""
     of_all: bool = True
@@ -30,6 +30,7 @@ class _Convention:
 
 
 _CONVENTIONS = {
+    "target-copy": _Convention(),
     "degrees": _Convention("angle_unit to deg (of mm: m and a scale of 0.001)", by_joint=False),
     "target-scale": _Convention("scale of joint_target to one over the gear"),
     "joint-order": _Convention("the names of joint_pos and of joint_target in one order"),
@@ -159,7 +160,7 @@ def _error(common: _Common, rollouts: int, dataset: object) -> BadInput:
         f"otherwise on {_listed(common.joints)} in {common.count} of {rollouts} rollouts "
         f"(in {first.file}, column {first.column}: {first.came})"
     )
-    do = (
+    do = first.do or (
         "That is one convention of the logger or the model, no fault of single recordings: set "
         f"{common.remedy} in the import's map, or correct the model; rollouts by another convention "
         "belong in another dataset."
@@ -168,10 +169,9 @@ def _error(common: _Common, rollouts: int, dataset: object) -> BadInput:
 
 
 def _warning(common: _Common, rollouts: int) -> str:
-    return (
-        f"{common.count} of {rollouts} rollouts were set aside by rule {common.rule} on {_listed(common.joints)}: "
-        f"if that is one convention of the logger, set {common.remedy} in the import's map."
-    )
+    told = f"{common.count} of {rollouts} rollouts were set aside by rule {common.rule} on {_listed(common.joints)}"
+    do = f"if that is one convention of the logger, set {common.remedy} in the import's map."
+    return f"{told}: {common.first.do or do}"
 
 
 def _listed(names: Sequence[str]) -> str:

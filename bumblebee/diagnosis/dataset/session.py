@@ -11,9 +11,9 @@ from bumblebee.diagnosis.dataset.conventions import wrong_conventions
 from bumblebee.diagnosis.dataset.declared_contacts import without_contradicted
 from bumblebee.diagnosis.dataset.held_out import HeldOut, condition_notes, split_by
 from bumblebee.diagnosis.dataset.noise import estimate_noise
+from bumblebee.diagnosis.dataset.own_step import agreed_steps
 from bumblebee.diagnosis.dataset.smoothing import smooth_rollouts
 from bumblebee.diagnosis.dataset.split import accepting, accepting_across, motion_names, split
-from bumblebee.diagnosis.dataset.time_steps import steps_of
 from bumblebee.diagnosis.dataset.undriven import undriven_warnings
 from bumblebee.diagnosis.dataset.velocity_latency import age_note, in_step, velocity_ages
 from bumblebee.diagnosis.simulation import (
@@ -143,11 +143,12 @@ def make_session(
         + [NO_HEIGHT] * (plant.floating and not has_pos)
         + [JUDGED_TWICE] * bool(set(accept) & set(holdout))
     )
-    period = float(np.median(np.diff(long[0].time)))
-    steps, search_step = steps_of(period, float(spec.option.timestep), plant.model.nv, rules.time_steps)
     if not plant.floating:
         long, sigma, more = _refined(plant, layout, long, sigma, rules)
         notes += more
+    declared = float(spec.option.timestep)
+    steps, search_step, agreed = agreed_steps(plant, declared, layout, long, sigma, rules.time_steps)
+    notes += agreed
     told = (*undriven, *contradicted)
     aside = [{"rollout": name, "reason": str(error)} for name, error in failed]
     return Session(

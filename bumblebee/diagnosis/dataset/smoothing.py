@@ -5,6 +5,9 @@ friction. At a few hundred hertz the positions around a tick say the velocity fa
 Each joint is fitted at each tick by a cubic in time over +-10 ms, positions and velocities weighted by their noise; the
 fit's own covariance is the noise that is left. Slow logs stay as read, and floating bases, whose impacts are shorter.
 
+Where a motion is no cubic within the span, as that of a stiff servo at a step of its command, a fit would be far off
+the readings, which stay as they are.
+
 Readings that agree better than their noise allows have the same error, as those within one step of an encoder do: a
 mean of them is no better than one.
 """
@@ -72,8 +75,10 @@ def _smooth(rollout: Rollout, near: int, sigma_pos: np.ndarray, sigma_vel: np.nd
         fits = [_Signal(basis, x * inside, s) for basis, x, s in zip((powers, slopes), read, noise, strict=True)]
         inverse = np.linalg.inv(sum(fit.normal for fit in fits) + 1e-9 / noise[0] ** 2 * np.eye(terms))
         fitted = np.einsum("tab,tb->ta", inverse, sum(fit.right for fit in fits))
-        place[:, j] = rollout.joint_pos[:, j] + fitted[:, 0]
-        speed[:, j] = fitted[:, 1] / span
+        missed = sum(fit.missed(fitted) for fit in fits)
+        smooth = missed <= rule.bent * max(float(np.median(missed)), 2 * shift.shape[1] - terms)
+        place[:, j] = rollout.joint_pos[:, j] + np.where(smooth, fitted[:, 0], 0.0)
+        speed[:, j] = np.where(smooth, fitted[:, 1] / span, rollout.joint_vel[:, j])
         whole, middle = inside.all(axis=1), len(inside) // 2
         typical = np.median(inverse, axis=0)
         for k, (fit, unit) in enumerate(zip(fits, (1.0, 1.0 / span), strict=True)):

@@ -95,11 +95,11 @@ class _Values(Mapping[str, np.ndarray]):
             return self._data.t
         if name in self._own:
             return getattr(self._data, name)[..., self._joint]
-        if "(" in name:
-            numbers = name[name.index("(") + 1 : -1].split(", ")
-            return self._data.state(self._joint, name, tuple(map(float, numbers)))
-        kind, _, other = name.partition("[")
-        return getattr(self._data, kind)[..., self._data.joints.index(other[:-1])]
+        kind, bracket, other = name.partition("[")
+        if bracket:
+            return getattr(self._data, kind)[..., self._data.joints.index(other[:-1])]
+        numbers = name[name.index("(") + 1 : -1].split(", ")
+        return self._data.state(self._joint, name, tuple(map(float, numbers)))
 
     def __iter__(self) -> Iterator[str]:
         return iter((*self._own, "t"))

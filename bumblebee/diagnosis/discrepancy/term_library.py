@@ -244,8 +244,8 @@ def joined(texts: list[str], sizes: np.ndarray) -> tuple[list[str], np.ndarray]:
     """A table's terms as one curve of coefficient 1; formulas as they are."""
     if len(texts) < 2 or not all("curve(" in text for text in texts):
         return texts, sizes
-    frame, inner = texts[0].split("curve(")[0], texts[0].split("curve(")[1]
-    name, *points = inner.rstrip(")").split(", ")
+    frame, inner = texts[0].split("curve(", 1)
+    name, *points = inner.rstrip(")").rsplit(", ", 2 * len(texts))
     knots = [float(k) for k in points[::2]]
     closing = ")" if frame.endswith("(") else ""
     return [frame + _curve(name, knots, sizes.tolist()) + closing], np.ones(1)

@@ -9,6 +9,7 @@ from bumblebee.diagnosis.plan.drawing import panels
 from bumblebee.diagnosis.plan.plan import Plan
 from bumblebee.diagnosis.plan.predicted import pairs, words_of
 from bumblebee.diagnosis.report import number, table
+from bumblebee.io.page_policy import policy_tag
 
 _STYLE = """@page{size:A4;margin:13mm}:root{color-scheme:light}
 body{font:13px/1.45 system-ui,-apple-system,'Segoe UI',sans-serif;color:#1d2430;background:#fff;margin:0 auto;
@@ -35,7 +36,7 @@ def sheet(plan: Plan, told: dict[str, Any]) -> str:
     """The whole page; it loads nothing from anywhere."""
     view = "<meta name='viewport' content='width=device-width,initial-scale=1'>"
     title = f"Run sheet: {told['model']}"
-    head = f"<meta charset='utf-8'>{view}<title>{escape(title)}</title><style>{_STYLE}</style>"
+    head = f"<meta charset='utf-8'>{policy_tag()}{view}<title>{escape(title)}</title><style>{_STYLE}</style>"
     pages = "".join(_page(plan, told, k) for k in range(len(plan.motions)))
     return f"<!doctype html><html lang='en'><head>{head}</head><body>\n{_front(plan, told)}\n{pages}</body></html>\n"
 

@@ -3,7 +3,6 @@
 Measured curves: the mean of a joint's missing torque over one quantity, in equally filled bins, with intervals.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,10 +15,10 @@ from bumblebee.diagnosis.discrepancy import BasisFunction, Discovery, JointLackO
 from bumblebee.diagnosis.report.what_matters import LEFT
 from bumblebee.diagnosis.simulation import joint_units
 from bumblebee.diagnosis.thresholds.report import MeasuredCurve, ReportThresholds
+from bumblebee.sim.effects import TABLE
 
 NOT_TESTED = {"significant": False, "p": 1.0, "where": [], "depends_on": [], "description": "not tested"}
 _NOWHERE = "no single joint has a significant residual torque, but the reduced chi-square is {:.2f}"
-_TABLE = re.compile(r"(curve)\(([^,()]+),[^()]*\)")  # its points are for diagnosis.json
 
 
 def discovered_entry(
@@ -88,7 +87,7 @@ def _described(left: Sequence[JointLackOfFit], found: Discovery, rules: ReportTh
             line = f"{j.joint}: a {what} of {j.rms:.2g} {unit} RMS ({share:.0f} % of its drive's) depends on {on}"
         if j.joint in forms:
             terms = " + ".join(f"{v:.3g}*({t})" if " " in t else f"{v:.3g}*{t}" for t, v in forms[j.joint].items())
-            terms = _TABLE.sub(r"\1(\2, ...)", terms)
+            terms = TABLE.sub(r"curve(\1, ...)", terms)  # its points are for diagnosis.json
             line += f"; approximately {terms}, not confirmed on validation windows"
         lines.append(f"{line}; {100 * shares[j.joint]:.0f} % of {LEFT}")
     if more := len(left) - len(told) - slight:

@@ -6,6 +6,7 @@ from typing import Any
 
 from bumblebee.diagnosis.simulation import pick
 from bumblebee.diagnosis.simulation import rows as rows_of
+from bumblebee.io.page_policy import policy_tag
 
 _STYLE = """:root{color-scheme:light}body{font:15px/1.55 system-ui,-apple-system,'Segoe UI',sans-serif;max-width:62rem;
 margin:2.2rem auto;padding:0 1.2rem;color:#1d2430;background:#fff}h1{font-size:1.7rem;margin:0 0 .3rem}
@@ -32,7 +33,7 @@ details{margin:.6rem 0}summary{cursor:pointer;color:#6b7385}.good{color:#1b8a6b}
 def html_page(title: str, parts: Sequence[str]) -> str:
     """A whole page; it loads nothing from anywhere."""
     view = "<meta name='viewport' content='width=device-width,initial-scale=1'>"
-    head = f"<meta charset='utf-8'>{view}<title>{escape(title)}</title>"
+    head = f"<meta charset='utf-8'>{policy_tag()}{view}<title>{escape(title)}</title>"
     body = "\n".join(part for part in parts if part)
     return f"<!doctype html><html lang='en'><head>{head}<style>{_STYLE}</style></head><body>\n{body}\n</body></html>\n"
 

@@ -137,17 +137,8 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
     while len(run.fit.chosen) < config.most + run.given and vain < run.patience:
         if not budget.has_time_for("more effects"):
             break
-        tried, looked = [], []
-        if not run.given:
-            tried = attempt("drives far from the declared ones", partial(_drives, run), list)
-            tried = [t for t in tried if t.candidate not in run.closed]
-        if all(t.candidate.effect in SATURATIONS for t in tried):  # a limit alone does not say that slopes are none
-            more, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
-            tried += more
-        if attempt(_ALL_JOINTS, partial(start_far_off, run, tried), _no):
-            continue
-        many = not _explains_much(tried, run)
-        if many and attempt(_ALL_JOINTS, partial(start_with_all_joints, run), _no):
+        tried, looked, anew = look_around(run)
+        if anew:
             continue
         tried += attempt("contact with a surface", touching.trials, list)
         late = attempt("drives that follow their targets late", partial(setpoint_trials, run, tried), list)
@@ -179,6 +170,22 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
         if accepted:
             attempt("a torque limit in the place of a weak drive", partial(swap_limits, run), _no)
             run.hopeless = {(kind, where) for kind, where in run.hopeless if place and where != place}
+
+
+def look_around(run: SearchState) -> tuple[list[Trial], list[Candidate], bool]:
+    """Trials of single effects, those looked at; and whether the search began anew with effects of all joints."""
+    attempt = run.problem.plant.failures.attempt
+    tried, looked = [], []
+    if not run.given:
+        tried = attempt("drives far from the declared ones", partial(_drives, run), list)
+        tried = [t for t in tried if t.candidate not in run.closed]
+    if all(t.candidate.effect in SATURATIONS for t in tried):  # a limit alone does not say that slopes are none
+        more, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
+        tried += more
+    anew = attempt(_ALL_JOINTS, partial(start_far_off, run, tried), _no)
+    if not anew and not _explains_much(tried, run):
+        anew = attempt(_ALL_JOINTS, partial(start_with_all_joints, run), _no)
+    return tried, looked, anew
 
 
 class _Touching:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate
-from bumblebee.diagnosis.comparison import Holdout
+from bumblebee.diagnosis.comparison import Holdout, walds
 from bumblebee.diagnosis.config import SearchConfig
-from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.estimation import Fit, gauss_newton
 from bumblebee.diagnosis.residuals import Problem
-from bumblebee.diagnosis.selection.forward import begin
+from bumblebee.diagnosis.selection.forward import begin, look_around
 from bumblebee.diagnosis.selection.moves import Terms, refitted
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
@@ -30,6 +30,18 @@ class Lead:
     """Share of the chi-square above the noise that goes with it, on windows that took no part where there are any."""
 
 
+@dataclass(frozen=True, eq=False)
+class Leads:
+    """What the first step of a search finds."""
+
+    together: list[Lead]
+    """Effects of many joints that were fitted together, as the declared model is far off; each explains what all do."""
+    alone: list[Lead]
+    """Single effects beside them, the best first."""
+    bound: float
+    """z that a single one had to reach."""
+
+
 def leads(
     problem: Problem,
     holdout: Holdout,
@@ -37,14 +49,16 @@ def leads(
     config: SearchConfig,
     say: Callable[[str], None],
     count: int,
-) -> tuple[list[Lead], float]:
-    """The `count` candidates whose trials cost least, the best first; and the z that each had to reach.
+) -> Leads:
+    """The `count` candidates whose trials cost least, beside what the search begins with.
 
-    An effect in one place is one lead, by the candidate whose trial costs least, however many of its parameters are
-    tested together.
+    A search begins with effects of all joints where the declared model is far off. An effect in one place is one lead,
+    by the candidate whose trial costs least, however many of its parameters are tested together.
     """
     run = begin(problem, holdout, remake, config, say)
-    tried, _ = run.trials()
+    tried, looked, anew = look_around(run)
+    if anew or not looked:
+        tried = [*([] if anew else tried), *run.trials()[0]]
     found = []
     cheapest: dict[tuple[str, str], Trial] = {}
     for trial in sorted(tried, key=lambda t: t.cost):
@@ -53,13 +67,25 @@ def leads(
         start = np.concatenate((run.fit.values, trial.values))
         move = refitted(run.now, run.fit, trial.candidate, [start], Terms(run.bound, (), iterations=2))
         if move is not None:
-            found.append(Lead(trial.candidate, move.after.of(trial.candidate), move.z, _explains(run, move.after)))
-    return sorted(found, key=lambda lead: -lead.explains), run.bound
+            share = _explains(run, run.fit, move.after)
+            found.append(Lead(trial.candidate, move.after.of(trial.candidate), move.z, share))
+    return Leads(_together(run), sorted(found, key=lambda lead: -lead.explains), run.bound)
 
 
-def _explains(run: SearchState, after: Fit) -> float:
-    """Share of the mean square above 1 that goes from the state's fit to another; by the median of the windows."""
+def _together(run: SearchState) -> list[Lead]:
+    """What the search began with and is sure, the surest first."""
+    if not run.fit.chosen:
+        return []
+    declared = gauss_newton(run.problem, (), (), run.weights, iterations=0)
+    share = _explains(run, declared, run.fit)
+    sizes = walds(run.problem, run.fit, run.weights, run.fit.chosen)
+    found = [Lead(c, run.fit.of(c), float(z), share) for c, z in zip(run.fit.chosen, sizes, strict=True)]
+    return sorted((lead for lead in found if lead.z >= run.bound), key=lambda lead: -lead.z)
+
+
+def _explains(run: SearchState, before: Fit, after: Fit) -> float:
+    """Share of the mean square above 1 that goes from one fit to another; by the median of the windows."""
     judged = run.holdout.problem is not None
-    old, new = run.holdout.left([run.fit, after]) if judged else (f.clean(run.problem) for f in (run.fit, after))
+    old, new = run.holdout.left([before, after]) if judged else (f.clean(run.problem) for f in (before, after))
     power = [float(np.median((r**2).mean(axis=1))) for r in (old, new)]
     return float(np.clip((power[0] - power[1]) / max(power[0] - 1.0, 1e-12), 0.0, 1.0))

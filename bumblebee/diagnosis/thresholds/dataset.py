@@ -45,6 +45,13 @@ class TimeSteps:
     """Step for residuals of the search of larger models at most [s]: it costs half."""
     uneven: float = 0.02
     """Share of a step by which it may be longer: a median of uneven stamps is no whole number of milliseconds."""
+    own: float = 0.5
+    """Share of the declared model's squared error that its own, longer step must leave at most, to be kept to: logs of
+    a simulation of that model have its step's error in them."""
+    own_horizon: float = 0.2
+    """Length of the windows over which the steps are compared [s]."""
+    own_windows: int = 40
+    """Number of these windows at most."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +138,9 @@ class Smoothing:
     """Half spans within which a neighbour must lie: a gap in the log has no neighbours beyond it."""
     white: float = 0.5
     """Share of their noise that readings must be apart, below which they have the same error."""
+    bent: float = 10.0
+    """Times the chi-square of readings about their fit, that of noise or of the median fit, above which a motion is no
+    cubic: a stiff servo at a step of its command. There they stay as read."""
 
 
 @dataclass(frozen=True)

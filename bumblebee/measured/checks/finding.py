@@ -22,12 +22,15 @@ class Finding:
     """What was found instead."""
     fatal: bool
     """True: the file is set aside; False: it is used, and the person is told."""
+    do: str = ""
+    """What the person can do about it, where the rule has one remedy."""
 
     @property
     def message(self) -> str:
         """The finding in one line."""
         row = "" if self.row is None else f", row {self.row}"
         line = f"{self.file}: column {self.column}{row}: rule {self.rule}: expected {self.expected}, came {self.came}"
+        line = f"{line}. {self.do}" if self.do else line
         return " ".join(line.split())
 
     def as_dict(self) -> dict[str, Any]:

@@ -10,6 +10,10 @@ from bumblebee.measured.checks.view import View
 
 ORDER_WINDOW = 0.2  # s over which changes are compared: long against a servo's lag, short against a motion
 ORDER_LATE = (0.06, 0.12, 0.2)  # s by which a joint's response to its own target may lag; the first for any target
+_LOCKED = (
+    "Of joints that the robot has locked or lacks: list them under locked in the import's map, and give the model.xml "
+    "that lies in the dataset."
+)
 SURE_FIT, SURE_MARGIN = 0.9, 0.7  # from here on one joint alone is worth a warning
 
 
@@ -24,7 +28,7 @@ def check_names(view: View) -> None:
     absent = sorted(set(driven_joints(view.model)) - set(view.rollout.joints))
     if absent:
         came = f"no column for {', '.join(absent[:3])}{' ...' if len(absent) > 3 else ''} ({len(absent)} in all)"
-        view.add("joints", None, "joint-missing", "every actuated joint of the model", came, fatal=True)
+        view.add("joints", None, "joint-missing", "every actuated joint of the model", came, fatal=True, do=_LOCKED)
     _check_contract_names(view)
     if view.floating:
         for column in ("base_quat", "base_ang_vel", "base_lin_vel"):

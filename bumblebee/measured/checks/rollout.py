@@ -12,6 +12,8 @@ from bumblebee.measured.checks.magnitude import check_magnitude
 from bumblebee.measured.checks.order import check_names, check_order
 from bumblebee.measured.checks.response import check_response
 from bumblebee.measured.checks.sign import check_velocity
+from bumblebee.measured.checks.target_copy import RULE as TARGET_COPY
+from bumblebee.measured.checks.target_copy import check_target_copy
 from bumblebee.measured.checks.target_scale import check_target_scale
 from bumblebee.measured.checks.thresholds import Thresholds
 from bumblebee.measured.checks.time import check_time
@@ -60,6 +62,9 @@ def _check_all(view: View) -> None:
     no_clock = view.found("time-order") or view.found("time-duplicate") or other_unit
     if no_clock or view.found("finite") or rollout.frames < 4:
         return  # what follows needs numbers and a clock
+    check_target_copy(view)
+    if view.found(TARGET_COPY):
+        return  # what compares positions with targets would compare positions with themselves
     check_target_scale(view)
     check_degrees(view)
     check_frozen(view)

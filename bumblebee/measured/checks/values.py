@@ -41,10 +41,10 @@ def check_frozen(view: View) -> None:
     and a person is told no more than that. Fatal is what no standing joint shows: a velocity that adds up to a way, a
     coupled joint that moves, a tracking error far beyond those at which this joint moves, all readings repeated.
     """
-    rollout, limits = view.rollout, view.limits
+    rollout = view.rollout
     if view.found("degrees"):
         return
-    need = max(10, round(limits.freeze_seconds / view.period))
+    need = view.lasting
     ranges = view.ranges()
     for joint in range(len(rollout.joints)):
         place = rollout.joint_pos[:, joint]

@@ -23,11 +23,19 @@ class View:
     findings: list[Finding] = field(default_factory=list)
 
     def add(
-        self, column: str, row: int | np.integer | None, rule: str, expected: str, came: str, *, fatal: bool
+        self,
+        column: str,
+        row: int | np.integer | None,
+        rule: str,
+        expected: str,
+        came: str,
+        *,
+        fatal: bool,
+        do: str = "",
     ) -> None:
         """Note a finding."""
         row = None if row is None else int(row)
-        self.findings.append(Finding(self.file, column, row, rule, expected, came, bool(fatal)))
+        self.findings.append(Finding(self.file, column, row, rule, expected, came, bool(fatal), do))
 
     def found(self, rule: str, column: str = "") -> bool:
         """Whether a rule was broken before, in a column whose name starts so."""
@@ -47,6 +55,11 @@ class View:
     def period(self) -> float:
         """Median time between rows [s]."""
         return float(np.median(np.diff(self.rollout.time)))
+
+    @property
+    def lasting(self) -> int:
+        """Rows that a reading must last to count as evidence: those of `freeze_seconds`, at least 10."""
+        return max(10, round(self.limits.freeze_seconds / self.period))
 
     @property
     def floating(self) -> bool:

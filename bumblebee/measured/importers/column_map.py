@@ -62,6 +62,8 @@ class ColumnMap:
     """Order of base_quat as the file's columns are named in the map."""
     names: tuple[str, ...] = ()
     """What messages with names call the joints, where it is not as the model does; one a joint."""
+    locked: tuple[str, ...] = ()
+    """Joints of the model that the robot has locked or lacks: they are in no log, and stand still in the model."""
     order: dict[str, tuple[str, ...]] = field(default_factory=dict)
     """Topic of messages without names -> the joints in the order of its values."""
     episode: str = ""

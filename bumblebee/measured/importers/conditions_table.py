@@ -93,6 +93,20 @@ def with_conditions(rollouts: Sequence[Rollout], table: ConditionsTable) -> list
     return out
 
 
+def with_settings(rollouts: Sequence[Rollout], settings: Sequence[str]) -> list[Rollout]:
+    """The rollouts with conditions NAME=VALUE that hold for all of them; a value that reads as a number is one."""
+    values: dict[str, Any] = {}
+    for text in settings:
+        name, _, value = text.partition("=")
+        if not name.strip() or not value.strip() or name in values:
+            raise BadInput("--set", "NAME=VALUE, a condition of all logs, each once", repr(text)[:80])
+        try:
+            values[name] = _finite(f"--set {name}", value)
+        except ValueError:
+            values[name] = value
+    return [replace(one, meta=one.meta | _meta("--set", one, values)) for one in rollouts] if values else list(rollouts)
+
+
 def table_names(rollout_id: str) -> list[str]:
     """By what names a row may mean a rollout: its own, and of an episode that of the whole log."""
     return [rollout_id, *([rollout_id.rsplit("_", 1)[0]] if "_" in rollout_id else [])]

@@ -1,7 +1,7 @@
 """`import_dataset`: any known layout of logs as a dataset of the contract, with the declared model beside it."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from bumblebee.io.names import distinct_stems
 from bumblebee.io.write import new_folder, try_output
 from bumblebee.measured.importers.asap_npz import import_asap
 from bumblebee.measured.importers.column_map import DOUBLE_PENDULUM
-from bumblebee.measured.importers.conditions_table import read_conditions, with_conditions
+from bumblebee.measured.importers.conditions_table import read_conditions, with_conditions, with_settings
 from bumblebee.measured.importers.csv_map import import_csv
 from bumblebee.measured.importers.hdf5_log import import_hdf5
 from bumblebee.measured.importers.lerobot import import_lerobot
@@ -36,6 +36,7 @@ def read_rollouts(
     model: mujoco.MjModel | None = None,
     column_map: Path | None = None,
     conditions: Path | None = None,
+    settings: Sequence[str] = (),
 ) -> list[Rollout]:
     """The rollouts of a source in one of the layouts `KINDS`.
 
@@ -45,6 +46,7 @@ def read_rollouts(
         model: the declared model.
         column_map: YAML file with the fields of `ColumnMap`.
         conditions: table of what was different in each log, see `conditions_table`.
+        settings: NAME=VALUE, conditions of all logs.
     """
     table = read_conditions(conditions, open_source(source)) if conditions else None
     no_log = (table.member,) if table else ()
@@ -68,7 +70,7 @@ def read_rollouts(
     if kind not in readers:
         raise BadInput(kind, f"one of {', '.join(KINDS)}", repr(kind))
     rollouts = _distinct(readers[kind]())
-    return with_conditions(rollouts, table) if table else rollouts
+    return with_settings(with_conditions(rollouts, table) if table else rollouts, settings)
 
 
 def import_dataset(
@@ -78,6 +80,7 @@ def import_dataset(
     model_path: Path | None = None,
     column_map: Path | None = None,
     conditions: Path | None = None,
+    settings: Sequence[str] = (),
 ) -> list[str]:
     """Write `out`/rollouts/*.parquet and `out`/model.xml; `out` appears whole and must not exist. Returns the ids."""
     out = Path(out)
@@ -85,12 +88,13 @@ def import_dataset(
         raise BadInput(out, "a new folder", "one that exists", "Choose another name.")
     try_output(out)
     model = load_model(model_path) if model_path else None
-    rollouts = read_rollouts(Path(source), kind, model, column_map, conditions)
+    rollouts = read_rollouts(Path(source), kind, model, column_map, conditions, settings)
     with new_folder(out) as folder:
         for rollout in rollouts:
             write_rollout(folder / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)
         if model_path:
-            copy_model(model_path, folder / "model.xml")
+            locked = read_map(column_map, kind).locked if kind in MAPPED and column_map else ()
+            copy_model(model_path, folder / "model.xml", locked)
     return [rollout.rollout_id for rollout in rollouts]
 
 

@@ -6,6 +6,7 @@ the target, target + (feed_forward + kd target_vel) / kp, which commands the sam
 the feed-forward torque is the command.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 
+LOCKED = "A motor that is absent, dead or locked has _ in its place in joints, and its joint stands under locked."
 _FOLDED = ("kp", "kd", "target_vel", "feed_forward")
 
 
@@ -36,7 +38,11 @@ class Stretch:
 
 
 def stretches(
-    where: str, time: np.ndarray, values: dict[str, np.ndarray], settings: DriveSettings | None = None
+    where: str,
+    time: np.ndarray,
+    values: dict[str, np.ndarray],
+    joints: Sequence[str],
+    settings: DriveSettings | None = None,
 ) -> tuple[list[Stretch], list[str]]:
     """Cut a log (T rows) where its gains change; returns the stretches, and what was left out, for the notes.
 
@@ -44,6 +50,7 @@ def stretches(
         where: the file, for messages.
         time: (T,) stamps [s].
         values: columns of the contract and of the drive (kp, kd, target_vel, feed_forward), (T, J) each.
+        joints: names of the J joints, for messages.
         settings: when a stretch is long enough.
 
     Raises:
@@ -58,14 +65,18 @@ def stretches(
     gains = np.concatenate((values["kp"], values.get("kd", np.zeros_like(values["kp"]))), axis=1)
     edges = np.flatnonzero((gains[1:] != gains[:-1]).any(axis=1)) + 1
     bounds = [0, *edges.tolist(), len(time)]
-    found, left_out = [], 0
+    found, left_out, off = [], 0, np.zeros(len(joints), dtype=bool)
     for first, last in pairwise(bounds):
         long_enough = last - first > 1 and time[last - 1] - time[first] >= settings.shortest
         stretch = _stretch(slice(first, last), values) if long_enough else None
+        off |= long_enough & (values["kp"][first] == 0)
         found += [stretch] if stretch else []
         left_out += 0 if stretch else last - first
     if not found:
         expected = f"{settings.shortest:g} s under constant gains, kp > 0 of all joints or of none"
+        some = [name for name, out in zip(joints, off, strict=True) if out]
+        if some and not off.all():
+            raise BadInput(f"{where}: kp", expected, f"kp 0 of {', '.join(some)}", LOCKED)
         raise BadInput(f"{where}: kp", expected, f"{len(bounds) - 1} stretches, none of them so")
     return found, [f"{left_out} rows under changing gains, or damped without a target, left out"] if left_out else []
 

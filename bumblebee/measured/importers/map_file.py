@@ -64,6 +64,7 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     given |= _clock(path, table, kind) | {"hz": _rate(f"{path}: hz", table.get("hz", 0.0))}
     given["angle_unit"] = _angle_unit(f"{path}: angle_unit", table, len(joints))
     given["names"] = _renamed(f"{path}: names", table.get("names"), joints)
+    given["locked"] = _names(f"{path}: locked", table["locked"]) if table.get("locked") else ()
     given["order"] = _orders(f"{path}: order", table.get("order"))
     given["meta"] = _meta(f"{path}: meta", table.get("meta", {}))
     given |= {key: _linear(f"{path}: {key}", table.get(key), len(joints)) for key in ("scale", "offset")}

@@ -45,9 +45,9 @@ def rollouts_of(
     if "joint_vel" not in turned:
         turned["joint_vel"] = differences(time, turned["joint_pos"])
         lost.insert(0, NO_VELOCITY)
-    parts, left_out = stretches(where, time, turned)
-    said = "; ".join(filter(None, (str(chosen.meta.get("notes") or ""), *notes, *lost, *left_out)))
     joints = tuple(chosen.joints[place] for place in keep)
+    parts, left_out = stretches(where, time, turned, joints)
+    said = "; ".join(filter(None, (str(chosen.meta.get("notes") or ""), *notes, *lost, *left_out)))
     rollouts = []
     for number, part in enumerate(parts, start=1):
         name = rollout_id if len(parts) == 1 else f"{rollout_id}_{number}"

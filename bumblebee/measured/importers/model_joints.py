@@ -8,6 +8,7 @@ import mujoco
 from bumblebee.errors import BadInput
 from bumblebee.measured.checks import driven_joints
 from bumblebee.measured.importers.column_map import LEFT_OUT, UNCOMMANDED, ColumnMap
+from bumblebee.measured.importers.drive import LOCKED
 
 _TURNED = ("rad", "deg", "turn")
 _LISTED = "Say a unit a joint, a list, with m for slides; for mm say m, and factors of 0.001 under scale."
@@ -18,22 +19,35 @@ def require_joints(path: Path, chosen: ColumnMap, model: mujoco.MjModel | None) 
 
     Raises:
         BadInput: a joint that the model lacks, a unit of angles for a slide or of lengths for a hinge, or no command
-            for a joint that an actuator drives.
+            for a joint that an actuator drives and that is not locked.
     """
     _require_commands(path, chosen, model)
     if model is None:
+        if chosen.locked:
+            raise BadInput(f"{path}: locked", "the declared model, whose joints these are", "none", "Give it: --model.")
         return
     _require_names(path, chosen, model)
+    _require_driven(path, chosen, model)
     _require_units(path, chosen, model)
 
 
 def _require_names(path: Path, chosen: ColumnMap, model: mujoco.MjModel) -> None:
     known = [name for i in range(model.njnt) if (name := model.joint(i).name)]
-    for joint in chosen.joints:
+    for key, joint in [*(("joints", joint) for joint in chosen.joints), *(("locked", one) for one in chosen.locked)]:
         if joint != LEFT_OUT and joint not in known:
             near = difflib.get_close_matches(joint, known, 1)
             do = f"The nearest is {near[0]}." if near else f"It has {', '.join(known) or 'none with a name'}."[:300]
-            raise BadInput(f"{path}: joints", "joints of the model", repr(joint)[:80], do)
+            raise BadInput(f"{path}: {key}", "joints of the model", repr(joint)[:80], do)
+
+
+def _require_driven(path: Path, chosen: ColumnMap, model: mujoco.MjModel) -> None:
+    """Every joint that an actuator drives is in the log or locked, and none is both."""
+    if both := set(chosen.locked) & set(chosen.joints):
+        raise BadInput(f"{path}: locked", "joints that are not under joints", ", ".join(sorted(both)))
+    known = {*chosen.joints, *chosen.locked}
+    if absent := [joint for joint in driven_joints(model) if joint not in known]:
+        expected = "every joint that an actuator of the model drives"
+        raise BadInput(f"{path}: joints", expected, f"all but {', '.join(absent)}"[:300], LOCKED)
 
 
 def _require_commands(path: Path, chosen: ColumnMap, model: mujoco.MjModel | None) -> None:

@@ -14,16 +14,18 @@ from bumblebee.sim.effects.native import SUFFIX, is_hidden, physical_inertia, sl
 from bumblebee.sim.effects.setpoints import NO_SPEED_LIMIT, SETPOINTS, advance
 from bumblebee.sim.effects.spec import ADDED, add_to_spec
 from bumblebee.sim.effects.states import State, states_of
-from bumblebee.sim.effects.terms import Term, read_term
+from bumblebee.sim.effects.terms import QUOTED, TABLE, Term, read_term
 
 __all__ = [
     "ADDED",
     "CATALOGUE",
     "NO_SPEED_LIMIT",
+    "QUOTED",
     "SETPOINTS",
     "STICTION_SOLIMP",
     "STICTION_SOLREF",
     "SUFFIX",
+    "TABLE",
     "Effect",
     "Kind",
     "Memory",

@@ -21,6 +21,7 @@ losses of a joint, each `coefficient * term`, add up with the one that it has; t
 """
 
 import ast
+import re
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -32,6 +33,10 @@ import numpy as np
 from bumblebee.errors import BadInput
 
 OWN = ("q", "v", "u", "tau", "t")
+QUOTED = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*\"""")
+"""A joint's name in a term's text that is no word."""
+TABLE = re.compile(rf"""curve\(((?:{QUOTED.pattern}|[^'"])+?)((?:, [-+.\de]+)+)\)""")
+"""A curve in a term's text: its quantity, and its points as numbers with commas before them."""
 _LONGEST = 2000  # characters
 _DEEPEST = 100  # levels: a term is evaluated by a function that calls itself
 _FUNCTIONS: dict[str, Callable[[Any], Any]] = {
@@ -90,7 +95,8 @@ def read_term(text: str) -> Term:
             raise ValueError(f"{len(text)} characters")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Python's own about formulas such as 1(q), which are refused below
-            tree = ast.parse(text.replace("^", "**"), mode="eval").body
+            plain = re.sub(rf"({QUOTED.pattern})|\^", lambda found: found[1] or "**", text)
+            tree = ast.parse(plain, mode="eval").body
         rubs = False
         if isinstance(tree, ast.Call) and isinstance(tree.func, ast.Name) and tree.func.id == "friction":
             rubs = True

@@ -118,3 +118,15 @@ def test_degrees_of_all_joints_name_the_unit(tmp_path: Path) -> None:
     rates = [replace(r, joint_vel=np.degrees(r.joint_vel)) for r in good(4)]
     with pytest.raises(BadInput, match=r"rule degrees: .* scale of joint_vel to 0\.01745"):
         session(tmp_path / "rates", rates, xml=xml)
+
+
+def test_copies_of_the_positions_end_it_unless_commands_are_seen_elsewhere(tmp_path: Path) -> None:
+    """Rollouts in which nothing moves say nothing for the targets; commands that positions follow do."""
+    copies = [replace(r, rollout_id=f"bad{k}", joint_target=r.joint_pos) for k, r in enumerate(good(4))]
+    rest = np.tile(copies[0].joint_pos[:1], (copies[0].frames, 1))
+    stands = replace(copies[0], rollout_id="stands", joint_pos=rest, joint_target=rest, joint_vel=0 * rest)
+    with pytest.raises(BadInput, match=r"rule target-copy: .* on j1, j2, j3 in 4 of 5 .* the same row.*--set targets"):
+        session(tmp_path, [*copies, stands])
+    made = session(tmp_path / "some", [*copies, *good(2)])
+    assert [r.rollout_id for r in made.rollouts] == ["moving0", "moving1"]
+    assert "4 of 6 rollouts were set aside by rule target-copy" in made.warnings[0] and "Log the" in made.warnings[0]

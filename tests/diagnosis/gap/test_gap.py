@@ -13,8 +13,10 @@ from bumblebee.diagnosis.report import gap_summary
 from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.diagnosis.thresholds.gap import GapPage, GapThresholds
 from bumblebee.diagnosis.thresholds.report import ExampleWindows, ReportThresholds, Verdicts
+from bumblebee.measured.rollout import write_rollout
 from tests.diagnosis import arm, cart
 from tests.diagnosis.arm import SMALL, session_of
+from tests.test_cli_diagnosis import run
 
 COUNT = 4
 """Rollouts of a case: two to fit at least, and some that take no part."""
@@ -126,3 +128,24 @@ def test_no_threshold_is_without_a_reader() -> None:
     for concept in vars(GapThresholds()).values():
         unread = [f.name for f in fields(concept) if f".{f.name}" not in source]
         assert unread == [], type(concept).__name__
+
+
+def test_joints_and_motions_of_any_name_are_reported_and_move_no_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Parentheses, commas and quotes in a joint's name; a motion's name that would clear the screen and ring."""
+    names = ("j1", "elbow(1), it's", "j3^2")
+    xml = arm.XML
+    for old, new in zip(arm.JOINTS, names, strict=True):
+        xml = xml.replace(f'"{old}"', f'"{new}"')
+    (tmp_path / "model.xml").write_text(xml)
+    for k, rollout in enumerate(arm.simulate({("spring", "j2"): 1.5}, count=3, seconds=4.0)):
+        meta = rollout.meta | {"motion": f"wave {k}\x1b[2J\x07\u202e"}
+        write_rollout(tmp_path / "set" / "rollouts" / f"r{k}.parquet",
+                      replace(rollout, rollout_id=f"r{k}", joints=names, meta=meta))  # fmt: skip
+    assert run("gap", tmp_path / "model.xml", tmp_path / "set", "--out", tmp_path / "gap") == 0
+    said = capsys.readouterr().out
+    assert all(sign.isprintable() or sign == "\n" for sign in said) and "wave 0\ufffd[2J" in said
+    assert "elbow(1), it's" in said and "j3^2" in said
+    page = (tmp_path / "gap" / "gap.html").read_text()
+    assert page.index("Content-Security-Policy") < page.index("<style") and "default-src 'none'" in page

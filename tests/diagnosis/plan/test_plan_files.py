@@ -35,7 +35,7 @@ def test_the_sheet_has_a_section_a_run_and_loads_nothing(tmp_path: Path) -> None
     write_plan(plan, tmp_path / "plan")
     page = (tmp_path / "plan" / "sheet.html").read_text()
     assert page.count("<section>") == len(plan.motions)
-    assert "http" not in page and "<script" not in page and "src=" not in page
+    assert "://" not in page and "<script" not in page and "src=" not in page
     assert "kd x 0.2" in page
 
 
