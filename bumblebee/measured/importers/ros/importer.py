@@ -79,11 +79,10 @@ def _rollouts(
             there = ", ".join(f"{other} ({kind})" for other, kind in sorted(found.others.items())[:20])
             came = f"none; others: {there or 'none'}"[:400]
             raise BadInput(f"{where}: {name}"[:300], "messages of this topic", came)
-        parts = series_of(f"{where}: {name}"[:300], name, topic, wants, chosen)
-        series += list(zip(wants, parts, strict=True))
-    series.sort(key=lambda pair: pair[0].part)  # joints with a topic each stand in the map's order
-    time, values, notes = on_one_grid(where, [one for _, one in series], chosen.grid)
-    first = min(int(one.stamps.min()) for _, one in series)
+        series += series_of(f"{where}: {name}"[:300], name, topic, wants, chosen)
+    series.sort(key=lambda one: one.places[0])
+    time, values, notes = on_one_grid(where, series, chosen)
+    first = min(int(one.stamps.min()) for one in series)
     if first > _EPOCH and "recorded_at" not in chosen.meta:
         at = datetime.fromtimestamp(first // 10**9, UTC).isoformat()
         chosen = replace(chosen, meta=chosen.meta | {"recorded_at": at})

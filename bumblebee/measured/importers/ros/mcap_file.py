@@ -97,6 +97,7 @@ class _Found:
         self.topics: dict[str, Topic] = {}
         self.others: dict[str, str] = {}
         self.notes: tuple[str, ...] = ()
+        self.met = 0
         self.unpacked = 0
         self.held = 0
 
@@ -113,7 +114,9 @@ class _Found:
             if topic in self.topics:
                 self.held += len(record.data)
                 require_small(self.where, topic, len(record.data), self.limits, self.held)
-                self.topics[topic].messages.append(Message(record.log_time, record.publish_time, record.data))
+                one = Message(record.log_time, record.publish_time, record.data, self.met)
+                self.topics[topic].messages.append(one)
+                self.met += 1
 
     def _open(self, channel: Any) -> None:
         schema = self.schemas.get(channel.schema_id)

@@ -63,11 +63,12 @@ def _read(where: str, base: sqlite3.Connection, wanted: Container[str], limits: 
         topics[name], numbers[number] = Topic(kind, text), name
     held = 0
     for number, name in numbers.items():
-        for stamp, data in base.execute("SELECT timestamp, data FROM messages WHERE topic_id = ?", (number,)):
+        rows = base.execute("SELECT rowid, timestamp, data FROM messages WHERE topic_id = ? ORDER BY rowid", (number,))
+        for place, stamp, data in rows:
             _require_row(where, stamp, data)
             held += len(data)
             require_small(where, name, len(data), limits, held)
-            topics[name].messages.append(Message(stamp, stamp, data))
+            topics[name].messages.append(Message(stamp, stamp, data, place))
     return Recording(topics, others)
 
 
