@@ -28,6 +28,8 @@ _CHOICES = {
     "gyro_unit": ("rad", "deg"),
     "quat_order": ("wxyz", "xyzw"),
     "grid": ("states", "commands"),
+    "episodes": ("whole", "split"),
+    "rows": ("all", "complete"),
 }
 LEROBOT = {
     "columns": {"joint_pos": "observation.state", "joint_target": "action"},
@@ -73,7 +75,24 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     choices["gyro_unit"] = table.get("gyro_unit") or ("deg" if given["angle_unit"] == ("deg",) else "rad")
     chosen = ColumnMap(**(given | choices))
     _require_scales(path, chosen)
+    for column in ("base_quat", "base_ang_vel", "base_lin_vel", "base_pos"):
+        _require_components(f"{path}: columns: {column}", chosen, column)
     return chosen
+
+
+def _require_components(where: str, chosen: ColumnMap, column: str) -> None:
+    """Refuse a name twice, and names that say other components of a vector than those in whose place they stand."""
+    names = chosen.columns.get(column, ())
+    order = chosen.quat_order if column == "base_quat" else "xyz"
+    differ = ["".join(signs).lower() for signs in zip(*names, strict=False) if len(set(signs)) > 1]
+    letters = differ[0] if len(differ) == 1 else order
+    if len(names) == len(order) and (
+        len(set(names)) < len(names) or (letters != order and set(letters) <= set("wxyz"))
+    ):
+        do = f"List the names of {', '.join(order)}, in this order" + ", or state the other quat_order" * (
+            column == "base_quat"
+        )
+        raise BadInput(where, f"{', '.join(order)}", ", ".join(names)[:200], f"{do}.")
 
 
 def _with_layout(path: Path, table: Any, kind: str) -> Any:

@@ -42,7 +42,7 @@ def test_a_unit_that_makes_the_rate_absurd_is_refused_and_the_likely_one_named(
 
 def test_rows_out_of_order_are_refused_with_their_row_unless_episodes_tell_them_apart(tmp_path: Path) -> None:
     twice = np.tile(0.02 * np.arange(15), 2)
-    with pytest.raises(BadInput, match=r"time, row 15: expected stamps that grow.*`episode`"):
+    with pytest.raises(BadInput, match=r"time, row 15: expected stamps that grow.*of one recording"):
         read(tmp_path, twice, "s")
     assert len(read(tmp_path, twice, "s", "episode: n\n", "time,q,u,n")) == 2
 

@@ -8,10 +8,11 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.importers.column_map import ColumnMap
 from bumblebee.measured.importers.mapped import rollouts_of
 from bumblebee.measured.importers.ros.fields import steps
-from bumblebee.measured.importers.ros.grid import on_one_grid
+from bumblebee.measured.importers.ros.grid import Series, on_one_grid
 from bumblebee.measured.importers.ros.mcap_file import read_mcap
 from bumblebee.measured.importers.ros.recording import Recording, merged
 from bumblebee.measured.importers.ros.sqlite_file import read_sqlite
+from bumblebee.measured.importers.ros.takes import require_running, split_takes
 from bumblebee.measured.importers.ros.topic_series import Wanted, series_of
 from bumblebee.measured.importers.source import Source, open_source
 from bumblebee.measured.rollout import Rollout
@@ -72,6 +73,21 @@ def _wanted(place: Path, chosen: ColumnMap) -> dict[str, list[Wanted]]:
 def _rollouts(
     where: str, rollout_id: str, found: Recording, wanted: dict[str, list[Wanted]], chosen: ColumnMap
 ) -> list[Rollout]:
+    series = _series(where, found, wanted, chosen)
+    takes = [series]
+    if chosen.episodes == "split":
+        takes = split_takes(series)
+    else:
+        require_running(where, series, chosen, lambda other: _series(where, found, wanted, other))
+    return [
+        rollout
+        for number, take in enumerate(takes, start=1)
+        for rollout in _of_take(where, rollout_id if len(takes) == 1 else f"{rollout_id}_{number}", found, take, chosen)
+    ]
+
+
+def _series(where: str, found: Recording, wanted: dict[str, list[Wanted]], chosen: ColumnMap) -> list[Series]:
+    """The series of all topics, by the joints' places in the map."""
     series = []
     for name, wants in wanted.items():
         topic = found.topics.get(name)
@@ -80,7 +96,10 @@ def _rollouts(
             came = f"none; others: {there or 'none'}"[:400]
             raise BadInput(f"{where}: {name}"[:300], "messages of this topic", came)
         series += series_of(f"{where}: {name}"[:300], name, topic, wants, chosen)
-    series.sort(key=lambda one: one.places[0])
+    return sorted(series, key=lambda one: one.places[0])
+
+
+def _of_take(where: str, rollout_id: str, found: Recording, series: list[Series], chosen: ColumnMap) -> list[Rollout]:
     time, values, notes = on_one_grid(where, series, chosen)
     first = min(int(one.stamps.min()) for one in series)
     if first > _EPOCH and "recorded_at" not in chosen.meta:
