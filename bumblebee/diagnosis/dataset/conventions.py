@@ -38,7 +38,7 @@ _CONVENTIONS = {
     "quaternion-order": _Convention("quat_order to the file's"),
     "velocity-frame": _Convention("base_ang_vel and base_lin_vel to columns in the base frame"),
     "gyro-sign": _Convention("base_quat to columns of the rotation from base to world"),
-    "velocity-derivative": _Convention("scale of joint_vel, or time_unit,", of_all=False),
+    "velocity-derivative": _Convention("no joint_vel, which is then made of joint_pos, or its scale", of_all=False),
     "range": _Convention("scale or offset of joint_pos", of_all=False),
 }
 

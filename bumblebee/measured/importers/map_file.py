@@ -75,24 +75,24 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     choices["gyro_unit"] = table.get("gyro_unit") or ("deg" if given["angle_unit"] == ("deg",) else "rad")
     chosen = ColumnMap(**(given | choices))
     _require_scales(path, chosen)
-    for column in ("base_quat", "base_ang_vel", "base_lin_vel", "base_pos"):
-        _require_components(f"{path}: columns: {column}", chosen, column)
+    _require_components(path, chosen)
     return chosen
 
 
-def _require_components(where: str, chosen: ColumnMap, column: str) -> None:
-    """Refuse a name twice, and names that say other components of a vector than those in whose place they stand."""
-    names = chosen.columns.get(column, ())
-    order = chosen.quat_order if column == "base_quat" else "xyz"
+def _require_components(path: Path, chosen: ColumnMap) -> None:
+    """Refuse a component twice, and a quaternion's names that have w at the other end than its order says.
+
+    Joints may share a column, as the fingers of a gripper do; axes may be exchanged.
+    """
+    for column, names in chosen.columns.items():
+        if NAMED[column] != "J" and len(set(names)) < len(names):
+            raise BadInput(f"{path}: columns: {column}", "each component once", ", ".join(names)[:200])
+    names = chosen.columns.get("base_quat", ())
     differ = ["".join(signs).lower() for signs in zip(*names, strict=False) if len(set(signs)) > 1]
-    letters = differ[0] if len(differ) == 1 else order
-    if len(names) == len(order) and (
-        len(set(names)) < len(names) or (letters != order and set(letters) <= set("wxyz"))
-    ):
-        do = f"List the names of {', '.join(order)}, in this order" + ", or state the other quat_order" * (
-            column == "base_quat"
-        )
-        raise BadInput(where, f"{', '.join(order)}", ", ".join(names)[:200], f"{do}.")
+    order = "wxyz" if chosen.quat_order == "xyzw" else "xyzw"
+    if len(differ) == 1 and set(differ[0]) == set(order) and differ[0].index("w") == order.index("w"):
+        came = f"{chosen.quat_order} beside {', '.join(names)}"[:200]
+        raise BadInput(f"{path}: quat_order", "the order in which the names stand", came, f"`quat_order: {order}`.")
 
 
 def _with_layout(path: Path, table: Any, kind: str) -> Any:
