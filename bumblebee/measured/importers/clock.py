@@ -63,12 +63,12 @@ def require_clock(where: str, time: np.ndarray, chosen: ColumnMap) -> None:
         )
     if not np.isfinite(period) or _SLOWEST <= 1 / period <= _FASTEST:
         return
-    do = "They are whole seconds and nanoseconds, as `time` names two columns."
+    do = "Two columns under `time` are whole seconds and nanoseconds; name one, with its time_unit, if they are others."
     if len(chosen.time) == 1:
         seconds = period / SECONDS[chosen.time_unit]
         fit = [unit for unit, factor in SECONDS.items() if _USUAL[0] <= 1 / (seconds * factor) <= _USUAL[1]]
-        looks = " or ".join(f"{unit} ({1 / (seconds * SECONDS[unit]):.4g} Hz)" for unit in fit)
-        do = f"time_unit is {chosen.time_unit}: " + (f"these look like {looks}." if fit else "state the stamps' unit.")
+        looks = " or ".join(f"`time_unit: {unit}` ({1 / (seconds * SECONDS[unit]):.4g} Hz)" for unit in fit)
+        do = f"time_unit is {chosen.time_unit}: these look like {looks}." if fit else ""
     raise BadInput(place, f"a rate of 1 to {_FASTEST:g} Hz", f"{1 / period:.4g} Hz by the median period", do)
 
 

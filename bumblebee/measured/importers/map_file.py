@@ -127,7 +127,12 @@ def _require_keys(path: Path, table: Any, kind: str) -> None:
     if kind == "csv":
         return
     if table.get("valid") and kind != "lerobot":
-        raise BadInput(f"{path}: valid", "no such key: a column of csv and lerobot says it", repr(table["valid"])[:60])
+        raise BadInput(
+            f"{path}: valid",
+            "no such key, which csv and lerobot have",
+            repr(table["valid"])[:60],
+            "`rows: complete` leaves out rows without a number.",
+        )
     stated = {"angle_unit": f"the unit of the joints, one of {', '.join(ANGLES)}, for all or one a joint"}
     if kind == "rosbag":
         stated["time"] = "the stamp that counts, header or log"

@@ -71,9 +71,7 @@ def _parts(
         time, values = time[whole], {column: value[whole] for column, value in values.items()}
         notes += [f"{int((~whole).sum())} rows without a number left out"] * (not whole.all())
         if len(time) < 2:
-            raise BadInput(
-                where, "rows with a number in every column", f"{len(time)}", "Name fewer columns in the map."
-            )
+            raise BadInput(where, "rows with a number in every column", f"{len(time)}", "Take a column out of the map.")
     require_clock(where, time, chosen)
     lost = [f"{column}: {n} cells without a number" for column, v in values.items() if (n := int(np.isnan(v).sum()))]
     if "joint_vel" not in values:

@@ -41,7 +41,7 @@ def _recordings(source: Source) -> list[tuple[str, list[str]]]:
     names = sorted(name for name in source.names if _ending(name) in READERS)
     if not names:
         packed = [name for name in source.names if name.endswith((".mcap.zstd", ".db3.zstd"))]
-        do = "Unpack it first: zstd -d." if packed else ""
+        do = f"Unpack it first: zstd -d {packed[0]}" if packed else ""
         raise BadInput(source.place, "recordings (.mcap or .db3)", ", ".join(packed)[:200] or "none", do)
     bags = {PurePosixPath(name).parent for name in source.names if PurePosixPath(name).name == "metadata.yaml"}
     groups: dict[PurePosixPath, list[str]] = {}

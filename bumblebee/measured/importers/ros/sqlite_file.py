@@ -59,7 +59,12 @@ def _read(where: str, base: sqlite3.Connection, wanted: Container[str], limits: 
         if form != "cdr" or not text:
             came = f"{form}, type {kind}"[:120]
             expected = f"cdr and a definition of the type (in the bag, or one of {', '.join(TYPES)})"
-            raise BadInput(f"{where}: {name}", expected, came, "Convert the bag to MCAP with ros2 bag convert.")
+            raise BadInput(
+                f"{where}: {name}",
+                expected,
+                came,
+                "Convert the bag to MCAP, which holds its definitions: ros2 bag convert.",
+            )
         topics[name], numbers[number] = Topic(kind, text), name
     held = 0
     for number, name in numbers.items():
