@@ -35,7 +35,7 @@ _CONVENTIONS = {
     "joint-order": _Convention("the names of joint_pos and of joint_target in one order"),
     "velocity-sign": _Convention("scale of joint_vel, or of joint_pos, to -1"),
     "response-sign": _Convention("scale of the command, or of joint_pos and joint_vel, to -1"),
-    "quaternion-order": _Convention("quat_order to the file's"),
+    "quaternion-order": _Convention("quat_order to xyzw"),
     "velocity-frame": _Convention("base_ang_vel and base_lin_vel to columns in the base frame"),
     "gyro-sign": _Convention("base_quat to columns of the rotation from base to world"),
     "velocity-derivative": _Convention("no joint_vel, which is then made of joint_pos, or its scale", of_all=False),
@@ -44,8 +44,8 @@ _CONVENTIONS = {
 
 
 _DEGREES = {
-    "joint_vel": "scale of joint_vel to 0.01745 (positions are in rad)",
-    "joint_target": "scale of joint_target to 0.01745, of mm to 0.001 (positions are in rad, m)",
+    "joint_vel": "scale of joint_vel to 0.01745 on all joints (positions are in rad)",
+    "joint_target": "scale of joint_target to 0.01745 on all joints, of mm to 0.001 (positions are in rad, m)",
     "base_ang_vel": "gyro_unit to deg",
 }
 """What to set where the rule `degrees` is broken in such a column and not in joint_pos."""

@@ -22,7 +22,7 @@ class Thresholds:
     rate_fatal: float = 0.1
     """Relative error of the rate from which the metadata are wrong rather than rounded."""
     drift_warn: float = 0.01
-    """Change of the mean period between quarters of the file: crystals keep within 0.01 %."""
+    """Change of the mean period between parts of the file: crystals keep within 0.01 %."""
     drift_fatal: float = 0.2
     """Change from which velocities and delays of one file cannot both be right."""
     freeze_seconds: float = 0.4

@@ -64,19 +64,18 @@ def _check_jitter(view: View, steps: np.ndarray, period: float) -> None:
 
 
 def _check_drift(view: View, steps: np.ndarray) -> None:
-    """The periods of the file's quarters against one another: a clock that runs ever slower, or several rates."""
-    quarters = [part[part < view.limits.gap_warn * np.median(part)] for part in np.array_split(steps, 4) if len(part)]
-    least = min(map(len, quarters))
-    if least < 20:
+    """The periods of up to eight parts of the file: a clock that runs ever slower, or several rates."""
+    count = min(8, len(steps) // 20)
+    if count < 4:
         return
-    periods = np.array([part.mean() for part in quarters])
-    doubt = 3.0 * float(np.sqrt(np.mean([part.var() for part in quarters]))) * np.sqrt(2.0 / least)
+    parts = [part[part < view.limits.gap_warn * np.median(part)] for part in np.array_split(steps, count)]
+    periods = np.array([part.mean() for part in parts])
+    doubt = 3.0 * float(np.sqrt(np.mean([part.var() for part in parts]))) * np.sqrt(2.0 * count / len(steps))
     change = float(periods.max() / periods.min() - 1)
     if np.ptp(periods) > doubt and change > view.limits.drift_warn:
-        came = (
-            f"{', '.join(f'{1e3 * period:.4g}' for period in periods)} ms in its quarters ({100 * change:.1f} % apart)"
-        )
+        shown = ", ".join(f"{1e3 * period:.4g}" for period in periods)
+        came = f"{shown} ms in its {count} parts ({100 * change:.1f} % apart)"
         fatal = change > view.limits.drift_fatal
         came += ": import what was logged at each rate as a file of its own" * fatal
-        row = int(np.argmax(np.abs(periods - periods[0]))) * len(steps) // 4
+        row = int(np.argmax(np.abs(periods - periods[0]))) * len(steps) // count
         view.add("time", row, "time-drift", "one period throughout", came, fatal=fatal)
