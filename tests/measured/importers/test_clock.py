@@ -28,9 +28,9 @@ def read(folder: Path, stamps: np.ndarray, unit: str, more: str = "", head: str 
 @pytest.mark.parametrize(
     ("stamps", "unit", "looks"),
     [
-        (NANOSECONDS, "ms", "5e-05 Hz.*time_unit is ms: these look like ns (50 Hz)"),
-        (20.0 * np.arange(30), "s", "0.05 Hz.*time_unit is s: these look like ms (50 Hz)"),
-        (0.02 * np.arange(30), "us", "5e+07 Hz.*time_unit is us: these look like s (50 Hz)"),
+        (NANOSECONDS, "ms", "5e-05 Hz.*time_unit is ms: these look like `time_unit: ns` (50 Hz)"),
+        (20.0 * np.arange(30), "s", "0.05 Hz.*time_unit is s: these look like `time_unit: ms` (50 Hz)"),
+        (0.02 * np.arange(30), "us", "5e+07 Hz.*time_unit is us: these look like `time_unit: s` (50 Hz)"),
     ],
 )
 def test_a_unit_that_makes_the_rate_absurd_is_refused_and_the_likely_one_named(

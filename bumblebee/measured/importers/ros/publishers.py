@@ -56,7 +56,7 @@ def counted(where: str, topic: str, parts: Sequence[Part], chosen: ColumnMap) ->
         do = "The list must be the names in the messages, in their order."
         raise BadInput(f"{where}: order", f"messages with {', '.join(order)}"[:300], came, do)
     kept = [p for p in kept if 0 not in p.kind.lengths or not any(_fuller(q.kind, p.kind) for q in kept)]
-    named = [part for part in kept if part.kind.names]
+    named = [part for part in kept if asked & set(part.kind.names)]
     for k, part in enumerate(named):
         for other in named[:k]:
             if asked & set(part.kind.names) & set(other.kind.names):
@@ -84,9 +84,7 @@ def _two_publishers(where: str, topic: str, one: Part, other: Part) -> BadInput:
     do = f"Say in the map whose messages count: `order: {flow({topic: list(best.kind.names)})}`."
     if one.kind.names == other.kind.names:
         more = next((name for name in best.kind.filled if name in _COLUMNS and name not in rest.kind.filled), "")
-        do = f"Those that have {more} are read with `{_COLUMNS.get(more)}: {topic}:{more}` under `columns`." * bool(
-            more
-        )
+        do = f"Those that have {more} are read with `{_COLUMNS[more]}: {topic}:{more}` under `columns`." if more else ""
     return BadInput(where, "messages of one publisher for each joint", came, do)
 
 

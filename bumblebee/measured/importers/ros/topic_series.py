@@ -123,6 +123,8 @@ def _stamp(where: str, clock: str, raw: Message, message: Any) -> int:
 
 def _places(where: str, name: str, kind: str, named: tuple[str, ...], count: int, chosen: ColumnMap) -> dict[int, int]:
     """Joint of the map -> where it stands among `count` values; of messages with names those that they hold."""
+    if named and not set(named) & set(chosen.names or chosen.joints):
+        return {}
     if named and len(named) != count:
         do = f"Take {where.rpartition(': ')[2]} out of the map's columns."
         raise BadInput(where, f"{len(named)} values, one for each name", str(count), do)
