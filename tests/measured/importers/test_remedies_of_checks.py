@@ -166,10 +166,10 @@ def scale(column: str, pattern: str = r"set scale of [^;]*? to (-?[\d.]+)") -> C
 
 
 def says(words: str, **keys: object) -> Callable[[Import, str], None]:
-    """The line says `set WORDS in the import's map`; keys of `columns` are set there, None takes one out."""
+    """The line says `WORDS in the import's map`; keys of `columns` are set there, None takes one out."""
 
     def mend(attempt: Import, line: str) -> None:
-        assert f"set {words}" in line, line
+        assert words in line, line
         for key, value in keys.items():
             place = attempt.map["columns"] if key in attempt.map["columns"] else attempt.map
             if value is None:
@@ -210,26 +210,28 @@ def rolled(log: pd.DataFrame) -> pd.DataFrame:
 
 DEG = 180 / np.pi
 WRONG = {
-    "degrees": Wrong(times(DEG, *VECTORS), says("angle_unit to deg", angle_unit="deg")),
+    "degrees": Wrong(times(DEG, *VECTORS), says("set angle_unit to deg", angle_unit="deg")),
     "degrees of velocities": Wrong(times(DEG, "joint_vel"), scale("joint_vel")),
     "degrees of targets": Wrong(times(DEG, "joint_target"), scale("joint_target")),
-    "degrees of the gyro": Wrong(times(DEG, "base_ang_vel"), says("gyro_unit to deg", gyro_unit="deg"), "g1"),
+    "degrees of the gyro": Wrong(times(DEG, "base_ang_vel"), says("set gyro_unit to deg", gyro_unit="deg"), "g1"),
     "target-scale": Wrong(
         times(9.0, "joint_target.elbow"), scale("joint_target", r"one over the gear, about ([\d.]+)")
     ),
     "joint-order": Wrong(exchanged, one_order),
     "velocity-sign": Wrong(times(-1.0, "joint_vel.elbow"), scale("joint_vel")),
     "response-sign": Wrong(times(-1.0, "joint_target.wrist"), scale("joint_target")),
-    "velocity-derivative": Wrong(times(5.0, "joint_vel"), says("no joint_vel, which is then made", joint_vel=None)),
+    "velocity-derivative": Wrong(
+        times(5.0, "joint_vel"), says("leave joint_vel out, which is then made", joint_vel=None)
+    ),
     "range": Wrong(
         lambda log: log.assign(**{n: log[n] + 3.0 for n in log if n.endswith(".elbow") and "vel" not in n}),
-        says("scale or offset of joint_pos", offset={c: [0.0, -3.0, 0.0] for c in ("joint_pos", "joint_target")}),
+        says("set scale or offset of joint_pos", offset={c: [0.0, -3.0, 0.0] for c in ("joint_pos", "joint_target")}),
     ),
-    "quaternion-order": Wrong(rolled, says("quat_order to xyzw", quat_order="xyzw"), "g1"),
+    "quaternion-order": Wrong(rolled, says("set quat_order to xyzw", quat_order="xyzw"), "g1"),
     "velocity-frame": Wrong(
         put(base_ang_vel="world_ang_vel", base_lin_vel="world_lin_vel"),
         says(
-            "base_ang_vel and base_lin_vel to columns in the base frame",
+            "set base_ang_vel and base_lin_vel to columns in the base frame",
             **{c: numbered(c, f"kept_{c}") for c in ("base_ang_vel", "base_lin_vel")},
         ),
         "g1",
@@ -237,7 +239,8 @@ WRONG = {
     "gyro-sign": Wrong(
         put(base_quat="world_quat"),
         says(
-            "base_quat to columns of the rotation from base to world", base_quat=numbered("base_quat", "kept_base_quat")
+            "set base_quat to columns of the rotation from base to world",
+            base_quat=numbered("base_quat", "kept_base_quat"),
         ),
         "g1",
     ),
