@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -26,10 +27,22 @@ def read_csv(where: object, content: bytes, limits: Limits = LIMITS, **options: 
     rows, columns = content.count(b"\n"), 1 + max(head.count(sign) for sign in (b",", b";", b"\t"))
     _within(where, rows, columns, limits)
     try:
+        _require_once(where, head, options.get("sep", ","))
         table = pd.read_csv(io.BytesIO(content), encoding="utf-8-sig", low_memory=False, **options)
-    except Exception as error:  # pandas' parser raises what it likes
+    except BadInput:
+        raise
+    except Exception as error:  # the parsers raise what they like
         raise csv_fault(where, content, error) from None
     return require_unshifted(where, table)
+
+
+def _require_once(where: object, head: bytes, cut: str) -> None:
+    """Refuse a name that stands twice in the header; pandas makes up another one for the second."""
+    names = next(csv.reader([head.decode("utf-8-sig", "replace")], delimiter=cut, skipinitialspace=True), [])
+    twice = [name for name, count in Counter(name.strip() for name in names).items() if name and count > 1]
+    if twice:
+        do = "Rename or remove one of them."
+        raise BadInput(f"{where}: column {twice[0]}"[:200], "every column once", "the same name twice", do)
 
 
 def read_parquet(where: object, content: bytes, wanted: Sequence[str], limits: Limits = LIMITS) -> pd.DataFrame:

@@ -31,23 +31,25 @@ class _Convention:
 
 _CONVENTIONS = {
     "target-copy": _Convention(),
-    "degrees": _Convention("angle_unit to deg (of mm: m and a scale of 0.001)", by_joint=False),
-    "target-scale": _Convention("scale of joint_target to one over the gear"),
-    "joint-order": _Convention("the names of joint_pos and of joint_target in one order"),
-    "velocity-sign": _Convention("scale of joint_vel, or of joint_pos, to -1"),
-    "response-sign": _Convention("scale of the command, or of joint_pos and joint_vel, to -1"),
-    "quaternion-order": _Convention("quat_order to the file's"),
-    "velocity-frame": _Convention("base_ang_vel and base_lin_vel to columns in the base frame"),
-    "gyro-sign": _Convention("base_quat to columns of the rotation from base to world"),
-    "velocity-derivative": _Convention("scale of joint_vel, or time_unit,", of_all=False),
-    "range": _Convention("scale or offset of joint_pos", of_all=False),
+    "degrees": _Convention("set angle_unit to deg (of mm: m and a scale of 0.001)", by_joint=False),
+    "target-scale": _Convention("set scale of joint_target to one over the gear"),
+    "joint-order": _Convention("set the names of joint_pos and of joint_target in one order"),
+    "velocity-sign": _Convention("set scale of joint_vel, or of joint_pos, to -1"),
+    "response-sign": _Convention("set scale of the command, or of joint_pos and joint_vel, to -1"),
+    "quaternion-order": _Convention("set quat_order to xyzw"),
+    "velocity-frame": _Convention("set base_ang_vel and base_lin_vel to columns in the base frame"),
+    "gyro-sign": _Convention("set base_quat to columns of the rotation from base to world"),
+    "velocity-derivative": _Convention(
+        "leave joint_vel out, which is then made of joint_pos, or set its scale", of_all=False
+    ),
+    "range": _Convention("set scale or offset of joint_pos", of_all=False),
 }
 
 
 _DEGREES = {
-    "joint_vel": "scale of joint_vel to 0.01745 (positions are in rad)",
-    "joint_target": "scale of joint_target to 0.01745, of mm to 0.001 (positions are in rad, m)",
-    "base_ang_vel": "gyro_unit to deg",
+    "joint_vel": "set scale of joint_vel to 0.01745 on all joints (positions are in rad)",
+    "joint_target": "set scale of joint_target to 0.01745 on all joints, of mm to 0.001 (positions are in rad, m)",
+    "base_ang_vel": "set gyro_unit to deg",
 }
 """What to set where the rule `degrees` is broken in such a column and not in joint_pos."""
 
@@ -161,7 +163,7 @@ def _error(common: _Common, rollouts: int, dataset: object) -> BadInput:
         f"(in {first.file}, column {first.column}: {first.came})"
     )
     do = first.do or (
-        "That is one convention of the logger or the model, no fault of single recordings: set "
+        "That is one convention of the logger or the model, no fault of single recordings: "
         f"{common.remedy} in the import's map, or correct the model; rollouts by another convention "
         "belong in another dataset."
     )
@@ -170,7 +172,7 @@ def _error(common: _Common, rollouts: int, dataset: object) -> BadInput:
 
 def _warning(common: _Common, rollouts: int) -> str:
     told = f"{common.count} of {rollouts} rollouts were set aside by rule {common.rule} on {_listed(common.joints)}"
-    do = f"if that is one convention of the logger, set {common.remedy} in the import's map."
+    do = f"if that is one convention of the logger, {common.remedy} in the import's map."
     return f"{told}: {common.first.do or do}"
 
 

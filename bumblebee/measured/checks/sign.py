@@ -12,8 +12,11 @@ def check_velocity(view: View) -> None:
     """joint_vel against the derivative of joint_pos: sign, unit, column; compared as displacement over a window.
 
     The window is the shortest over which a joint moves fast enough. Joints that move slowly are judged on sign, unit
-    and column alone, since coarse velocities (a servo's 50 counts/s) say little more about them.
+    and column alone, since coarse velocities (a servo's 50 counts/s) say little more about them. Velocities that an
+    import made of the positions, as the log had none, are not judged.
     """
+    if _made_of_positions(view):
+        return
     pairs = {seconds: _displacements(view, seconds) for seconds in WINDOWS}
     for joint in range(len(view.rollout.joints)):
         if view.found("frozen", view.label("joint_pos", joint)):
@@ -24,6 +27,13 @@ def check_velocity(view: View) -> None:
                 longer = [pair for other, pair in pairs.items() if other > seconds]
                 _judge_velocity(view, joint, speed, said, longer, slow=factor < 1)
                 break
+
+
+def _made_of_positions(view: View) -> bool:
+    """Whether joint_vel are the central differences of joint_pos."""
+    rollout = view.rollout
+    made = np.gradient(rollout.joint_pos, rollout.time, axis=0)
+    return bool(np.allclose(made[1:-1], rollout.joint_vel[1:-1]))
 
 
 def _displacements(view: View, seconds: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,8 +11,6 @@ class Thresholds:
     """Periods between two rows: from here on a tick is missing. Loggers wander by less than half a period."""
     gap_fatal: float = 5.0
     """Periods: from here on no one knows which commands the robot got in between (0.1 s at 50 Hz)."""
-    gap_episode: float = 3.0
-    """Seconds: a pause this long is no lost packet, but rather another recording."""
     gap_share_fatal: float = 0.05
     """Share of the file's ticks that may be missing in all before it is not one rollout any more."""
     jitter_warn: float = 0.15
@@ -24,7 +22,7 @@ class Thresholds:
     rate_fatal: float = 0.1
     """Relative error of the rate from which the metadata are wrong rather than rounded."""
     drift_warn: float = 0.01
-    """Change of the mean period from the first to the last quarter: crystals keep within 0.01 %."""
+    """Change of the mean period between parts of the file: crystals keep within 0.01 %."""
     drift_fatal: float = 0.2
     """Change from which velocities and delays of one file cannot both be right."""
     freeze_seconds: float = 0.4

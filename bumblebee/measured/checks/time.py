@@ -1,4 +1,4 @@
-"""Checks of time: order, duplicates, gaps, jitter, a clock that drifts, and a rate that is not `control_hz`."""
+"""Checks of time: order, duplicates, gaps, jitter, a clock that drifts, several rates, one that is not `control_hz`."""
 
 import numpy as np
 
@@ -20,9 +20,11 @@ def check_time(view: View) -> None:
         return
     period = float(np.median(steps))
     _check_rate(view, period)
+    _check_drift(view, steps)
+    if any(finding.rule == "time-drift" and finding.fatal for finding in view.findings):
+        return  # gaps and jitter are told by the period, of which there are several
     _check_gaps(view, np.diff(view.rollout.time), period)
     _check_jitter(view, steps[steps < view.limits.gap_warn * period], period)
-    _check_drift(view, steps[steps < view.limits.gap_warn * period])
 
 
 def _check_rate(view: View, period: float) -> None:
@@ -47,8 +49,8 @@ def _check_gaps(view: View, steps: np.ndarray, period: float) -> None:
     missing = float((steps[gaps] / period - 1).sum()) / len(steps)
     came = f"{int(gaps.sum())} gaps, the longest {longest:.4g} s = {longest / period:.1f} periods"
     fatal = longest > limits.gap_fatal * period or missing > limits.gap_share_fatal
-    if fatal and longest > limits.gap_episode:
-        came += " (several recordings in one file? `episode` in the import's map tells them apart)"
+    if longest > limits.gap_fatal * period:
+        came += " (`episodes: split` in the import's map makes a rollout of what lies before, between and after)"
     row = int(np.argmax(steps)) + 1 if fatal else int(np.argmax(gaps)) + 1
     view.add("time", row, "time-gap", f"a row every {period:.4g} s", came, fatal=fatal)
 
@@ -62,14 +64,18 @@ def _check_jitter(view: View, steps: np.ndarray, period: float) -> None:
 
 
 def _check_drift(view: View, steps: np.ndarray) -> None:
-    """The period at the file's end against that at its beginning: a clock that runs ever slower or faster."""
-    part = len(steps) // 4
-    if part < 20:
+    """The periods of up to eight parts of the file: a clock that runs ever slower, or several rates."""
+    count = min(8, len(steps) // 20)
+    if count < 4:
         return
-    first, last = float(np.mean(steps[:part])), float(np.mean(steps[-part:]))
-    doubt = 3.0 * float(steps.std()) * np.sqrt(2.0 / part)
-    change = last / first - 1
-    if abs(last - first) > doubt and abs(change) > view.limits.drift_warn:
-        came = f"{1e3 * first:.4g} ms in the first quarter, {1e3 * last:.4g} ms in the last ({100 * change:+.1f} %)"
-        fatal = abs(change) > view.limits.drift_fatal
-        view.add("time", len(steps) - part, "time-drift", "one period throughout", came, fatal=fatal)
+    parts = [part[part < view.limits.gap_warn * np.median(part)] for part in np.array_split(steps, count)]
+    periods = np.array([part.mean() for part in parts])
+    doubt = 3.0 * float(np.sqrt(np.mean([part.var() for part in parts]))) * np.sqrt(2.0 * count / len(steps))
+    change = float(periods.max() / periods.min() - 1)
+    if np.ptp(periods) > doubt and change > view.limits.drift_warn:
+        shown = ", ".join(f"{1e3 * period:.4g}" for period in periods)
+        came = f"{shown} ms in its {count} parts ({100 * change:.1f} % apart)"
+        fatal = change > view.limits.drift_fatal
+        came += ": import what was logged at each rate as a file of its own" * fatal
+        row = int(np.argmax(np.abs(periods - periods[0]))) * len(steps) // count
+        view.add("time", row, "time-drift", "one period throughout", came, fatal=fatal)

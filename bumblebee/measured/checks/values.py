@@ -20,7 +20,7 @@ def check_finite(view: View) -> None:
         name = view.label(column, place) if per_joint else column
         came = f"{values.reshape(len(values), -1)[row, place]} ({int(bad.sum())} such values)"
         if np.isnan(values).any():
-            came += ": empty cells? `valid` in the map of csv and lerobot names a column that is 0 in rows to leave out"
+            came += ": empty cells? `rows: complete` in the import's map leaves such rows out"
         view.add(name, row, "finite", "finite numbers", came, fatal=True)
 
 

@@ -40,23 +40,23 @@ _OTHER_NAMES = {
 }
 
 
-def import_asap(place: Path, model: mujoco.MjModel, joints: tuple[str, ...] = ()) -> list[Rollout]:
+def import_asap(place: Path, model: mujoco.MjModel) -> list[Rollout]:
     """Every .npz of a folder or zip archive, or one file.
 
     Args:
         place: folder, archive or file.
-        model: the declared model; joints that it lacks (wrists, say) are dropped.
-        joints: joint names in the logs' order; by default the model's actuated joints, or the G1's 29.
+        model: the declared model, whose actuated joints the logs hold in its order; or the G1's 29, of which those that
+            it lacks (wrists, say) are dropped.
     """
     source = open_source(place)
     names = source.ending(".npz")
     if not names:
         raise BadInput(place, ".npz files", "none")
     ids = rollout_names(names, ".npz")
-    return [_read(source, name, ids[name], model, joints) for name in names]
+    return [_read(source, name, ids[name], model) for name in names]
 
 
-def _read(source: Source, name: str, rollout_id: str, model: mujoco.MjModel, joints: tuple[str, ...]) -> Rollout:
+def _read(source: Source, name: str, rollout_id: str, model: mujoco.MjModel) -> Rollout:
     where, table = source.where(name), _renamed(read_arrays(source, name))
     for key in NEEDED:
         if key not in table:
@@ -70,7 +70,7 @@ def _read(source: Source, name: str, rollout_id: str, model: mujoco.MjModel, joi
     differenced = "joint_vel" not in table
     if differenced:
         table["joint_vel"] = differences(time, table["joint_pos"])
-    named = joints or _default_joints(where, model, table["joint_pos"].shape[1])
+    named = _default_joints(where, model, table["joint_pos"].shape[1])
     known = {model.joint(i).name for i in range(model.njnt)}
     keep = [i for i, joint in enumerate(named) if joint in known] or list(range(len(named)))
     meta = {"motion": rollout_id, "notes": "ASAP logger"}
@@ -126,7 +126,12 @@ def _require_wxyz(where: str, rollout: Rollout, model: mujoco.MjModel) -> None:
         check_base(view)
     for finding in view.findings:
         if finding.rule == "quaternion-order" and finding.fatal:
-            raise BadInput(f"{where}: IMU_quaternion", "wxyz, Unitree's order", finding.came, "Reorder the array.")
+            raise BadInput(
+                f"{where}: IMU_quaternion",
+                "wxyz, Unitree's order",
+                finding.came,
+                "Store np.roll(IMU_quaternion, 1, axis=1).",
+            )
         rollout.meta["notes"] += f"; {finding.rule}: {finding.came}"
 
 
@@ -158,7 +163,12 @@ def _default_joints(where: str, model: mujoco.MjModel, width: int) -> tuple[str,
     for names in (actuated, joint_names(29), joint_names(23)):
         if len(names) == width:
             return names
-    raise BadInput(f"{where}: joint_pos", f"{len(actuated)} joints, as the model has", str(width), "Name the joints.")
+    raise BadInput(
+        f"{where}: joint_pos",
+        f"{len(actuated)} joints, as the model has",
+        str(width),
+        "Give the model of the robot that was logged: --model.",
+    )
 
 
 def _base(table: dict[str, np.ndarray], time: np.ndarray) -> tuple[dict[str, np.ndarray], str]:

@@ -68,6 +68,10 @@ class ColumnMap:
     """Topic of messages without names -> the joints in the order of its values."""
     episode: str = ""
     """Column that numbers the episodes of a file, or HDF5's groups of an episode each; every one becomes a rollout."""
+    episodes: Literal["whole", "split"] = "whole"
+    """split: a log whose time starts again, or pauses, is cut there, and every take becomes a rollout."""
+    rows: Literal["all", "complete"] = "all"
+    """complete: rows in which a column of the map has no number are left out."""
     valid: str = ""
     """Column that is 0 in rows that do not count, as `torque_enable` is once a servo was switched off."""
     scale: dict[str, tuple[float, ...]] = field(default_factory=dict)

@@ -183,6 +183,7 @@ def _value(where: str, cell: Any, column: Column) -> Any:
     if pd.isna(cell):
         return None
     value = cell.item() if hasattr(cell, "item") else cell
+    value = str(value).lower() if isinstance(value, bool) else value  # pandas reads the text so
     if isinstance(value, str) and (column.scale != 1.0 or column.body):
         raise BadInput(where, "a number", repr(value)[:80])
     if not isinstance(value, str):

@@ -51,7 +51,7 @@ def read_rollouts(
     table = read_conditions(conditions, open_source(source)) if conditions else None
     no_log = (table.member,) if table else ()
     if kind in ("asap", "sysid") and model is None:
-        raise BadInput(kind, "the declared model, by whose joints the file is read", "none", "Give a model.xml.")
+        raise BadInput(kind, "the declared model, by whose joints the file is read", "none", "Give it: --model.")
     if kind in MAPPED and column_map is None:
         raise BadInput(kind, "a column map", "none", "Give a YAML file with joints, columns and units: --columns.")
     mapped = read_map(column_map, kind) if kind in MAPPED and column_map else DOUBLE_PENDULUM[0]

@@ -13,17 +13,10 @@ from itertools import pairwise
 import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.measured.importers.clock import SHORTEST
 
 LOCKED = "A motor that is absent, dead or locked has _ in its place in joints, and its joint stands under locked."
 _FOLDED = ("kp", "kd", "target_vel", "feed_forward")
-
-
-@dataclass(frozen=True)
-class DriveSettings:
-    """When a stretch of constant gains is a rollout."""
-
-    shortest: float = 1.0
-    """Seconds; shorter ones are ramps of the gains, which hold no window of the diagnosis' longest horizon."""
 
 
 @dataclass(frozen=True)
@@ -38,25 +31,21 @@ class Stretch:
 
 
 def stretches(
-    where: str,
-    time: np.ndarray,
-    values: dict[str, np.ndarray],
-    joints: Sequence[str],
-    settings: DriveSettings | None = None,
+    where: str, time: np.ndarray, values: dict[str, np.ndarray], joints: Sequence[str]
 ) -> tuple[list[Stretch], list[str]]:
     """Cut a log (T rows) where its gains change; returns the stretches, and what was left out, for the notes.
+
+    A stretch shorter than `SHORTEST` is a ramp of the gains.
 
     Args:
         where: the file, for messages.
         time: (T,) stamps [s].
         values: columns of the contract and of the drive (kp, kd, target_vel, feed_forward), (T, J) each.
         joints: names of the J joints, for messages.
-        settings: when a stretch is long enough.
 
     Raises:
         BadInput: a feed-forward torque or velocity target without kp, or no stretch that can be used.
     """
-    settings = settings or DriveSettings()
     if not any(column in values for column in _FOLDED):
         return [Stretch(slice(0, len(time)), values, {})], []
     if "kp" not in values:
@@ -67,13 +56,13 @@ def stretches(
     bounds = [0, *edges.tolist(), len(time)]
     found, left_out, off = [], 0, np.zeros(len(joints), dtype=bool)
     for first, last in pairwise(bounds):
-        long_enough = last - first > 1 and time[last - 1] - time[first] >= settings.shortest
+        long_enough = last - first > 1 and time[last - 1] - time[first] >= SHORTEST
         stretch = _stretch(slice(first, last), values) if long_enough else None
         off |= long_enough & (values["kp"][first] == 0)
         found += [stretch] if stretch else []
         left_out += 0 if stretch else last - first
     if not found:
-        expected = f"{settings.shortest:g} s under constant gains, kp > 0 of all joints or of none"
+        expected = f"{SHORTEST:g} s under constant gains, kp > 0 of all joints or of none"
         some = [name for name, out in zip(joints, off, strict=True) if out]
         if some and not off.all():
             raise BadInput(f"{where}: kp", expected, f"kp 0 of {', '.join(some)}", LOCKED)

@@ -28,6 +28,8 @@ _CHOICES = {
     "gyro_unit": ("rad", "deg"),
     "quat_order": ("wxyz", "xyzw"),
     "grid": ("states", "commands"),
+    "episodes": ("whole", "split"),
+    "rows": ("all", "complete"),
 }
 LEROBOT = {
     "columns": {"joint_pos": "observation.state", "joint_target": "action"},
@@ -74,7 +76,24 @@ def read_map(path: Path, kind: str = "csv") -> ColumnMap:
     choices["gyro_unit"] = table.get("gyro_unit") or ("deg" if given["angle_unit"] == ("deg",) else "rad")
     chosen = ColumnMap(**(given | choices))
     _require_scales(path, chosen)
+    _require_components(path, chosen)
     return chosen
+
+
+def _require_components(path: Path, chosen: ColumnMap) -> None:
+    """Refuse a component twice, and a quaternion's names that have w at the other end than its order says.
+
+    Joints may share a column, as the fingers of a gripper do; axes may be exchanged.
+    """
+    for column, names in chosen.columns.items():
+        if NAMED[column] != "J" and len(set(names)) < len(names):
+            raise BadInput(f"{path}: columns: {column}", "each component once", ", ".join(names)[:200])
+    names = chosen.columns.get("base_quat", ())
+    differ = ["".join(signs).lower() for signs in zip(*names, strict=False) if len(set(signs)) > 1]
+    order = "wxyz" if chosen.quat_order == "xyzw" else "xyzw"
+    if len(differ) == 1 and set(differ[0]) == set(order) and differ[0].index("w") == order.index("w"):
+        came = f"{chosen.quat_order} beside {', '.join(names)}"[:200]
+        raise BadInput(f"{path}: quat_order", "the order in which the names stand", came, f"`quat_order: {order}`.")
 
 
 def _with_layout(path: Path, table: Any, kind: str) -> Any:
@@ -109,7 +128,12 @@ def _require_keys(path: Path, table: Any, kind: str) -> None:
     if kind == "csv":
         return
     if table.get("valid") and kind != "lerobot":
-        raise BadInput(f"{path}: valid", "no such key: a column of csv and lerobot says it", repr(table["valid"])[:60])
+        raise BadInput(
+            f"{path}: valid",
+            "no such key, which csv and lerobot have",
+            repr(table["valid"])[:60],
+            "`rows: complete` leaves out rows without a number.",
+        )
     stated = {"angle_unit": f"the unit of the joints, one of {', '.join(ANGLES)}, for all or one a joint"}
     if kind == "rosbag":
         stated["time"] = "the stamp that counts, header or log"

@@ -5,13 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.measured.importers.clock import require_clock
+from bumblebee.measured.importers.clock import SHORTEST, require_clock, takes
 from bumblebee.measured.importers.column_map import LEFT_OUT, NAMED, ColumnMap
-from bumblebee.measured.importers.drive import stretches
+from bumblebee.measured.importers.drive import Stretch, stretches
 from bumblebee.measured.importers.source import NO_VELOCITY, differences, measured_rate
-from bumblebee.measured.rollout import Rollout
+from bumblebee.measured.rollout import COMMANDS, WIDTHS, Rollout
 
 _ANGULAR = ("joint_pos", "joint_vel", "joint_target", "target_vel")
+_NEEDED = ("joint_pos", *COMMANDS)
 _FACTORS = {"rad": 1.0, "deg": np.pi / 180, "turn": 2 * np.pi, "m": 1.0, "normalised": 1.0}
 
 
@@ -23,7 +24,7 @@ def rollouts_of(
     chosen: ColumnMap,
     notes: tuple[str, ...] = (),
 ) -> list[Rollout]:
-    """Rollouts of one log; more than one where the gains changed on the way.
+    """Rollouts of one log; more than one where it holds several takes or the gains changed on the way.
 
     Args:
         where: the file, for messages.
@@ -36,26 +37,65 @@ def rollouts_of(
     Raises:
         BadInput: stamps that step back or have another unit; gains without a use; no command.
     """
-    require_clock(where, time, chosen)
-    lost = [f"{column}: {n} cells without a number" for column, v in values.items() if (n := int(np.isnan(v).sum()))]
+    rows = [slice(0, len(time))]
+    if chosen.episodes == "split":
+        rows = takes(time)
+        if not rows:
+            raise BadInput(f"{where}: episodes", f"takes of {SHORTEST:g} s or more", "none")
+        short = len(time) - sum(part.stop - part.start for part in rows)
+        notes = (*notes, *[f"{short} rows of takes shorter than {SHORTEST:g} s left out"] * bool(short))
     turned = {column: _turned(column, value, chosen) for column, value in values.items()}
     keep = [place for place, joint in enumerate(chosen.joints) if joint != LEFT_OUT]
     if len(keep) < len(chosen.joints):
         turned = {c: value[:, keep] if NAMED[c] == "J" else value for c, value in turned.items()}
-    if "joint_vel" not in turned:
-        turned["joint_vel"] = differences(time, turned["joint_pos"])
-        lost.insert(0, NO_VELOCITY)
     joints = tuple(chosen.joints[place] for place in keep)
-    parts, left_out = stretches(where, time, turned, joints)
-    said = "; ".join(filter(None, (str(chosen.meta.get("notes") or ""), *notes, *lost, *left_out)))
+    parts = [part for take in rows for part in _parts(where, time, turned, take, joints, chosen)]
     rollouts = []
-    for number, part in enumerate(parts, start=1):
+    for number, (stamps, part, found) in enumerate(parts, start=1):
+        said = "; ".join(filter(None, (str(chosen.meta.get("notes") or ""), *notes, *found)))
         name = rollout_id if len(parts) == 1 else f"{rollout_id}_{number}"
         meta = {"motion": name} | _meta(chosen, keep) | part.meta | ({"notes": said} if said else {})
-        stamps = time[part.rows]
         _require_command(where, part.values)
         rollouts.append(Rollout(name, joints, measured_rate(stamps), stamps, **part.values, meta=meta))
     return rollouts
+
+
+def _parts(
+    where: str, time: np.ndarray, values: dict[str, np.ndarray], take: slice, joints: tuple[str, ...], chosen: ColumnMap
+) -> list[tuple[np.ndarray, Stretch, list[str]]]:
+    """Stamps, columns and notes of every stretch of constant gains in one take."""
+    time, values = time[take], {column: value[take] for column, value in values.items()}
+    values, notes = _with_numbers(where, values, joints)
+    if chosen.rows == "complete":
+        whole = np.isfinite(time) & np.all([np.isfinite(value).all(axis=1) for value in values.values()], axis=0)
+        time, values = time[whole], {column: value[whole] for column, value in values.items()}
+        notes += [f"{int((~whole).sum())} rows without a number left out"] * (not whole.all())
+        if len(time) < 2:
+            raise BadInput(where, "rows with a number in every column", f"{len(time)}", "Take a column out of the map.")
+    require_clock(where, time, chosen)
+    lost = [f"{column}: {n} cells without a number" for column, v in values.items() if (n := int(np.isnan(v).sum()))]
+    if "joint_vel" not in values:
+        values["joint_vel"] = differences(time, values["joint_pos"])
+        notes.insert(0, NO_VELOCITY)
+    parts, left_out = stretches(where, time, values, joints)
+    return [(time[part.rows], part, [*notes, *lost, *left_out]) for part in parts]
+
+
+def _with_numbers(
+    where: str, values: dict[str, np.ndarray], joints: tuple[str, ...]
+) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Columns with numbers of every joint, and notes on the others, which are left out where they are optional."""
+    kept, notes = {}, []
+    for column, value in values.items():
+        empty = np.isnan(value).all(axis=0)
+        which = "" if empty.all() or NAMED[column] != "J" else f" of {', '.join(np.array(joints)[empty])}"
+        if empty.any() and column in _NEEDED:
+            raise BadInput(f"{where}: {column}", "numbers", f"no number{which} in any row")
+        if empty.any() and column in WIDTHS:
+            notes.append(f"{column} left out: no number{which} in any row")
+        else:
+            kept[column] = value
+    return kept, notes
 
 
 def _turned(column: str, value: np.ndarray, chosen: ColumnMap) -> np.ndarray:

@@ -99,7 +99,7 @@ def test_a_range_that_most_rollouts_leave_spoils_no_others(tmp_path: Path) -> No
 def test_velocities_of_another_size_are_told_where_all_have_them(tmp_path: Path) -> None:
     """Where some fail by another rule, nothing is common to all, and the first reason ends it as ever."""
     large = [replace(r, joint_vel=5 * r.joint_vel) for r in good(4)]
-    with pytest.raises(BadInput, match=r"rule velocity-derivative: .* in 4 of 4 rollouts .* scale of joint_vel"):
+    with pytest.raises(BadInput, match=r"rule velocity-derivative: .* in 4 of 4 rollouts .* leave joint_vel out"):
         session(tmp_path, large)
     broken = good(4)[3].joint_pos.copy()
     broken[7] = np.nan

@@ -89,13 +89,15 @@ def unitree_messages(
     return out
 
 
-def write_mcap(path: Path, messages: list[tuple[str, str, int, Any]], compression: str = "ZSTD") -> None:
-    """A recording as ROS 2 Iron and later write it."""
+def write_mcap(
+    path: Path, messages: list[tuple[str, str, int, Any]], compression: str = "ZSTD", chunk: int = 1 << 13
+) -> None:
+    """A recording as ROS 2 Iron and later write it, in chunks of so many bytes."""
     from mcap.writer import CompressionType
     from mcap_ros2.writer import Writer
 
     with path.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType[compression], chunk_size=1 << 13)
+        writer = Writer(stream, compression=CompressionType[compression], chunk_size=chunk)
         schemas = {kind: writer.register_msgdef(kind, TYPES[kind]) for kind in {kind for _, kind, _, _ in messages}}
         for topic, kind, stamp, message in messages:
             writer.write_message(topic, schemas[kind], message, log_time=stamp + LOGGED, publish_time=stamp + 1)

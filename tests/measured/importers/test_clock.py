@@ -28,9 +28,9 @@ def read(folder: Path, stamps: np.ndarray, unit: str, more: str = "", head: str 
 @pytest.mark.parametrize(
     ("stamps", "unit", "looks"),
     [
-        (NANOSECONDS, "ms", "5e-05 Hz.*time_unit is ms: these look like ns (50 Hz)"),
-        (20.0 * np.arange(30), "s", "0.05 Hz.*time_unit is s: these look like ms (50 Hz)"),
-        (0.02 * np.arange(30), "us", "5e+07 Hz.*time_unit is us: these look like s (50 Hz)"),
+        (NANOSECONDS, "ms", "5e-05 Hz.*time_unit is ms: these look like `time_unit: ns` (50 Hz)"),
+        (20.0 * np.arange(30), "s", "0.05 Hz.*time_unit is s: these look like `time_unit: ms` (50 Hz)"),
+        (0.02 * np.arange(30), "us", "5e+07 Hz.*time_unit is us: these look like `time_unit: s` (50 Hz)"),
     ],
 )
 def test_a_unit_that_makes_the_rate_absurd_is_refused_and_the_likely_one_named(
@@ -42,7 +42,7 @@ def test_a_unit_that_makes_the_rate_absurd_is_refused_and_the_likely_one_named(
 
 def test_rows_out_of_order_are_refused_with_their_row_unless_episodes_tell_them_apart(tmp_path: Path) -> None:
     twice = np.tile(0.02 * np.arange(15), 2)
-    with pytest.raises(BadInput, match=r"time, row 15: expected stamps that grow.*`episode`"):
+    with pytest.raises(BadInput, match=r"time, row 15: expected stamps that grow.*of one recording"):
         read(tmp_path, twice, "s")
     assert len(read(tmp_path, twice, "s", "episode: n\n", "time,q,u,n")) == 2
 
@@ -52,19 +52,19 @@ def test_usual_rates_pass(tmp_path: Path, stamps: np.ndarray, unit: str) -> None
     assert len(read(tmp_path, stamps, unit)) == 1
 
 
-@pytest.mark.parametrize(("pause", "named"), [(10.0, True), (0.5, False)])
-def test_a_long_pause_names_episodes_as_the_remedy(pause: float, named: bool) -> None:
+@pytest.mark.parametrize(("pause", "named"), [(10.0, True), (0.5, True), (0.06, False)])
+def test_a_pause_names_episodes_as_the_remedy(pause: float, named: bool) -> None:
     rollout = arm_rollout(0)
     late = np.where(np.arange(rollout.frames) < 100, 0.0, pause)
     (found,) = (
         f for f in check_rollout(replace(rollout, time=rollout.time + late), arm_model()) if f.rule == "time-gap"
     )
-    assert found.fatal and ("`episode`" in found.came) == named
+    assert found.fatal == named and ("`episodes: split`" in found.came) == named
 
 
-def test_cells_without_a_number_name_the_column_that_leaves_rows_out() -> None:
+def test_cells_without_a_number_name_the_setting_that_leaves_rows_out() -> None:
     rollout = arm_rollout(0)
     place = rollout.joint_pos.copy()
     place[7, 1] = np.nan
     (found,) = (f for f in check_rollout(replace(rollout, joint_pos=place), arm_model()) if f.rule == "finite")
-    assert found.row == 7 and "`valid`" in found.came
+    assert found.row == 7 and "`rows: complete`" in found.came

@@ -78,7 +78,7 @@ def test_names_of_the_messages_are_said_beside_the_model_s(tmp_path: Path) -> No
     same(ours, rollout)
 
 
-def test_a_bag_in_parts_is_one_rollout_and_one_that_was_cut_off_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+def test_a_bag_in_parts_is_one_rollout(tmp_path: Path) -> None:
     rollout = arm_rollout(0)
     messages, bag = joint_messages(rollout, ARM_JOINTS), tmp_path / "walk"
     bag.mkdir()
@@ -88,12 +88,6 @@ def test_a_bag_in_parts_is_one_rollout_and_one_that_was_cut_off_is_read_as_far_a
     (ours,) = imported(tmp_path, "walk", SAME_CLOCK)
     assert ours.rollout_id == "walk"
     same(ours, rollout)
-    write_mcap(tmp_path / "cut.mcap", messages)
-    whole = (tmp_path / "cut.mcap").read_bytes()
-    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
-    (ours,) = imported(tmp_path, "cut.mcap", SAME_CLOCK)
-    assert 10 < ours.frames < rollout.frames and "middle of a record" in ours.meta["notes"]
-    same(ours, rollout, slice(ours.frames))
 
 
 def test_unitree_s_low_states_and_commands_give_a_rollout_for_each_set_of_gains(tmp_path: Path) -> None:
@@ -159,7 +153,7 @@ def test_a_trajectory_s_points_and_an_imu_with_named_components_are_read(tmp_pat
         (("angle_unit: rad\n", ""), r"angle_unit.*nothing.*not guessed"),
         (("time: log\n", ""), r"time: .*header or log.*nothing"),
         (("order: {/command: [wrist, elbow, shoulder]}\n", ""), r"order.*/command's 3 values.*nothing stated"),
-        (("[wrist, elbow, shoulder]", "[elbow, shoulder]"), r"order.*3 joints.*came 2"),
+        (("[wrist, elbow, shoulder]", "[elbow, shoulder]"), r"order.*/command's 3 values.*came elbow, shoulder"),
         (("time: log", "time: header"), r"/command.*a header.*time: log"),
         (("/command:data", "/cmd:data"), r"/cmd.*messages of this topic.*/command \(std_msgs"),
         (("/joint_states:velocity", "/joint_states:effort"), r"joint_vel.*3 values.*came 0.*out of the map"),

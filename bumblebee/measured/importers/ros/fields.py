@@ -90,6 +90,14 @@ def names_in(message: Any) -> tuple[str, ...]:
     return ()
 
 
+def filled_lists(message: Any) -> tuple[str, ...]:
+    """A message's own lists that are not empty, but for the joints' names."""
+    fields = {name: getattr(message, name) for name in type(message).__slots__ if name not in NAME_FIELDS}
+    return tuple(
+        name for name, value in fields.items() if isinstance(value, Sequence) and not isinstance(value, str) and value
+    )
+
+
 def _flat(where: str, value: Any) -> list[float]:
     if isinstance(value, bool | int | float):
         return [float(value)]

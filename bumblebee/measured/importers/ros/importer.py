@@ -8,10 +8,11 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.importers.column_map import ColumnMap
 from bumblebee.measured.importers.mapped import rollouts_of
 from bumblebee.measured.importers.ros.fields import steps
-from bumblebee.measured.importers.ros.grid import on_one_grid
+from bumblebee.measured.importers.ros.grid import Series, on_one_grid
 from bumblebee.measured.importers.ros.mcap_file import read_mcap
 from bumblebee.measured.importers.ros.recording import Recording, merged
 from bumblebee.measured.importers.ros.sqlite_file import read_sqlite
+from bumblebee.measured.importers.ros.takes import require_running, split_takes
 from bumblebee.measured.importers.ros.topic_series import Wanted, series_of
 from bumblebee.measured.importers.source import Source, open_source
 from bumblebee.measured.rollout import Rollout
@@ -40,7 +41,7 @@ def _recordings(source: Source) -> list[tuple[str, list[str]]]:
     names = sorted(name for name in source.names if _ending(name) in READERS)
     if not names:
         packed = [name for name in source.names if name.endswith((".mcap.zstd", ".db3.zstd"))]
-        do = "Unpack it first: zstd -d." if packed else ""
+        do = f"Unpack it first: zstd -d {packed[0]}" if packed else ""
         raise BadInput(source.place, "recordings (.mcap or .db3)", ", ".join(packed)[:200] or "none", do)
     bags = {PurePosixPath(name).parent for name in source.names if PurePosixPath(name).name == "metadata.yaml"}
     groups: dict[PurePosixPath, list[str]] = {}
@@ -72,6 +73,21 @@ def _wanted(place: Path, chosen: ColumnMap) -> dict[str, list[Wanted]]:
 def _rollouts(
     where: str, rollout_id: str, found: Recording, wanted: dict[str, list[Wanted]], chosen: ColumnMap
 ) -> list[Rollout]:
+    series = _series(where, found, wanted, chosen)
+    takes = [series]
+    if chosen.episodes == "split":
+        takes = split_takes(series)
+    else:
+        require_running(where, series, chosen, lambda other: _series(where, found, wanted, other))
+    return [
+        rollout
+        for number, take in enumerate(takes, start=1)
+        for rollout in _of_take(where, rollout_id if len(takes) == 1 else f"{rollout_id}_{number}", found, take, chosen)
+    ]
+
+
+def _series(where: str, found: Recording, wanted: dict[str, list[Wanted]], chosen: ColumnMap) -> list[Series]:
+    """The series of all topics, by the joints' places in the map."""
     series = []
     for name, wants in wanted.items():
         topic = found.topics.get(name)
@@ -79,11 +95,13 @@ def _rollouts(
             there = ", ".join(f"{other} ({kind})" for other, kind in sorted(found.others.items())[:20])
             came = f"none; others: {there or 'none'}"[:400]
             raise BadInput(f"{where}: {name}"[:300], "messages of this topic", came)
-        parts = series_of(f"{where}: {name}"[:300], name, topic, wants, chosen)
-        series += list(zip(wants, parts, strict=True))
-    series.sort(key=lambda pair: pair[0].part)  # joints with a topic each stand in the map's order
-    time, values, notes = on_one_grid(where, [one for _, one in series], chosen.grid)
-    first = min(int(one.stamps.min()) for _, one in series)
+        series += series_of(f"{where}: {name}"[:300], name, topic, wants, chosen)
+    return sorted(series, key=lambda one: one.places[0])
+
+
+def _of_take(where: str, rollout_id: str, found: Recording, series: list[Series], chosen: ColumnMap) -> list[Rollout]:
+    time, values, notes = on_one_grid(where, series, chosen)
+    first = min(int(one.stamps.min()) for one in series)
     if first > _EPOCH and "recorded_at" not in chosen.meta:
         at = datetime.fromtimestamp(first // 10**9, UTC).isoformat()
         chosen = replace(chosen, meta=chosen.meta | {"recorded_at": at})

@@ -1,7 +1,7 @@
 """What both storages of rosbag2 hold: topics with their types, and messages as bytes with two stamps."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
@@ -19,6 +19,8 @@ class Message:
     """When it was sent [ns], where the storage has it; else `logged`."""
     data: bytes
     """CDR."""
+    place: int = 0
+    """Its number among the file's messages, of whatever topic."""
 
 
 @dataclass
@@ -44,10 +46,12 @@ class Recording:
 
 def merged(parts: Iterable[Recording]) -> Recording:
     """Files that rosbag2 split one recording into, as one."""
-    whole = Recording({}, {})
+    whole, before = Recording({}, {}), 0
     for part in parts:
         for name, topic in part.topics.items():
-            whole.topics.setdefault(name, Topic(topic.kind, topic.definition)).messages.extend(topic.messages)
+            moved = [replace(one, place=one.place + before) for one in topic.messages] if before else topic.messages
+            whole.topics.setdefault(name, Topic(topic.kind, topic.definition)).messages.extend(moved)
+        before += 1 + max((one.place for topic in part.topics.values() for one in topic.messages), default=0)
         whole.others |= part.others
         whole.notes += part.notes
     return whole

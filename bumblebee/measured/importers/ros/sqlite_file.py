@@ -59,15 +59,21 @@ def _read(where: str, base: sqlite3.Connection, wanted: Container[str], limits: 
         if form != "cdr" or not text:
             came = f"{form}, type {kind}"[:120]
             expected = f"cdr and a definition of the type (in the bag, or one of {', '.join(TYPES)})"
-            raise BadInput(f"{where}: {name}", expected, came, "Convert the bag to MCAP with ros2 bag convert.")
+            raise BadInput(
+                f"{where}: {name}",
+                expected,
+                came,
+                "Convert the bag to MCAP, which holds its definitions: ros2 bag convert.",
+            )
         topics[name], numbers[number] = Topic(kind, text), name
     held = 0
     for number, name in numbers.items():
-        for stamp, data in base.execute("SELECT timestamp, data FROM messages WHERE topic_id = ?", (number,)):
+        rows = base.execute("SELECT rowid, timestamp, data FROM messages WHERE topic_id = ? ORDER BY rowid", (number,))
+        for place, stamp, data in rows:
             _require_row(where, stamp, data)
             held += len(data)
             require_small(where, name, len(data), limits, held)
-            topics[name].messages.append(Message(stamp, stamp, data))
+            topics[name].messages.append(Message(stamp, stamp, data, place))
     return Recording(topics, others)
 
 
