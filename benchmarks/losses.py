@@ -58,7 +58,7 @@ def roll(policy: Policy, clips: Sequence[Clip], starts: Tensor, counts: Tensor, 
     engine = make_engine("mujoco", model, n, 1)
     ids, dt, scale, middle = torch.arange(n), engine.control_dt, action_scale(), action_middle(policy.shape.action)
     group = Group(policy.shape.seen, (n, library.num_joints, len(library.ahead)), 0.0, engine.device)
-    generator, limit = torch.Generator().manual_seed(0), torch.tensor([success_threshold(c.family) for c in clips])
+    generator, limit = torch.Generator().manual_seed(0), torch.tensor([success_threshold(c) for c in clips])
     first = library.frames(ids, starts * dt)
     engine.reset(ids, *start_state(first, 0.0, generator), first.hold_pos)
     engine.settle()

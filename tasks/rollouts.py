@@ -18,11 +18,11 @@ from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.sensors import NO_NOISE
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.episodes import rollout_metrics
-from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.measured.rollout import copy_of_cluster
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
 from bumblebee.robot.model import write_xml
+from bumblebee.tracking.terminations import success_threshold
 from tasks import paths
 from tasks.rollouts_config import RolloutsConfig
 from tasks.sections import parent_of
@@ -79,7 +79,7 @@ def followed(policy: Path, clips: list[Clip], threads: int) -> pd.DataFrame:
     )
     rows = []
     for clip, rollout in zip(clips, rollouts, strict=True):
-        result = rollout_metrics(rollout, clip, success_threshold(clip.family))
+        result = rollout_metrics(rollout, clip, success_threshold(clip))
         share = 1.0 if result.success else result.frames / clip.frames
         rows.append((clip.name, clip.family, result.success, result.frames, share, result.mpkpe_mm))
     return pd.DataFrame(rows, columns=["motion", "family", "success", "frames", "share", "mpkpe_mm"])

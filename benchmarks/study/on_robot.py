@@ -9,12 +9,12 @@ import pandas as pd
 
 from bumblebee.deploy.episodes import Episode
 from bumblebee.evaluation.episodes import rollout_metrics
-from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import load_policy
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import write_library
+from bumblebee.tracking.terminations import success_threshold
 from tasks.stand_in import start_stand_in
 
 KEY = "policy"
@@ -69,7 +69,7 @@ def judged_rows(rollouts: Sequence[Rollout], clips: Sequence[Clip], held_out: Se
     by_name, rows = {clip.name: clip for clip in clips}, []
     for rollout in rollouts:
         clip = by_name[rollout.meta["motion"]]
-        found = rollout_metrics(rollout, clip, success_threshold(clip.family))
+        found = rollout_metrics(rollout, clip, success_threshold(clip))
         which = "held out" if clip.name in held_out else "recorded"
         row = {"name": clip.name, "set": which, "seed": int(rollout.rollout_id.rsplit("-", 1)[1])}
         rows.append(row | {"success": found.success, "seconds": rollout.duration, "mpkpe_mm": found.mpkpe_mm})

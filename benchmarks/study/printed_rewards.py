@@ -57,7 +57,7 @@ def earned(
     assert stand is not None  # "default" has one
     still = (first.hold_pos - stand) / scale
     actions, speed = (still, still, still), engine.state().joint_vel
-    running, limit = torch.ones(n, dtype=torch.bool), torch.tensor([success_threshold(c.family) for c in clips])
+    running, limit = torch.ones(n, dtype=torch.bool), torch.tensor([success_threshold(c) for c in clips])
     counts, sums = torch.zeros(n), {}
     for frame in range(int(library.length.max()) - 1):
         ref = library.frames(ids, torch.full((n,), (frame + 1) * dt))

@@ -97,7 +97,7 @@ class Judge:
     def __init__(self, clips: Sequence[Clip], dt: float) -> None:
         n = len(clips)
         self._clips, self._dt = clips, dt
-        self._limit = torch.tensor([success_threshold(clip.family) for clip in clips])
+        self._limit = torch.tensor([success_threshold(clip) for clip in clips])
         self._kept = torch.ones(3, n, dtype=torch.bool)  # in the world, over the robot's own place, by `upright`
         self._sums = torch.zeros(4, n)  # frames before the loss, and the three errors over them
 

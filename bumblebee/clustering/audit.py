@@ -65,7 +65,7 @@ def cluster_table(
     means = statistics[list(COLUMNS)].groupby(labels).mean().reindex(range(k))
     means.insert(0, "clips", np.bincount(labels, minlength=k))
     means["keywords"] = [", ".join(words) for words in keywords(captions, labels, k)]
-    means["label"] = names(means)
+    means["label"] = names(statistics, labels, k)
     return means.reset_index(drop=True)
 
 

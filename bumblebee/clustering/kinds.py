@@ -7,9 +7,11 @@ latents kept such differences, and not that the clusters mean anything.
 import numpy as np
 import pandas as pd
 
+from bumblebee.motion.clip import TRAVELS
+
 RULES = (
     ("airborne", "no foot on the floor in more than 10 % of the frames, the root up or down at 75 mm/s or more"),
-    ("travelling", "the root gets 1 m or more from where it starts"),
+    ("travelling", f"the root gets {TRAVELS:g} m or more from where it starts"),
     ("crouching", "the root comes below 0.62 m; it stands at 0.78 m"),
     ("turning", "the heading covers 90 degrees or more"),
     ("arms", "joints above the legs move at least twice as fast as the legs', and at 0.1 rad/s or more"),
@@ -24,7 +26,7 @@ def kinds(statistics: pd.DataFrame) -> np.ndarray:
     upper, lower = statistics["upper_joint"], statistics["lower_joint"]
     holds = [
         (statistics["airborne"] > 0.1) & (statistics["z_move"] >= 2.5),  # motion capture that floats does not bounce
-        statistics["displacement"] >= 1.0,
+        statistics["displacement"] >= TRAVELS,
         statistics["lowest"] < 0.62,
         statistics["turn"] >= np.pi / 2,
         (upper >= 2 * lower) & (upper >= 0.1),

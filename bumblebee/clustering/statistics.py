@@ -7,8 +7,9 @@ import pandas as pd
 from sklearn.feature_extraction.text import ENGLISH_STOP_WORDS, TfidfVectorizer
 
 from bumblebee.clustering.features import heading
+from bumblebee.clustering.kinds import kinds
 from bumblebee.clustering.text import FILLERS, plain_text
-from bumblebee.motion.clip import Clip, velocities
+from bumblebee.motion.clip import Clip, displacement, velocities
 from bumblebee.motion.contacts import foot_contacts
 from bumblebee.robot.facts import joint_names
 
@@ -16,10 +17,18 @@ LOWER = tuple(i for i, name in enumerate(joint_names()) if any(part in name for 
 UPPER = tuple(i for i in range(len(joint_names())) if i not in LOWER)
 COLUMNS = ("displacement", "z_move", "speed", "joint", "lower_joint", "upper_joint", "airborne")
 MORE = ("turn", "lowest")
-"""Of a clip, and not in the table: what `kinds.kind` goes by beside it."""
+"""Of a clip, and not in the table: what `kinds.kinds` goes by beside it."""
 
-_WALKS = 0.15  # m/s: above it a cluster is called a walk; the paper's stands reach 0.148, its walks start at 0.353
-_FLIES, _BOUNCES = 0.03, 1.5  # a jump is in the air for more than this share and bounces this often the median cluster
+_WORDS = {
+    "speed": ("slow", "fast"),
+    "displacement": ("near", "far"),
+    "z_move": ("level", "bouncing"),
+    "turn": ("straight", "turning"),
+    "lowest": ("low", "upright"),
+    "lower_joint": ("quiet-legs", "lively-legs"),
+    "upper_joint": ("quiet-arms", "lively-arms"),
+}
+"""What a cluster is called whose mean of a statistic is less than that of others, and more."""
 _NEARLY_ALL = 0.8  # of the clips with a text: a word that so many have is the captions' form, not their meaning
 
 
@@ -39,9 +48,8 @@ def clip_statistics(clip: Clip, contacts: np.ndarray | None = None) -> dict[str,
     contacts = foot_contacts(clip) if contacts is None else contacts
     rates = velocities(clip)
     joint = np.abs(rates.joint_vel).mean(0)
-    flat = np.linalg.norm(clip.root_pos[:, :2] - clip.root_pos[0, :2], axis=-1)
     values = (
-        flat.max(),
+        displacement(clip),
         1000.0 / 30.0 * np.abs(rates.root_lin_vel_w[:, 2]).mean(),
         np.linalg.norm(rates.root_lin_vel_w[:, :2], axis=-1).mean(),
         joint.mean(),
@@ -90,28 +98,37 @@ def _marks(has: np.ndarray, own: np.ndarray) -> np.ndarray:
     return (inside > outside) & (has.mean(0) < _NEARLY_ALL)
 
 
-def names(table: pd.DataFrame) -> list[str]:
-    """A readable name for each row of cluster statistics, in the paper's words: jump, walk-fast, stand-up ...
+def names(statistics: pd.DataFrame, labels: np.ndarray, k: int) -> list[str]:
+    """A name for each cluster: the commonest kind of its clips (`kinds.RULES`), and what sets it apart from others.
 
-    In the air and bouncing more than the others -> jump; travelling -> walk; else stand. Of several walks the fastest
-    is walk-fast, the slowest walk-slow; of several stands the one with the most leg motion relative to the arms' is
-    stand-low, the least stand-up. Anything between is -mid (and numbered if that is not enough). Where nobody counted
-    the frames in the air, as in the paper's own table, only the cluster with the largest z-move can be a jump.
+    Clusters of one kind get a second word each, after the statistic in which the cluster's mean is farthest from the
+    mean of the others of that kind, in standard deviations over all clips. No word is used twice.
+
+    Args:
+        statistics: one row a clip, as `clip_statistics` gives it.
+        labels: (N,) each clip's cluster.
+        k: number of clusters.
     """
-    bounce = table["z_move"] > _BOUNCES * table["z_move"].median()
-    flies = table["airborne"] > _FLIES if "airborne" in table else table["z_move"] == table["z_move"].max()
-    jumps = bounce & flies
-    kinds = np.where(jumps, "jump", np.where(table["speed"] > _WALKS, "walk", "stand"))
-    share = table["lower_joint"] / (table["lower_joint"] + table["upper_joint"]).clip(lower=1e-9)
-    ends = {
-        "jump": ("low", "high", table["z_move"]),
-        "walk": ("slow", "fast", table["speed"]),
-        "stand": ("up", "low", share),
-    }
-    result = list(kinds)
-    for kind, (least, most, value) in ends.items():
-        rows = [int(i) for i in np.argsort(value.to_numpy(), kind="stable") if kinds[i] == kind]
-        middle = [f"mid-{n}" for n in range(1, len(rows) - 1)] if len(rows) > 3 else ["mid"]
-        for row, suffix in zip(rows, [least, *middle[: len(rows) - 2], most], strict=False) if len(rows) > 1 else ():
-            result[row] = f"{kind}-{suffix}"
+    own = (
+        pd.Series(kinds(statistics)).groupby(labels).agg(lambda of: of.mode()[0]).reindex(range(k), fill_value="empty")
+    )
+    values = statistics[list(_WORDS)]
+    means = (values / values.std(ddof=0).replace(0.0, np.inf)).groupby(labels).mean().reindex(range(k), fill_value=0.0)
+    result = own.tolist()
+    for kind, alike in own.groupby(own):
+        if len(alike) > 1:
+            for c, word in _apart(means.loc[alike.index]).items():
+                result[c] = f"{kind}-{word}"
     return result
+
+
+def _apart(means: pd.DataFrame) -> dict[int, str]:
+    """A word for each of some clusters, none twice, from the means of their scaled statistics."""
+    off = (means - means.mean()) * len(means) / (len(means) - 1)  # from the mean of the others
+    words: dict[int, str] = {}
+    for (c, name), far in off.stack().sort_values(key=lambda far: -far.abs(), kind="stable").items():
+        word = _WORDS[name][int(far > 0)]
+        if c not in words and word not in words.values():
+            words[c] = word
+    left = [c for c in means.index if c not in words]
+    return words | {c: str(number) for number, c in enumerate(left, 1)}

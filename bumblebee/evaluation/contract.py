@@ -13,9 +13,9 @@ from typing import Annotated, Any
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.evaluation.metrics import WALKING_FAMILIES, success_threshold
-from bumblebee.motion.clip import Clip
-from bumblebee.ranges import Name, Range, Ranged
+from bumblebee.motion.clip import TRAVELS, Clip
+from bumblebee.ranges import Range, Ranged
+from bumblebee.tracking.terminations import success_threshold
 
 SCHEMA = 1
 ALIGNMENT = (
@@ -33,11 +33,9 @@ class Thresholds(Ranged):
     """How far a key body may be from its reference."""
 
     walking: Annotated[float, Range(above=0, most=100)] = 0.8
-    """Families whose root travels [m]."""
+    """Motions that travel [m]."""
     other: Annotated[float, Range(above=0, most=100)] = 0.4
-    """All other families [m]."""
-    walking_families: tuple[Name, ...] = WALKING_FAMILIES
-    """The families that count as walking."""
+    """All others [m]."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +68,8 @@ class Contract:
     """How frames are matched."""
     errors: str = ERRORS
     """How the two errors are averaged."""
+    travels: float = TRAVELS
+    """How far from its start the root of a motion that counts as walking comes [m]."""
 
     @property
     def sha256(self) -> str:
@@ -115,7 +115,7 @@ def freeze(
             "family": clip.family,
             "split": clip.split,
             "frames": len(clip.root_pos),
-            "threshold_m": success_threshold(clip.family, limits.walking, limits.other, limits.walking_families),
+            "threshold_m": success_threshold(clip, limits.walking, limits.other),
         }
         for clip in sorted(clips, key=lambda clip: clip.name)
     )

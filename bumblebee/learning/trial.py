@@ -88,7 +88,7 @@ def _try_some(
     act = policy.follower() if isinstance(policy, Policy) else policy
     seen, middle = (shape.seen, action_middle(shape.action)) if shape else (ObservationConfig(), None)
     group = Group(seen, (n, library.num_joints, len(library.ahead)), trials.noise, engine.device)
-    limit = torch.tensor([success_threshold(clip.family) for clip in clips])
+    limit = torch.tensor([success_threshold(clip) for clip in clips])
     first = library.frames(ids, torch.zeros(n))
     qpos, qvel = start_state(first, trials.noise, generator)
     engine.reset(ids, qpos, qvel, first.hold_pos)

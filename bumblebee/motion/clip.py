@@ -1,10 +1,13 @@
-"""A motion of the robot as arrays, and the velocities that follow from them."""
+"""A motion of the robot as arrays, and what follows from them: velocities, and whether it travels."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from bumblebee import quaternions
+
+TRAVELS = 1.0
+"""Horizontal distance from its start that the root of a motion which counts as walking reaches [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,16 @@ def velocities(clip: Clip) -> ClipVelocities:
         angular_velocity(clip.root_quat, clip.fps).astype(np.float32),
         differences(clip.joint_pos, clip.fps),
     )
+
+
+def displacement(clip: Clip) -> float:
+    """Largest horizontal distance of the root from where it starts [m]; a closed circle is not zero."""
+    return float(np.linalg.norm(clip.root_pos[:, :2] - clip.root_pos[0, :2], axis=-1).max())
+
+
+def travels(clip: Clip) -> bool:
+    """Whether a motion counts as walking, whatever it is called: it goes somewhere, and not only turns or marches."""
+    return displacement(clip) >= TRAVELS
 
 
 def differences(values: np.ndarray, fps: float) -> np.ndarray:

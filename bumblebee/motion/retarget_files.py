@@ -3,7 +3,7 @@
 import io
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Literal
@@ -20,7 +20,7 @@ from bumblebee.motion.listing import Found, find_motions, reason_of
 from bumblebee.motion.one_file import FileConfig
 from bumblebee.motion.retarget.config import RetargetConfig
 from bumblebee.motion.retarget.mapping import Robot, g1, read_robot
-from bumblebee.motion.retarget.retarget import aim, fit, root_quat
+from bumblebee.motion.retarget.retarget import aim, fit, fit_notes, root_quat
 from bumblebee.motion.side_by_side import in_order
 from bumblebee.motion.texts import shown
 from bumblebee.ranges import Range, Ranged
@@ -129,7 +129,8 @@ def _made(job: _Job, config: RobotFiles) -> _Done:
         return _Done(job, reason=job.reason)
     robot = _robot(config.model, config.mapping)
     try:
-        return _Done(job, content_of(job.motion, robot, config))
+        content, notes = content_of(job.motion, robot, config)
+        return _Done(replace(job, motion=replace(job.motion, notes=(*job.motion.notes, *notes))), content)
     except BadInput as error:
         return _Done(job, reason=reason_of(error, job.motion.file))
     except Exception as error:  # a mistake of ours about one motion must not cost the user all the others
@@ -142,21 +143,23 @@ def _robot(model: Path | None, mapping: Path | None) -> Robot:
     return read_robot(model, mapping) if model is not None and mapping is not None else g1()
 
 
-def content_of(motion: HumanMotion, robot: Robot, config: RobotFiles) -> bytes:
-    """A person on a robot as the bytes of a file.
+def content_of(motion: HumanMotion, robot: Robot, config: RobotFiles) -> tuple[bytes, tuple[str, ...]]:
+    """A person on a robot as the bytes of a file, and notes on where its motion is another than the person's.
 
     `.npz`: `fps` (1,) [Hz], `root_pos` (T, 3) [m], `root_quat_wxyz` (T, 4), `joint_pos` (T, n) [rad], `joint_names`
     (n,) in the MJCF's order, `robot`. CSV: `time` [s], `root_x`, `root_y`, `root_z` [m], `root_qw` to `root_qz`, then
     the joints [rad] by name.
     """
     settings = RetargetConfig()
-    at = fit(aim(motion, robot, config.fps, settings), robot, settings)
+    target = aim(motion, robot, config.fps, settings)
+    at = fit(target, robot, settings)
+    notes = fit_notes(at, target, robot, settings)
     if config.to == "csv":
         head = ["time", *(f"root_{c}" for c in ("x", "y", "z", "qw", "qx", "qy", "qz")), *robot.tree.joints]
         table = np.c_[np.arange(len(at.root)) / config.fps, at.root, root_quat(at), at.joint]
         text = io.StringIO()
         np.savetxt(text, table, fmt="%.9g", delimiter=",", header=",".join(map(_cell, head)), comments="")
-        return text.getvalue().encode()
+        return text.getvalue().encode(), notes
     stream = io.BytesIO()
     arrays = {"root_pos": at.root, "root_quat_wxyz": root_quat(at), "joint_pos": at.joint}
     np.savez(
@@ -166,7 +169,7 @@ def content_of(motion: HumanMotion, robot: Robot, config: RobotFiles) -> bytes:
         robot=np.array(robot.name),
         **{name: values.astype(np.float32) for name, values in arrays.items()},  # type: ignore[arg-type]
     )
-    return stream.getvalue()
+    return stream.getvalue(), notes
 
 
 def _cell(name: str) -> str:

@@ -2,6 +2,7 @@
 
 from torch import Tensor
 
+from bumblebee.motion.clip import Clip, travels
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import angle_between, length3
 from bumblebee.tracking.library import ReferenceFrame
@@ -9,13 +10,10 @@ from bumblebee.tracking.library import ReferenceFrame
 FALL_HEIGHT = 0.35  # m: the pelvis is this much lower than its reference
 FALL_ANGLE = 1.2  # rad: or tilted this far away from it
 
-LOOSE_FAMILIES = frozenset({"walk", "step", "turn", "sidestep", "run", "march"})
-"""Families that travel: their key bodies may be 0.8 m off, those of the others 0.4 m (paper, metrics)."""
 
-
-def success_threshold(family: str) -> float:
-    """Distance of a key body [m] at which a clip of this family counts as failed."""
-    return 0.8 if family in LOOSE_FAMILIES else 0.4
+def success_threshold(clip: Clip, walking: float = 0.8, other: float = 0.4) -> float:
+    """Distance of a key body [m] at which a clip counts as failed: `walking` where it travels (paper, metrics)."""
+    return walking if travels(clip) else other
 
 
 def fallen(state: RobotState, ref: ReferenceFrame) -> Tensor:

@@ -48,28 +48,45 @@ def test_a_word_that_is_no_more_frequent_in_a_cluster_than_elsewhere_does_not_na
     assert keywords(captions, np.array([0, 0, 1, 1]), 2) == [["walks"], ["waves"]]
 
 
-def test_names_follow_the_papers_table() -> None:
-    """Jump, two walks by speed, three stands by the legs' share."""
+PLAIN = {"displacement": 2.0, "z_move": 2.0, "speed": 0.4, "joint": 0.4, "lower_joint": 0.4, "upper_joint": 0.4,
+         "airborne": 0.0, "turn": 0.2, "lowest": 0.75}  # fmt: skip
+
+
+def clips_of(*clusters: dict[str, float]) -> tuple[pd.DataFrame, np.ndarray]:
+    """Statistics of three clips a cluster around a plain walk's, and their labels."""
     rows = [
-        (0.1, 0.33, 0.35, 0.4),
-        (0, 0.35, 0.36, 0.2),
-        (0, 0.43, 0.47, 0.4),
-        (0, 0.06, 0.14, 0.31),
-        (0, 0.12, 0.17, 0.22),
+        {name: value * share for name, value in (PLAIN | own).items()} for own in clusters for share in (0.98, 1, 1.02)
     ]
-    rows.append((0, 0.15, 0.28, 0.27))
-    table = pd.DataFrame(rows, columns=["airborne", "speed", "lower_joint", "upper_joint"]).assign(
-        z_move=[9.0, 1.0, 5.0, 0.7, 0.8, 1.5]
+    return pd.DataFrame(rows), np.repeat(np.arange(len(clusters)), 3)
+
+
+def test_clusters_are_called_after_the_commonest_kind_of_their_clips() -> None:
+    jump, stand = {"airborne": 0.3, "z_move": 9.0}, {"displacement": 0.1, "lower_joint": 0.05, "upper_joint": 0.06}
+    assert names(*clips_of({}, jump, stand, {"displacement": 0.2, "lowest": 0.5}), 4) == [
+        "travelling", "airborne", "still", "crouching"
+    ]  # fmt: skip
+    assert names(*clips_of({}, stand), 3) == ["travelling", "still", "empty"]
+
+
+def test_six_clusters_of_walks_have_six_names_that_say_what_each_is() -> None:
+    walks = (
+        {"speed": 2.0},
+        {"turn": 4.0},
+        {"lowest": 0.4},
+        {"upper_joint": 1.6},
+        {"z_move": 8.0},
+        {"displacement": 9.0},
     )
-    assert names(table) == ["jump", "walk-slow", "walk-fast", "stand-up", "stand-mid", "stand-low"]
-    floating = table.assign(airborne=0.1, z_move=3.0)  # poor motion capture: feet hover, but no cluster bounces
-    assert not any("jump" in name for name in names(floating))
-    many = pd.concat([table.iloc[[3]].assign(lower_joint=0.1 * i) for i in range(1, 6)])
-    assert len(set(names(many))) == 5
+    assert names(*clips_of(*walks), 6) == [
+        f"travelling-{word}" for word in ("fast", "turning", "low", "lively-arms", "bouncing", "far")
+    ]
+    slow, fast = names(*clips_of({"speed": 0.2}, {"speed": 0.9}), 2)
+    assert (slow, fast) == ("travelling-slow", "travelling-fast")
+    assert len(set(names(*clips_of(*[{}] * 20), 20))) == 20
 
 
 def test_cluster_table_has_a_row_for_each_cluster() -> None:
-    statistics = pd.DataFrame({name: [1.0, 3.0, 5.0] for name in COLUMNS})
+    statistics = pd.DataFrame({name: [1.0, 3.0, 5.0] for name in (*COLUMNS, *MORE)})
     table = cluster_table(statistics, [("walks",)] * 3, np.array([1, 1, 0]), 2)
     assert table["clips"].tolist() == [1, 2] and table["speed"].tolist() == [5.0, 2.0]
 
@@ -94,22 +111,6 @@ def test_random_split_explains_less() -> None:
     assert ours["speed"] > 0.9 and chance["speed"] < 0.2 and ours["airborne"] == 0.0
     by_hand = 1 - np.mean([values[truth == c].var() for c in (0, 1)]) / values.var()
     assert ours["speed"] == pytest.approx(by_hand)
-
-
-def test_the_papers_own_table_gets_the_papers_own_names() -> None:
-    """All six rows of its table 2; it counts no frames in the air."""
-    columns = ["displacement", "z_move", "speed", "joint", "lower_joint", "upper_joint"]
-    rows = {
-        "jump": (2.32, 9.21, 0.329, 0.379, 0.346, 0.405),
-        "walk-slow": (3.42, 1.60, 0.353, 0.279, 0.358, 0.215),
-        "walk-fast": (3.24, 5.63, 0.429, 0.430, 0.472, 0.396),
-        "stand-up": (0.89, 0.68, 0.061, 0.230, 0.136, 0.305),
-        "stand-mid": (1.33, 0.82, 0.119, 0.198, 0.170, 0.221),
-        "stand-low": (1.84, 1.52, 0.148, 0.274, 0.281, 0.267),
-    }
-    table = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
-    assert names(table) == list(rows)
-    assert names(table.iloc[::-1]) == list(rows)[::-1]
 
 
 def test_kinds_follow_their_rules() -> None:

@@ -29,7 +29,7 @@ def test_stands_and_walks_are_told_apart(result: Clustering) -> None:
 def test_summary_counts_every_clip(result: Clustering, library: list[Clip]) -> None:
     rows = result.summary["clusters"]
     assert sum(row["clips"] + row["held_out_clips"] for row in rows.values()) == len(library) == len(result.labels)
-    assert [row["label"] for row in rows.values()] == ["stand", "walk"]
+    assert [row["label"] for row in rows.values()] == ["arms", "travelling"]
     assert result.summary["clips"] == {"train": 14, "held_out": 2, "with_captions": 16, "texts": {"file": 16},
                                        "windows": 16, "windows_with_captions": 16}  # fmt: skip
     assert result.elbow["k"].tolist() == list(range(1, 7)) and len(result.curve) == 25

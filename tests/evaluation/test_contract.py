@@ -23,14 +23,15 @@ from bumblebee.motion.kinematics import make_clip
 from bumblebee.robot.facts import stand_pose
 
 
-def clip(name: str = "a", family: str = "walk", bend: float = 0.0) -> Clip:
+def clip(name: str = "a", far: float = 1.2, bend: float = 0.0) -> Clip:
     pose = np.tile(stand_pose() + bend, (4, 1))
-    return make_clip(name, 50.0, np.zeros((4, 3)), np.tile([1.0, 0, 0, 0], (4, 1)), pose, family=family)
+    root_pos = np.linspace([0.0, 0.0, 0.0], [0.0, far, 0.0], 4)
+    return make_clip(name, 50.0, root_pos, np.tile([1.0, 0, 0, 0], (4, 1)), pose)
 
 
 def contract() -> Contract:
     return freeze(
-        [clip("b", "stand"), clip("a")], (0, 1), engines={"nominal": {"timestep": 0.005}}, fall={"tilt_deg": 60.0}
+        [clip("b", 0.1), clip("a")], (0, 1), engines={"nominal": {"timestep": 0.005}}, fall={"tilt_deg": 60.0}
     )
 
 
@@ -45,6 +46,7 @@ def test_each_fields_change_changes_the_hash() -> None:
         "fall": {"tilt_deg": 59.0},
         "alignment": "by Procrustes",
         "errors": "medians",
+        "travels": 2.0,
     }
     assert set(changes) == set(one.__dataclass_fields__)
     hashes = {replace(one, **{field: value}).sha256 for field, value in changes.items()}

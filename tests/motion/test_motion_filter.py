@@ -46,6 +46,17 @@ def bends_too_far(clip: Clip) -> Clip:
     return remade(clip, joint_pos=joint_pos)
 
 
+def falls_and_rises(clip: Clip) -> Clip:
+    joint_pos = np.array(clip.joint_pos)
+    bend = 1.35 * np.exp(-(((np.arange(clip.frames) - AT) / 8) ** 2))
+    for name, share in (("hip_pitch", -1.0), ("knee", 2.0), ("ankle_pitch", -0.2)):
+        both = [joint_names().index(f"{side}_{name}_joint") for side in ("left", "right")]
+        joint_pos[:, both] += share * bend[:, None]
+    root_pos = np.array(clip.root_pos)
+    root_pos[:, 2] -= lowest(root_pos, clip.root_quat, joint_pos)
+    return remade(clip, root_pos, joint_pos)
+
+
 def leaps_aside(clip: Clip) -> Clip:
     root_pos = np.array(clip.root_pos)
     root_pos[AT + 1 :, 1] += 0.15  # 7.5 m/s at 50 Hz: the pelvis jumps, no body reaches 15 m/s
@@ -108,6 +119,7 @@ CASES = {
     "joint_limits": (bends_too_far, 0.2, 0.001, AT),
     "body_speed": (keypoint_too_fast, 20.0, 1.0, AT),
     "joint_speed": (turns_too_fast, 47.5, 1.0, AT),
+    "root_dip": (falls_and_rises, 0.5, 0.03, AT),
     "root_jump": (leaps_aside, 7.5, 0.2, AT),
     "root_turn": (spins_in_a_frame, 18.0, 0.3, AT),
     "spike": (jerks_for_a_frame, 700.0, 30.0, AT),
@@ -126,7 +138,7 @@ def test_a_rule_drops_the_motion_that_breaks_it_and_no_other_does(motions, rule)
     broken, value, tolerance, frame = CASES[rule]
     clip = broken(motions.clip("bad", 150))
     rows = violations(clip)
-    if rule == "joint_limits":  # a knee bent this far also lifts the foot: only the limit counts
+    if rule in ("joint_limits", "root_dip"):  # a knee bent this far also lifts the foot: only the limit counts
         rows = [row for row in rows if row["rule"] == rule]
     assert [row["rule"] for row in rows] == [rule]
     assert rows[0]["value"] == pytest.approx(value, abs=tolerance)

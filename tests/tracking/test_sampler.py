@@ -2,9 +2,12 @@
 
 from itertools import pairwise
 
+import numpy as np
 import pytest
 import torch
 
+from bumblebee.motion.kinematics import make_clip
+from bumblebee.robot.facts import stand_pose
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import from_rotation_vector
 from bumblebee.tracking.library import MotionLibrary
@@ -119,7 +122,10 @@ def test_terminations() -> None:
     assert fallen(state, ref).tolist() == [False, False, True, True]
 
 
-def test_travelling_families_may_drift_further() -> None:
-    """0.8 m for walking, 0.4 m for all others, unknown ones too."""
-    assert success_threshold("walk") == 0.8
-    assert success_threshold("squat") == success_threshold("") == 0.4
+@pytest.mark.parametrize(("far", "limit"), [(0.0, 0.4), (0.9, 0.4), (1.1, 0.8)])
+def test_motions_that_travel_may_drift_further_whatever_their_name(far: float, limit: float) -> None:
+    """0.8 m for walking, 0.4 m for all others; a way back to the start counts."""
+    for name, family in (("squat_level1", "squat"), ("walk_in_place", "walk"), ("05_13", "")):
+        root_pos = np.array([[0.0, 0.0, 0.8], [far, 0.0, 0.8], [0.0, 0.0, 0.8]])
+        quat, pose = np.tile([1.0, 0, 0, 0], (3, 1)), np.tile(stand_pose(), (3, 1))
+        assert success_threshold(make_clip(name, 50.0, root_pos, quat, pose, family=family)) == limit

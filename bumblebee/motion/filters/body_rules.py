@@ -1,6 +1,7 @@
 """Rules about the body itself: joints, speeds, jumps from frame to frame, links that lie in each other."""
 
 import numpy as np
+from scipy import ndimage
 
 from bumblebee import quaternions
 from bumblebee.motion.clip import Clip
@@ -56,6 +57,15 @@ def root_turn(clip: Clip, config: FilterConfig) -> Worst:
     value = float(speed[frame])
     said = f"the pelvis turns {value / clip.fps:.2f} rad in one frame, {value:.1f} rad/s"
     return Worst(value, config.root_turn, "rad/s", frame, said)
+
+
+def root_dip(clip: Clip, config: FilterConfig) -> Worst:
+    """The deepest that the pelvis sinks below where it is before and after within a second."""
+    height = clip.root_pos[:, 2].astype(np.float64)
+    depth = ndimage.grey_closing(height, min(round(clip.fps), clip.frames), mode="nearest") - height
+    frame = int(np.argmax(depth))
+    said = f"the pelvis sinks by {depth[frame]:.2f} m and rises again within a second"
+    return Worst(float(depth[frame]), config.root_dip, "m", frame, said)
 
 
 def spike(clip: Clip, config: FilterConfig) -> Worst:

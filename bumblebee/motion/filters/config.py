@@ -37,6 +37,8 @@ class FilterConfig(Ranged):
     """How fast the pelvis may move from one frame to the next [m/s]; beyond it the motion jumps."""
     root_turn: Speed = 15.0
     """How fast the pelvis may turn from one frame to the next [rad/s]; beyond it the motion flips."""
+    root_dip: Limit = 0.45
+    """How far the pelvis may sink and rise again within a second [m]; beyond it the motion was fitted to the floor."""
     spike: Speed = 600.0
     """Acceleration of a keypoint over three frames [m/s^2], 60 g; beyond it a frame lies beside its neighbours."""
     self_collision_depth: Limit = 0.05

@@ -1,4 +1,4 @@
-"""The first frame and the floor of a person's motion: a T-pose that was put in front, a floor that is not at 0."""
+"""The first frames and the floor of a person's motion: frames of something else in front, a floor that is not at 0."""
 
 import numpy as np
 
@@ -11,44 +11,31 @@ _STILL = 0.3  # speed below which a foot stands [m/s]
 _STANDING = 0.05  # share of the frames in which some foot must stand for a floor to be found
 _LOW = 10.0  # percentile of the standing feet's heights that is the floor: most stand on it, none much below it
 _OFF = 0.01  # a floor this near to 0 is at 0 [m]
-_LEAD = 12  # frames at the start among which a T-pose and its passage to the motion are looked for
+_LEAD = 12  # frames at the start among which bad ones and the passage from them to the motion are looked for
 _USUAL = 60  # frames after these with which they are compared
 _TIMES = 2.5  # a step this many times their median is none of the motion's
 _SLOW = 1.0  # mean speed of the landmarks below which a step always is the motion's [m/s]
-_FLING = 4.0  # mean speed of the landmarks in the step out of a T-pose, at least [m/s]
-_LEVEL_ARM = 0.35  # sine of an arm's angle to the horizontal that is still a T-pose: 20 degrees
-_STRAIGHT = 0.97  # shoulder to wrist over upper arm and forearm
+_JERKED = 2.0  # change of the landmarks' velocity from a step to the next that no person makes, at least, mean [m/s]
 
 _INDEX = {name: i for i, name in enumerate(LANDMARKS)}
 
 
-def t_pose_frames(positions: np.ndarray, fps: float) -> int:
-    """How many frames at the start are a T-pose, and the passage from it, that do not belong to the motion.
+def bad_start(positions: np.ndarray, fps: float) -> int:
+    """Number of frames at the start that do not belong to the motion: a T-pose, a teleported or turned frame.
 
-    Converters put the skeleton's own pose in front. It is known by level, straight arms and a step out of it that
-    nobody moves; behind it some files hold a few frames that were never set, or the ringing of a filter: they go up to
-    the last step that is too fast for the motion that follows.
+    A step out of them is faster than the steps that follow and ends at once: from one frame to the next the landmarks
+    change their velocity by 2 m/s in the mean, and by more than anywhere in what follows. Some files hold a few frames
+    behind it that were never set, or the ringing of a filter: the cut goes up to the last step that is too fast.
     """
-    if len(positions) < _LEAD + 3 or not _arms_level(positions[0]):
+    if len(positions) < _LEAD + 3:
         return 0
-    near = positions[: _LEAD + _USUAL + 1]
-    speed = np.linalg.norm(np.diff(near, axis=0), axis=2).mean(axis=1) * fps
-    limit = max(_TIMES * float(np.median(speed[_LEAD:])), _SLOW)
-    flung = np.flatnonzero(speed[:_LEAD] > max(limit, _FLING))
-    if not len(flung) or not _arms_level(positions[flung[0]]):
+    step = np.diff(positions[: _LEAD + _USUAL + 1], axis=0) * fps
+    speed = np.linalg.norm(step, axis=2).mean(axis=1)
+    change = np.linalg.norm(np.diff(step, axis=0), axis=2).mean(axis=1)
+    fast = speed[:_LEAD] > max(_TIMES * float(np.median(speed[_LEAD:])), _SLOW)
+    if not (fast & (change[:_LEAD] > max(change[_LEAD:].max(), _JERKED))).any():
         return 0
-    return int(np.flatnonzero(speed[:_LEAD] > limit)[-1]) + 1
-
-
-def _arms_level(landmarks: np.ndarray) -> bool:
-    """Whether both arms are straight and level, in one frame (18, 3)."""
-    for side in ("left", "right"):
-        shoulder, elbow, wrist = (landmarks[_INDEX[f"{side}_{joint}"]] for joint in ("shoulder", "elbow", "wrist"))
-        arm = wrist - shoulder
-        whole = np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow)
-        if np.linalg.norm(arm) < _STRAIGHT * whole or abs(arm[2]) > _LEVEL_ARM * whole:
-            return False
-    return True
+    return int(np.flatnonzero(fast)[-1]) + 1
 
 
 def floor_height(positions: np.ndarray, fps: float) -> float | None:

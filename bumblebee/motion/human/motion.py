@@ -47,7 +47,7 @@ class HumanMotion:
     part: str = ""
     """Which motion of the file, where it holds several."""
     notes: tuple[str, ...] = ()
-    """What was detected and not stated by the file: units, the up axis, a T-pose that was cut; for the summary."""
+    """What was detected and not stated by the file: units, the up axis, first frames that were cut; for the summary."""
 
     @property
     def where(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.human.bvh import Bvh, parse_bvh
-from bumblebee.motion.human.floor import on_floor, t_pose_frames
+from bumblebee.motion.human.floor import bad_start, on_floor
 from bumblebee.motion.human.forward import adds_positions, bvh_positions, rest_positions
 from bumblebee.motion.human.frame import find_unit, find_up, leg_length, require_right_handed, upright_axis, z_up
 from bumblebee.motion.human.landmarks import find_landmarks
@@ -53,10 +53,11 @@ def read_human(path: Path, data: bytes, options: HumanConfig | None = None) -> l
         raise BadInput(path, "poses and trans, as AMASS's files have them", "an .npz file without them")
     if not (np.abs(positions) < _FAR).all():
         raise BadInput(path, f"a person within {_FAR:g} m of the origin", "one farther away")
-    cut = t_pose_frames(positions, fps)
+    cut = bad_start(positions, fps)
     if cut:
+        off = float(np.linalg.norm(positions[cut] - positions[0], axis=1).mean())
         positions = positions[cut:]
-        notes += (f"{cut} frame{'s' * (cut > 1)} at the start cut: a T-pose that does not belong to the motion",)
+        notes += (f"{cut} frame{'s' * (cut > 1)} at the start cut: {off:.2f} m off the motion that follows at once",)
     if len(positions) < 2:
         raise BadInput(path, "a motion of at least 2 frames", f"{len(positions)}")
     require_right_handed(path, positions)

@@ -8,13 +8,14 @@ from bumblebee import quaternions
 from bumblebee.errors import BadInput
 from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
 from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.retarget.branch import far_note, solve_near
 from bumblebee.motion.retarget.config import RetargetConfig
 from bumblebee.motion.retarget.mapping import SIDES, Robot, g1
-from bumblebee.motion.retarget.solve import Trajectory, solve
+from bumblebee.motion.retarget.solve import Trajectory
 from bumblebee.motion.retarget.targets import Targets, at_rate, targets
 from bumblebee.robot.facts import joint_names
 
-VERSION = 2
+VERSION = 3
 """Of the method: a cached result of another version is made again."""
 _MOST_SECONDS = 3600.0
 _RATES = (1.0, 1000.0)  # Hz
@@ -37,7 +38,7 @@ def retarget(motion: HumanMotion, fps: float = 50.0, config: RetargetConfig | No
     target = aim(motion, g1(), fps, config)
     at = fit(target, g1(), config)
     assert g1().tree.joints == joint_names()
-    notes = (*motion.notes, *_climb(target))
+    notes = (*motion.notes, *fit_notes(at, target, g1(), config))
     return RawMotion(
         motion.name, fps, at.root, root_quat(at), at.joint, motion.file, motion.first_row, motion.part, notes
     )
@@ -73,6 +74,11 @@ def _check(motion: HumanMotion) -> None:
             raise BadInput(f"{motion.where}, {a} to {b}", f"at least {_SHORTEST:g} m apart", f"{length:.3g} m")
 
 
+def fit_notes(at: Trajectory, target: Targets, robot: Robot, config: RetargetConfig) -> tuple[str, ...]:
+    """Notes on where a robot's motion is another than the person's."""
+    return (*_climb(target), *far_note(at, target, robot, config))
+
+
 def _climb(target: Targets) -> tuple[str, ...]:
     """A note where the floor rises or falls under the person: on the robot's flat floor this is another motion."""
     rise = float(np.ptp(target.floor))
@@ -81,7 +87,7 @@ def _climb(target: Targets) -> tuple[str, ...]:
 
 def fit(target: Targets, robot: Robot, config: RetargetConfig) -> Trajectory:
     """The trajectory of any robot that fits the targets, solved in parts that overlap."""
-    parts = [solve(target.part(start, end), robot, config) for start, end in _parts(len(target.hips))]
+    parts = [solve_near(target.part(start, end), robot, config) for start, end in _parts(len(target.hips))]
     return _joined(parts)
 
 

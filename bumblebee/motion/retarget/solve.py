@@ -20,7 +20,7 @@ ROOT = 6
 _LARGEST = 0.4  # rad or m: of one step
 _MARGIN = 0.002  # rad inside a joint's range
 _DAMPING = 1.0, 1e7  # least and most of Levenberg's: a segment weighs 1e3
-_HIPS = [POINTS.index("left_hip"), POINTS.index("right_hip")]
+HIPS = [POINTS.index("left_hip"), POINTS.index("right_hip")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ def start(target: Targets, robot: Robot) -> Trajectory:
     frames = len(target.hips)
     joint = target.near(robot)
     at = poses(robot.tree, np.zeros((frames, 3)), target.frame, joint)
-    hips = points(at, robot.body[_HIPS], robot.local[_HIPS]).mean(axis=1)
+    hips = points(at, robot.body[HIPS], robot.local[HIPS]).mean(axis=1)
     return Trajectory(target.hips - hips, target.frame, joint)
 
 
@@ -107,8 +107,8 @@ def _mix() -> np.ndarray:
     for row, (a, b) in enumerate(SEGMENTS):
         mix[row, [POINTS.index(a), POINTS.index(b)]] = -1.0, 1.0
     mix[-2, POINTS.index("neck")] = 1.0
-    mix[-2, _HIPS] = -0.5
-    mix[-1, _HIPS] = 0.5
+    mix[-2, HIPS] = -0.5
+    mix[-1, HIPS] = 0.5
     return mix
 
 

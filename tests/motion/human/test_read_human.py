@@ -80,18 +80,30 @@ def test_a_t_pose_before_the_motion_is_cut_and_noted(odd):
     pose[:, 6:] = 0
     motion = read(bvh(values=np.concatenate([pose, whole])))
     assert motion.first_row == 2 + odd and len(motion.positions) == 60
-    assert any(note.startswith(f"{1 + odd} frame") and "T-pose" in note for note in motion.notes)
+    assert any(note.startswith(f"{1 + odd} frame") and "at the start cut" in note for note in motion.notes)
     np.testing.assert_allclose(motion.positions, read(bvh(values=whole)).positions, atol=1e-5)
     assert motion.row(0) == f"frame {2 + odd}"
 
 
-def test_a_motion_that_starts_with_level_arms_or_with_a_jump_is_kept():
+@pytest.mark.parametrize("fps", [30.0, 120.0])
+@pytest.mark.parametrize(("column", "off"), [(0, 50), (1, -30), (4, 90)])  # aside, below [cm], turned [degrees]
+def test_a_first_frame_that_is_elsewhere_is_cut_and_noted(fps, column, off):
+    whole = rows(60)
+    bad = whole[:1].copy()
+    bad[0, column] += off
+    motion = read(bvh(values=np.concatenate([bad, whole]), fps=fps))
+    assert motion.first_row == 2 and any(note.startswith("1 frame at the start cut: ") for note in motion.notes)
+    np.testing.assert_allclose(motion.positions, read(bvh(values=whole, fps=fps)).positions, atol=1e-5)
+
+
+def test_a_motion_that_starts_with_level_arms_or_that_stops_from_a_run_is_kept():
     slow = rows(60)
     slow[:, 6:] *= np.linspace(0, 1, 60)[:, None]
     assert read(bvh(values=slow)).first_row == 1
-    jump = rows(60)
-    jump[0, 0] = 50
-    assert read(bvh(values=jump)).first_row == 1
+    stops = rows(120)
+    seconds = np.minimum(np.arange(120) / 30, 0.8)
+    stops[:, 0] = 100 * (8 * seconds - 5 * seconds**2)  # 8 m/s, at rest after 0.8 s
+    assert read(bvh(values=stops, fps=30)).first_row == 1
 
 
 @pytest.mark.parametrize("height", [-0.2, 0.0, 0.5])

@@ -87,6 +87,21 @@ def jump(fps: float = FPS, rise: float = 0.3) -> tuple[HumanMotion, np.ndarray]:
     return person(np.array([0.0, 0.0, HIPS]) + height, ankles, fps=fps, name="jump"), up
 
 
+def turning_kick(turns: float = 1.5, seconds: float = 0.6, frames: int = 70) -> HumanMotion:
+    """A person who stands on the left foot, kicks with the right, and turns about the left within `seconds`."""
+    time = np.arange(frames) / FPS
+    up = np.sin(np.pi * np.clip((time - 0.3) / (time[-1] - 0.6), 0, 1)) ** 2
+    ankles = np.tile([[0.0, 0.1, ANKLE], [0.0, -0.1, ANKLE]], (frames, 1, 1))
+    ankles[:, 1] += up[:, None] * np.array([0.35, -0.1, 0.5])
+    share = np.clip((time - (time[-1] - seconds) / 2) / seconds, 0, 1)
+    angle = 2 * np.pi * turns * share * share * (3 - 2 * share)
+    zero, one = np.zeros(frames), np.ones(frames)
+    rows = [[np.cos(angle), -np.sin(angle), zero], [np.sin(angle), np.cos(angle), zero], [zero, zero, one]]
+    turn, about = np.moveaxis(np.array(rows), 2, 0), np.array([0.0, 0.1, 0.0])
+    still = person(np.tile([0.0, 0.0, HIPS], (frames, 1)), ankles, name="turning kick")
+    return changed(still, lambda p: np.einsum("tij,tkj->tki", turn, p - about) + about)
+
+
 def changed(motion: HumanMotion, how: Callable[[np.ndarray], np.ndarray]) -> HumanMotion:
     """The same person with other positions."""
     return HumanMotion(motion.name, motion.fps, how(motion.positions), motion.file)

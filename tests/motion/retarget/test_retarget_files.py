@@ -3,6 +3,7 @@
 import csv
 import io
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,11 @@ from bumblebee import cli
 from bumblebee.motion.formats.write import write_motion
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.retarget.mapping import read_robot
-from bumblebee.motion.retarget_files import _cell
+from bumblebee.motion.retarget_files import RobotFiles, _cell, _Job, _made
 from bumblebee.robot.facts import joint_names, stand_pose
 from tests.motion.human.people import bvh
 from tests.motion.retarget.robots import H1
+from tests.motion.retarget.stepping import steps
 
 ROBOT = ("--model", H1 / "h1.xml", "--mapping", H1 / "h1.yaml")
 
@@ -129,3 +131,12 @@ def test_a_folder_with_no_person_is_status_two_and_leaves_nothing(people, tmp_pa
 
 def test_a_joints_name_with_a_comma_stays_one_column():
     assert next(csv.reader(io.StringIO(",".join(map(_cell, ["a,b", 'c"d', "e"]))))) == ["a,b", 'c"d', "e"]
+
+
+def test_notes_of_the_fit_are_kept_beside_those_of_the_reader():
+    person = steps(5)[0]
+    rising = replace(
+        person, positions=person.positions + np.linspace(0, 0.5, len(person.positions))[:, None, None] * [0, 0, 1]
+    )
+    made = _made(_Job("steps", motion=replace(rising, notes=("z is up",))), RobotFiles())
+    assert made.job.motion.notes[0] == "z is up" and "the floor under the person moves by" in made.job.motion.notes[1]
