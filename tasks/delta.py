@@ -77,10 +77,8 @@ def main(round: int, cluster: str) -> None:
     print(verdict(round, cluster, gain))
     numbers = {f"held_out/{h}/{k}": v for h, values in gain.change.items() for k, v in values.items() if v == v}
     tags = {"promoted": str(gain.promoted).lower()}
-    log_run(
-        "delta", cluster=cluster, round=round, params=config, metrics=numbers, curve=target / "curve.csv",
-        artifacts=[target], tags=tags,
-    )  # fmt: skip
+    curve = target / "curve.csv"
+    log_run("delta", cluster=cluster, round=round, params=config, metrics=numbers, curve=curve, tags=tags)
 
 
 def corrected(round: int) -> Simulator:

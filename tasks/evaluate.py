@@ -109,13 +109,8 @@ def main() -> None:
         episodes.to_parquet(folder / "episodes.parquet", index=False)
         (folder / "summary.json").write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n")
     tell(summary)
-    log_run(
-        "evaluate",
-        params=config,
-        metrics=headline(summary),
-        artifacts=[paths.EVALUATION],
-        tags={"evaluation_contract": contract.sha256},
-    )
+    tags = {"evaluation_contract": contract.sha256}
+    log_run("evaluate", params=config, metrics=headline(summary), tags=tags)
 
 
 def motions(config: EvaluateConfig) -> tuple[list[Clip], dict[str, str]]:
