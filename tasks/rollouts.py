@@ -18,11 +18,11 @@ from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.sensors import NO_NOISE
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.episodes import rollout_metrics
-from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.measured.rollout import copy_of_cluster
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_index, read_library, write_library
 from bumblebee.robot.model import write_xml
+from bumblebee.tracking.terminations import success_threshold
 from tasks import paths
 from tasks.rollouts_config import RolloutsConfig
 from tasks.sections import parent_of

@@ -18,10 +18,10 @@ from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.sensors import NO_NOISE
 from bumblebee.evaluation.episodes import rollout_metrics
-from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.measured.rollout import Rollout, read_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import write_library
+from bumblebee.tracking.terminations import success_threshold
 from tasks.stand_in import start_stand_in
 
 KEY = "shipped"

@@ -9,12 +9,12 @@ import pandas as pd
 
 from bumblebee.deploy.episodes import Episode
 from bumblebee.evaluation.episodes import rollout_metrics
-from bumblebee.evaluation.metrics import success_threshold
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.policy import load_policy
 from bumblebee.measured.rollout import Rollout, read_rollout, rollout_files
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import write_library
+from bumblebee.tracking.terminations import success_threshold
 from tasks.stand_in import start_stand_in
 
 KEY = "policy"

@@ -11,14 +11,9 @@ Where the paper is inconsistent, this is what is computed:
 Frames are matched by index (tick k against frame k) in the world frame; nothing is aligned in space or time.
 """
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-
-from bumblebee.tracking.terminations import LOOSE_FAMILIES
-
-WALKING_FAMILIES = tuple(sorted(LOOSE_FAMILIES))
 
 
 @dataclass(frozen=True)
@@ -35,13 +30,6 @@ class EpisodeMetrics:
     """Frames before termination, those that the two errors average over; at least one."""
     end_reason: str
     """"end", "keypoint" (threshold exceeded) or "fall"."""
-
-
-def success_threshold(
-    family: str, walking: float = 0.8, other: float = 0.4, families: Collection[str] = WALKING_FAMILIES
-) -> float:
-    """The keypoint threshold [m] of a motion's family: `walking` where the root travels, else `other`."""
-    return walking if family in families else other
 
 
 def key_errors(key_pos_w: np.ndarray, reference_w: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bumblebee.evaluation.metrics import episode_metrics, success_threshold
+from bumblebee.evaluation.metrics import episode_metrics
 
 
 def arrays(frames: int, shift: float = 0.0, angle: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -55,8 +55,3 @@ def test_not_a_number_is_not_a_success() -> None:
     key[3] = np.nan
     result = episode_metrics(q, key, reference_q, reference_key, 0.4)
     assert not result.success and result.frames == 3
-
-
-def test_thresholds_of_the_paper() -> None:
-    assert success_threshold("walk") == 0.8
-    assert success_threshold("squat") == success_threshold("") == 0.4

@@ -213,8 +213,6 @@ WRONG: list[tuple[str, Any, str]] = [
     *_same("evaluate.max_motions", 0, -1),
     *_same("evaluate.contract", "abc"),
     *_same("evaluate.threads", 0),
-    *_same("evaluate.thresholds.walking", 0, NAN),
-    *_same("evaluate.thresholds.other", -1),
     *_same("evaluate.start_noise.joint_pos", -1, NAN),
     *_same("evaluate.start_noise.joint_vel", INF),
     *_same("publish.engine", "robot"),
