@@ -30,8 +30,8 @@ def wanted(content: Mapping[str, Any], sections: Iterable[str]) -> int:
         section = content.get(name)
         if isinstance(section, dict):
             env = section.get("env")
-            on_gpu = isinstance(env, dict) and env.get("engine") == "mujoco_warp"
-            number = section.get("gpus", int(on_gpu))
+            own = env if isinstance(env, dict) else section
+            number = section.get("gpus", int(own.get("engine") == "mujoco_warp"))
             found.append(number if isinstance(number, int) else 0)
     return max(found)
 

@@ -97,7 +97,9 @@ def train(simulator: Simulator, round: int, cluster: str, config: DeltaConfig) -
     """Train and judge the cluster's delta action; None where no rollout is long enough to train on."""
     offset = torch.as_tensor(simulator.hooks.encoder_offset, dtype=torch.float32)
     train, held_out = recordings(round, cluster)
-    engine = make_engine("mujoco", simulator.model, config.num_envs, config.threads, simulator.hooks)
+    engine = make_engine(
+        config.engine, simulator.model, config.num_envs, config.threads, simulator.hooks, config.buffers
+    )
     steps = int(config.episode_seconds / engine.control_dt + 0.5)
     if train is None or len(train.windows(steps, 1)) == 0:
         return None

@@ -1,5 +1,6 @@
 """The delta action: its rewards by hand, what an untrained one does, when one is kept."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import torch
 from bumblebee.errors import BadInput
 from bumblebee.learning.delta import DeltaEnv, Recordings, compare, replay_error, rewards, stack, train_delta
 from bumblebee.learning.delta.action import (
+    DELTA_PPO,
     DeltaAction,
     DeltaConfig,
     action_adapter,
@@ -205,7 +207,7 @@ def test_a_motion_that_was_recorded_more_often_counts_no_more() -> None:
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 def test_on_a_gpu_a_delta_is_trained_where_the_engine_is(recordings: Recordings) -> None:
-    config = DeltaConfig(num_envs=64, iterations=1, steps_per_iteration=4, episode_seconds=0.4)
+    config = DeltaConfig(num_envs=64, ppo=replace(DELTA_PPO, iterations=1, steps=4), episode_seconds=0.4)
     env = DeltaEnv(make_engine("mujoco_warp", load_model(), 64), recordings, config, NO_OFFSET)
     assert {seen.device.type for seen in env.get_observations().values()} == {"cuda"}
     delta, curve = train_delta(env, config)
