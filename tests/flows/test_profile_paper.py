@@ -1,4 +1,4 @@
-"""profiles/paper.yaml has the figures of the paper's appendices A to D, typed off here, and sections that stages take."""
+"""profiles/paper.yaml has the figures of the paper's appendices A to D, typed off here; stages take its sections."""
 
 from functools import reduce
 from importlib import import_module
