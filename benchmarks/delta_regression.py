@@ -84,7 +84,9 @@ def fitted(rollouts: Sequence[Rollout], config: DeltaConfig | None = None) -> di
     engine = make_engine("mujoco", model, config.num_envs, 1)
     delta, fit = learn_delta(engine, learnt, config, nothing)
     judge = make_engine("mujoco", model, WORLDS, 1)
-    gain = compare(replay_error(judge, judges, nothing, None), replay_error(judge, judges, nothing, delta))
+    gain = compare(
+        replay_error(judge, judges, nothing, None), replay_error(judge, judges, nothing, delta), judges.motions
+    )
     return {"learnt": len(learnt.ids), **asdict(gain), "fit": fit.to_dict("list")}
 
 

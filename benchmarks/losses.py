@@ -21,16 +21,13 @@ from benchmarks.flights import flights
 from benchmarks.motion_pack import read_pack, whole_motions
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.rollout import Judge, Manner, roll_out
 from bumblebee.motion.clip import Clip
 from bumblebee.robot.facts import KEY_BODIES
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.observations import action_middle, action_scale, joint_targets
-from bumblebee.tracking.rows import Rows
-from bumblebee.tracking.starts import start_state
-from bumblebee.tracking.terminations import fallen, success_threshold
+from bumblebee.tracking.terminations import fallen
 
 BACK = (0.5, 1.0, 2.0)  # s before the loss that the robot starts again
 AFTER = 1.0  # s beyond the loss that it must then last
@@ -54,24 +51,13 @@ class Rolled:
 @torch.inference_mode()
 def roll(policy: Policy, clips: Sequence[Clip], starts: Tensor, counts: Tensor, model: mujoco.MjModel) -> Rolled:
     """Roll out each clip from its start (N,) for its count (N,) of frames, without noise, by the rule of the trials."""
-    n, library = len(clips), MotionLibrary(clips, policy.shape.ahead)
-    engine = make_engine("mujoco", model, n, 1)
-    ids, dt, scale, middle = torch.arange(n), engine.control_dt, action_scale(), action_middle(policy.shape.action)
-    group = Group(policy.shape.seen, (n, library.num_joints, len(library.ahead)), 0.0, engine.device)
-    generator, limit = torch.Generator().manual_seed(0), torch.tensor([success_threshold(c) for c in clips])
-    first = library.frames(ids, starts * dt)
-    engine.reset(ids, *start_state(first, 0.0, generator), first.hold_pos)
-    engine.settle()
-    act, action, lost = policy.follower(), torch.zeros(n, library.num_joints), torch.full((n,), -1)
+    n, library, limit = len(clips), MotionLibrary(clips, policy.shape.ahead), Judge(clips).limit
+    engine, lost = make_engine("mujoco", model, n, 1), torch.full((n,), -1)
     body, drift, height, wanted = [""] * n, [], [], []
-    for t in range(int(counts.max())):
-        ref = library.frames(ids, (starts + t + 1) * dt)
-        group.look(engine.state(), ref, action, Rows(torch.full((n,), t == 0), by_mask=False), generator)
-        action = act(group.exact)
-        engine.step(joint_targets(ref, action, scale, middle))
-        state = engine.state()
+    for t, tick in enumerate(roll_out(policy, Manner(policy.shape.seen), library, engine, starts=starts)):
+        state, ref = tick.state, tick.ref
         distance = torch.nan_to_num((state.key_pos_w - ref.key_pos_w).norm(dim=-1), nan=torch.inf)
-        bad = (distance.amax(-1) > limit) | fallen(state, ref) | engine.unstable()
+        bad = (distance.amax(-1) > limit) | fallen(state, ref) | tick.unstable
         new = bad & (lost < 0) & (t < counts)
         lost[new] = t
         for index in new.nonzero()[:, 0].tolist():

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from prefect.task_runners import ThreadPoolTaskRunner
 
 from bumblebee.errors import BadInput
 from bumblebee.last_line import full_disk
-from flows import gate_question, progress
+from flows import gate_question, gpus, progress
 from flows.environment import SERVERS, environment, without_login
 from flows.owned import require_own
 from flows.runs import recorded
@@ -48,15 +49,16 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
 
     A failure is a state and no exception: the stage has said what is wrong, a traceback of ours would bury it.
     """
-    log = get_run_logger()
-    command = [sys.executable, "-m", runner_of(Path(workspace)), name]
+    log, folder = get_run_logger(), Path(workspace)
+    command = [sys.executable, "-m", runner_of(folder), name]
     last: deque[str] = deque(maxlen=KEPT)
     with (
         progress.stage(workspace, name) as told,
+        devices_of(folder, name) as devices,
         subprocess.Popen(
             command,
             cwd=workspace,
-            env=without_login(environment(Path(workspace))),
+            env=without_login(environment(folder)) | devices,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -79,6 +81,12 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
 def runner_of(workspace: Path) -> str:
     """The module that brings a stage up to date: on this machine, or on one of the lab's Ray cluster."""
     return "flows.away" if on_cluster(workspace) else "flows.reproduce"
+
+
+def devices_of(workspace: Path, stage: str) -> AbstractContextManager[dict[str, str]]:
+    """The variable that gives a stage GPUs of this machine, while it runs; on a cluster Ray does it."""
+    count = 0 if on_cluster(workspace) else gpus.wanted_by(workspace, stage)
+    return gpus.lent(count, gpus.usable() if count else [])
 
 
 def is_chatter(line: str) -> bool:

@@ -23,7 +23,7 @@ from bumblebee import DISTRIBUTION
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_yaml
 from bumblebee.last_line import guarded
-from flows import node
+from flows import gpus, node
 from tasks import params
 from tasks.lab import AUTO, CLUSTER, FILE, RayLab, read_lab
 
@@ -99,19 +99,6 @@ def _refused(own: RayLab, where: str, text: str) -> BadInput:
     return BadInput(f"{where}.address", f"to join {own.address}", text[:200], do)
 
 
-def gpus(content: Mapping[str, Any], sections: Iterable[str]) -> int:
-    """GPUs for a stage that reads these sections: the most that one of them names, or 1 for the engine on a GPU."""
-    found = [0]
-    for name in sections:
-        section = content.get(name)
-        if isinstance(section, dict):
-            env = section.get("env")
-            on_gpu = isinstance(env, dict) and env.get("engine") == "mujoco_warp"
-            number = section.get("gpus", int(on_gpu))
-            found.append(number if isinstance(number, int) else 0)
-    return max(found)
-
-
 @dataclass(frozen=True)
 class Need:
     """What a stage asks of one machine beside a CPU slot."""
@@ -129,7 +116,7 @@ class Need:
 
 def need(own: RayLab, content: Mapping[str, Any], kind: str, sections: Iterable[str]) -> Need:
     """What a stage needs, by its name without cluster and round and the sections of `content` that it reads."""
-    return Need(gpus(content, sections), own.memory.get(kind, 0.0))
+    return Need(gpus.wanted(content, sections), own.memory.get(kind, 0.0))
 
 
 def require_room(ray: Any, wanted: Need, name: str) -> None:
@@ -168,7 +155,7 @@ def check(workspace: Path) -> None:
     ray = connect(lab.ray, where)
     content = params.read(workspace / "params.yaml")
     for name in content:
-        require_room(ray, Need(gpus(content, [name])), f"{workspace / 'params.yaml'}: {name}.gpus")
+        require_room(ray, Need(gpus.wanted(content, [name])), f"{workspace / 'params.yaml'}: {name}.gpus")
     stages = read_yaml(workspace / "dvc.yaml")["stages"]
     for kind in lab.ray.memory:
         if kind not in stages:

@@ -37,9 +37,7 @@ def main() -> None:
         write_tables(folder, result)
     tell(result)
     curve = paths.CLUSTERS / "curve.csv"
-    log_run(
-        "cluster", params=config, metrics=metrics(result), curve=curve, artifacts=[paths.CLUSTERS, paths.CLUSTERING]
-    )
+    log_run("cluster", params=config, metrics=metrics(result), curve=curve)
 
 
 def kept_material(config: ClusterConfig) -> list[Material]:

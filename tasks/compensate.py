@@ -39,7 +39,7 @@ def main(round: int) -> None:
     print(table_of(compensation))
     print(f"round {round}: {undone} of {len(compensation.plan)} effects undone at the joint")
     metrics = {"effects": len(compensation.plan), "undone": undone}
-    log_run("compensate", round=round, params=config, metrics=metrics, artifacts=[target])
+    log_run("compensate", round=round, params=config, metrics=metrics)
 
 
 def undone_after(parent: int, found: Path, limits: CompensationLimits) -> Compensation:

@@ -77,10 +77,8 @@ def main(round: int, cluster: str) -> None:
     print(verdict(round, cluster, gain))
     numbers = {f"held_out/{h}/{k}": v for h, values in gain.change.items() for k, v in values.items() if v == v}
     tags = {"promoted": str(gain.promoted).lower()}
-    log_run(
-        "delta", cluster=cluster, round=round, params=config, metrics=numbers, curve=target / "curve.csv",
-        artifacts=[target], tags=tags,
-    )  # fmt: skip
+    curve = target / "curve.csv"
+    log_run("delta", cluster=cluster, round=round, params=config, metrics=numbers, curve=curve, tags=tags)
 
 
 def corrected(round: int) -> Simulator:
@@ -99,14 +97,16 @@ def train(simulator: Simulator, round: int, cluster: str, config: DeltaConfig) -
     """Train and judge the cluster's delta action; None where no rollout is long enough to train on."""
     offset = torch.as_tensor(simulator.hooks.encoder_offset, dtype=torch.float32)
     train, held_out = recordings(round, cluster)
-    engine = make_engine("mujoco", simulator.model, config.num_envs, config.threads, simulator.hooks)
+    engine = make_engine(
+        config.engine, simulator.model, config.num_envs, config.threads, simulator.hooks, config.buffers
+    )
     steps = int(config.episode_seconds / engine.control_dt + 0.5)
     if train is None or len(train.windows(steps, 1)) == 0:
         return None
     with progress(total_frames(config), f"delta action, round {round}, {cluster}", "frames") as bar:
         delta, curve = learn_delta(engine, train, config, offset, bar.update)
     judge = make_engine("mujoco", simulator.model, _WORLDS_TO_JUDGE, config.threads, simulator.hooks)
-    nothing = Gain(0, {}, False, "no held-out rollouts")
+    nothing = Gain(0, 0, {}, False, "no held-out rollouts")
     gain = judged(judge, held_out, offset, delta) if held_out is not None else nothing
     return Trained(delta, curve, gain, tuple(train.ids), magnitudes(delta, recorded_state(train), train.targets))
 
@@ -126,7 +126,7 @@ def card(trained: Trained, round: int, cluster: str, config: DeltaConfig) -> dic
 
 def leave_out(round: int, cluster: str, config: DeltaConfig, reason: str) -> None:
     """A cluster without usable rollouts gets an untrained delta that is not kept; the other clusters go on."""
-    gain = Gain(0, {}, False, reason)
+    gain = Gain(0, 0, {}, False, reason)
     delta = DeltaAction(make_network((), len(config.joints)), config.joints, config.limit)
     card = {"round": round, "cluster": cluster, "promoted": False, "held_out": asdict(gain), "train_rollouts": []}
     with output_folder(paths.delta(round, cluster)) as folder:
@@ -155,7 +155,7 @@ def recordings(round: int, cluster: str) -> tuple[Recordings | None, Recordings 
 def judged(engine: Engine, held_out: Recordings, offset: torch.Tensor, delta: DeltaAction) -> Gain:
     """The held-out comparison with and without the delta."""
     without = replay_error(engine, held_out, offset, None)
-    return compare(without, replay_error(engine, held_out, offset, delta))
+    return compare(without, replay_error(engine, held_out, offset, delta), held_out.motions)
 
 
 def verdict(round: int, cluster: str, gain: Gain) -> str:
@@ -166,11 +166,15 @@ def verdict(round: int, cluster: str, gain: Gain) -> str:
     longest = list(gain.change.values())[-1]
     if not math.isfinite(longest["relative"]):
         return f"{outcome}; no held-out rollout reaches 1 s, so no error after it"
-    rollouts = f"{gain.rollouts} held-out rollout{'' if gain.rollouts == 1 else 's'}"
+    rollouts = f"{_counted(gain.rollouts, 'held-out rollout')} of {_counted(gain.motions, 'motion')}"
     if not math.isfinite(longest["low"]):
         return f"{outcome}; error after 1 s {longest['relative']:+.1%}, no interval, on {rollouts}"
     ends = f"[{longest['low']:+.1%}, {longest['high']:+.1%}]"
     return f"{outcome}; error after 1 s {longest['relative']:+.1%} {ends} on {rollouts}"
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 if __name__ == "__main__":

@@ -70,7 +70,7 @@ def main() -> None:
     final = {"kl": float(curve["kl"].iloc[-1]), **{f"success/{k}": v for k, v in card["agreement"].items()}}
     rate = card["agreement"]["all"]
     print(f"generalist: KL to the experts {final['kl']:.3f}, success in the corrected simulator {rate:.0%}")
-    log_run("distill", params=config, metrics=final, curve=paths.GENERALIST / "curve.csv", artifacts=[paths.GENERALIST])
+    log_run("distill", params=config, metrics=final, curve=paths.GENERALIST / "curve.csv")
 
 
 def training_clips(clusters: tuple[str, ...]) -> tuple[list[Clip], list[int]]:

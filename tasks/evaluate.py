@@ -23,7 +23,6 @@ from bumblebee.errors import BadInput
 from bumblebee.evaluation.contract import (
     Contract,
     StartNoise,
-    Thresholds,
     freeze,
     read_contract,
     require_same,
@@ -65,8 +64,6 @@ class EvaluateConfig(Ranged):
     """sha256 of the contract that must be met, or nothing; a different one is refused."""
     threads: Few = 2
     """CPU threads of the simulation."""
-    thresholds: Thresholds = field(default_factory=Thresholds)
-    """Keypoint thresholds of success."""
     start_noise: StartNoise = field(default_factory=StartNoise)
     """Noise of the start states."""
 
@@ -109,13 +106,8 @@ def main() -> None:
         episodes.to_parquet(folder / "episodes.parquet", index=False)
         (folder / "summary.json").write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n")
     tell(summary)
-    log_run(
-        "evaluate",
-        params=config,
-        metrics=headline(summary),
-        artifacts=[paths.EVALUATION],
-        tags={"evaluation_contract": contract.sha256},
-    )
+    tags = {"evaluation_contract": contract.sha256}
+    log_run("evaluate", params=config, metrics=headline(summary), tags=tags)
 
 
 def motions(config: EvaluateConfig) -> tuple[list[Clip], dict[str, str]]:
@@ -130,7 +122,7 @@ def motions(config: EvaluateConfig) -> tuple[list[Clip], dict[str, str]]:
 def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
     """The contract; one that is not the wanted one is refused, with what differs if the old one is still there."""
     engines = {name: settings(name) for name in config.engines}
-    contract = freeze(clips, config.seeds, config.thresholds, config.start_noise, engines, FALL_RULE)
+    contract = freeze(clips, config.seeds, config.start_noise, engines, FALL_RULE)
     if config.contract and config.contract != contract.sha256:
         if (paths.EVALUATION / "contract.json").exists():
             require_same(

@@ -57,8 +57,7 @@ def main() -> None:
         write_library(folder, (clip for clip in library if clip.name in kept))
         drops_table(decisions).to_csv(folder / "drops.csv", index=False)
         decisions_table(decisions).to_csv(folder / "decisions.csv", index=False)
-    tables = [paths.FILTERED / "drops.csv", paths.FILTERED / "decisions.csv"]
-    log_run("filter", params=config, metrics=metrics(accounting(decisions)), artifacts=tables)
+    log_run("filter", params=config, metrics=metrics(accounting(decisions)))
 
 
 def decide(library: Library, config: FilterStageConfig) -> list[Decision]:

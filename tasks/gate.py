@@ -11,7 +11,7 @@ from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
 from tasks import paths
 from tasks.params import load
-from tasks.stage import run_stage
+from tasks.stage import log_run, run_stage
 
 EXIT_PENDING, EXIT_REJECTED = 3, 4
 TO_ANSWER = {verb: f"to {verb} this and nothing else" for verb in ("approve", "reject")}
@@ -34,6 +34,7 @@ def main(round: int) -> None:
         raise SystemExit(EXIT_REJECTED)
     gate.write_json(passed, {key: table[key] for key in KEPT if key in table})
     print(line, flush=True)
+    log_run("gate", round=round, params=own, tags={"status": table["status"]})
 
 
 def rule(workspace: Path = Path()) -> gate.GateConfig:
@@ -113,4 +114,4 @@ def _parser() -> argparse.ArgumentParser:
 if __name__ == "__main__":
     if {"--show", "--approve", "--reject", "--more", "--help", "-h"} & set(sys.argv[1:]):
         raise SystemExit(guarded(lambda: command(sys.argv[1:])))
-    run_stage(main, logs=False)
+    run_stage(main)

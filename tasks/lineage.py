@@ -22,14 +22,22 @@ PLACE = "BUMBLEBEE_PLACE"  # variable
 def path_hash(path: Path) -> str:
     """DVC's hash of a file or folder (`.dir` at the end for a folder); "missing" where there is none."""
     if path.is_dir():
-        listing = [
-            {"md5": _file_md5(file), "relpath": file.relative_to(path).as_posix()}
-            for file in sorted(path.rglob("*"))
-            if file.is_file() and "__pycache__" not in file.parts
-        ]
-        listing.sort(key=lambda entry: entry["relpath"])
-        return hashlib.md5(json.dumps(listing, sort_keys=True).encode()).hexdigest() + ".dir"
+        return listing_hash(file_hashes(path))
     return _file_md5(path) if path.is_file() else "missing"
+
+
+def file_hashes(path: Path) -> dict[str, str]:
+    """Path -> MD5 of each file in a folder, relative to it; of a single file the path is empty."""
+    if path.is_file():
+        return {"": _file_md5(path)}
+    files = (file for file in path.rglob("*") if file.is_file() and "__pycache__" not in file.parts)
+    return {inside: _file_md5(path / inside) for inside in sorted(file.relative_to(path).as_posix() for file in files)}
+
+
+def listing_hash(hashes: Mapping[str, str]) -> str:
+    """DVC's hash of a folder with these files."""
+    listing = [{"md5": md5, "relpath": inside} for inside, md5 in sorted(hashes.items())]
+    return hashlib.md5(json.dumps(listing, sort_keys=True).encode()).hexdigest() + ".dir"
 
 
 def _file_md5(path: Path) -> str:
@@ -40,17 +48,23 @@ def _file_md5(path: Path) -> str:
     return digest.hexdigest()
 
 
-def stage_inputs(stage: str, root: Path = Path(".")) -> dict[str, str]:
-    """Path -> hash of every dependency of a DVC stage, and `params:<section>` -> hash of its parameters."""
+def stage_files(stage: str, root: Path = Path(".")) -> tuple[dict[str, str], tuple[Path, ...]]:
+    """The inputs and outputs of a DVC stage.
+
+    Returns:
+        path -> hash of every dependency and `params:<section>` -> hash of its parameters; the paths of the outputs.
+    """
     from dvc.dependency.param import ParamsDependency
     from dvc.repo import Repo
 
     lock_file.read_whole()
     found: dict[str, str] = {}
+    outputs: tuple[Path, ...] = ()
     with Repo(str(root)) as repo:
         for loaded in repo.stage.load_all("dvc.yaml"):
             if loaded.addressing != stage:
                 continue
+            outputs = tuple(Path(str(out.def_path)) for out in loaded.outs)
             for dep in loaded.deps:
                 if isinstance(dep, ParamsDependency):
                     for section, values in dep.read_params().items():
@@ -58,14 +72,19 @@ def stage_inputs(stage: str, root: Path = Path(".")) -> dict[str, str]:
                         found[f"params:{section}"] = hashlib.md5(text.encode()).hexdigest()
                 else:
                     found[str(dep.def_path)] = path_hash(Path(dep.fs_path))
-    return found
+    return found, outputs
 
 
 @cache
-def current_inputs() -> dict[str, str]:
-    """The inputs of the stage that DVC runs in this process; empty when it was started by hand."""
+def current_stage() -> tuple[dict[str, str], tuple[Path, ...]]:
+    """The inputs and outputs of the stage that DVC runs in this process; none when it was started by hand."""
     stage = os.environ.get("DVC_STAGE")
-    return stage_inputs(stage) if stage else {}
+    return stage_files(stage) if stage else ({}, ())
+
+
+def current_inputs() -> dict[str, str]:
+    """The inputs alone."""
+    return current_stage()[0]
 
 
 def upstream(output: Path, lock: Path = lock_file.FILE) -> dict[str, str]:

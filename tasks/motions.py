@@ -64,8 +64,7 @@ def main() -> None:
         shutil.rmtree(unsplit, ignore_errors=True)
     index = read_index(paths.MOTIONS)
     tell(index, reading)
-    tables = [paths.MOTIONS / "skipped.csv", paths.MOTIONS / NOTES]
-    log_run("motions", params=config, metrics=metrics(index, reading), artifacts=tables)
+    log_run("motions", params=config, metrics=metrics(index, reading))
 
 
 def make_cache() -> None:

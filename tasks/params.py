@@ -37,7 +37,7 @@ SECTIONS = {
     "report": "tasks.report:ReportConfig",
 }
 LOOP = ("clusters", "rounds", "final_round")
-EXPONENT = re.compile(r"[-+]?[0-9]+e[-+]?[0-9]+", re.IGNORECASE)
+EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?e[-+]?[0-9]+", re.IGNORECASE)
 Config = TypeVar("Config")
 
 
@@ -133,7 +133,7 @@ def convert(kind: Any, value: Any, path: Path | str, place: str) -> Any:
         keys = {key: f"{place}.{shown(key, bare=True)}" for key in value}
         return {convert(args[0], k, path, keys[k]): convert(args[1], v, path, keys[k]) for k, v in value.items()}
     elif kind is float and isinstance(value, str) and EXPONENT.fullmatch(value):
-        return float(value)  # YAML 1.1 reads 1e-4 as text, YAML 1.2 (and DVC) as a number
+        return float(value)  # YAML 1.1 reads 1e-4 and 1.5e4 as text, YAML 1.2 (and DVC) as numbers
     elif fault(kind, value, place) is None:
         return _made(kind, value)
     raise BadInput(f"{path}: {place}", describe(kind), _said(value))

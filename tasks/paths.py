@@ -32,6 +32,14 @@ INCOMING = Path("data/incoming")
 """Where a lab may put its measured rollouts."""
 ROLLOUTS_OF_ROUND = "data/rollouts/r{round}"
 """A round's measured rollouts, as the default of a parameter."""
+LISTED = (
+    # Data sets: large, kept by DVC, and under the licences of whoever recorded them.
+    *("data/motions/clips/*", "data/filtered/clips/*", "data/retargets/*"),
+    *("data/rollouts/*.parquet", "data/measured/*.parquet"),
+    # The stand-in robot's effects, which nobody who watches the loop is to see before the report.
+    "data/sealed/*",
+)
+"""Patterns of outputs' files that runs in MLflow list and do not hold (`tasks/outputs.py`); `*` spans folders."""
 SCRATCH = Path(".scratch")
 """Checkpoints of stages that are not done."""
 

@@ -21,7 +21,7 @@ from tasks.promotion import CHAMPION, Verdict, against_champion, against_parent,
 from tasks.promotion_gate import Promotion, PromotionConfig, settle
 from tasks.rollouts_config import RolloutsConfig
 from tasks.sections import Loop, loop
-from tasks.stage import load, output_file, run_stage
+from tasks.stage import load, log_run, output_file, run_stage
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,7 @@ def main() -> None:
         made, champion, reason = (models[name][key] for key in ("version", "champion", "reason"))
         print(f"{name}: version {made}, champion is {champion} ({reason})")
     write(content)
+    log_run("publish", params=config, tags={"evaluation_contract": contract})
 
 
 def write(content: dict[str, Any]) -> None:

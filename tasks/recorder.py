@@ -80,9 +80,8 @@ def away(text: str) -> BadInput | None:
 
 def _plain(run: dict[str, Any]) -> dict[str, Any]:
     """The same in what JSON knows."""
-    files = [str(path) for path in run["artifacts"]]
     curve = None if run["curve"] is None else str(run["curve"])
-    return {**run, "params": registry.flatten(run["params"]), "curve": curve, "artifacts": files}
+    return {**run, "params": registry.flatten(run["params"]), "curve": curve}
 
 
 def main() -> int:
@@ -94,7 +93,7 @@ def main() -> int:
         if text:
             run = json.loads(text)
             curve = None if run["curve"] is None else Path(run["curve"])
-            registry.log_run(**{**run, "curve": curve, "artifacts": [Path(name) for name in run["artifacts"]]})
+            registry.log_run(**{**run, "curve": curve})
     except Exception as error:  # every one is the stage's, which says it in its own way
         print(told(error), file=sys.stderr)
         return 1

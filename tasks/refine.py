@@ -40,7 +40,7 @@ def main(round: int, cluster: str) -> None:
     if not learned(round, cluster):
         keep(parent, out, round)
         print(f"round {round}, {cluster}: nothing was found that the model lacks: the expert stays what it is")
-        log_run("refine", cluster=cluster, round=round, params=config, artifacts=[out], tags={"kept": "parent"})
+        log_run("refine", cluster=cluster, round=round, params=config, tags={"kept": "parent"})
         return
     clips, share, tried = cluster_clips(cluster, config.others)
     job = Job(

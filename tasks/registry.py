@@ -11,7 +11,7 @@ import json
 import logging
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import cache
 from pathlib import Path
@@ -21,7 +21,8 @@ from bumblebee.errors import BadInput
 from tasks.lab import MlflowLab, read_lab
 from tasks.lab_checks import one_at_a_time
 from tasks.lab_serve import read_tracking
-from tasks.lineage import git_sha, history, inputs_of_stage, lineage, place
+from tasks.lineage import current_stage, git_sha, history, inputs_of_stage, lineage, place
+from tasks.outputs import MANIFEST, copied, manifest
 from tasks.run_form import card_settings, fitted, flatten, metric_name, read_curve
 
 if TYPE_CHECKING:
@@ -150,10 +151,20 @@ def log_run(
     params: object,
     metrics: dict[str, float],
     curve: Path | None,
-    artifacts: list[Path],
     tags: dict[str, str],
+    outputs: Sequence[Path] | None = None,
 ) -> str:
-    """Write one finished run; returns its id.
+    """Write one finished run with its outputs (`tasks/outputs.py`); returns its id.
+
+    Args:
+        stage: the stage's name.
+        cluster: the cluster, where the stage has one.
+        round: the round, where the stage has one.
+        params: the configuration (dataclass or mapping).
+        metrics: final numbers.
+        curve: a CSV file whose first column is the step.
+        tags: anything else worth searching for.
+        outputs: files and folders, relative to the workspace; None: those of the stage that DVC runs.
 
     A stage that DVC runs again with equal inputs, as after a kill, takes the place of what it has written before.
     """
@@ -184,11 +195,10 @@ def log_run(
     for start in range(0, len(written), 100):
         client.log_batch(run_id, tags=written[start : start + 100])
     client.log_text(run_id, origin, LINEAGE)
-    for artifact in artifacts:
-        if artifact.is_dir():
-            client.log_artifacts(run_id, str(artifact), artifact.name)
-        elif artifact.exists():
-            client.log_artifact(run_id, str(artifact))
+    made = manifest(current_stage()[1] if outputs is None else outputs)
+    client.log_text(run_id, _text(made), MANIFEST)
+    for file in copied(made):
+        client.log_artifact(run_id, str(file), os.path.dirname(file))
     client.set_terminated(run_id)
     return str(run_id)
 

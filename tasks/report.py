@@ -62,7 +62,7 @@ def main() -> None:
     print(f"report: {paths.REPORT} ({paths.REPORT.stat().st_size / 1e6:.1f} MB)")
     for line in opening_lines(results):
         print(f"  {line}")
-    log_run("report", params=config, artifacts=[paths.REPORT])
+    log_run("report", params=config)
 
 
 def collect(shape: Loop) -> LoopResults:

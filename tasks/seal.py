@@ -26,7 +26,7 @@ from bumblebee.robot.facts import g1_bodies, joint_names
 from tasks import paths
 from tasks.rollouts_config import RolloutsConfig
 from tasks.seal_trial import Trial, followed, try_robot
-from tasks.stage import load, output_file, run_stage
+from tasks.stage import load, log_run, output_file, run_stage
 from tasks.stand_in import cut
 
 WORSE = 1.1  # sizes of a draw over those of the draw before
@@ -106,6 +106,7 @@ def main() -> None:
     with output_file(paths.SEALED_ROBOT) as path:
         path.write_text(json.dumps(sealed, indent=1) + "\n")
     print(f"sealed {len(sealed['effects'])} effects, sha256 {sealed['sha256'][:12]}")
+    log_run("seal", params=config, metrics=sealed.get("trial", {}), tags={"sealed": sealed["sha256"]})
 
 
 def found(config: SealConfig) -> dict[str, Any]:
@@ -208,4 +209,4 @@ def size(kind: Kind, place: Place, severity: float, rng: np.random.Generator) ->
 
 
 if __name__ == "__main__":
-    run_stage(main, logs=False)
+    run_stage(main)

@@ -6,7 +6,7 @@ A stage's module reads:
         config = load("experts", ExpertConfig)       # the section of params.yaml, checked
         with output_folder(paths.expert(round, cluster)) as folder:
             ...                                      # write into `folder`; it is renamed at the end
-        log_run("experts", cluster=cluster, round=round, params=config, metrics={...}, curve=..., artifacts=[...])
+        log_run("experts", cluster=cluster, round=round, params=config, metrics={...}, curve=...)
 
     if __name__ == "__main__":
         run_stage(main)
@@ -167,10 +167,11 @@ def log_run(
     params: object = None,
     metrics: dict[str, float] | None = None,
     curve: Path | None = None,
-    artifacts: list[Path] | tuple[Path, ...] = (),
     tags: dict[str, str] | None = None,
 ) -> None:
-    """Write the stage's run to MLflow: parameters, numbers, learning curve, files, and what it was made from.
+    """Write the stage's run to MLflow: parameters, numbers, learning curve, and what it was made from.
+
+    The run also has the stage's outputs as dvc.yaml names them, so the last of them must be written before.
 
     Args:
         stage: the stage's name.
@@ -179,12 +180,11 @@ def log_run(
         params: the configuration (dataclass or mapping); nested fields are flattened with dots.
         metrics: final numbers.
         curve: a CSV file whose first column is the step and each other one a metric.
-        artifacts: files or folders to keep beside the run.
         tags: anything else worth searching for.
     """
     recorder.record(
         {
-            **{"stage": stage, "cluster": cluster, "round": round, "params": params, "metrics": metrics or {}},
-            **{"curve": curve, "artifacts": list(artifacts), "tags": tags or {}},
+            **{"stage": stage, "cluster": cluster, "round": round, "params": params},
+            **{"metrics": metrics or {}, "curve": curve, "tags": tags or {}},
         }
     )

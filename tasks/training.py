@@ -175,7 +175,6 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
         params=config,
         metrics=metrics,
         curve=folder / CURVE,
-        artifacts=[job.out],
     )
     return card
 

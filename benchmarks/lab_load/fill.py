@@ -33,13 +33,13 @@ def mlflow(folder: Path, loops: int, stages: int) -> None:
     client, draw = registry.prepare(), random.Random(0)
     experiment = client.get_experiment_by_name(registry.experiment_name())
     assert experiment is not None
-    (policy := folder / "policy").mkdir()
+    (policy := Path("policy")).mkdir()
     for name in MODELS:
         client.create_registered_model(name)
     for loop in range(loops):
         (policy / "policy.onnx").write_bytes(draw.randbytes(BYTES))
         settings, numbers = {f"key{n}": draw.random() for n in range(PARAMS)}, {"success": draw.random()}
-        run = registry.log_run("experts", "c0", 1, settings, numbers, None, [policy], {"loop": str(loop)})
+        run = registry.log_run("experts", "c0", 1, settings, numbers, None, {"loop": str(loop)}, [policy])
         model = MODELS[loop % len(MODELS)]
         made = client.create_model_version(model, f"{client.get_run(run).info.artifact_uri}/policy", run)
         client.set_registered_model_alias(model, "champion", made.version)

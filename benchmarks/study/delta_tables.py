@@ -10,7 +10,7 @@ import pandas as pd
 from benchmarks.study.deltas import ARMS, GENERAL, NONE, OWN
 from benchmarks.study.round_tables import paired
 from benchmarks.study.settings import frozen
-from benchmarks.study.tables import cell, head, line, rate, relative, signed
+from benchmarks.study.tables import cell, head, line, motions_of, rate, relative, signed
 from bumblebee.errors import BadInput
 from bumblebee.learning.delta import CARD, compare
 
@@ -53,16 +53,18 @@ def _errors(tables: dict[str, pd.DataFrame]) -> str:
             (arm, str(horizon)): own.sort_values("rollout")["error"].to_numpy()
             for (arm, horizon), own in table.groupby(["arm", "horizon"])
         }
+        motions = motions_of(table, "arm")
         for arm in ARMS:
-            lines.append(line([name, *_arm_errors(errors, arm)]))
+            lines.append(line([name, *_arm_errors(errors, motions, arm)]))
     return "\n".join(lines) + "\n"
 
 
-def _arm_errors(errors: dict[tuple[str, str], np.ndarray], arm: str) -> list[str]:
+def _arm_errors(errors: dict[tuple[str, str], np.ndarray], motions: list[str], arm: str) -> list[str]:
     horizons = sorted({horizon for _, horizon in errors}, key=float)
 
     def change(first: str, second: str) -> dict[str, dict[str, float]]:
-        return compare({h: errors[first, h] for h in horizons}, {h: errors[second, h] for h in horizons}).change
+        before, after = ({h: errors[name, h] for h in horizons} for name in (first, second))
+        return compare(before, after, motions).change
 
     own, cells = change(NONE, arm), [arm, str(int(np.isfinite(errors[arm, horizons[-1]]).sum()))]
     for horizon in horizons:

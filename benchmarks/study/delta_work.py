@@ -73,7 +73,8 @@ def errors(work: Work) -> None:
     for arm in ARMS:
         correction = Correction(delta=delta_folder(work.out, arm, work.what))
         for horizon, values in replayed(correction, held_out, work.config.judge_worlds).items():
-            rows = {"rollout": held_out.ids, "arm": arm, "horizon": float(horizon), "error": values}
+            about = {"rollout": held_out.ids, "motion": held_out.motions, "arm": arm}
+            rows = {**about, "horizon": float(horizon), "error": values}
             tables.append(pd.DataFrame(rows))
     write_csv(work.out / f"errors-{work.what}.csv", pd.concat(tables, ignore_index=True))
 

@@ -9,7 +9,7 @@ judged by the rest of these recordings, and by what a policy is worth on the rob
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import torch
@@ -23,7 +23,7 @@ from benchmarks.study.settings import FROZEN, SMALL, Study, freeze, frozen, sha2
 from benchmarks.study.steps import Places, Runner, Step
 from bumblebee.deploy.stand_in import BASES
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
-from bumblebee.learning.delta import DeltaConfig
+from bumblebee.learning.delta import DELTA_PPO, DeltaConfig
 from bumblebee.learning.policy import FILE
 from bumblebee.measured.rollout import Rollout
 
@@ -38,7 +38,7 @@ class DeltasConfig:
 
     delta: DeltaConfig = field(
         default_factory=lambda: DeltaConfig(
-            method="ppo", limit=0.2, iterations=1000, num_envs=1024, steps_per_iteration=16
+            method="ppo", limit=0.2, num_envs=1024, ppo=replace(DELTA_PPO, iterations=1000)
         )
     )
     """The same for a cluster's own and the general one, which thus sees a cluster a fifth as often."""

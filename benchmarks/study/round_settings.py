@@ -1,12 +1,12 @@
 """What the rounds fix beforehand, and which of it the command line chooses."""
 
 import argparse
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from benchmarks.study.settings import SMALL, Study
 from bumblebee.deploy.stand_in import BASES
 from bumblebee.diagnosis.config import DiagnosisConfig
-from bumblebee.learning.delta import DeltaConfig
+from bumblebee.learning.delta import DELTA_PPO, DeltaConfig
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class RoundsConfig:
     try_seed: int = 18_900
     delta: DeltaConfig = field(
         default_factory=lambda: DeltaConfig(
-            method="ppo", limit=0.2, iterations=300, num_envs=1024, steps_per_iteration=16
+            method="ppo", limit=0.2, num_envs=1024, ppo=replace(DELTA_PPO, iterations=300)
         )
     )
     diagnosis: DiagnosisConfig = field(default_factory=DiagnosisConfig)
@@ -58,7 +58,9 @@ SMALL_CONFIG = RoundsConfig(
     tries=1,
     shards=1,
     steps=512,
-    delta=DeltaConfig(method="ppo", limit=0.2, iterations=1, num_envs=8, steps_per_iteration=4, episode_seconds=0.4),
+    delta=DeltaConfig(
+        method="ppo", limit=0.2, num_envs=8, ppo=replace(DELTA_PPO, iterations=1, steps=4), episode_seconds=0.4
+    ),
     diagnosis=_HASTY,
     later=_HASTY,
 )

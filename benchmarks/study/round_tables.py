@@ -9,11 +9,11 @@ import pandas as pd
 
 from benchmarks.study.round_settings import RoundsConfig
 from benchmarks.study.rounds import ARMS, BASE, Place
-from benchmarks.study.tables import cell, head, line, rate, relative, signed
+from benchmarks.study.tables import cell, head, line, motions_of, rate, relative, signed
 from bumblebee.deploy.stand_in_effects import read_sealed
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.intervals import Estimate, mean_by_motion, motion_means, sign_flip_test
-from bumblebee.learning.delta import compare
+from bumblebee.learning.delta import Gain, compare
 
 SETS = ("recorded", "held out")
 NONE = next(iter(ARMS))
@@ -104,27 +104,28 @@ def _errors(out: Path, names: Sequence[str]) -> str:
             (name, str(horizon)): own.sort_values("rollout")["error"].to_numpy()
             for (name, horizon), own in table.groupby(["correction", "horizon"])
         }
+        motions = motions_of(table, "correction")
         for name in table["correction"].unique():
-            lines.append(line([robot, *_replayed(errors, name)]))
+            lines.append(line([robot, *_replayed(errors, motions, name)]))
     return "\n".join(lines) + "\n"
 
 
-def _replayed(errors: dict[tuple[str, str], np.ndarray], name: str) -> list[str]:
+def _replayed(errors: dict[tuple[str, str], np.ndarray], motions: list[str], name: str) -> list[str]:
     """The cells of one simulator."""
     horizons = sorted({horizon for _, horizon in errors}, key=float)
 
-    def change(first: str, second: str) -> dict[str, dict[str, float]]:
-        return compare({h: errors[first, h] for h in horizons}, {h: errors[second, h] for h in horizons}).change
+    def gain(first: str, second: str) -> Gain:
+        before, after = ({h: errors[one, h] for h in horizons} for one in (first, second))
+        return compare(before, after, motions)
 
-    own, cells = change("declared", name), [name, str(int(np.isfinite(errors[name, horizons[-1]]).sum()))]
+    own, cells = gain("declared", name).change, [name, str(int(np.isfinite(errors[name, horizons[-1]]).sum()))]
     for horizon in horizons:
         cells += [f"{own[horizon]['with']:.4f}", "" if name == "declared" else relative(own[horizon])]
-    cells.append(relative(change("delta", "both")[horizons[-1]]) if name == "both" else "")
+    cells.append(relative(gain("delta", "both").change[horizons[-1]]) if name == "both" else "")
     before = {"delta": "declared", "both": "physics"}.get(name)
     if before is None:
         return [*cells, ""]
-    gain = compare({h: errors[before, h] for h in horizons}, {h: errors[name, h] for h in horizons})
-    return [*cells, "kept" if gain.promoted else "not kept"]
+    return [*cells, "kept" if gain(before, name).promoted else "not kept"]
 
 
 def _magnitudes(out: Path, names: Sequence[str], config: RoundsConfig) -> str:

@@ -135,7 +135,8 @@ def errors(work: Work) -> None:
     for name, parts in CORRECTIONS.items():
         found = replayed(work.correction(parts, name), held_out, work.config.judge_worlds)
         for horizon, values in found.items():
-            rows = {"rollout": held_out.ids, "correction": name, "horizon": float(horizon), "error": values}
+            about = {"rollout": held_out.ids, "motion": held_out.motions}
+            rows = {**about, "correction": name, "horizon": float(horizon), "error": values}
             tables.append(pd.DataFrame(rows))
     write_csv(work.folder / "errors.csv", pd.concat(tables, ignore_index=True))
 

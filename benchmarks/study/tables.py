@@ -206,3 +206,9 @@ def signed(value: Estimate) -> str:
 def relative(change: dict[str, float]) -> str:
     """A relative change, an entry of `learning.delta.Gain.change`, with its interval."""
     return f"{change['relative']:+.3f} [{change['low']:+.3f}, {change['high']:+.3f}]"
+
+
+def motions_of(table: pd.DataFrame, by: str) -> list[str]:
+    """The motion of each rollout of a table of errors, in the order of the rollouts' names."""
+    (_, one), *_ = table.groupby([by, "horizon"])
+    return one.sort_values("rollout")["motion"].tolist()

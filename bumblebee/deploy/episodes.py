@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
+import torch
 
 from bumblebee import quaternions
 from bumblebee.deploy.compensation import Compensation
@@ -23,21 +24,11 @@ from bumblebee.robot.facts import joint_names
 from bumblebee.robot.facts import joints as robot_joints
 from bumblebee.robot.model import gains
 from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.terminations import FALL, Stop, beyond
 
 MAX_LIFT = 0.10  # m: a start is lifted or lowered by no more than this to stand on the floor
 
 
-@dataclass(frozen=True)
-class Stop:
-    """When an episode ends before its clip does."""
-
-    tilt_deg: float = 60.0
-    """Angle of the pelvis' up axis from the reference's."""
-    drop_m: float = 0.35
-    """How far the pelvis is below the reference's."""
-
-
-FALL = Stop()
 FALL_RULE = {"tilt_deg": FALL.tilt_deg, "drop_m": FALL.drop_m, "max_start_lift_m": MAX_LIFT}
 
 
@@ -101,7 +92,7 @@ def run_episodes(
     for tick in range(int(lengths.max())):
         alive = np.flatnonzero(~ended & (tick < lengths))
         true = robots.read()
-        fallen = alive[_fallen(true, [own[i] for i in alive], alive, tick, stop)] if tick else alive[:0]
+        fallen = alive[_fallen(true, [own[i] for i in alive], alive, tick, stop)] if tick and len(alive) else alive[:0]
         ended[fallen] = True
         alive = np.setdiff1d(alive, fallen)
         if not len(alive):
@@ -216,14 +207,9 @@ def _act(groups: list, alive: np.ndarray, tick: int, sensors: Sensors) -> tuple[
 
 def _fallen(true: Sensors, clips: list[Clip], robots: np.ndarray, tick: int, stop: Stop) -> np.ndarray:
     """Which of the robots lie or are no longer numbers: (n,) bool."""
-    if not len(robots):
-        return np.zeros(0, dtype=bool)
-    quat, height = true.base_quat[robots], true.base_pos[robots, 2]
-    wanted = np.stack([clip.root_quat[tick] for clip in clips])
-    up = np.array([0.0, 0.0, 1.0])
-    cosine = np.sum(quaternions.rotate(quat, up) * quaternions.rotate(wanted, up), axis=1)
-    drop = np.array([clip.root_pos[tick, 2] for clip in clips]) - height
-    return ~((cosine > np.cos(np.radians(stop.tilt_deg))) & (drop < stop.drop_m))
+    reached = (true.base_quat[robots], true.base_pos[robots, 2])
+    wanted = (np.array([clip.root_quat[tick] for clip in clips]), np.array([clip.root_pos[tick, 2] for clip in clips]))
+    return beyond(stop, *(torch.as_tensor(part, dtype=torch.float64) for part in (*reached, *wanted))).numpy()
 
 
 def episode_generator(episode: Episode) -> np.random.Generator:

@@ -7,7 +7,7 @@
 It takes the robot's place: its effects are sealed in a file that nothing else reads before the loop's report.
 A plan is {"policies": {key: folder}, "episodes": [{"rollout_id", "policy", "motion", "seed", "meta"}],
 "start_noise": {...}, "base": ..., "stop": {...}, "compensations": {key: compensation.json}}; meta and all from
-start_noise on may be absent. `stop` is when an episode ends before its clip does (`episodes.Stop`).
+start_noise on may be absent. `stop` is when an episode ends before its clip does (`terminations.Stop`).
 `judged`: the rollouts hold the true state in place of readings, for the evaluation.
 
 `base` says what the robot knows of its base's place: `mocap`, 1 mm of noise; `odometry`, which drifts, for the policy
@@ -26,7 +26,7 @@ import mujoco
 
 from bumblebee.deploy.compensation import Compensation
 from bumblebee.deploy.compensation_file import load_compensations
-from bumblebee.deploy.episodes import FALL, Episode, Stop, run_episodes
+from bumblebee.deploy.episodes import Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import SideBySide
 from bumblebee.deploy.sensors import SensorNoise
@@ -38,6 +38,7 @@ from bumblebee.measured.rollout import write_rollout
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
 from bumblebee.progress import progress
+from bumblebee.tracking.terminations import FALL, Stop
 
 BASES = ("mocap", "odometry", "none")
 

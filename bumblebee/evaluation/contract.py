@@ -15,7 +15,7 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import TRAVELS, Clip
 from bumblebee.ranges import Range, Ranged
-from bumblebee.tracking.terminations import success_threshold
+from bumblebee.tracking.terminations import LOOSE, TIGHT, success_threshold
 
 SCHEMA = 1
 ALIGNMENT = (
@@ -29,12 +29,12 @@ ERRORS = (
 
 
 @dataclass(frozen=True)
-class Thresholds(Ranged):
-    """How far a key body may be from its reference."""
+class Thresholds:
+    """How far a key body may be from its reference, as `success_threshold` says it everywhere."""
 
-    walking: Annotated[float, Range(above=0, most=100)] = 0.8
+    walking: float = LOOSE
     """Motions that travel [m]."""
-    other: Annotated[float, Range(above=0, most=100)] = 0.4
+    other: float = TIGHT
     """All others [m]."""
 
 
@@ -101,13 +101,11 @@ def clip_digest(clip: Clip) -> str:
 def freeze(
     clips: list[Clip],
     seeds: tuple[int, ...],
-    thresholds: Thresholds | None = None,
     start_noise: StartNoise | None = None,
     engines: dict[str, dict[str, Any]] | None = None,
     fall: dict[str, float] | None = None,
 ) -> Contract:
     """The contract of evaluating on these clips with these seeds; motions are sorted by name."""
-    limits = thresholds or Thresholds()
     motions = tuple(
         {
             "name": clip.name,
@@ -115,11 +113,11 @@ def freeze(
             "family": clip.family,
             "split": clip.split,
             "frames": len(clip.root_pos),
-            "threshold_m": success_threshold(clip, limits.walking, limits.other),
+            "threshold_m": success_threshold(clip),
         }
         for clip in sorted(clips, key=lambda clip: clip.name)
     )
-    return Contract(motions, tuple(seeds), limits, start_noise or StartNoise(), engines or {}, fall or {})
+    return Contract(motions, tuple(seeds), Thresholds(), start_noise or StartNoise(), engines or {}, fall or {})
 
 
 def write_contract(path: Path, contract: Contract) -> None:

@@ -9,18 +9,14 @@ import torch
 from torch import Tensor
 
 from bumblebee.learning.policy import Policy
+from bumblebee.learning.rollout import Judge, Manner, roll_out
 from bumblebee.motion.clip import Clip
 from bumblebee.ranges import Factor, Few, Ranged, Seed
 from bumblebee.sim.effects import RuntimeHooks
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.env import ActionAdapter
-from bumblebee.tracking.groups import Group
 from bumblebee.tracking.library import MotionLibrary
-from bumblebee.tracking.observations import action_middle, action_scale, middle_targets
-from bumblebee.tracking.rows import Rows
-from bumblebee.tracking.starts import start_state
-from bumblebee.tracking.terminations import fallen, key_distance, success_threshold
 
 _WORLDS = 128  # at once
 
@@ -79,50 +75,22 @@ def success_by_family(trials: pd.DataFrame) -> dict[str, float]:
 def _try_some(
     policy: Callable[[Tensor], Tensor], clips: Sequence[Clip], world: World, ahead: Sequence[float], trials: Trials
 ) -> pd.DataFrame:
-    n = len(clips)
-    generator = torch.Generator().manual_seed(trials.seed)
     library = MotionLibrary(clips, ahead)
-    engine = make_engine("mujoco", world.model, n, min(world.threads, n), world.hooks)
-    ids, scale, dt = torch.arange(n), action_scale(), engine.control_dt
-    shape = getattr(policy, "shape", None)
-    act = policy.follower() if isinstance(policy, Policy) else policy
-    seen, middle = (shape.seen, action_middle(shape.action)) if shape else (ObservationConfig(), None)
-    group = Group(seen, (n, library.num_joints, len(library.ahead)), trials.noise, engine.device)
-    limit = torch.tensor([success_threshold(clip) for clip in clips])
-    first = library.frames(ids, torch.zeros(n))
-    qpos, qvel = start_state(first, trials.noise, generator)
-    engine.reset(ids, qpos, qvel, first.hold_pos)
-    engine.settle()
-    action = torch.zeros(n, library.num_joints)
-    alive = torch.ones(n, dtype=torch.bool)
-    survived, key_sum, joint_sum = torch.zeros(n), torch.zeros(n), torch.zeros(n)
-    for frame in range(int(library.length.max()) - 1):
-        ref = library.frames(ids, torch.full((n,), (frame + 1) * dt))
-        state = engine.state()
-        group.look(state, ref, action, Rows(torch.full((n,), frame == 0), by_mask=False), generator)
-        action = act(group.noisy)
-        zero, adapter = middle_targets(ref, middle), world.action_adapter
-        motor = action if adapter is None else adapter(state, zero, action)
-        engine.step(zero + scale * motor)
-        state = engine.state()
-        running = frame + 1 < library.length
-        good = (key_distance(state, ref) <= limit) & ~fallen(state, ref) & ~engine.unstable()
-        alive &= good | ~running
-        counted = (alive & running).float()
-        survived += counted
-        key_sum += counted * torch.nan_to_num((state.key_pos_w - ref.key_pos_w).norm(dim=-1).mean(-1))
-        joint_sum += counted * torch.nan_to_num((state.joint_pos - ref.joint_pos).abs().mean(-1))
-        if not bool((alive & running).any()):
+    engine = make_engine("mujoco", world.model, len(clips), min(world.threads, len(clips)), world.hooks)
+    seen = policy.shape.seen if isinstance(policy, Policy) else ObservationConfig()
+    manner = Manner(seen, noise=trials.noise, adapter=world.action_adapter)
+    judge = Judge(clips)
+    for tick in roll_out(policy, manner, library, engine, torch.Generator().manual_seed(trials.seed)):
+        if not bool(judge.see(tick).any()):
             break
-    steps = survived.clamp(min=1)
     return pd.DataFrame(
         {
             "name": [clip.name for clip in clips],
             "family": [clip.family for clip in clips],
             "split": [clip.split for clip in clips],
-            "success": alive.numpy(),
-            "share": (survived / (library.length - 1).clamp(min=1)).numpy(),
-            "key_error": (key_sum / steps).numpy(),
-            "joint_error": (joint_sum / steps).numpy(),
+            "success": judge.kept.numpy(),
+            "share": (judge.frames / (library.length - 1).clamp(min=1)).numpy(),
+            "key_error": judge.key_error.numpy(),
+            "joint_error": judge.joint_error.numpy(),
         }
     )

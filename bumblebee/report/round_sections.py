@@ -149,7 +149,7 @@ def _deltas(cards: dict[str, Json]) -> list[Block]:
     header = ("cluster", "after", "without delta [rad]", "with delta [rad]", "change [95 %]", "delta")
     explained = note(
         "Joint position error on held-out rollouts. A delta is kept only if the interval of the change after 1 s lies "
-        "below zero; one rollout gives no interval."
+        "below zero. The interval is over motions: rollouts of one motion count as one, and one motion gives none."
     )
     return [table(header, rows, "", "delta actions"), explained, *([bullets(lines)] if lines else [])]
 

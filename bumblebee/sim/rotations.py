@@ -32,6 +32,12 @@ def two_columns(q: Tensor) -> Tensor:
     return torch.stack((one, four, seven, two, five, eight), dim=-1).unflatten(-1, (2, 3))
 
 
+def up_axis(q: Tensor) -> Tensor:
+    """The rotated z axis (..., 3) of unit quaternions (..., 4)."""
+    w, x, y, z = q.unbind(-1)
+    return torch.stack((2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)), dim=-1)
+
+
 def _entries(q: Tensor) -> tuple[Tensor, ...]:
     """The nine entries (...,) of the matrices of quaternions (..., 4), row by row."""
     parts = q.movedim(-1, 0).contiguous()  # columns of their own, three at a time: faster on a CPU

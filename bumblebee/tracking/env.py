@@ -28,7 +28,7 @@ from bumblebee.tracking.sampler import ClipSampler, ClipShares
 from bumblebee.tracking.starts import start_state
 from bumblebee.tracking.statistics import Statistics
 from bumblebee.tracking.stretches import StretchSampler
-from bumblebee.tracking.terminations import lying, threshold_at
+from bumblebee.tracking.terminations import fallen, threshold_at
 from bumblebee.tracking.terrain import Ground
 from bumblebee.tracking.threads import Aside, one_thread
 
@@ -240,7 +240,7 @@ class TrackingEnv(VecEnv):
 
     def _fallen(self, step: Step) -> Tensor:
         """Robots (B,) bool that a step leaves lying."""
-        return lying(step.state, step.ref, step.root_angle)
+        return fallen(step.state, step.ref)
 
     def _push(self) -> None:
         """Push whom it hits now."""

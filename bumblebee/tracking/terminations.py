@@ -1,30 +1,46 @@
 """When an episode is lost: the robot has fallen, or a key body is too far from its reference (paper, section 3.2)."""
 
+import math
+from dataclasses import dataclass
+
 from torch import Tensor
 
 from bumblebee.motion.clip import Clip, travels
 from bumblebee.sim.engine import RobotState
-from bumblebee.sim.rotations import angle_between, length3
+from bumblebee.sim.rotations import length3, up_axis
 from bumblebee.tracking.library import ReferenceFrame
 
-FALL_HEIGHT = 0.35  # m: the pelvis is this much lower than its reference
-FALL_ANGLE = 1.2  # rad: or tilted this far away from it
+LOOSE, TIGHT = 0.8, 0.4  # m: how far a key body may be off in motions that travel, and in all others
 
 
-def success_threshold(clip: Clip, walking: float = 0.8, other: float = 0.4) -> float:
-    """Distance of a key body [m] at which a clip counts as failed: `walking` where it travels (paper, metrics)."""
-    return walking if travels(clip) else other
+@dataclass(frozen=True)
+class Stop:
+    """When a robot is stopped: in training, in trials and in the frozen evaluation when it has fallen."""
+
+    tilt_deg: float = 60.0
+    """Angle of the pelvis' up axis from the reference's."""
+    drop_m: float = 0.35
+    """How far the pelvis is below the reference's."""
+
+
+FALL = Stop()
+
+
+def success_threshold(clip: Clip) -> float:
+    """Distance of a key body [m] at which a clip counts as failed (paper, appendix A, "Termination")."""
+    return LOOSE if travels(clip) else TIGHT
 
 
 def fallen(state: RobotState, ref: ReferenceFrame) -> Tensor:
-    """Robots (B,) bool that lie or topple where the reference does not."""
-    return lying(state, ref, angle_between(state.root_quat_w, ref.root_quat_w))
+    """Robots (B,) bool that lie or topple where the reference does not, or are no longer numbers."""
+    here, there = (state.root_quat_w, state.root_pos_w[:, 2]), (ref.root_quat_w, ref.root_pos_w[:, 2])
+    return beyond(FALL, *here, *there)
 
 
-def lying(state: RobotState, ref: ReferenceFrame, angle: Tensor) -> Tensor:
-    """`fallen`, from the `angle` (B,) [rad] between the roots."""
-    low = state.root_pos_w[:, 2] < ref.root_pos_w[:, 2] - FALL_HEIGHT
-    return low | (angle > FALL_ANGLE)
+def beyond(stop: Stop, quat: Tensor, height: Tensor, ref_quat: Tensor, ref_height: Tensor) -> Tensor:
+    """Robots (B,) bool to be stopped, from the orientations (B, 4) and heights (B,) [m] of pelvis and reference."""
+    cosine = (up_axis(quat) * up_axis(ref_quat)).sum(-1)
+    return ~((cosine > math.cos(math.radians(stop.tilt_deg))) & (ref_height - height < stop.drop_m))
 
 
 def key_distance(state: RobotState, ref: ReferenceFrame) -> Tensor:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from bumblebee.deploy import episodes
 from bumblebee.deploy.episodes import Episode, run_episodes
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import NominalRobots
@@ -14,9 +15,11 @@ from bumblebee.deploy.runner import PolicyRunner, reference_library, robot_state
 from bumblebee.deploy.sensors import NO_NOISE, SensorNoise, Sensors, add_noise, draws
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.sim.mujoco_cpu import MujocoCpu
+from bumblebee.sim.rotations import from_rotation_vector, multiply
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.library import AHEAD
+from bumblebee.tracking.library import AHEAD, MotionLibrary
 from bumblebee.tracking.observations import joint_targets, observe
+from bumblebee.tracking.terminations import FALL, fallen
 from tests.deploy.conftest import nod
 
 
@@ -126,3 +129,18 @@ def test_a_robot_that_lies_stops_and_one_that_stands_goes_on(policy_folder: Call
     fell, stood = run_episodes(make, episodes, policies, clips, NO_NOISE, StartNoise(0.0, 0.0))
     assert fell.frames < 80 and stood.frames == 25
     assert stood.foot_force[10:, :, 2].sum(axis=1) == pytest.approx(33.34 * 9.81, rel=0.1)
+
+
+@pytest.mark.parametrize(("degrees", "drop", "falls"), [(59, 0.34, False), (61, 0.0, True), (0, 0.36, True)])
+def test_a_robot_falls_on_the_robot_where_it_falls_in_training(degrees: float, drop: float, falls: bool) -> None:
+    """The frozen evaluation's rule and the training's, on one state, turned about the vertical as well."""
+    clip = nod("nod", 3)
+    tilt = from_rotation_vector(torch.deg2rad(torch.tensor([[0.0, degrees, 0.0]])))
+    about = from_rotation_vector(torch.deg2rad(torch.tensor([[0.0, 0.0, 80.0]])))
+    quat = multiply(about, multiply(torch.as_tensor(clip.root_quat[1:2], dtype=torch.float32), tilt))
+    robots = NominalRobots(1, threads=1)
+    robots.batch.bind("qpos")[:, 2:7] = np.concatenate([[clip.root_pos[1, 2] - drop], quat[0].numpy()])
+    true = robots.read()
+    ref = MotionLibrary([clip]).frames(torch.zeros(1, dtype=torch.long), torch.full((1,), 0.02))
+    assert episodes._fallen(true, [clip], np.array([0]), 1, FALL).tolist() == [falls]
+    assert fallen(robot_state(true), ref).tolist() == [falls]

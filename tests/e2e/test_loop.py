@@ -26,6 +26,7 @@ from flows import demo, login, servers
 from flows import workspace as workspaces
 from flows.environment import environment
 from flows.stages import changed_stages, read_stages
+from tasks import registry
 
 pytestmark = pytest.mark.e2e
 LIMIT = 600  # [s] for any one command
@@ -138,6 +139,20 @@ def test_every_output_of_every_stage_is_there(loop: Loop):
     assert [path for path in outs if not (loop.folder / path).exists()] == []
     assert (loop.folder / "reports" / "report.html").stat().st_size > 10_000
     assert not list(loop.folder.rglob(".*.writing"))
+
+
+def test_mlflow_has_a_run_of_every_stage_with_all_of_its_outputs(loop: Loop, monkeypatch: pytest.MonkeyPatch):
+    for name, value in environment(loop.folder).items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.chdir(loop.folder)
+    client = registry.prepare()
+    experiment = client.get_experiment_by_name(registry.experiment_name())
+    lock = yaml.safe_load((loop.folder / "dvc.lock").read_text())["stages"]
+    for name, stage in lock.items():
+        run = client.search_runs([experiment.experiment_id], f"tags.dvc_stage = '{name}' and tags.record != ''")[0]
+        file = Path(".servers/artifacts/runs", run.info.run_id, "artifacts/outputs.json")
+        logged = {out["path"]: out["md5"] for out in json.loads(file.read_text())["outputs"]}
+        assert logged == {out["path"]: out["md5"] for out in stage["outs"]}, name
 
 
 def test_a_second_run_does_nothing(loop: Loop):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bumblebee.deploy.episodes import FALL_RULE
 from bumblebee.errors import BadInput
 from bumblebee.evaluation.contract import (
     Contract,
@@ -33,6 +34,13 @@ def contract() -> Contract:
     return freeze(
         [clip("b", 0.1), clip("a")], (0, 1), engines={"nominal": {"timestep": 0.005}}, fall={"tilt_deg": 60.0}
     )
+
+
+def test_the_rules_of_loss_are_those_of_the_evaluations_that_were_frozen_before() -> None:
+    """What a fall is, and how far a key body may be off, decide the hash; results under another are not compared."""
+    clips = [clip("b", "stand"), clip("a")]
+    frozen = freeze(clips, (0, 1), engines={"nominal": {"timestep": 0.005}}, fall=FALL_RULE)
+    assert frozen.sha256 == "7b8e9925e985b503b586b964caa3b8047b6a4c8175eb988650f560c2cac2af8f"
 
 
 def test_each_fields_change_changes_the_hash() -> None:

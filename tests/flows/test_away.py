@@ -12,7 +12,7 @@ import yaml
 
 from bumblebee.errors import BadInput
 from bumblebee.last_line import disk_line
-from flows import away, node, parcel, ray_cluster
+from flows import away, gpus, node, parcel, ray_cluster
 from flows.stages import Stage
 from tasks.lab import Lab, MlflowLab, PrefectLab, RayLab
 
@@ -56,11 +56,15 @@ def test_all_that_came_before_is_pulled_but_no_set_of_the_users():
 
 
 def test_gpus_are_those_of_the_sections_or_one_for_the_engine_on_a_gpu():
-    content = {"clusters": ["c0"], "delta": {}, "experts": {"gpus": 4}, "refine": {"env": {"engine": "mujoco_warp"}}}
-    asked = [
-        ray_cluster.gpus(content, names) for names in ([], ["delta", "clusters"], ["refine"], ["refine", "experts"])
-    ]
+    content = {
+        "clusters": ["c0"],
+        "delta": {"engine": "mujoco"},
+        "experts": {"gpus": 4},
+        "refine": {"env": {"engine": "mujoco_warp"}},
+    }
+    asked = [gpus.wanted(content, names) for names in ([], ["delta", "clusters"], ["refine"], ["refine", "experts"])]
     assert asked == [0, 0, 1, 4]
+    assert gpus.wanted({"delta": {"engine": "mujoco_warp"}}, ["delta"]) == 1
 
 
 def test_a_stage_asks_for_its_gpus_and_its_memory():

@@ -21,7 +21,7 @@ STAGE = """
 from pathlib import Path
 from tasks import registry
 from tests.tasks.test_registry import policy_folder
-print(registry.log_run("base", "c0", 1, {"seed": 3}, {"success": 0.5}, None, [Path("lab.yaml")], {}))
+print(registry.log_run("base", "c0", 1, {"seed": 3}, {"success": 0.5}, None, {}, [Path("lab.yaml")]))
 folder = policy_folder(Path("policy").resolve(), 2.0)
 version = registry.register("of-a-laptop", folder, {"onnx_sha256": "1", "policy": "c0"}, {"success": 0.5}, "# Card")
 registry.set_alias("of-a-laptop", "champion", version)

@@ -27,7 +27,7 @@ LOG = """
 from pathlib import Path
 from tasks import registry
 Path("file.txt").write_text("what a stage made")
-print(registry.log_run("base", "c0", 1, {"seed": 3}, {"success": 0.5}, None, [Path("file.txt")], {}))
+print(registry.log_run("base", "c0", 1, {"seed": 3}, {"success": 0.5}, None, {}, [Path("file.txt")]))
 """
 
 

@@ -52,6 +52,13 @@ def record(
     names = ("base_pos", "base_quat", "base_lin_vel", "base_ang_vel", "joint_pos", "joint_vel", "joint_target")
     time = np.arange(ticks) / 50
     return [
-        Rollout(f"r{i}", joint_names(), 50, time, **{n: c[i] for n, c in zip(names, columns, strict=True)})
+        Rollout(
+            f"r{i}",
+            joint_names(),
+            50,
+            time,
+            meta={"motion": f"phase {i}"},
+            **{n: c[i] for n, c in zip(names, columns, strict=True)},
+        )
         for i in range(worlds)
     ]

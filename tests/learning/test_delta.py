@@ -1,5 +1,6 @@
 """The delta action: its rewards by hand, what an untrained one does, when one is kept."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import torch
 from bumblebee.errors import BadInput
 from bumblebee.learning.delta import DeltaEnv, Recordings, compare, replay_error, rewards, stack, train_delta
 from bumblebee.learning.delta.action import (
+    DELTA_PPO,
     DeltaAction,
     DeltaConfig,
     action_adapter,
@@ -68,7 +70,9 @@ def test_the_limit_rows_say_whether_any_joint_is_beyond_however_many(beyond: int
 def test_a_rollout_that_is_shorter_than_a_window_has_none() -> None:
     """A log that ends where the operator stopped is no reason for the others to be lost."""
     rows = torch.zeros(70, 1)
-    recordings = Recordings(rows, rows, rows, torch.tensor([0, 10]), torch.tensor([10, 60]), ("short", "long"))
+    recordings = Recordings(
+        rows, rows, rows, torch.tensor([0, 10]), torch.tensor([10, 60]), ("short", "long"), ("a", "b")
+    )
     assert recordings.windows(50, 5).tolist() == [10, 15]
 
 
@@ -170,22 +174,40 @@ def test_promotion_needs_an_interval_below_zero() -> None:
     def scaled(factor: np.ndarray) -> dict[str, np.ndarray]:
         return {h: v * factor for h, v in base.items()}
 
-    assert compare(base, scaled(0.8 + 0.02 * rng.normal(size=12))).promoted
-    assert not compare(base, scaled(1.0 + 0.05 * rng.normal(size=12))).promoted
-    assert not compare(base, scaled(1.3 + 0.02 * rng.normal(size=12))).promoted
-    assert compare(base, base).reason == "nothing was found that it should correct"
+    motions = [f"m{i // 2}" for i in range(12)]
+    assert compare(base, scaled(0.8 + 0.02 * rng.normal(size=12)), motions).promoted
+    assert not compare(base, scaled(1.0 + 0.05 * rng.normal(size=12)), motions).promoted
+    assert not compare(base, scaled(1.3 + 0.02 * rng.normal(size=12)), motions).promoted
+    assert compare(base, base, motions).reason == "nothing was found that it should correct"
     worse_soon = {"0.2": before * 1.2, "1.0": before * 1.5}
-    assert not compare(base, worse_soon).promoted
-    few = {h: v[:3] for h, v in base.items()}
-    judged = compare(few, {h: 0.5 * v for h, v in few.items()})
-    assert not judged.promoted
-    assert "too few held-out rollouts to judge (3, 4 are needed)" in judged.reason
+    assert not compare(base, worse_soon, motions).promoted
+
+
+def test_repeats_of_a_motion_are_no_further_evidence() -> None:
+    """Two motions, one gains much and one little, each recorded twice or often: two numbers, whatever the repeats."""
+    for repeats in (1, 2, 8):
+        before = np.full(2 * repeats, 0.1)
+        gained = np.repeat([0.7, 0.9], repeats)
+        judged = compare({"1.0": before}, {"1.0": gained * before}, ["kick"] * repeats + ["bow"] * repeats)
+        own = judged.change["1.0"]
+        assert (judged.rollouts, judged.motions, judged.promoted) == (2 * repeats, 2, False)
+        assert own["relative"] == pytest.approx(-0.2)
+        assert own["high"] == pytest.approx(-0.2 + 12.706 * 0.1, abs=1e-3)  # t of one degree of freedom
+    one = compare({"1.0": before}, {"1.0": gained * before}, ["kick"] * len(before))
+    assert not one.promoted and "of one motion" in one.reason
+
+
+def test_a_motion_that_was_recorded_more_often_counts_no_more() -> None:
+    before = np.full(10, 0.1)
+    gained = np.array([0.5] * 8 + [1.1, 1.2])
+    judged = compare({"1.0": before}, {"1.0": gained * before}, ["kick"] * 8 + ["bow", "step"])
+    assert judged.change["1.0"]["relative"] == pytest.approx(np.mean([-0.5, 0.1, 0.2])) and judged.motions == 3
 
 
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 def test_on_a_gpu_a_delta_is_trained_where_the_engine_is(recordings: Recordings) -> None:
-    config = DeltaConfig(num_envs=64, iterations=1, steps_per_iteration=4, episode_seconds=0.4)
+    config = DeltaConfig(num_envs=64, ppo=replace(DELTA_PPO, iterations=1, steps=4), episode_seconds=0.4)
     env = DeltaEnv(make_engine("mujoco_warp", load_model(), 64), recordings, config, NO_OFFSET)
     assert {seen.device.type for seen in env.get_observations().values()} == {"cuda"}
     delta, curve = train_delta(env, config)

@@ -45,7 +45,9 @@ def test_the_correction_of_weak_ankles_is_found_and_holds_on_other_rollouts(weak
     assert table["left"].iloc[-1] < 0.3
     assert delta.hidden == ()
     judge, other = make_engine("mujoco", load_model(), 12, 1), recordings(0.6, seed=1)
-    gain = compare(replay_error(judge, other, NO_OFFSET, None), replay_error(judge, other, NO_OFFSET, delta))
+    gain = compare(
+        replay_error(judge, other, NO_OFFSET, None), replay_error(judge, other, NO_OFFSET, delta), other.motions
+    )
     assert gain.change["0.2"]["with"] < 0.5 * gain.change["0.2"]["without"]
 
 
@@ -71,14 +73,35 @@ def test_a_robot_as_declared_is_not_corrected() -> None:
 
 
 def test_one_rollout_alone_leaves_nothing_to_judge_by(weak: Recordings) -> None:
-    one = Recordings(weak.qpos[:30], weak.qvel[:30], weak.targets[:30], weak.start[:1], weak.length[:1], weak.ids[:1])
+    one = Recordings(
+        weak.qpos[:30],
+        weak.qvel[:30],
+        weak.targets[:30],
+        weak.start[:1],
+        weak.length[:1],
+        weak.ids[:1],
+        weak.motions[:1],
+    )
     _, table = learn_delta(make_engine("mujoco", load_model(), 60, 1), one, CONFIG, NO_OFFSET)
     assert table["held_out"].tolist() == [1.0]
 
 
+def test_repeats_of_a_motion_are_left_out_together(weak: Recordings) -> None:
+    """Of one motion nothing is left to judge by, however often it was recorded; without names likewise."""
+    engine = make_engine("mujoco", load_model(), 60, 1)
+    for name in ("kick", ""):
+        same = replace(weak, motions=(name,) * len(weak.ids))
+        delta, table = learn_delta(engine, same, CONFIG, NO_OFFSET)
+        assert table["held_out"].tolist() == [1.0]
+        assert float(delta.network[1].weight.detach().abs().max()) == 0.0
+    pairs = replace(weak, motions=tuple(f"m{i // 2}" for i in range(len(weak.ids))))
+    rows = weak.start.clone()
+    assert pairs.motion(rows).tolist() == [i // 2 for i in range(len(weak.ids))]
+
+
 def test_where_every_replay_blows_up_nothing_is_corrected(weak: Recordings) -> None:
     broken = Recordings(
-        weak.qpos, torch.full_like(weak.qvel, torch.nan), weak.targets, weak.start, weak.length, weak.ids
+        weak.qpos, torch.full_like(weak.qvel, torch.nan), weak.targets, weak.start, weak.length, weak.ids, weak.motions
     )
     delta, table = learn_delta(make_engine("mujoco", load_model(), 60, 1), broken, CONFIG, NO_OFFSET)
     assert table["held_out"].tolist() == [1.0]
@@ -121,7 +144,7 @@ def test_influence_is_the_change_for_a_radian(weak: Recordings) -> None:
     moved = windows.effect[:, 12 + ANKLES[0], pitch]
     assert (moved > 0).all()
     assert (windows.effect[:, 12 + ANKLES[1], pitch].abs() < moved).float().mean() > 0.9
-    assert windows.owner.tolist() == weak.owner(rows).tolist()
+    assert windows.owner.tolist() == weak.motion(rows).tolist()
 
 
 def test_nothing_is_missed_where_the_recording_is_the_simulators_own() -> None:

@@ -69,7 +69,7 @@ def test_delta_alone_is_used_though_it_beats_nothing(workspace: Path, monkeypatc
     with torch.no_grad():
         network[-1].bias += 0.1
     delta = DeltaAction(network, DeltaConfig().joints, 0.2)
-    made = Trained(delta, pd.DataFrame({"iteration": [1]}), Gain(2, {}, False, "no better"), ("r",), {})
+    made = Trained(delta, pd.DataFrame({"iteration": [1]}), Gain(2, 1, {}, False, "no better"), ("r",), {})
     Path("data/measured/r1").mkdir(parents=True)
     write_xml(Path("data/measured/r1/model.xml"))
     monkeypatch.setattr(control, "train", lambda *_: made)

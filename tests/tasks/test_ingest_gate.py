@@ -27,7 +27,8 @@ Setup = Callable[..., Path]
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Setup:
     """A workspace with two clusters of one rollout each, of which the second may be bad."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(ingest, "log_run", lambda *args, **options: None)
+    for module in (ingest, gate_task):
+        monkeypatch.setattr(module, "log_run", lambda *_, **__: None)
 
     def make(mode: str = "ask", bad: tuple[str, ...] = (), seed: int = 0) -> Path:
         (tmp_path / "params.yaml").write_text(f"ingest: {{}}\ngate: {{mode: {mode}}}\n")

@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Literal
 
 import pytest
+from ruamel.yaml import YAML
 
 from bumblebee.errors import BadInput
 from tasks import sections
-from tasks.params import build, load
+from tasks.params import build, load, read
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,17 @@ def test_values_arrive_in_their_types_and_the_rest_has_its_default():
     assert isinstance(config.rate, float)
 
 
-def test_a_number_with_an_exponent_is_a_number_as_it_is_for_dvc():
-    assert build(Config, {"iterations": 1, "rate": "1e-4"}, "params.yaml", "base").rate == 1e-4
+@pytest.mark.parametrize("text", ["1e-4", "1.5e4", "2.E+3", "-1e3", "1.5E4"])
+def test_a_number_with_an_exponent_is_a_number_as_it_is_for_dvc(text: str, tmp_path: Path):
+    (tmp_path / "params.yaml").write_text(f"base: {{iterations: 1, rate: {text}}}\n")
+    values = read(tmp_path / "params.yaml")["base"]
+    assert build(Config, values, "params.yaml", "base").rate == YAML(typ="safe").load(f"v: {text}")["v"] == float(text)
+
+
+@pytest.mark.parametrize("text", ["e4", "1.5e", "1.5e4 m", "0x1e4", ".5e1", ".e3", "1_0e3"])
+def test_text_that_is_no_number_stays_text(text: str):
+    with pytest.raises(BadInput, match="rate"):
+        build(Config, {"iterations": 1, "rate": text}, "params.yaml", "base")
 
 
 def test_an_unknown_key_is_named_with_the_nearest_known_one():

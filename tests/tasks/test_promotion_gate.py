@@ -50,6 +50,7 @@ def registry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registry:
     for module in (publish, promotion_gate):
         monkeypatch.setattr(module, "registry", made)
     monkeypatch.setattr(publish, "path_hash", lambda folder: "hash")
+    monkeypatch.setattr(publish, "log_run", lambda *_, **__: None)
     settings("mode: ask")
     for folder in ("models/base", "models/experts/r0/c0", "models/experts/r0/c1", "models/generalist"):
         Path(folder).mkdir(parents=True)

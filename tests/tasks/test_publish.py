@@ -51,6 +51,7 @@ def registry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registry:
     made = Registry()
     monkeypatch.setattr(publish, "registry", made)
     monkeypatch.setattr(publish, "path_hash", lambda folder: "hash")
+    monkeypatch.setattr(publish, "log_run", lambda *_, **__: None)
     Path("params.yaml").write_text(PARAMS)
     for folder in ("models/base", "models/experts/r0/c0", "models/experts/r0/c1", "models/generalist"):
         Path(folder).mkdir(parents=True)

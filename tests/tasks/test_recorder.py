@@ -19,7 +19,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def run(**over: object) -> dict[str, object]:
-    empty = {"cluster": None, "round": None, "params": None, "metrics": {}, "curve": None, "artifacts": [], "tags": {}}
+    empty = {"cluster": None, "round": None, "params": None, "metrics": {}, "curve": None, "tags": {}}
     return {"stage": "base", **empty, **over}
 
 
@@ -27,16 +27,14 @@ def test_the_run_is_written_with_everything_in_it(workspace: Path) -> None:
     curve = workspace / "curve.csv"
     curve.write_text("frames,reward\n10,0.5\n20,0.75\n")
     recorder.start()
-    recorder.record(
-        run(cluster="c0", round=1, params={"a": {"b": 2}}, metrics={"x": 0.5}, curve=curve, artifacts=[curve])
-    )
+    recorder.record(run(cluster="c0", round=1, params={"a": {"b": 2}}, metrics={"x": 0.5}, curve=curve))
     client = registry.prepare()
     experiment = client.get_experiment_by_name(workspace.name)
     (found,) = client.search_runs([experiment.experiment_id])
     assert found.data.params == {"a.b": "2"}
     assert found.data.metrics == {"x": 0.5, "reward": 0.75}
     assert (found.data.tags["cluster"], found.data.tags["round"]) == ("c0", "1")
-    assert [item.path for item in client.list_artifacts(found.info.run_id)] == ["curve.csv", "lineage.json"]
+    assert [item.path for item in client.list_artifacts(found.info.run_id)] == ["lineage.json", "outputs.json"]
 
 
 def test_a_failure_is_the_stages(workspace: Path) -> None:

@@ -73,9 +73,9 @@ def test_runs_and_models_can_be_found_again_even_when_the_workspace_has_moved(
     workspace: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """One run of a stage and two versions of a model; then the folder gets another name and all is still there."""
-    curve = workspace / "curve.csv"
+    curve = Path("curve.csv")
     curve.write_text("step,loss\n0,2.0\n1,1.0\n")
-    run_id = registry.log_run("base", None, 0, Config(), {"success": 0.5}, curve, [curve], {"note": "x"})
+    run_id = registry.log_run("base", None, 0, Config(), {"success": 0.5}, curve, {"note": "x"}, [curve])
     first = registry.register(
         "generalist", policy_folder(workspace / "p1", 2.0), {"onnx_sha256": "1"}, {"success": 0.5}
     )
@@ -128,8 +128,8 @@ def test_a_stage_that_dvc_repeats_with_equal_inputs_has_one_record(
     client, known = registry.prepare(), set()
 
     def log(curve: Path | None = None) -> set[str]:
-        lineage.current_inputs.cache_clear()
-        registry.log_run("base", None, 0, Config(), {"success": 0.5}, curve, [], {})
+        lineage.current_stage.cache_clear()
+        registry.log_run("base", None, 0, Config(), {"success": 0.5}, curve, {})
         experiment = client.get_experiment_by_name(workspace.name)
         return {run.info.run_id for run in client.search_runs([experiment.experiment_id])}
 

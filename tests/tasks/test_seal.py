@@ -80,6 +80,7 @@ def trials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
     """A workspace in which the shipped policy's trials end as this list says, one draw after the other."""
     monkeypatch.chdir(tmp_path)
     Path("params.yaml").write_text("seal: {seed: 4, draws: 3}\nrollouts: {}\n")
+    monkeypatch.setattr(seal, "log_run", lambda *_, **__: None)
     outcomes: list[Trial] = []
     monkeypatch.setattr(seal, "export_shipped", lambda folder: folder)
     monkeypatch.setattr(seal, "trial_clips", lambda config: ["clip"])

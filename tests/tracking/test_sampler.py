@@ -110,16 +110,18 @@ def test_the_curriculum_only_tightens() -> None:
 
 
 def test_terminations() -> None:
-    """A key body 0.5 m off, a pelvis 0.4 m too low, a trunk tilted by 1.3 rad; on the reference, none."""
-    ref = MotionLibrary([waving()]).frames(torch.zeros(4, dtype=torch.long), torch.zeros(4))
+    """A key body .5 m off; a pelvis .4 m too low, a trunk at 61 degrees, no number; at 59, or turned about, no fall."""
+    ref = MotionLibrary([waving()]).frames(torch.zeros(7, dtype=torch.long), torch.zeros(7))
     pos, quat, keys = ref.root_pos_w.clone(), ref.root_quat_w.clone(), ref.key_pos_w.clone()
     keys[1, 10, 1] += 0.5
     pos[2, 2] -= 0.4
-    quat[3] = from_rotation_vector(torch.tensor([0.0, 1.3, 0.0]))
-    zero3, zero = torch.zeros(4, 3), torch.zeros(4, 23)
+    for world, turn in ((3, (0.0, 61.0, 0.0)), (5, (-59.0, 0.0, 0.0)), (6, (0.0, 0.0, 120.0))):
+        quat[world] = from_rotation_vector(torch.deg2rad(torch.tensor(turn)))
+    pos[4] = torch.nan
+    zero3, zero = torch.zeros(7, 3), torch.zeros(7, 23)
     state = RobotState(pos, quat, zero3, zero3, zero, zero, keys)
-    assert key_distance(state, ref).tolist() == pytest.approx([0, 0.5, 0, 0], abs=1e-6)
-    assert fallen(state, ref).tolist() == [False, False, True, True]
+    assert key_distance(state, ref).tolist() == pytest.approx([0, 0.5, 0, 0, 0, 0, 0], abs=1e-6)
+    assert fallen(state, ref).tolist() == [False, False, True, True, True, False, False]
 
 
 @pytest.mark.parametrize(("far", "limit"), [(0.0, 0.4), (0.9, 0.4), (1.1, 0.8)])

@@ -2,6 +2,7 @@
 
 from bumblebee.learning.delta.action import (
     CARD,
+    DELTA_PPO,
     DeltaAction,
     DeltaConfig,
     action_adapter,
@@ -19,6 +20,7 @@ from bumblebee.learning.delta.train import train_delta
 
 __all__ = [
     "CARD",
+    "DELTA_PPO",
     "DeltaAction",
     "DeltaConfig",
     "DeltaEnv",

@@ -18,11 +18,14 @@ from torch import Tensor
 
 from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
+from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.delta.rewards import DeltaRewardConfig
-from bumblebee.ranges import Count, Factor, Few, Name, Positive, Range, Ranged, Seed, Size, Widths
+from bumblebee.ranges import Factor, Few, Name, Positive, Range, Ranged, Seed, Size
 from bumblebee.robot.facts import ANKLE_JOINTS, joint_names
 from bumblebee.sim.engine import RobotState
+from bumblebee.sim.engine_choice import Name as EngineName
 from bumblebee.sim.rotations import conjugate, matrix
+from bumblebee.sim.warp_limits import Buffers
 
 WEIGHTS, CARD = "delta.pt", "card.json"
 
@@ -47,21 +50,35 @@ class RegressionConfig(Ranged):
     """Standard errors by which the misfit must fall on what was left out; else nothing is corrected."""
 
 
+DELTA_PPO = PpoConfig(
+    iterations=60,
+    gamma=0.95,
+    entropy=0.0,
+    desired_kl=0.02,
+    desired_kl_end=0.02,
+    hidden=(128, 64),
+    initial_std=0.05,
+)
+"""For minutes on a CPU; `profiles/paper.yaml` has the paper's."""
+
+
 @dataclass(frozen=True)
 class DeltaConfig(Ranged):
     """Training of one cluster's delta action."""
 
     method: Literal["regression", "ppo"] = "regression"
-    """How the correction is learnt: by regression on short replays, or by PPO as in the paper, which every field but
-    `joints`, `limit`, `seed`, `num_envs`, `threads` and `episode_seconds` is about."""
+    """How the correction is learnt: by regression on short replays, or by PPO as in the paper, which `ppo`, `rewards`,
+    `action_penalty` and `divergence` are about."""
     regression: RegressionConfig = field(default_factory=RegressionConfig)
     """The regression."""
-    iterations: Count = 60
-    """PPO iterations."""
+    ppo: PpoConfig = field(default_factory=lambda: DELTA_PPO)
+    """The algorithm; its `initial_std` is in radians of correction."""
+    engine: EngineName = "mujoco"
+    """What replays the recordings: `mujoco_warp` on a GPU."""
+    buffers: Buffers = field(default_factory=Buffers)
+    """Room for contacts on a GPU."""
     num_envs: Annotated[int, Range(least=1, most=1000000)] = 256
     """Robots that replay recordings at once."""
-    steps_per_iteration: Annotated[int, Range(least=1, most=10000)] = 16
-    """Control steps of each robot between two updates."""
     threads: Few = 1
     """CPU threads of the simulator."""
     seed: Seed = 0
@@ -70,16 +87,8 @@ class DeltaConfig(Ranged):
     """Joints that the correction acts on (paper: the four ankle joints)."""
     limit: Annotated[float, Range(above=0, most=3.2)] = 1.2
     """Largest correction of a target [rad]."""
-    hidden: Widths = (128, 64)
-    """Units of the hidden layers."""
     episode_seconds: Annotated[float, Range(least=0.02, most=3600)] = 1.0
     """Length of an episode, restarted from a recorded state."""
-    learning_rate: Annotated[float, Range(least=1e-4, most=2e-3)] = 1e-3
-    """Adam's rate at the start; it adapts to `desired_kl`."""
-    desired_kl: Positive = 0.02
-    """Change of the policy that the adaptive rate aims at."""
-    init_std: Positive = 0.25
-    """Standard deviation of the first exploration, as a share of `limit`."""
     action_penalty: Factor = 0.05
     """Factor on the table's two action rows: 1 is the paper's, which with corrections this small allows none."""
     divergence: Positive = 0.5
@@ -91,7 +100,9 @@ class DeltaConfig(Ranged):
         """Refuse joints that the robot has not, and batches smaller than the parts that they are learnt in."""
         super().__post_init__()
         self.require_names("joints", joint_names())
-        self.require(self.num_envs * self.steps_per_iteration >= 4, "num_envs", "times steps_per_iteration, at least 4")
+        batch, parts = self.num_envs * self.ppo.steps, self.ppo.mini_batches
+        self.require(batch >= parts, "num_envs", f"times ppo.steps, at least ppo.mini_batches, {parts}")
+        self.require(not self.ppo.symmetry, "ppo", "symmetry: false, since a correction is not reflected")
 
 
 def layout(joints: int = 23) -> list[tuple[str, int]]:

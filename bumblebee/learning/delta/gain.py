@@ -1,6 +1,9 @@
-"""Does a delta action beat no delta? Replayed on rollouts that took no part in its training, rollout by rollout."""
+"""Does a delta action beat no delta? Replayed on rollouts that took no part in its training, and tested by motion.
 
-from collections.abc import Callable
+Rollouts of one motion are the same policy going the same way again: they err alike, and count as one.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,17 +17,17 @@ from bumblebee.sim.engine import Engine, RobotState
 from bumblebee.sim.rotations import angle_between
 
 HORIZONS = (0.2, 1.0)
-MIN_ROLLOUTS = 4
 Adapter = Callable[[RobotState, Tensor], Tensor]
 
 
 @dataclass(frozen=True)
 class Gain:
-    """Relative change of the error that the delta brings, by horizon: below 0 is better; paired over rollouts."""
+    """Relative change of the error that the delta brings, by horizon: below 0 is better; paired by motion."""
 
     rollouts: int
+    motions: int
     change: dict[str, dict[str, float]]
-    """Horizon [s] -> {"without", "with" (errors), "relative", "low", "high" (95 %, t over rollouts)}."""
+    """Horizon [s] -> {"without", "with" (errors), "relative", "low", "high" (95 %, t over motions)}."""
     promoted: bool
     """Whether the interval at the longest horizon lies below zero and no shorter one above."""
     reason: str
@@ -62,31 +65,40 @@ def replay_error(
     return {str(h): _by_rollout(errors[h].numpy(), owner, len(recordings.ids)) for h in HORIZONS}
 
 
-def compare(without: dict[str, np.ndarray], with_delta: dict[str, np.ndarray]) -> Gain:
-    """Paired comparison of two sets of `replay_error`; fewer than four rollouts promote nothing."""
-    change, count = {}, 0
+def compare(without: dict[str, np.ndarray], with_delta: dict[str, np.ndarray], motions: Sequence[str]) -> Gain:
+    """Paired comparison of two sets of `replay_error`; rollouts of one motion alone promote nothing.
+
+    Args:
+        without: horizon -> error of each rollout (R,) without the delta.
+        with_delta: the same with it.
+        motions: (R) the motion of each rollout.
+    """
+    change, count, names = {}, 0, np.array(motions)
+    told: set[str] = set()
     for horizon, before in without.items():
         after = with_delta[horizon]
         both = np.isfinite(before) & np.isfinite(after) & (before > 0)
         relative = after[both] / before[both] - 1.0
         count = max(count, len(relative))
-        low, high = _t_interval(relative)
-        mean = float(relative.mean()) if len(relative) else float("nan")
+        told |= set(names[both])
+        by_motion = np.array([relative[names[both] == name].mean() for name in sorted(set(names[both]))])
+        low, high = _t_interval(by_motion)
+        mean = float(by_motion.mean()) if len(by_motion) else float("nan")
         values = (float(before[both].mean()), float(after[both].mean())) if both.any() else (float("nan"),) * 2
         change[horizon] = {"without": values[0], "with": values[1], "relative": mean, "low": low, "high": high}
     longest = change[str(max(HORIZONS))]
     worse = any(c["low"] > 0 for c in change.values())
     if change and all(c["with"] == c["without"] for c in change.values()):
         reason = "nothing was found that it should correct"
-    elif count < MIN_ROLLOUTS:
-        reason = f"too few held-out rollouts to judge ({count}, {MIN_ROLLOUTS} are needed)"
+    elif len(told) < 2:
+        reason = "the held-out rollouts are of one motion, or their metadata name no `motion`: there is no interval"
     elif worse:
         reason = "it makes the error worse at some horizon"
     elif not longest["high"] < 0:
         reason = "it does not beat no delta beyond its interval"
     else:
-        return Gain(count, change, True, "its error is lower beyond the interval")
-    return Gain(count, change, False, reason)
+        return Gain(count, len(told), change, True, "its error is lower beyond the interval")
+    return Gain(count, len(told), change, False, reason)
 
 
 def _error(state: RobotState, qpos: Tensor) -> Tensor:

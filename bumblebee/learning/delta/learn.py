@@ -34,4 +34,4 @@ def total_frames(config: DeltaConfig) -> int:
     """Control steps of all robots that `learn_delta` takes at most."""
     if config.method == "regression":
         return regression.frames(config)
-    return config.iterations * config.steps_per_iteration * config.num_envs
+    return config.ppo.iterations * config.ppo.steps * config.num_envs

@@ -27,7 +27,8 @@ class Recordings:
     """R rollouts laid end to end in N rows.
 
     `qpos` (N, 7 + J) and `qvel` (N, 6 + J) in MuJoCo's convention, joints as the encoders read them; `targets`
-    (N, J) [rad]; `start` and `length` (R,) rows of each rollout; `ids` their names.
+    (N, J) [rad]; `start` and `length` (R,) rows of each rollout; `ids` their names; `motions` what they follow, ""
+    where a rollout does not say it.
     """
 
     qpos: Tensor
@@ -36,11 +37,12 @@ class Recordings:
     start: Tensor
     length: Tensor
     ids: tuple[str, ...]
+    motions: tuple[str, ...]
 
     def to(self, device: torch.device | str) -> "Recordings":
         """The same on a device."""
         moved = {name: getattr(self, name).to(device) for name in ("qpos", "qvel", "targets", "start", "length")}
-        return Recordings(**moved, ids=self.ids)
+        return Recordings(**moved, ids=self.ids, motions=self.motions)
 
     def windows(self, frames: int, stride: int) -> Tensor:
         """First rows of all windows of `frames` steps, every `stride` rows of each longer rollout, (W,)."""
@@ -54,6 +56,11 @@ class Recordings:
     def owner(self, rows: Tensor) -> Tensor:
         """Index of the rollout that each row belongs to."""
         return torch.bucketize(rows, self.start, right=True) - 1
+
+    def motion(self, rows: Tensor) -> Tensor:
+        """Index of the motion that each row belongs to, in the order in which motions come first."""
+        order = {name: index for index, name in enumerate(dict.fromkeys(self.motions))}
+        return torch.tensor([order[name] for name in self.motions], device=rows.device)[self.owner(rows)]
 
 
 def recorded_state(recordings: Recordings, rows: Tensor | slice = slice(None)) -> RobotState:
@@ -81,7 +88,8 @@ def stack(rollouts: Sequence[Rollout], model: mujoco.MjModel) -> Recordings:
     parts = [_states(rollout, model) for rollout in rollouts]
     lengths = torch.tensor([len(qpos) for qpos, _, _ in parts])
     qpos, qvel, targets = (torch.as_tensor(np.concatenate(c), dtype=torch.float32) for c in zip(*parts, strict=True))
-    return Recordings(qpos, qvel, targets, lengths.cumsum(0) - lengths, lengths, tuple(r.rollout_id for r in rollouts))
+    ids, motions = tuple(r.rollout_id for r in rollouts), tuple(str(r.meta.get("motion") or "") for r in rollouts)
+    return Recordings(qpos, qvel, targets, lengths.cumsum(0) - lengths, lengths, ids, motions)
 
 
 def _states(rollout: Rollout, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

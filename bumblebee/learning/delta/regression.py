@@ -50,7 +50,7 @@ class Windows:
     effect: Tensor
     """(N, M, A) change of the simulator's end for each radian of correction, held throughout the window: a secant."""
     owner: Tensor
-    """(N,) index of the rollout."""
+    """(N,) index of the motion."""
 
     def __getitem__(self, which: Tensor) -> "Windows":
         """Some of them."""
@@ -179,13 +179,13 @@ def replay(
         before = observe(recorded_state(recordings, own - 1), targets).cpu()
         parts.append((mean, before, ends[0], effect))
     columns = (torch.cat(own).double() for own in zip(*parts, strict=True))
-    return Windows(*columns, recordings.owner(rows).cpu())
+    return Windows(*columns, recordings.motion(rows).cpu())
 
 
 def _cross_validated(system: System, own: RegressionConfig) -> tuple[float, float, float]:
-    """Share of the misfit left on rollouts that took no part, its standard error over folds, and the ridge for it.
+    """Share of the misfit left on motions that took no part, its standard error over folds, and the ridge for it.
 
-    A fold is a run of rollouts that follow each other: repeats of a motion stay together.
+    A fold is a run of motions, each with all of its rollouts.
     """
     fold = system.owner * own.folds // (int(system.owner.max()) + 1)
     present = [k for k in range(own.folds) if 0 < int((fold == k).sum()) < len(fold)]

@@ -9,7 +9,6 @@ import pandas as pd
 import torch
 from rsl_rl.runners import OnPolicyRunner
 
-from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.delta.action import DeltaAction, DeltaConfig, make_network
 from bumblebee.learning.delta.env import DeltaEnv
 from bumblebee.learning.ppo import BoundedPpo, runner_config
@@ -18,7 +17,7 @@ from bumblebee.learning.ppo import BoundedPpo, runner_config
 def train_delta(
     env: DeltaEnv, config: DeltaConfig, report: Callable[[int, str], None] = lambda frames, note: None
 ) -> tuple[DeltaAction, pd.DataFrame]:
-    """Train for `config.iterations` updates.
+    """Train for `config.ppo.iterations` updates.
 
     Args:
         env: replays the training rollouts.
@@ -30,31 +29,17 @@ def train_delta(
     """
     torch.manual_seed(config.seed)
     with contextlib.redirect_stdout(io.StringIO()):  # rsl_rl prints both networks
-        runner = OnPolicyRunner(env, runner_config(_ppo(config)), log_dir=None, device=env.device)
+        runner = OnPolicyRunner(env, runner_config(config.ppo), log_dir=None, device=env.device)
     algorithm: BoundedPpo = runner.alg  # type: ignore[assignment]
     _start_at_zero(algorithm.actor.mlp)
     algorithm.train_mode()
-    frames_each, rows = config.steps_per_iteration * config.num_envs, []
-    for iteration in range(1, config.iterations + 1):
-        rewards, lost = _collect(env, algorithm, config.steps_per_iteration)
+    frames_each, rows = config.ppo.steps * config.num_envs, []
+    for iteration in range(1, config.ppo.iterations + 1):
+        rewards, lost = _collect(env, algorithm, config.ppo.steps)
         algorithm.update()
         rows.append({"iteration": iteration, "frames": iteration * frames_each, "reward": rewards, "lost": lost})
         report(frames_each, f"reward {rewards:.4f}, lost {lost:.3f}")
     return _extract(algorithm.actor, config), pd.DataFrame(rows)
-
-
-def _ppo(config: DeltaConfig) -> PpoConfig:
-    return PpoConfig(
-        iterations=config.iterations,
-        steps=config.steps_per_iteration,
-        gamma=0.95,
-        learning_rate=config.learning_rate,
-        desired_kl=config.desired_kl,
-        desired_kl_end=config.desired_kl,
-        entropy=0.0,
-        hidden=config.hidden,
-        initial_std=config.init_std * config.limit,
-    )
 
 
 def _start_at_zero(mlp: torch.nn.Sequential) -> None:
@@ -77,7 +62,7 @@ def _collect(env: DeltaEnv, algorithm: BoundedPpo, steps: int) -> tuple[float, f
 
 
 def _extract(actor: Any, config: DeltaConfig) -> DeltaAction:
-    network = make_network(config.hidden, len(config.joints))
+    network = make_network(config.ppo.hidden, len(config.joints))
     network[0].mean.copy_(actor.obs_normalizer._mean[0])
     network[0].std.copy_(actor.obs_normalizer._std[0] + actor.obs_normalizer.eps)
     trained = [layer for layer in actor.mlp if isinstance(layer, torch.nn.Linear)]

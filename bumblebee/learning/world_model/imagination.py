@@ -1,7 +1,7 @@
 """The task inside the world model: what a policy would earn in rollouts that the model imagines, with gradients.
 
-Observation, reward and the ends of episodes are those of `bumblebee.tracking`, worked out from imagined states. The model
-imagines no contact forces: `stumble` sees none. Torques are the declared servos' at the end of the control step.
+Observation, reward and the ends of episodes are those of `bumblebee.tracking`, worked out from imagined states. The
+model imagines no contact forces: `stumble` sees none. Torques are the declared servos' at the end of the step.
 """
 
 from collections.abc import Callable
@@ -88,7 +88,8 @@ class Imagination:
         alive = torch.ones_like(body[:, 0])
         earned, lived, left = torch.zeros_like(alive), torch.zeros_like(alive), self._left(starts)
         for index, ref in enumerate(self.references(starts.clip, starts.frame)):
-            after, action, target, reward, lost = self._advance(act, model, body, before, last, earlier, starts.context, ref)
+            now = (body, before, last, earlier, starts.context, ref)
+            after, action, target, reward, lost = self._advance(act, model, *now)
             alive = alive * (index < left)
             earned = earned + self.gamma**index * torch.where(alive > 0, reward, 0.0)
             lived = lived + alive / self.horizon
