@@ -10,9 +10,8 @@ from shlex import quote
 from configobj import ConfigObj  # as DVC reads its settings
 
 from bumblebee.errors import BadInput
-from bumblebee.last_line import guarded
+from bumblebee.last_line import OTHERS_WRITE, guarded
 
-OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 INDEX = Path(".dvc") / "tmp" / "site"  # DVC's databases; by default it keeps them where all users of the machine write
 
 

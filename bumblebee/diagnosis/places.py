@@ -106,7 +106,7 @@ def _refuse_inputs(out: Path, inputs: Sequence[Path]) -> None:
     refuse_overlap(out, inputs)
     above = Path(os.path.realpath(out)).parents
     for given in inputs:
-        if given.name == "rollouts" and Path(os.path.realpath(given)) in above:
+        if Path(os.path.realpath(given)) in above:
             raise BadInput(out, "a place apart from what is read", f"one in {given}", "Choose another.")
 
 
