@@ -76,7 +76,18 @@ def prefect_app(port: int, password: str) -> Any:
     os.environ["PREFECT_API_AUTH_STRING"] = login.pair(password)  # its services are clients of itself
     from prefect.server.api.server import create_app
 
-    return create_app(final=True)
+    app = create_app(final=True)
+    for part in (app, *(route.app for route in app.routes if hasattr(route, "app"))):  # itself, interface, pages
+        drop_descriptions(part)
+    return app
+
+
+def drop_descriptions(app: Any) -> None:
+    """Take out FastAPI's own pages about an application's interface, which would ask for no login."""
+    names = ("openapi_url", "docs_url", "redoc_url", "swagger_ui_oauth2_redirect_url")
+    pages = {getattr(app, name, None) for name in names} - {None}
+    if pages:
+        app.router.routes[:] = [route for route in app.router.routes if getattr(route, "path", "") not in pages]
 
 
 # What `mlflow server` hands to its application; tests/flows/test_servers.py compares the names with MLflow's.
