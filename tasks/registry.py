@@ -118,6 +118,7 @@ def ensure_database(folder: Path) -> None:
         from mlflow.db import upgrade
 
         _quiet()
+        assert upgrade.callback is not None
         upgrade.callback(f"sqlite:///{path}")
 
     with _locked(folder):
