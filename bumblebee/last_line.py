@@ -10,6 +10,7 @@ import os
 import select
 import signal
 import sqlite3
+import stat
 import sys
 import tempfile
 import threading
@@ -28,6 +29,7 @@ _DISK = {
     errno.EROFS: "a read-only disk",
     errno.EACCES: "no permission to write",
 }
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _SQLITE = ("database or disk is full", "disk I/O error")
 _DO = "Free some space or choose another folder, then run again."
 
@@ -44,8 +46,10 @@ def guarded(command: Callable[[], int | None]) -> int:
     """Run a command and return its exit status; every exception becomes one line on standard error.
 
     0 or what the command returns; 2 for bad input and for a disk that takes nothing; 130 for Ctrl-C, 143 for SIGTERM,
-    129 for SIGHUP; 1 for anything else, with the traceback in a file that the line names.
+    129 for SIGHUP; 1 for anything else, with the traceback in a file that the line names. What the command makes nobody
+    else may change, whatever the umask.
     """
+    os.umask(os.umask(OTHERS_WRITE) | OTHERS_WRITE)
     try:
         with _signals():
             status = int(command() or 0)

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from configobj import ConfigObj
+
 from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from flows import checkpoints, node, parcel, ray_cluster, reproduce
@@ -20,6 +22,7 @@ from flows.stages import Stage, kind_of, read_stages
 from tasks import lineage, lock_file, params
 from tasks.lab import FILE, Lab, read_lab
 from tasks.parent import end_with_parent
+from tasks.private import local_settings, write_settings
 
 TRIES = 3  # machines that may be lost under one stage
 EXIT_LOST = 1
@@ -102,15 +105,16 @@ def recorded(name: str) -> bool:
 
 def settle(lab: Lab) -> None:
     """Make the shared remote the workspace's default, so that `dvc pull` and `dvc push` mean it."""
-    path, text = Path(".dvc/config.local"), parcel.dvc_settings(lab)
-    own = "\n".join(line for line in text.splitlines() if "no_scm" not in line) + "\n"
-    if not path.exists():
-        part = path.with_name(f"config.local.{os.getpid()}")
-        part.write_text(own)
-        part.replace(path)
-    elif f"url = {lab.ray.remote if lab.ray else ''}\n" not in path.read_text():
+    settings, own = local_settings(Path.cwd()), ConfigObj(parcel.dvc_settings(lab).splitlines())
+    del own["core"]["no_scm"]
+    (section,) = set(own) - {"core"}
+    url = settings.get(section, {}).get("url")
+    if url is None:
+        settings.merge(own)
+        write_settings(settings)
+    elif url != own[section]["url"]:
         do = f"Remove it, or give it the remote `{parcel.REMOTE}` with that url."
-        raise BadInput(path.resolve(), f"url = {lab.ray.remote if lab.ray else ''}", "another remote", do)
+        raise BadInput(settings.filename, f"url = {own[section]['url']}", "another remote", do)
 
 
 def send(ray: Any, what: Errand, lab: Lab, wanted: ray_cluster.Need) -> int | None:

@@ -19,6 +19,7 @@ from flows.servers import Addresses, require_port, servers
 from flows.stages import changed_stages, read_stages, to_run
 from tasks import params, paths, sections
 from tasks.lab import on_cluster
+from tasks.private import private_index
 
 EXIT_WAITING = 3
 NULL = "null"  # the seed of a robot without undeclared effects
@@ -91,6 +92,7 @@ def robot_of(seed: str) -> dict[str, dict[str, int]]:
 def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
     """Bring the workspace up to date through the flow."""
     require_own(folder)
+    private_index(folder)
     os.environ.update(environment(folder))
     params.check_names(params.read(folder / "params.yaml"), folder / "params.yaml")
     sections.loop(folder / "params.yaml")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from flows import login
 from tasks.lab import read_lab
+from tasks.private import INDEX
 
 SERVERS = ".servers"  # folder of the workspace with both servers' databases, logs and addresses
 
@@ -50,7 +51,7 @@ def environment(workspace: Path) -> dict[str, str]:
     found["PREFECT_LOGGING_TO_API_WHEN_MISSING_FLOW"] = "ignore"
     found["PREFECT_RESULTS_PERSIST_BY_DEFAULT"] = "false"
     # Without it DVC keeps its indices in a folder of the machine, shared by all users.
-    found["DVC_SITE_CACHE_DIR"] = str(workspace / ".dvc" / "tmp" / "site")
+    found["DVC_SITE_CACHE_DIR"] = str(workspace / INDEX)
     found["PYTHONUNBUFFERED"] = "1"
     found["SHELL"] = "/bin/sh"  # DVC runs commands in it; a login shell's settings have no place in a stage
     for level in ("TASK", "FLOW"):

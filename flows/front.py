@@ -14,9 +14,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from flows import login
 from flows.environment import SERVERS
 from flows.guard import Guard
+from tasks import registry
 from tasks.lab import read_lab
 from tasks.parent import end_with_parent
 
@@ -48,7 +50,11 @@ def main(argv: list[str] | None = None) -> int:
     port = int(listener.getsockname()[1])
     if options.door is not None:
         os.environ["MLFLOW_SERVER_ALLOWED_HOSTS"] = "*"  # the guard and the door before it judge them
-    app = prefect_app(port, password) if options.server == "prefect" else mlflow_app(options.workspace)
+    try:
+        app = prefect_app(port, password) if options.server == "prefect" else mlflow_app(options.workspace)
+    except BadInput as error:
+        print(error, file=sys.stderr)  # its last line is what the keeper tells
+        return EXIT_BAD_INPUT
     door = None
     if options.door is not None:
         from flows.door_server import with_door
@@ -70,7 +76,18 @@ def prefect_app(port: int, password: str) -> Any:
     os.environ["PREFECT_API_AUTH_STRING"] = login.pair(password)  # its services are clients of itself
     from prefect.server.api.server import create_app
 
-    return create_app(final=True)
+    app = create_app(final=True)
+    for part in (app, *(route.app for route in app.routes if hasattr(route, "app"))):  # itself, interface, pages
+        drop_descriptions(part)
+    return app
+
+
+def drop_descriptions(app: Any) -> None:
+    """Take out FastAPI's own pages about an application's interface, which would ask for no login."""
+    names = ("openapi_url", "docs_url", "redoc_url", "swagger_ui_oauth2_redirect_url")
+    pages = {getattr(app, name, None) for name in names} - {None}
+    if pages:
+        app.router.routes[:] = [route for route in app.router.routes if getattr(route, "path", "") not in pages]
 
 
 # What `mlflow server` hands to its application; tests/flows/test_servers.py compares the names with MLflow's.
@@ -87,8 +104,10 @@ MLFLOW = {
 def mlflow_app(workspace: Path) -> Any:
     """MLflow's server on the database of the workspace or its lab; by name, since flows import nothing of MLflow."""
     folder, lab = workspace / SERVERS, read_lab(workspace)
-    database, artifacts = f"sqlite:///{folder}/mlflow.db", f"{folder}/artifacts"
-    if lab is not None:
+    database, artifacts = f"sqlite:///{folder}/{registry.DATABASE}", f"{folder}/artifacts"
+    if lab is None:
+        registry.ensure_database(folder)
+    else:
         database, artifacts = lab.mlflow.connection, lab.mlflow.artifacts
     os.environ |= {name: value.format(database=database, artifacts=artifacts) for name, value in MLFLOW.items()}
     import_module("mlflow.server.handlers").initialize_backend_stores(

@@ -44,7 +44,9 @@ def list_gates(workspace: Workspace = Path()) -> None:
         table = promotion_answer.asked(place)
         grid.add_row(place.model, words.short(table), escape(words.what(table)), escape(words.said(table)))
     Console().print(grid if grid.row_count else "no round has come in")
-    print(f"answers in the record: {len(gate_record.check(folder / 'data' / 'approvals'))}, unchanged since")
+    record = folder / "data" / "approvals"
+    so_far = "" if gate_record.end_known(record) else ", as far as they go: none was given here yet"
+    print(f"answers in the record: {len(gate_record.check(record))}, unchanged since{so_far}")
 
 
 @app.command()

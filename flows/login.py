@@ -5,31 +5,15 @@ import os
 import re
 import secrets
 import stat
-from contextlib import suppress
 from pathlib import Path
 
-from bumblebee.errors import BadInput
+from tasks.private import private
+
+__all__ = ["NAME", "USER", "ensure", "header", "pair", "private", "read", "write_private"]
 
 USER = "bumblebee"
 NAME = "login"  # the file, one line `user:password`, as Prefect's page asks for it
 _LINE = re.compile(rf"{USER}:([A-Za-z0-9_-]{{40,}})\n")
-
-
-def private(folder: Path) -> Path:
-    """Make the folder, or take it over, so that nobody but the owner can look into it.
-
-    Raises:
-        BadInput: when it is a link, no folder, or somebody else's.
-    """
-    with suppress(FileExistsError):
-        folder.mkdir(mode=0o700, parents=True)
-    found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid():
-        came = "a link or a file" if not stat.S_ISDIR(found.st_mode) else f"one of user {found.st_uid}"
-        raise BadInput(folder, "a folder of your own", came, "Move it away, then start again.")
-    if stat.S_IMODE(found.st_mode) & 0o077:
-        folder.chmod(0o700)
-    return folder
 
 
 def ensure(folder: Path) -> str:

@@ -18,6 +18,7 @@ from flows.environment import environment
 from flows.owned import require_own
 from flows.servers import Addresses, require_port, servers
 from tasks.lab_serve import read_serve
+from tasks.private import private_index
 
 DEPLOYMENT = "demo"
 
@@ -36,6 +37,7 @@ def started(options: argparse.Namespace) -> int:
             require_port("--mlflow-port", options.mlflow_port)
             folder = workspaces.named(options.name)
             require_own(folder)
+            private_index(folder)
             os.environ.update(environment(folder))
             door = read_serve(folder)
             with servers(folder, options.prefect_port, options.mlflow_port, door) as addresses:

@@ -16,6 +16,7 @@ from flows.environment import environment
 from tasks import params, paths
 from tasks.filter_files import files_named
 from tasks.lab import FILE as LAB
+from tasks.private import private_index
 
 HOME = Path(bumblebee.__file__).resolve().parent.parent  # the folder with dvc.yaml, params.yaml and the packages
 CODE = ("bumblebee", "tasks", "flows")
@@ -75,6 +76,7 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
         subprocess.run(init, cwd=folder, env=environment(folder), check=True)
         settings = (HOME / ".dvc" / "config").read_text()
         _write(folder / ".dvc" / "config", settings.replace("[core]\n", "[core]\n    no_scm = True\n"))
+    private_index(folder)
     return folder
 
 

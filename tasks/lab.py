@@ -144,14 +144,22 @@ def read_lab(workspace: Path) -> Lab | None:
     for where, url in (("prefect", lab.prefect.database), ("mlflow", lab.mlflow.database)):
         _check_database(f"{path}: {where}.database", url)
     if not BUCKET.fullmatch(lab.mlflow.artifacts):
-        raise BadInput(f"{path}: mlflow.artifacts", "s3://BUCKET/FOLDER", lab.mlflow.artifacts[:80])
+        raise BadInput(f"{path}: mlflow.artifacts", "s3://BUCKET/FOLDER", form(lab.mlflow.artifacts))
     if lab.mlflow.s3_endpoint and not re.fullmatch(r"https?://[A-Za-z0-9.-]+(:\d{1,5})?", lab.mlflow.s3_endpoint):
-        raise BadInput(f"{path}: mlflow.s3_endpoint", "https://HOST[:PORT]", lab.mlflow.s3_endpoint[:80])
+        raise BadInput(f"{path}: mlflow.s3_endpoint", "https://HOST[:PORT]", form(lab.mlflow.s3_endpoint))
     if lab.prefect.database == lab.mlflow.database:
         raise BadInput(f"{path}: mlflow.database", "another database than Prefect's", "the same one")
     if lab.ray is not None:
         _check_ray(lab.ray, f"{path}: ray")
     return lab
+
+
+def form(address: str) -> str:
+    """How an address that is refused looks, without its words: a secret may stand in any part of it."""
+    found = re.match(r"[a-z][a-z0-9+.-]{1,15}://", address)
+    parts = [name for sign, name in (("@", "a user"), ("?", "a query"), ("#", "a fragment")) if sign in address]
+    shown = ", ".join(([f"{found[0]}..."] if found else []) + parts)
+    return f"another form ({shown})" if shown else "another form"
 
 
 def on_cluster(workspace: Path) -> bool:
@@ -195,7 +203,8 @@ def _take_numbers(section: Any, where: str) -> dict[str, Any]:
 def _number(value: Any, where: str, limits: tuple[float, float]) -> float:
     least, most = limits
     if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
-        raise BadInput(where, f"a number from {least:g} to {most:g}", repr(value)[:80])
+        came = type(value).__name__ if isinstance(value, str) else repr(value)
+        raise BadInput(where, f"a number from {least:g} to {most:g}", came[:80])
     return float(value)
 
 
@@ -203,10 +212,10 @@ def _check_ray(ray: RayLab, where: str) -> None:
     """Refuse what is no address of a cluster or no place for DVC."""
     port = CLUSTER.fullmatch(ray.address)
     if ray.address != AUTO and (not port or int(port[1]) > 65535):
-        raise BadInput(f"{where}.address", f"HOST:PORT of the cluster's head, or {AUTO}", ray.address[:80])
+        raise BadInput(f"{where}.address", f"HOST:PORT of the cluster's head, or {AUTO}", form(ray.address))
     if not REMOTE.fullmatch(ray.remote):
         expected = "a folder from / on, s3://BUCKET/FOLDER or ssh://HOST/FOLDER"
-        raise BadInput(f"{where}.remote", expected, re.sub(r":[^/@]*@", ":...@", ray.remote)[:80])
+        raise BadInput(f"{where}.remote", expected, form(ray.remote))
 
 
 def _check_database(where: str, url: str) -> None:
@@ -219,4 +228,4 @@ def _check_database(where: str, url: str) -> None:
     if parts.password is not None:
         raise BadInput(where, f"{DATABASE}, without a password", "one with it", "Put the password into ~/.pgpass.")
     if not known or not re.fullmatch(r"/[A-Za-z0-9_-]+", parts.path) or parts.query or parts.fragment:
-        raise BadInput(where, DATABASE, url[:80])
+        raise BadInput(where, DATABASE, form(url))

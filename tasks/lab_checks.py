@@ -41,14 +41,15 @@ def check_lab(lab: Lab, workspace: Path) -> None:
     _check_store(lab.mlflow, f"{Path(workspace) / FILE}: mlflow.artifacts")
 
 
-def known_revisions(name: str) -> set[str]:
-    """Versions of its tables that the installed program can read; of `MIGRATIONS`' names."""
+def revisions(name: str) -> tuple[set[str], set[str]]:
+    """Versions of its tables that the installed program can read, and the newest of them; of `MIGRATIONS`' names."""
     package, folder = MIGRATIONS[name]
     spec = find_spec(package)
     assert spec is not None and spec.submodule_search_locations
-    files = (Path(spec.submodule_search_locations[0]) / folder).glob("*.py")
-    found = (re.search(r"^revision\s*=\s*[\"'](\w+)[\"']", file.read_text(), re.MULTILINE) for file in files)
-    return {match[1] for match in found if match}
+    texts = [file.read_text() for file in (Path(spec.submodule_search_locations[0]) / folder).glob("*.py")]
+    known, before = ({word for text in texts for line in re.findall(rf"^{key}\s*=(.*)", text, re.MULTILINE)
+                      for word in re.findall(r"\w{6,}", line)} for key in ("revision", "down_revision"))  # fmt: skip
+    return known, known - before
 
 
 def _check_database(name: str, url: str, where: str) -> None:
@@ -82,7 +83,7 @@ def _check_opened(cursor: Any, name: str, where: str) -> None:
     if cursor.fetchone()[0] is None:
         return  # a new database
     cursor.execute("SELECT version_num FROM alembic_version")
-    unknown = sorted({row[0] for row in cursor.fetchall()} - known_revisions(name))
+    unknown = sorted({row[0] for row in cursor.fetchall()} - revisions(name)[0])
     if unknown:
         do = f"Install the version of {name} that made it, or give another database."
         raise BadInput(where, f"tables that this version of {name} knows", f"newer ones ({unknown[0]})", do)

@@ -25,7 +25,7 @@ from typing import Any
 
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_yaml
-from tasks.lab import FILE
+from tasks.lab import FILE, form
 
 ADDRESS = re.compile(r"https://([a-z0-9]([a-z0-9.-]*[a-z0-9])?)(:([1-9][0-9]{0,4}))?")
 GROUP = re.compile(r"[a-z][a-z0-9_-]{0,31}")
@@ -114,12 +114,8 @@ def require_server(address: Any, where: str) -> str:
     """
     here = isinstance(address, str) and re.fullmatch(r"http://(127\.0\.0\.1|localhost)(:[0-9]{1,5})?", address)
     if not here and (not isinstance(address, str) or not ADDRESS.fullmatch(address)):
-        raise BadInput(where, "https://HOST[:PORT]", _without_password(str(address)))
+        raise BadInput(where, "https://HOST[:PORT]", form(str(address)))
     return str(address)
-
-
-def _without_password(address: str) -> str:
-    return re.sub(r"//[^/@]*@", "//...@", address)[:80]
 
 
 def _content(path: Path) -> dict[str, Any]:
@@ -131,14 +127,13 @@ def _check(own: ServeLab, where: str) -> None:
     for name, url in own.addresses.items():
         found = ADDRESS.fullmatch(url)
         if not found or int(found[4] or 443) > 65535:
-            came = "plain http" if url.startswith("http://") else _without_password(url)
-            raise BadInput(f"{where}.{name}", "https://HOST[:PORT], as people open it", came)
+            raise BadInput(f"{where}.{name}", "https://HOST[:PORT], as people open it", form(url))
     if own.prefect == own.mlflow:
         raise BadInput(f"{where}.mlflow", "another address than Prefect's", "the same one")
     for group in ("write", "promote"):
         value = getattr(own, group)
         if value and not GROUP.fullmatch(value):
-            raise BadInput(f"{where}.{group}", "a group's name in small letters", repr(value)[:80])
+            raise BadInput(f"{where}.{group}", "a group's name in small letters", form(value))
     beyond = [name for name, text in _places(own, where).items() if not text.is_loopback]
     if beyond and not own.certificate:
         do = "Name certificate and key, or listen on 127.0.0.1 behind a proxy on this machine that does TLS."
@@ -159,7 +154,7 @@ def _places(own: ServeLab, where: str) -> dict[str, ipaddress.IPv4Address]:
             known = None
         if not known:
             expected = "ADDRESS:PORT of this machine, such as 0.0.0.0:4200, with a port from 1024 to 65535"
-            raise BadInput(f"{where}.{name}_listen", expected, text[:80])
+            raise BadInput(f"{where}.{name}_listen", expected, form(text))
     return found
 
 
@@ -172,7 +167,8 @@ def tls(own: ServeLab, where: str = "serve") -> ssl.SSLContext:
     for name in ("certificate", "key"):
         path = Path(getattr(own, name))
         if not path.is_absolute() or not path.is_file():
-            raise BadInput(f"{where}.{name}", "a file, by its whole path", f"{path}: no such file")
+            came = f"{path}: no such file" if path.is_absolute() else "no whole path"
+            raise BadInput(f"{where}.{name}", "a file, by its whole path", came)
     if stat.S_IMODE(Path(own.key).stat().st_mode) & 0o077:
         raise BadInput(f"{where}.key", "a file that only its owner can read", own.key, f"chmod 600 {own.key}")
     made = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)

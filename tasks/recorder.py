@@ -54,6 +54,8 @@ def told(error: Exception) -> str:
     """An error as one line for the other process."""
     text = " ".join(str(error).split())
     facts = {"type": type(error).__name__, "text": text, "errno": getattr(error, "errno", None)}
+    if isinstance(error, BadInput):
+        facts["parts"] = (error.where, error.expected, error.came, error.do)
     return json.dumps({**facts, "file": str(getattr(error, "filename", None) or "")})
 
 
@@ -64,6 +66,8 @@ def heard(said: str) -> Exception:
         facts = json.loads(last)
     except ValueError:
         return RuntimeError(last)
+    if "parts" in facts:
+        return BadInput(*facts["parts"])
     if facts["errno"] is not None:
         return OSError(facts["errno"], facts["text"], facts["file"] or None)
     text = f"{facts['type']}: {facts['text']}"

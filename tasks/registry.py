@@ -18,17 +18,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bumblebee.errors import BadInput
+from tasks.database import ensure
 from tasks.lab import MlflowLab, read_lab
 from tasks.lab_checks import one_at_a_time
 from tasks.lab_serve import read_tracking
 from tasks.lineage import current_stage, git_sha, history, inputs_of_stage, lineage, place
 from tasks.outputs import MANIFEST, copied, manifest
+from tasks.private import private
 from tasks.run_form import card_settings, fitted, flatten, metric_name, read_curve
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
 
-SERVERS = Path(".servers")
+SERVERS, DATABASE = Path(".servers"), "mlflow.db"
 SCHEME = "mlflow-artifacts"
 # Characters that MLflow's tables hold; what is longer says so there and is whole in the file that it names.
 LONGEST_PARAM, LONGEST_TAG, LONGEST_DESCRIPTION = 6000, 5000, 5000
@@ -48,19 +50,20 @@ def _prepared(workspace: Path) -> "MlflowClient":
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     os.environ.setdefault("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT", "1")
-    logging.getLogger("mlflow").setLevel(logging.WARNING)
+    _quiet()
     import mlflow
 
-    SERVERS.mkdir(exist_ok=True)
+    private(SERVERS)
     if server is not None:
-        with _locked():
+        with _locked(SERVERS):
             client = _of_server(server)
             _make_experiment(client)
         mlflow.set_experiment(experiment_name())
         return client
-    uri = f"sqlite:///{(SERVERS / 'mlflow.db').resolve()}" if lab is None else lab.mlflow.connection
-    logging.getLogger("alembic").setLevel(logging.WARNING)
-    with _locked(), nullcontext() if lab is None else one_at_a_time(lab.mlflow.database):
+    uri = f"sqlite:///{(SERVERS / DATABASE).resolve()}" if lab is None else lab.mlflow.connection
+    if lab is None:
+        ensure_database(SERVERS.resolve())
+    with _locked(SERVERS), nullcontext() if lab is None else one_at_a_time(lab.mlflow.database):
         mlflow.set_tracking_uri(uri)
         mlflow.set_registry_uri(uri)
         if lab is None:
@@ -105,9 +108,32 @@ def experiment_name() -> str:
     return Path.cwd().name
 
 
+def ensure_database(folder: Path) -> None:
+    """See that `folder` holds a whole database of the installed MLflow; one process makes it, others wait for it.
+
+    Raises:
+        BadInput: for one that MLflow can do nothing with.
+    """
+
+    def update(path: Path) -> None:
+        from mlflow.db import upgrade
+
+        _quiet()
+        assert upgrade.callback is not None
+        upgrade.callback(f"sqlite:///{path}")
+
+    with _locked(folder):
+        ensure(folder / DATABASE, "mlflow", update)
+
+
+def _quiet() -> None:
+    for name in ("mlflow", "alembic"):
+        logging.getLogger(name).setLevel(logging.WARNING)
+
+
 @contextmanager
-def _locked() -> Iterator[None]:
-    with (SERVERS / "mlflow.lock").open("w") as lock:
+def _locked(folder: Path) -> Iterator[None]:
+    with (folder / "mlflow.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
@@ -310,8 +336,8 @@ def fetch(name: str, wanted: str, out: Path, server: str = "") -> Path:
     from mlflow.exceptions import MlflowException
 
     here = not server and read_lab(Path.cwd()) is None and read_tracking(Path.cwd()) is None
-    if here and not (SERVERS / "mlflow.db").exists():
-        raise BadInput(Path.cwd() / SERVERS / "mlflow.db", "a workspace's registry", "no file", "Give its --workspace.")
+    if here and not (SERVERS / DATABASE).exists():
+        raise BadInput(Path.cwd() / SERVERS / DATABASE, "a workspace's registry", "no file", "Give its --workspace.")
     if out.exists():
         raise BadInput(out, "a new folder", "one that exists", "Choose another --out.")
     client = _of_server(server) if server else prepare()

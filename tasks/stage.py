@@ -30,6 +30,7 @@ from tasks.lab import read_lab
 from tasks.lab_serve import read_tracking
 from tasks.params import load
 from tasks.parent import end_with_parent
+from tasks.private import private_index
 from tasks.sections import check_once
 
 __all__ = ["disk_line", "load", "log_run", "output_file", "output_folder", "run_stage", "scratch"]
@@ -62,6 +63,8 @@ def _run(main: Callable[..., object], options: dict[str, object]) -> None:
     try:
         if "DVC_STAGE" in os.environ:
             check_once()
+            if "DVC_ROOT" in os.environ:
+                private_index(Path(os.environ["DVC_ROOT"]), remake=False)  # DVC has it open
         main(**options)
     except Exception as error:
         if "database or disk is full" in str(error):  # how SQLite says it, through whichever library

@@ -195,7 +195,7 @@ def tree(folder: Path) -> dict[str, bytes]:
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-@pytest.mark.parametrize("out", ["set", ".", "set/rollouts", "set/rollouts/new", "link"])
+@pytest.mark.parametrize("out", ["set", ".", "set/rollouts", "set/rollouts/new", "set/new", "link", "link/new"])
 @pytest.mark.parametrize("command", ["diagnose", "gap"])
 def test_no_output_replaces_or_enters_what_is_read(
     at_once: Path, capsys: pytest.CaptureFixture[str], command: str, out: str

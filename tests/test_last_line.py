@@ -121,3 +121,18 @@ def test_a_working_folder_that_is_gone_hides_no_error(
     said = capsys.readouterr().err
     assert "surprise" in said
     Path(said.split("with ")[-1].strip()).unlink()
+
+
+def test_what_a_command_makes_nobody_else_may_change_whatever_the_umask(tmp_path: Path):
+    folder = tmp_path / "folder"
+
+    def make() -> None:
+        folder.mkdir()
+        (folder / "file").touch()
+
+    old = os.umask(0)
+    try:
+        assert guarded(make) == 0
+    finally:
+        os.umask(old)
+    assert [path.stat().st_mode & 0o777 for path in (folder, folder / "file")] == [0o755, 0o644]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from bumblebee.deploy.compensation_limits import CompensationLimits
+from bumblebee.robot.facts import ROBOT
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ def as_table(compensation: Compensation) -> dict[str, Any]:
         lists[name] = [list(row) for row in getattr(compensation, name)]
     return {
         "schema": 1,
-        "robot": "g1_23dof",
+        "robot": ROBOT,
         "effects_sha256": compensation.effects_sha256,
         "joints": list(compensation.joints),
         "limits": asdict(compensation.limits),

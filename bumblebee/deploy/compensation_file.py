@@ -17,12 +17,12 @@ from bumblebee.io.limits import Limits
 from bumblebee.io.read import read_json
 from bumblebee.io.write import refuse_foreign, refuse_overlap, try_output, write_file
 from bumblebee.ranges import Unfit
-from bumblebee.robot.facts import g1_bodies, joint_names
+from bumblebee.robot.facts import ROBOT, g1_bodies, joint_names
 from bumblebee.robot.model import build_model
 from bumblebee.sim.effects import read_term
 
 _LIMITS = Limits(text_bytes=4 << 20, nodes=60_000)
-_ROBOT, _AGAIN = "g1_23dof", "Make it again with `bumblebee compensate`."
+_AGAIN = "Make it again with `bumblebee compensate`."
 _LARGEST = 1e4  # of any number in SI units that has no limit of its own
 _LONGEST = 1000  # characters of a text
 _KEYS = (
@@ -67,7 +67,7 @@ def read_compensation(path: Path) -> Compensation:
     table = read_json(Path(path), _LIMITS)
     _keys(path, table, _KEYS)
     _same(f"{path}: schema", table["schema"], 1)
-    _same(f"{path}: robot", table["robot"], _ROBOT)
+    _same(f"{path}: robot", table["robot"], ROBOT)
     _same(f"{path}: joints", table["joints"], list(joint_names()))
     arrays = {name: _numbers(f"{path}: {name}", table[name], len(joint_names())) for name in JOINT_ARRAYS}
     compensation = Compensation(

@@ -20,7 +20,7 @@ from bumblebee.evaluation.contract import StartNoise
 from bumblebee.measured.rollout import Rollout
 from bumblebee.motion.clip import Clip, velocities
 from bumblebee.motion.kinematics import sole_points
-from bumblebee.robot.facts import joint_names
+from bumblebee.robot.facts import ROBOT, joint_names
 from bumblebee.robot.facts import joints as robot_joints
 from bumblebee.robot.model import gains
 from bumblebee.tracking.library import MotionLibrary
@@ -152,7 +152,7 @@ class _Log:
         stacked = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
         servo = [gains(joint) for joint in robot_joints()]
         meta = {
-            "robot": policy.contract.get("robot", "g1_23dof"),
+            "robot": ROBOT,
             "kp": [kp for kp, _ in servo] if undone is None else undone.kp.tolist(),
             "kd": [kd for _, kd in servo] if undone is None else undone.kd.tolist(),
             "motion": clip.name,

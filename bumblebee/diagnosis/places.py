@@ -9,7 +9,7 @@ from pathlib import Path
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import LIMITS
 from bumblebee.io.read import read_json, read_text
-from bumblebee.io.write import refuse_overlap, try_output
+from bumblebee.io.write import refuse_entering, try_output
 
 _OWN = replace(LIMITS, text_bytes=1 << 28, nodes=20_000_000)  # our own results may be larger than settings
 _FILE = re.compile(r"""\b(?:file|fileright|filefront|fileback|fileleft|fileup|filedown)\s*=\s*["']([^"']+)["']""")
@@ -47,14 +47,14 @@ def inputs_of(model: Path, dataset: Path, *more: Path | None) -> list[Path]:
 
 def claim_folder(out: Path, result: Result, overwrite: bool, inputs: Sequence[Path]) -> None:
     """See that a result may be written at `out` and that the disk takes it, before the work; else `BadInput`."""
-    _refuse_inputs(out, inputs)
+    refuse_entering(out, inputs)
     try_output(out)
     refuse_folder(out, result, overwrite)
 
 
 def claim_file(out: Path, overwrite: bool, inputs: Sequence[Path]) -> None:
     """The same for the file of errors that `replay` writes."""
-    _refuse_inputs(out, inputs)
+    refuse_entering(out, inputs)
     try_output(out)
     refuse_file(out, overwrite)
 
@@ -100,14 +100,6 @@ def model_files(model: Path) -> list[Path]:
                     found.append(path)
                     waiting += [path] if path.suffix == ".xml" else []
     return found
-
-
-def _refuse_inputs(out: Path, inputs: Sequence[Path]) -> None:
-    refuse_overlap(out, inputs)
-    above = Path(os.path.realpath(out)).parents
-    for given in inputs:
-        if given.name == "rollouts" and Path(os.path.realpath(given)) in above:
-            raise BadInput(out, "a place apart from what is read", f"one in {given}", "Choose another.")
 
 
 def _foreign(out: Path, result: Result, names: Sequence[str]) -> str | None:

@@ -10,6 +10,7 @@ import json
 import os
 import stat
 import zipfile
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -117,7 +118,7 @@ def _measure_yaml(where: object, text: str, limits: Limits) -> None:
 
 
 def read_json(path: Path, limits: Limits = LIMITS) -> Any:
-    """Plain data of a JSON file; NaN and infinities are refused."""
+    """Plain data of a JSON file; NaN, infinities and keys that stand twice are refused."""
     return parse_json(path, read_text(path, limits.text_bytes), limits)
 
 
@@ -127,8 +128,15 @@ def parse_json(where: object, text: str, limits: Limits = LIMITS) -> Any:
     def refuse(word: str) -> Any:
         raise BadInput(where, "JSON of finite numbers", word)
 
+    def distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            (twice, _), *_ = Counter(key for key, _ in pairs).most_common(1)
+            raise BadInput(where, "JSON with each key once", f"the key {twice!r:.80} twice")
+        return found
+
     try:
-        content = json.loads(text, parse_constant=refuse)
+        content = json.loads(text, parse_constant=refuse, object_pairs_hook=distinct)
     except RecursionError:
         raise BadInput(where, f"at most {limits.depth} levels of nesting", "more") from None
     except ValueError as error:

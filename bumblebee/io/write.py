@@ -22,6 +22,15 @@ def refuse_overlap(out: Path, inputs: Sequence[Path]) -> None:
             raise BadInput(out, "a place apart from what is read", f"one that is or holds {given}", "Choose another.")
 
 
+def refuse_entering(out: Path, inputs: Sequence[Path]) -> None:
+    """`BadInput` where `out` overlaps an input, or lies in a folder that is one; links are followed."""
+    refuse_overlap(out, inputs)
+    above = Path(os.path.realpath(out)).parents
+    for given in inputs:
+        if Path(os.path.realpath(given)) in above:
+            raise BadInput(out, "a place apart from what is read", f"one in {given}", "Choose another.")
+
+
 def refuse_foreign(out: Path, is_ours: Callable[[Path], bool], what: str) -> None:
     """`BadInput` where something lies at `out` that `is_ours` does not know; `what` names what would be replaced."""
     if os.path.lexists(out) and not (not out.is_symlink() and is_ours(out)):

@@ -10,7 +10,7 @@ from bumblebee.learning import pretrained
 from bumblebee.learning.onnx_graph import IR_VERSION, OPSET, Graph, behind_memory, layers, normalised
 from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.learning.transformer import TransformerModel
-from bumblebee.robot.facts import joint_names, joints, stand_pose
+from bumblebee.robot.facts import ROBOT, joint_names, joints, stand_pose
 from bumblebee.robot.model import gains
 from bumblebee.tracking.config import ObservationConfig
 from bumblebee.tracking.observations import action_scale
@@ -69,7 +69,7 @@ def contract(
     looks_ahead = any(name.startswith("ahead") for name, _ in parts((*seen.terms, *seen.now), *counts))
     return {
         "schema": 1,
-        "robot": "g1_23dof",
+        "robot": ROBOT,
         "joints": list(joint_names()),
         "kp": [round(kp, 6) for kp, _ in table],
         "kd": [round(kd, 6) for _, kd in table],

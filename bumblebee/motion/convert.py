@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
-from bumblebee.io.write import new_folder, refuse_overlap, try_output
+from bumblebee.io.write import new_folder, refuse_entering, try_output
 from bumblebee.motion.checks import check_clip, check_raw
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import beside
@@ -98,10 +98,7 @@ def convert(
 
 def claim(out: Path, path: Path, to: str, overwrite: bool) -> None:
     """See that a result may be written at `out`, and that the disk takes it, before the work; else `BadInput`."""
-    refuse_overlap(out, [path])
-    inside = Path(os.path.realpath(path)) in Path(os.path.realpath(out)).parents
-    if inside and Path(path).is_dir():
-        raise BadInput(out, "a place apart from what is read", f"one in {path}", "Choose another.")
+    refuse_entering(out, [path])
     try_output(out)
     if not os.path.lexists(out):
         return

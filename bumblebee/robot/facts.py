@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+ROBOT = "g1_23dof"  # as exported policies and compensations name it
 WRIST_JOINTS = tuple(f"{side}_wrist_{axis}_joint" for side in ("left", "right") for axis in ("roll", "pitch", "yaw"))
 ANKLE_JOINTS = tuple(f"{side}_ankle_{axis}_joint" for side in ("left", "right") for axis in ("pitch", "roll"))
 FEET = ("left_ankle_roll_link", "right_ankle_roll_link")

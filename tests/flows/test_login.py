@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from bumblebee.errors import BadInput
-from flows import front, guard, login, owned
+from flows import front, guard, login
 from flows.environment import environment, without_login
 
 HOST = ("host", "127.0.0.1:4321")
@@ -145,21 +145,6 @@ def test_programs_of_the_owner_get_the_login_and_stages_do_not(tmp_path: Path, m
     assert found["PREFECT_API_AUTH_STRING"] == f"bumblebee:{password}"
     assert found["NO_PROXY"] == "example.org,127.0.0.1,localhost"
     assert not any(password in value for value in without_login(found).values())
-
-
-def test_a_workspace_in_which_another_user_decides_what_runs_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    (tmp_path / "dvc.yaml").write_text("stages: {}\n")
-    owned.require_own(tmp_path)
-    (tmp_path / "dvc.yaml").chmod(0o666)
-    with pytest.raises(BadInput, match=r"dvc.yaml: .* everybody can write"):
-        owned.require_own(tmp_path)
-    (tmp_path / "dvc.yaml").chmod(0o644)
-    monkeypatch.setattr(owned.os, "geteuid", lambda: os.getuid() + 1)
-    monkeypatch.delenv("SUDO_UID", raising=False)
-    with pytest.raises(BadInput, match="a workspace of your own"):
-        owned.require_own(tmp_path)
 
 
 def test_mlflow_still_reads_the_settings_that_we_hand_to_its_application():

@@ -47,6 +47,16 @@ def test_nan_is_no_json():
         parse_json("x", '{"a": NaN}')
 
 
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [('{"a": 1, "a": 1}', "a"), ('[{"b": {"c": 1, "d": 2, "c": 3}}]', "c"), ('{"\\u0065": 1, "e": 2}', "e")],
+)
+def test_json_with_a_key_twice_is_refused_as_yaml_is(text: str, key: str):
+    with pytest.raises(BadInput, match=f"x: expected JSON with each key once, came the key '{key}' twice"):
+        parse_json("x", text)
+    assert parse_json("x", '[{"a": 1}, {"a": {"a": 2}}]') == [{"a": 1}, {"a": {"a": 2}}]
+
+
 def test_text_that_is_not_utf8_names_its_line(tmp_path: Path):
     (tmp_path / "a").write_bytes(b"one\ntwo \xff\n")
     with pytest.raises(BadInput, match=r"line 2.*0xff"):

@@ -17,7 +17,11 @@ def test_an_output_is_no_input_and_holds_none(tmp_path: Path):
     for out in (data, tmp_path, tmp_path / "link", data / "x" / ".."):
         with pytest.raises(BadInput, match="apart"):
             write.refuse_overlap(out, [data])
-    write.refuse_overlap(data / "found", [data])
+    for out in (data / "found", tmp_path / "link" / "found"):
+        write.refuse_overlap(out, [data])
+        with pytest.raises(BadInput, match="apart"):
+            write.refuse_entering(out, [data])
+    write.refuse_entering(tmp_path / "ds2", [data])
     write.refuse_overlap(tmp_path / "ds2", [data])
 
 

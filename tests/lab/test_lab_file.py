@@ -8,7 +8,7 @@ import yaml
 from bumblebee.errors import BadInput
 from flows.environment import environment
 from tasks.lab import read_lab
-from tasks.lab_checks import known_revisions
+from tasks.lab_checks import revisions
 
 GOOD = {
     "prefect": {"database": "postgresql://bumblebee@db.lab:5433/prefect"},
@@ -90,10 +90,28 @@ def test_processes_are_told_where_things_are(tmp_path: Path) -> None:
         (cluster(remote="shared/dvc"), "ray.remote: expected a folder from / on"),
         (cluster(remote="ssh://me:secret@host/dvc"), "ray.remote: expected a folder from / on"),
         (cluster(memory=12), "ray.memory: expected GiB by stage, such as {base: 12}, came int"),
-        (cluster(memory={"base": "12G"}), "ray.memory.base: expected a number from 0.001 to 1e+06, came '12G'"),
+        (cluster(memory={"base": "12G"}), "ray.memory.base: expected a number from 0.001 to 1e+06, came str"),
         (cluster(memory={"base": True}), "ray.memory.base: expected a number from 0.001 to 1e+06, came True"),
         (cluster(checkpoint_seconds=0), "ray.checkpoint_seconds: expected a number from 1 to 86400, came 0"),
         ([1], "prefect: expected a mapping"),
+        (
+            changed("prefect", "database", "postgresql://u@db/prefect?password=secret"),
+            "came another form (postgresql://..., a user, a query)",
+        ),
+        (changed("prefect", "database", "u:secret@db/prefect"), "came another form (a user)"),
+        (changed("mlflow", "s3_endpoint", "https://key:secret@s3.lab"), "came another form (https://..., a user)"),
+        (
+            changed("mlflow", "s3_endpoint", "https://s3.lab/?key=secret"),
+            "came another form (https://..., a query)",
+        ),
+        (
+            changed("mlflow", "artifacts", "s3://key:secret@bumblebee/mlflow"),
+            "came another form (s3://..., a user)",
+        ),
+        (changed("mlflow", "artifacts", "secret"), "mlflow.artifacts: expected s3://BUCKET/FOLDER, came another form"),
+        (cluster(address="me:secret@head:6379"), "came another form (a user)"),
+        (cluster(remote="s3://secret@bumblebee/dvc#secret"), "came another form (s3://..., a user, a fragment)"),
+        (cluster(checkpoint_seconds="secret"), "came str"),
     ],
 )
 def test_what_is_wrong_is_one_line_and_shows_no_password(tmp_path: Path, content: object, line: str) -> None:
@@ -103,4 +121,6 @@ def test_what_is_wrong_is_one_line_and_shows_no_password(tmp_path: Path, content
 
 
 def test_the_versions_of_tables_that_the_installed_programs_know_are_found() -> None:
-    assert len(known_revisions("mlflow")) > 30 and len(known_revisions("prefect")) > 50
+    for program, least in (("mlflow", 30), ("prefect", 50)):
+        known, newest = revisions(program)
+        assert len(known) > least and len(newest) == 1 and newest < known

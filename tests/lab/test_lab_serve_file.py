@@ -61,10 +61,10 @@ def test_beyond_loopback_with_a_certificate_and_its_key(tmp_path: Path) -> None:
         ({"mlflow_listen": "10.0.0.5:5000"}, "serve.mlflow_listen: expected TLS beyond this machine"),
         (
             {"prefect": "http://data.lab:4200"},
-            "serve.prefect: expected https://HOST[:PORT], as people open it, came plain",
+            "serve.prefect: expected https://HOST[:PORT], as people open it, came another form (http://...)",
         ),
         ({"mlflow": "https://data.lab/mlflow"}, "serve.mlflow: expected https://HOST[:PORT]"),
-        ({"mlflow": "https://ann:pw@data.lab"}, "came https://...@data.lab"),
+        ({"mlflow": "https://ann:secret@data.lab"}, "came another form (https://..., a user)"),
         ({"mlflow": "https://data.lab:99999"}, "serve.mlflow: expected https://HOST[:PORT]"),
         ({"mlflow": GOOD["prefect"]}, "another address than Prefect's"),
         ({"prefect_listen": "data.lab:4200"}, "serve.prefect_listen: expected ADDRESS:PORT"),
@@ -72,7 +72,8 @@ def test_beyond_loopback_with_a_certificate_and_its_key(tmp_path: Path) -> None:
         ({"prefect_listen": "127.0.0.1"}, "serve.prefect_listen: expected ADDRESS:PORT"),
         ({"prefect_listen": None}, "serve.prefect_listen: expected an address, came no such key"),
         ({"certificate": "/not/there.pem"}, "certificate and key together"),
-        ({"promote": "Leads!"}, "serve.promote: expected a group's name"),
+        ({"promote": "secret!"}, "serve.promote: expected a group's name"),
+        ({"prefect_listen": "secret@0.0.0.0"}, "serve.prefect_listen: expected ADDRESS:PORT"),
         ({"password": "x"}, "serve.password: expected prefect or mlflow"),
         ({"write": 3}, "serve.write: expected a text, came int"),
     ],
@@ -80,7 +81,7 @@ def test_beyond_loopback_with_a_certificate_and_its_key(tmp_path: Path) -> None:
 def test_what_is_wrong_is_one_line(tmp_path: Path, over: dict[str, Any], line: str) -> None:
     with pytest.raises(BadInput) as caught:
         read_serve(write(tmp_path, **over))
-    assert line in str(caught.value) and "\n" not in str(caught.value)
+    assert line in str(caught.value) and "\n" not in str(caught.value) and "secret" not in str(caught.value)
 
 
 def test_a_key_that_others_can_read_or_of_another_certificate_is_refused(tmp_path: Path) -> None:
@@ -96,6 +97,8 @@ def test_a_key_that_others_can_read_or_of_another_certificate_is_refused(tmp_pat
         tls(replace(own, key=str(other)))
     with pytest.raises(BadInput, match=r"serve\.certificate: expected a file, by its whole path"):
         tls(replace(own, certificate=str(tmp_path / "not-there.pem")))
+    with pytest.raises(BadInput, match=r"serve\.key: expected a file, by its whole path, came no whole path"):
+        tls(replace(own, key=key.read_text()))
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,8 @@ import grp
 import json
 import os
 import pwd
+import shlex
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +125,38 @@ def test_the_record_has_every_answer_with_what_was_seen_and_shows_what_was_chang
             gate_record.check(folder)
     file.write_text("".join(lines) + lines[0][:40])  # a kill within a line
     assert len(gate_record.check(folder)) == 3 and file.read_text() == "".join(lines)
+
+
+@pytest.mark.parametrize("cut", [1, 2, 3])
+def test_a_record_whose_end_was_cut_is_named_also_with_the_old_request_put_back(place: gate.Gate, cut: int) -> None:
+    gate.request(place)
+    file, old = place.approval.parent / gate_record.NAME, place.approval.read_text()
+    for number in range(3):
+        answer(place, "ann", approve=number == 1, change=True)
+    lines = file.read_text().splitlines(keepends=True)
+    file.write_text("".join(lines[:-cut]))
+    place.approval.write_text(old)
+    before = file.read_bytes()
+    with pytest.raises(BadInput, match="expected the last answer that was given"):
+        gate_record.check(file.parent)
+    with pytest.raises(BadInput, match="expected the last answer that was given") as caught:
+        answer(place, "bob")
+    assert place.approval.read_text() == old and file.read_bytes() == before
+    subprocess.run(shlex.split(caught.value.do.partition("on purpose: ")[2]), check=True)
+    answer(place, "bob")
+    assert len(gate_record.check(file.parent)) == 1
+    file.unlink()
+    with pytest.raises(BadInput, match="0 answers without it"):
+        gate_record.check(file.parent)
+
+
+def test_where_no_answer_was_given_a_record_is_believed_as_far_as_it_goes(place: gate.Gate) -> None:
+    """As in a copy of the workspace without its private folder."""
+    answer(place, "ann")
+    (place.workspace / ".servers").rename(place.workspace / "elsewhere")
+    assert not gate_record.end_known(place.approval.parent) and len(gate_record.check(place.approval.parent)) == 1
+    answer(place, "bob")
+    assert gate_record.end_known(place.approval.parent)
 
 
 def test_a_broken_record_takes_no_answer(place: gate.Gate) -> None:

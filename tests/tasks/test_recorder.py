@@ -48,6 +48,8 @@ def test_a_full_disk_is_still_known_as_one_on_the_other_side() -> None:
     assert isinstance(full, OSError) and disk_line(full) is not None and full.filename == "artifacts/x"
     database = recorder.heard(recorder.told(ValueError("database or disk is full\n[SQL: INSERT]\n(Background: ...)")))
     assert isinstance(database, RuntimeError) and "database or disk is full" in str(database)
+    bad = BadInput(Path("x.db"), "a database", "text", "mv it.")
+    assert str(recorder.heard(recorder.told(bad))) == str(bad)
     assert "Killed" in str(recorder.heard("Killed\n")) and str(recorder.heard(""))
 
 

@@ -16,7 +16,7 @@ from bumblebee.diagnosis.plan.plan import Plan
 from bumblebee.diagnosis.plan.sheet import sheet
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_json
-from bumblebee.io.write import new_folder, refuse_overlap, try_output
+from bumblebee.io.write import new_folder, refuse_entering, try_output
 
 PARQUET_KEY = b"bumblebee.plan"
 _RUNS, _DOCUMENT, _SHEET = "runs", "plan.json", "sheet.html"
@@ -24,7 +24,7 @@ _RUNS, _DOCUMENT, _SHEET = "runs", "plan.json", "sheet.html"
 
 def claim_plan(out: Path, overwrite: bool, inputs: list[Path]) -> None:
     """See that a plan may be written at `out` and that the disk takes it, before the work; else `BadInput`."""
-    refuse_overlap(out, inputs)
+    refuse_entering(out, inputs)
     try_output(out)
     refuse_plan(out, overwrite)
 
