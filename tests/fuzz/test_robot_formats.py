@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.checks import check_raw
+from bumblebee.motion.checks import usable
 from bumblebee.motion.formats.read import RobotConfig, is_robot_npz, read_robot
 from bumblebee.motion.formats.write import mjlab_npz
 from bumblebee.robot.facts import joint_names
@@ -29,7 +29,7 @@ def outcome(read: Callable[[], list], how: str) -> None:
     try:
         for raw in read():
             assert np.isfinite(raw.fps) and raw.joint_pos.shape == (len(raw.root_pos), len(joint_names())), how
-            check_raw(raw)
+            usable(raw)
     except BadInput as error:
         assert str(error).isprintable() and len(str(error)) < 2000, f"{how}: {str(error)[:300]!r}"
     except Exception as error:
