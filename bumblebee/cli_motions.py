@@ -37,7 +37,7 @@ def inspect(
     rows: Rows = 200,
 ) -> None:
     """A table of motions: format, rate and who says it, length, height, captions, licence; bad files one line each."""
-    from bumblebee.motion.inspect import Counts
+    from bumblebee.motion.inspect import Counts, count
     from bumblebee.motion.inspect import inspect as look
 
     options = _options(csv_fps, settings)
@@ -55,8 +55,8 @@ def inspect(
     if counts.motions > len(shown_rows):
         print(f"... and {counts.motions - len(shown_rows):,} more motions (--rows)")
     print(counts)
-    if not counts.motions:
-        raise BadInput(path, "a motion", f"{counts.files:,} files, none of them readable; the first: {first}"[:1500])
+    if not counts.usable:
+        raise BadInput(path, "a motion", f"{count(counts.files, 'file')}, nothing usable; the first: {first}"[:1500])
 
 
 @app.command()

@@ -1,4 +1,4 @@
-"""The order of a quaternion that nobody states is told by the foot that stands, whatever the robot does, or asked for."""
+"""The order of a quaternion that nobody states is told by the foot that stands, or it is asked for."""
 
 from dataclasses import replace
 

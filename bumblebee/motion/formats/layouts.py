@@ -1,8 +1,8 @@
 """Which joints the columns of a motion of the G1 are: all 29, or one of the two layouts of 23 that the field uses.
 
-ASAP, PHC, H2O, TWIST and this project leave out the wrists. The G1 that Unitree sells with 23 joints has one waist joint
-and rolls its wrists. The legs and the waist's yaw stand in the same columns of both, the arms do not, and no number
-tells them apart: names do, rotations about the joints' axes do, bodies do; else the layout is asked for.
+ASAP, PHC, H2O, TWIST and this project leave out the wrists. The G1 that Unitree sells with 23 joints has one waist
+joint and rolls its wrists. The legs and the waist's yaw stand in the same columns of both, the arms do not, and no
+number tells them apart: names do, rotations about the joints' axes do, bodies do; else the layout is asked for.
 """
 
 from collections.abc import Sequence

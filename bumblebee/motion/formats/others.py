@@ -1,4 +1,4 @@
-"""Files of the field that hold no motion as it is read here: what they are, and how to make one of them that is read."""
+"""Files of the field that are not read: what they are, and how to make one of them that is read."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -14,7 +14,7 @@ UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "cmu": 0.
 """Metres in a unit; `cmu` is that of CMU's files and their conversion by cgspeed (1 / 0.45 inch)."""
 LEGS = (0.65, 1.1)
 _POSSIBLE = (0.2, 1.5)  # legs of a child, of a stylised figure [m]: beyond, a stated unit is wrong
-_UPRIGHT = 0.7  # of the vector from the feet to the head, the share along an axis that is up: within 45 degrees
+_UPRIGHT = 0.7  # of the leg that stands, the share along an axis that is up: within 45 degrees
 
 _INDEX = {name: i for i, name in enumerate(LANDMARKS)}
 
@@ -56,14 +56,23 @@ def find_unit(where: object, legs: float, stated: str) -> tuple[float, tuple[str
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 _UP = ("y", "z")
-"""The axes that files have for up; a head above the feet along another one is a person who lies, or other axes."""
+"""The axes that files have for up; a leg that stands along another one is a person who lies, or other axes."""
 
 
 def upright_axis(positions: np.ndarray) -> str:
-    """The one of `AXES` along which the head is above the feet in the median over the frames; "" if it is none."""
-    feet = positions[:, [_INDEX["left_ankle"], _INDEX["right_ankle"]]].mean(axis=1)
-    rise = positions[:, _INDEX["head"]] - feet
-    middle = np.median(rise / np.maximum(np.linalg.norm(rise, axis=1, keepdims=True), 1e-9), axis=0)
+    """The one of `AXES` along which the leg that stands points up, from ankle to hip; "" if it is none.
+
+    The leg that stands is the one whose ankle moves least, whatever the trunk does. Of 210 motions of people its median
+    share along the up axis was .79 at least; that of the head above the feet .70, where the trunk is held level.
+
+    Args:
+        positions: (T, 18, 3), of a moving person or of a skeleton's own pose alone.
+    """
+    ankles = positions[:, [_INDEX["left_ankle"], _INDEX["right_ankle"]]]
+    rise = positions[:, [_INDEX["left_hip"], _INDEX["right_hip"]]] - ankles
+    moved = np.linalg.norm(np.diff(ankles, axis=0, append=ankles[-1:]), axis=2)
+    leg = np.take_along_axis(rise, moved.argmin(axis=1)[:, None, None], axis=1)[:, 0]
+    middle = np.median(leg / np.maximum(np.linalg.norm(leg, axis=1, keepdims=True), 1e-9), axis=0)
     return next((name for name, share in zip(AXES, (*middle, *-middle), strict=True) if share > _UPRIGHT), "")
 
 
@@ -83,9 +92,9 @@ def find_up(where: object, moving: str, resting: str, stated: str) -> tuple[str,
         return stated, ()
     told = {axis for axis in (moving, resting) if axis}
     if len(told) != 1 or not told <= set(_UP):
-        both = f"a head above the feet along {moving} by the motion, along {resting} by the skeleton's own pose"
-        came = both if len(told) > 1 else f"one above the feet along {moving or resting or 'no axis'}"
-        raise BadInput(where, "y or z as the up axis, along which the head is above the feet", came, ask_up(*told))
+        both = f"a person along {moving} by the motion, along {resting} by the skeleton's own pose"
+        came = both if len(told) > 1 else f"a person along {moving or resting or 'no axis'}"
+        raise BadInput(where, "a person who stands along y or z, which is up then", came, ask_up(*told))
     (axis,) = told
     by = "the motion" if moving else "the skeleton's own pose alone"
     return axis, (f"{axis} is up, by {by}",)

@@ -95,6 +95,6 @@ def _from_smpl(path: Path, data: bytes, options: HumanConfig) -> tuple[float, np
     motion = read_smpl(path, data, options.fps)
     shown = upright_axis(motion.positions)
     if shown != "z" and not options.up:
-        came = f"a head above the feet along {shown or 'no axis'}: another axis is up, or the person lies"
+        came = f"a person who stands along {shown or 'no axis'}: another axis is up, or the person lies"
         raise BadInput(path, "z up, as AMASS has it", came, ask_up(*filter(None, [shown])))
     return motion.fps, z_up(motion.positions, options.up or "z"), motion.notes
