@@ -1,7 +1,6 @@
 """What a motion file must satisfy before anything is made of it; each check names file, frame and remedy."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -9,7 +8,6 @@ from bumblebee.errors import BadInput
 from bumblebee.io.read import require_within
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import forward_key_positions
-from bumblebee.motion.quaternion_order import settled
 from bumblebee.motion.raw import RawMotion
 from bumblebee.robot.facts import KEY_BODIES, joint_names
 
@@ -21,20 +19,18 @@ _REACH = 1000.0  # m from the world's origin
 _KEY_ERROR = 0.02  # m between keypoints and what the joint angles say
 _FULL_TURN = 2 * np.pi  # rad: no joint of the G1 goes half as far
 _MAX_HEIGHT = 5.0  # m of the pelvis
-_NORM_TOLERANCE = 0.02
+NORM_TOLERANCE = 0.02
 _SHORTEST = 0.9  # of a quaternion between two that were interpolated: they are 52 degrees apart
 
 
-def usable(raw: RawMotion) -> RawMotion:
-    """The motion with unit quaternions in the order that holds, after all checks; a note says what was changed.
+def check_raw(raw: RawMotion) -> None:
+    """All checks, in an order in which the first that fails names the cause.
 
     Raises:
-        BadInput: too few frames, NaN or infinity, no quaternions, degrees, centimetres, an order that nothing tells.
-            The first check that fails names the cause.
+        BadInput: too few frames, NaN or infinity, no quaternions, degrees, centimetres.
     """
     for check in CHECKS:
         check(raw)
-    return settled(normalised(raw))
 
 
 def enough_frames(raw: RawMotion) -> None:
@@ -63,7 +59,7 @@ def quaternion_lengths(raw: RawMotion) -> None:
     """The root's four numbers are a rotation, or a mean of two: linear interpolation shortens quaternions."""
     with np.errstate(over="ignore"):
         norm = np.linalg.norm(raw.root_quat, axis=1)
-    bad = np.flatnonzero((norm > 1 + _NORM_TOLERANCE) | (norm < _SHORTEST))
+    bad = np.flatnonzero((norm > 1 + NORM_TOLERANCE) | (norm < _SHORTEST))
     if len(bad):
         where = f"{raw.where}, {raw.row(bad[0])}, root quaternion"
         raise BadInput(where, "length 1", f"{norm[bad[0]]:.3g}", "Are these the quaternion's columns?")
@@ -93,14 +89,6 @@ def near(raw: RawMotion) -> None:
         if len(bad):
             where = f"{raw.where}, {raw.row(bad[0])}, root position {axis}"
             raise BadInput(where, f"at most {_REACH:g} m", f"{values[bad[0]]:.4g}")
-
-
-def normalised(raw: RawMotion) -> RawMotion:
-    """The motion with quaternions of length 1, and a note where they were not."""
-    norm = np.linalg.norm(raw.root_quat, axis=1)
-    short = norm.min() < 1 - _NORM_TOLERANCE
-    note = (f"root quaternions of length {norm.min():.2f} to {norm.max():.2f} made 1",) if short else ()
-    return replace(raw, root_quat=raw.root_quat / norm[:, None], notes=(*raw.notes, *note))
 
 
 CHECKS: tuple[Callable[[RawMotion], None], ...] = (
@@ -152,11 +140,11 @@ def _check_arrays(where: object, clip: Clip) -> None:
             raise BadInput(f"{where}: {field}", f"shape {('at least 1', *size)}", str(values.shape))
     _check_rate(where, clip.fps, frames)
     require_within(f"{where}: root_pos", clip.root_pos, _REACH, "m")
-    require_within(f"{where}: root_quat", clip.root_quat, 1 + _NORM_TOLERANCE)
+    require_within(f"{where}: root_quat", clip.root_quat, 1 + NORM_TOLERANCE)
     require_within(f"{where}: joint_pos", clip.joint_pos, 2 * _FULL_TURN, "rad")
     require_within(f"{where}: key_pos", clip.key_pos, _REACH + 10, "m")
     norm = np.linalg.norm(clip.root_quat, axis=1)
-    bad = np.flatnonzero(np.abs(norm - 1) > _NORM_TOLERANCE)
+    bad = np.flatnonzero(np.abs(norm - 1) > NORM_TOLERANCE)
     if len(bad):
         raise BadInput(f"{where}: root_quat, row {bad[0]}", "length 1", f"{norm[bad[0]]:.3g}")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
 from bumblebee.io.write import new_folder, refuse_overlap, try_output
-from bumblebee.motion.checks import check_clip, usable
+from bumblebee.motion.checks import check_clip
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import beside
 from bumblebee.motion.formats.write import FORMATS, write_motion
@@ -25,6 +25,7 @@ from bumblebee.motion.resample import resample
 from bumblebee.motion.retarget.retarget import retarget
 from bumblebee.motion.store import write_library
 from bumblebee.motion.texts import shown
+from bumblebee.motion.usable import usable
 from bumblebee.motion.walk import INDEX
 
 LIBRARY = "library"

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.checks import usable
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import beside
 from bumblebee.motion.formats.read import format_of
@@ -15,6 +14,7 @@ from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.listing import Found, Motion, find_motions, reason_of
 from bumblebee.motion.one_file import FileConfig
 from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.usable import usable
 
 
 @dataclass(frozen=True)

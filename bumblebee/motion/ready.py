@@ -9,7 +9,6 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.cache import Arrays, cached, key_of
-from bumblebee.motion.checks import usable
 from bumblebee.motion.grounding import ground
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.human.smpl_body import model_files
@@ -21,6 +20,7 @@ from bumblebee.motion.retarget.refit import VERSION as REFIT
 from bumblebee.motion.retarget.refit import refit
 from bumblebee.motion.retarget.retarget import VERSION, retarget
 from bumblebee.motion.settings import ReadConfig
+from bumblebee.motion.usable import usable
 
 _READER = 3  # version of the readers, like those of the methods part of a cached result's key
 

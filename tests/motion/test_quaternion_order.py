@@ -7,10 +7,10 @@ import pytest
 
 from bumblebee import quaternions
 from bumblebee.errors import BadInput
-from bumblebee.motion.checks import usable
 from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.g1_csv import read_g1_csv
 from bumblebee.motion.formats.read import read_robot
+from bumblebee.motion.usable import usable
 from bumblebee.robot.facts import joint_names
 from tests.motion.conftest import standing
 

@@ -23,7 +23,7 @@ __all__ = ["PICKLES", "SUFFIXES", "RobotConfig", "format_of", "is_robot_npz", "r
 
 
 def read_robot(path: Path, data: bytes, options: RobotConfig | None = None) -> list[RawMotion]:
-    """The motions of a file that is on the G1 already, at the file's own rate, unchecked (`checks.usable`).
+    """The motions of a file that is on the G1 already, at the file's own rate, unchecked (`usable.usable`).
 
     Args:
         path: the file as it is shown; its suffix and what it holds decide how it is read.

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.checks import usable
 from bumblebee.motion.formats.asap_pickle import read_asap_pickle
 from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.g1_csv import read_g1_csv
 from bumblebee.motion.formats.layouts import NOTE, arranged, layouts
 from bumblebee.motion.formats.read import read_robot
+from bumblebee.motion.usable import usable
 from bumblebee.robot.facts import joint_names, joints
 from tests.motion.formats.test_mjlab_npz import arrays, npz
 from tests.motion.formats.test_pickle_variants import same
