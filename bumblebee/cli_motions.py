@@ -165,7 +165,7 @@ def play(
 def _options(csv_fps: float | None, settings: list[str] | None) -> "FileConfig":
     from bumblebee.motion.one_file import stated
 
-    return stated(settings or [], csv_fps)
+    return stated(settings or [], csv_fps=csv_fps)
 
 
 def _print_table(rows: "list[Inspected]", path: Path) -> None:

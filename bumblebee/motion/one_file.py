@@ -58,18 +58,18 @@ class FileConfig(Ranged):
         return HumanConfig(self.unit, self.up, self.smpl_fps)
 
 
-def stated(settings: Iterable[str], csv_fps: float | None = None) -> FileConfig:
+def stated(settings: Iterable[str], **options: Any) -> FileConfig:
     """The settings as a command line states them.
 
     Args:
         settings: texts KEY=VALUE with the fields of `FileConfig`.
-        csv_fps: the rate of CSV files by an option of its own [Hz].
+        options: fields that have an option of their own; None and "" are not said.
 
     Raises:
         BadInput: no such key, or a value that it does not take.
     """
     known = [field.name for field in fields(FileConfig)]
-    given: dict[str, Any] = {} if csv_fps is None else {"csv_fps": csv_fps}
+    given = {key: value for key, value in options.items() if value not in (None, "")}
     for text in settings:
         key, _, value = text.partition("=")
         if key not in known:

@@ -20,7 +20,7 @@ from tests.fuzz.motion_files import clip, fields, table
 
 SHARE = 1 / 4  # of the file's seconds, for each test
 START = int.from_bytes(os.urandom(4), "little") if "BUMBLEBEE_FUZZ_SECONDS" in os.environ else 0
-CONFIG = RobotConfig(csv_fps=30)
+CONFIG = RobotConfig(csv_fps=30, joints_23="asap")
 WORDS = (b"nan", b"inf", b"-1e200", b"0", b"", b",", b"\n", b'"', b"Frame", b"_dof", b"waist_yaw", b"w", b"x", b"1_0")
 
 

@@ -231,3 +231,12 @@ def test_several_motions_are_one_with_the_name_that_is_printed(motions, tmp_path
     assert run(*play) == 2
     name = re.search(r"--motion: (\w+),", capsys.readouterr().err)[1]
     assert run(*play, "--motion", name) == 0
+
+
+def test_files_that_hold_no_rate_are_written_at_the_one_that_is_printed(motions, tmp_path, capsys):
+    for name, fps in (("a", 30.0), ("b", 60.0)):
+        write_motion(motions.folder / "in", replace(motions.clip(name), fps=fps), "asap")
+    convert = ("convert", motions.folder / "in", "--to", "g1_csv", "--out", tmp_path / "out")
+    assert run(*convert) == 2
+    rate = re.search(r"Say it: --fps (\d+)\.", capsys.readouterr().err)[1]
+    assert run(*convert, "--fps", rate) == 0

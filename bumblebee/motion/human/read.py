@@ -85,9 +85,9 @@ def _from_bvh(path: Path, data: bytes, options: HumanConfig) -> tuple[float, np.
 
 
 def _added(bvh: Bvh) -> tuple[str, ...]:
-    """A note on joints whose positions were taken as added to their offsets."""
+    """The file's notes, and one on joints whose positions were taken as added to their offsets."""
     names = [bvh.names[joint] for joint in range(len(bvh.names)) if adds_positions(bvh, joint)]
-    return (f"positions of {len(names)} joints are near 0: added to their OFFSET",) if names else ()
+    return (*bvh.notes, *([f"positions of {len(names)} joints are near 0: added to their OFFSET"] if names else []))
 
 
 def _from_smpl(path: Path, data: bytes, options: HumanConfig) -> tuple[float, np.ndarray, tuple[str, ...]]:
