@@ -4,7 +4,7 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -37,7 +37,7 @@ def inspect(
     rows: Rows = 200,
 ) -> None:
     """A table of motions: format, rate and who says it, length, height, captions, licence; bad files one line each."""
-    from bumblebee.motion.inspect import Counts
+    from bumblebee.motion.inspect import Counts, count
     from bumblebee.motion.inspect import inspect as look
 
     options = _options(csv_fps, settings)
@@ -55,8 +55,8 @@ def inspect(
     if counts.motions > len(shown_rows):
         print(f"... and {counts.motions - len(shown_rows):,} more motions (--rows)")
     print(counts)
-    if not counts.motions:
-        raise BadInput(path, "a motion", f"{counts.files:,} files, none of them readable; the first: {first}"[:1500])
+    if not counts.usable:
+        raise BadInput(path, "a motion", f"{count(counts.files, 'file')}, nothing usable; the first: {first}"[:1500])
 
 
 @app.command()
@@ -83,6 +83,7 @@ def convert(
     rates = ", ".join(f"{rate:g}" for rate in sorted(done.rates))
     took = time.monotonic() - began
     written = f"{count(done.written, 'motion')} written, {len(done.skipped):,} skipped"
+    _print_notes(done.notes)
     print(f"{count(done.files, 'file')}: {written}, in {took:.1f} s")
     print(f"written: {out}, {rates} Hz" + ("" if to == LIBRARY else f"; licences: {out / 'LICENCES.csv'}"))
     if to != LIBRARY and not FORMATS[to].holds_rate:
@@ -127,6 +128,7 @@ def retarget(
 
     done = retarget_files(path, out, config, overwrite, tell)
     written = f"{count(done.written, 'motion')} written, {len(done.skipped):,} skipped"
+    _print_notes(done.notes)
     print(f"{count(done.files, 'file')}: {written}, in {time.monotonic() - began:.1f} s")
     print(f"written: {out}, {fps:g} Hz, quaternions wxyz; licences: {out / 'LICENCES.csv'}")
 
@@ -161,21 +163,9 @@ def play(
 
 
 def _options(csv_fps: float | None, settings: list[str] | None) -> "FileConfig":
-    """The readers' settings, of which each is a word; what is out of range is said by its name."""
-    from bumblebee.motion.one_file import WORDS, FileConfig
-    from bumblebee.ranges import Unfit
+    from bumblebee.motion.one_file import stated
 
-    given: dict[str, Any] = {}
-    for text in settings or []:
-        key, _, value = text.partition("=")
-        if key not in WORDS:
-            raise BadInput("--set", f"KEY=VALUE with a key among {', '.join(WORDS)}", repr(text)[:80])
-        given[key] = value
-    try:
-        return FileConfig(csv_fps=csv_fps, **given)
-    except Unfit as error:
-        expected = error.expected.replace("one of , ", "one of ")  # "" stands for: not said
-        raise BadInput(f"--set {error.field}", expected, error.came) from None
+    return stated(settings or [], csv_fps=csv_fps)
 
 
 def _print_table(rows: "list[Inspected]", path: Path) -> None:
@@ -210,6 +200,14 @@ def _print_table(rows: "list[Inspected]", path: Path) -> None:
     Console(width=wide, highlight=False).print(table)
 
 
+def _print_notes(notes: list[tuple[str, str]]) -> None:
+    """What was detected and not stated, in few lines: (place, note) of each motion."""
+    from bumblebee.motion.few_lines import few_lines
+
+    for told in few_lines(notes):
+        print(_line(f"noted: {told.line}: {told.whose}"))
+
+
 def _place(file: Path, path: Path) -> str:
     from bumblebee.motion.texts import shown
 
@@ -227,13 +225,15 @@ def _chosen(path: Path, name: str, options: "FileConfig") -> "Clip":
     names: list[str] = []
     reasons: list[str] = []
     clip = None
-    for found in clips_at(path, options, reasons.append):
+    said: list[tuple[str, str]] = []
+    for found, notes in clips_at(path, options, reasons.append):
         names.append(found.name)
         if name in ("", found.name):
-            clip = found
+            clip, said = found, notes
         if (name and clip is not None) or (not name and len(names) > _NAMED):
             break
     if clip is not None and (name or len(names) == 1):
+        _print_notes(said)
         return clip
     some = ", ".join(names[:_NAMED]) + (" ..." if len(names) > _NAMED else "")
     if names:

@@ -11,6 +11,7 @@ from bumblebee import cli
 from bumblebee.motion.formats.write import write_motion
 from bumblebee.motion.kinematics import make_clip
 from bumblebee.robot.facts import joint_names, stand_pose
+from tests.motion.conftest import standing
 
 
 def run(*arguments: object) -> int:
@@ -30,8 +31,8 @@ def folder(tmp_path):
     """Two good motions at 50 Hz and a bad one."""
     time = np.arange(60) / 50
     joints = stand_pose() + 0.1 * np.sin(3 * time)[:, None] * np.linspace(0.2, 1, len(joint_names()))
-    root = np.stack([0.2 * time, 0 * time, 0.79 + 0 * time], axis=1)
     upright = np.tile([1.0, 0, 0, 0], (60, 1))
+    root = standing(upright, joints)
     for name, kind in (("walk", "asap"), ("sway", "g1_csv")):
         write_motion(tmp_path / "in", make_clip(name, 50.0, root, upright, joints), kind)
     (tmp_path / "in/bad.pkl").write_bytes(b"\x80")
@@ -83,7 +84,10 @@ def test_convert_writes_and_says_the_rates(folder, tmp_path, capsys):
     [
         (("--to", "bvh"), "--to: expected one of g1_csv, asap, mjlab, library"),
         (("--to", "asap", "--set", "csv_length=inch"), "--set csv_length: expected one of m, cm, mm"),
-        (("--to", "asap", "--set", "rate=3"), "--set: expected KEY=VALUE with a key among csv_length, csv_angle"),
+        (
+            ("--to", "asap", "--set", "rate=3"),
+            "--set: expected KEY=VALUE with a key among csv_fps, csv_length, csv_angle",
+        ),
         (("--to", "asap", "--fps", "0"), "Invalid value for '--fps'"),
     ],
 )

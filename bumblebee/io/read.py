@@ -21,6 +21,8 @@ import yaml
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import LIMITS, Limits
 
+_POINTER = b"version https://git-lfs.github.com/spec/v1\n"
+
 
 def read_bytes(path: Path, most: int = LIMITS.file_bytes) -> bytes:
     """The bytes of a regular file of at most `most` bytes; pipes, devices and folders are refused, not waited for."""
@@ -50,7 +52,28 @@ def open_file(path: Path, most: int = LIMITS.file_bytes) -> BinaryIO:
     if facts.st_size > most:
         os.close(handle)
         raise BadInput(path, f"at most {most:,} bytes", f"{facts.st_size:,}")
-    return os.fdopen(handle, "rb")
+    stream = os.fdopen(handle, "rb")
+    try:
+        refuse_pointer(path, stream.peek(len(_POINTER)))
+    except BaseException:
+        stream.close()
+        raise
+    return stream
+
+
+def refuse_pointer(where: object, data: bytes) -> None:
+    """Refuse the few lines that git keeps in place of a file in Git LFS, whatever the file's name.
+
+    Args:
+        where: the file's place in the message.
+        data: its first bytes, or all of them.
+
+    Raises:
+        BadInput: a pointer.
+    """
+    if data.startswith(_POINTER):
+        came = "a Git LFS pointer, which only says where the file's content is kept"
+        raise BadInput(where, "the file's content", came, "Fetch it: `git lfs pull` in the folder that was cloned.")
 
 
 def read_text(path: Path, most: int = LIMITS.text_bytes) -> str:
@@ -189,6 +212,7 @@ def member_bytes(where: object, archive: zipfile.ZipFile, info: zipfile.ZipInfo,
         raise BadInput(where, "a file that unpacks", f"{type(error).__name__}: {error}"[:160]) from None
     if len(data) > size:
         raise BadInput(where, f"{size:,} bytes, as the archive says", "more")
+    refuse_pointer(where, data)
     return data
 
 

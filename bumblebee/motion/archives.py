@@ -20,7 +20,7 @@ from typing import IO, NoReturn
 
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import LIMITS
-from bumblebee.io.read import member_bytes
+from bumblebee.io.read import member_bytes, open_file, refuse_pointer
 from bumblebee.motion.texts import shown
 
 SUFFIXES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2")  # AMASS comes as .tar.bz2
@@ -70,8 +70,10 @@ def list_archive(path: Path) -> list[Member]:
 @lru_cache(maxsize=4)
 def _listed(path: Path, changed: int, size: int) -> tuple[Member, ...]:
     """The members as of the time and size at which the archive was last changed."""
-    if not path.is_file():
-        return (_bad("", path, "an archive", "no regular file"),)
+    try:
+        open_file(path, size).close()
+    except BadInput as error:  # no regular file, or one that stands for it
+        return (_bad("", path, error.expected, error.came, error.do),)
     found = _zip(path, changed, size) if path.suffix.lower() == ".zip" else _tar(path, changed, size)
     listed: dict[tuple[str, ...], Member] = {}
     for member in found:
@@ -254,4 +256,6 @@ def _read_tar(path: Path, changed: int, size: int, name: str, start: int, length
         raise BadInput(where, "a member that unpacks", f"{type(error).__name__}: {error}"[:120], _AGAIN) from None
     if left:
         raise BadInput(where, f"{length:,} bytes, as the archive says", f"{length - left:,}", _AGAIN)
-    return b"".join(parts)
+    data = b"".join(parts)
+    refuse_pointer(where, data)
+    return data

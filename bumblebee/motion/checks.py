@@ -4,11 +4,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bumblebee import quaternions
 from bumblebee.errors import BadInput
 from bumblebee.io.read import require_within
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.kinematics import forward_key_positions, lowest
+from bumblebee.motion.kinematics import forward_key_positions
 from bumblebee.motion.raw import RawMotion
 from bumblebee.robot.facts import KEY_BODIES, joint_names
 
@@ -20,14 +19,15 @@ _REACH = 1000.0  # m from the world's origin
 _KEY_ERROR = 0.02  # m between keypoints and what the joint angles say
 _FULL_TURN = 2 * np.pi  # rad: no joint of the G1 goes half as far
 _MAX_HEIGHT = 5.0  # m of the pelvis
-_NORM_TOLERANCE = 0.02
+NORM_TOLERANCE = 0.02
+_SHORTEST = 0.9  # of a quaternion between two that were interpolated: they are 52 degrees apart
 
 
 def check_raw(raw: RawMotion) -> None:
     """All checks, in an order in which the first that fails names the cause.
 
     Raises:
-        BadInput: too few frames, NaN or infinity, no unit quaternion, degrees, centimetres, quaternion order.
+        BadInput: too few frames, NaN or infinity, no quaternions, degrees, centimetres.
     """
     for check in CHECKS:
         check(raw)
@@ -55,11 +55,11 @@ def finite(raw: RawMotion) -> None:
             raise BadInput(where, "a finite number", str(values[frame, column]), f"{len(bad)} such values in the file.")
 
 
-def unit_quaternions(raw: RawMotion) -> None:
-    """The root's four numbers are a rotation."""
+def quaternion_lengths(raw: RawMotion) -> None:
+    """The root's four numbers are a rotation, or a mean of two: linear interpolation shortens quaternions."""
     with np.errstate(over="ignore"):
         norm = np.linalg.norm(raw.root_quat, axis=1)
-    bad = np.flatnonzero(np.abs(norm - 1) > _NORM_TOLERANCE)
+    bad = np.flatnonzero((norm > 1 + NORM_TOLERANCE) | (norm < _SHORTEST))
     if len(bad):
         where = f"{raw.where}, {raw.row(bad[0])}, root quaternion"
         raise BadInput(where, "length 1", f"{norm[bad[0]]:.3g}", "Are these the quaternion's columns?")
@@ -91,37 +91,14 @@ def near(raw: RawMotion) -> None:
             raise BadInput(where, f"at most {_REACH:g} m", f"{values[bad[0]]:.4g}")
 
 
-def quaternion_order(raw: RawMotion) -> None:
-    """The file holds xyzw: read the other way round, the robot must not stand better.
-
-    A robot that stands becomes one that lies or hangs in the air when the order is mistaken, so both readings are
-    compared: by the pelvis's up axis, and by the distance of the robot's lowest point from the floor.
-    On 110 real files read right, the other way was never the more upright one.
-    """
-    some = slice(None, None, max(1, len(raw.root_pos) // 200))
-    as_read = quaternions.normalised(raw.root_quat[some])
-    # `raw.root_quat` is the file's (x, y, z, w) moved to (w, x, y, z); if the file was wxyz, the move must be undone.
-    other = as_read[:, [1, 2, 3, 0]]
-    up, floor = _upright(as_read), _floor_error(raw, as_read, some)
-    other_up, other_floor = _upright(other), _floor_error(raw, other, some)
-    if other_up > up + 0.05 and other_floor < 0.6 * floor:
-        raise BadInput(
-            f"{raw.where}, root quaternion",
-            "the order xyzw",
-            f"wxyz (read as xyzw the robot lies or stands on its head: up axis {up:.2f}, as wxyz {other_up:.2f})",
-            "Move w to the end.",
-        )
-
-
 CHECKS: tuple[Callable[[RawMotion], None], ...] = (
     enough_frames,
     frame_rate,
     finite,
-    unit_quaternions,
+    quaternion_lengths,
     radians,
     metres,
     near,
-    quaternion_order,
 )
 
 
@@ -163,11 +140,11 @@ def _check_arrays(where: object, clip: Clip) -> None:
             raise BadInput(f"{where}: {field}", f"shape {('at least 1', *size)}", str(values.shape))
     _check_rate(where, clip.fps, frames)
     require_within(f"{where}: root_pos", clip.root_pos, _REACH, "m")
-    require_within(f"{where}: root_quat", clip.root_quat, 1 + _NORM_TOLERANCE)
+    require_within(f"{where}: root_quat", clip.root_quat, 1 + NORM_TOLERANCE)
     require_within(f"{where}: joint_pos", clip.joint_pos, 2 * _FULL_TURN, "rad")
     require_within(f"{where}: key_pos", clip.key_pos, _REACH + 10, "m")
     norm = np.linalg.norm(clip.root_quat, axis=1)
-    bad = np.flatnonzero(np.abs(norm - 1) > _NORM_TOLERANCE)
+    bad = np.flatnonzero(np.abs(norm - 1) > NORM_TOLERANCE)
     if len(bad):
         raise BadInput(f"{where}: root_quat, row {bad[0]}", "length 1", f"{norm[bad[0]]:.3g}")
 
@@ -184,13 +161,3 @@ def _named(raw: RawMotion) -> list[tuple[np.ndarray, tuple[str, ...]]]:
     root_quat = tuple(f"root quaternion {axis}" for axis in "wxyz")
     root_pos = tuple(f"root position {axis}" for axis in "xyz")
     return [(raw.root_pos, root_pos), (raw.root_quat, root_quat), (raw.joint_pos, joint_names())]
-
-
-def _upright(quat: np.ndarray) -> float:
-    """Mean vertical component of the pelvis's up axis."""
-    return float(quaternions.rotate(quat, [0.0, 0.0, 1.0])[:, 2].mean())
-
-
-def _floor_error(raw: RawMotion, quat: np.ndarray, frames: slice) -> float:
-    """Median distance of the robot's lowest point from the floor [m]."""
-    return float(np.median(np.abs(lowest(raw.root_pos[frames], quat, raw.joint_pos[frames]))))

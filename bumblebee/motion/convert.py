@@ -10,7 +10,7 @@ from pathlib import Path
 from bumblebee.errors import BadInput
 from bumblebee.io.names import safe_stem
 from bumblebee.io.write import new_folder, refuse_entering, try_output
-from bumblebee.motion.checks import check_clip, check_raw
+from bumblebee.motion.checks import check_clip
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import beside
 from bumblebee.motion.formats.write import FORMATS, write_motion
@@ -25,6 +25,7 @@ from bumblebee.motion.resample import resample
 from bumblebee.motion.retarget.retarget import retarget
 from bumblebee.motion.store import write_library
 from bumblebee.motion.texts import shown
+from bumblebee.motion.usable import usable
 from bumblebee.motion.walk import INDEX
 
 LIBRARY = "library"
@@ -59,6 +60,8 @@ class Converted:
     files: int = 0
     skipped: list[tuple[str, str]] = field(default_factory=list)
     """Files and motions that gave nothing: place, reason."""
+    notes: list[tuple[str, str]] = field(default_factory=list)
+    """What was detected and not stated in those that were written, and captions that were not used: place, note."""
     rates: set[float] = field(default_factory=set)
 
 
@@ -76,7 +79,7 @@ def convert(
         out: a new folder, or with `overwrite` an earlier result.
         config: format and rate.
         overwrite: replace an earlier result.
-        tell: called with a line for each file or motion that gives nothing, and each caption that does not.
+        tell: called with a line for each file or motion that gives nothing.
 
     Raises:
         BadInput: `out` is an input or somebody else's; nothing could be written.
@@ -119,14 +122,14 @@ def _ours(out: Path, to: str) -> bool:
 
 
 def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> tuple[Clip, tuple[str, ...]]:
-    """A motion of the robot, checked and at another rate, as a clip, and the captions that could not be used.
+    """A motion of the robot, checked and at another rate, as a clip, and the notes on it and its captions.
 
     Heights stay as they are.
 
     Raises:
         BadInput: a check that it fails.
     """
-    check_raw(raw)
+    raw = usable(raw)
     raw = resample(raw, fps or raw.fps)
     texts, before = beside(raw.file, (len(raw.root_pos) - 1) / raw.fps), stated_of(raw.file)
     clip = make_clip(
@@ -142,16 +145,24 @@ def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> tuple[Clip, 
         sha256=digest,
     )
     check_clip(raw.where, clip)
-    return clip, texts.notes
+    return clip, (*raw.notes, *texts.notes)
 
 
-def clips_at(path: Path, files: FileConfig, tell: Callable[[str], None]) -> Iterator[Clip]:
-    """The motions at `path` as clips at their own rates, under distinct names; `tell` gets a line for what is not."""
-    yield from _clips(path, ConvertConfig("asap", files=files), Converted(), tell)
+def clips_at(
+    path: Path, files: FileConfig, tell: Callable[[str], None]
+) -> Iterator[tuple[Clip, list[tuple[str, str]]]]:
+    """The motions at `path` as clips at their own rates, under distinct names, each with its notes (place, note).
+
+    `tell` gets a line for what gives none.
+    """
+    done = Converted()
+    for clip in _clips(path, ConvertConfig("asap", files=files), done, tell):
+        yield clip, done.notes
+        done.notes = []
 
 
 def _clips(path: Path, config: ConvertConfig, done: Converted, tell: Callable[[str], None]) -> Iterator[Clip]:
-    """The motions that can be written, one after the other, under distinct names; the others are told."""
+    """The motions that can be written, one after the other, under distinct names; `done` gets what is said of them."""
     names = Names()
 
     def skip(place: str, reason: str) -> None:
@@ -171,8 +182,7 @@ def _clips(path: Path, config: ConvertConfig, done: Converted, tell: Callable[[s
                     f"{place}, {shown(motion.name)}" if len(found.motions) > 1 else place, reason_of(error, found.path)
                 )
                 continue
-            for note in notes:
-                tell(f"{place}: {note}")
+            done.notes += [(place, note) for note in notes]
             yield replace(clip, name=names.distinct(clip.name, found.path.parent.name))
 
 

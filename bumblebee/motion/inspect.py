@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.checks import check_raw
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import beside
 from bumblebee.motion.formats.read import format_of
@@ -15,6 +14,7 @@ from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.listing import Found, Motion, find_motions, reason_of
 from bumblebee.motion.one_file import FileConfig
 from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.usable import usable
 
 
 @dataclass(frozen=True)
@@ -104,27 +104,26 @@ def _row(found: Found, motion: Motion) -> Inspected:
             path, "library", motion.name, motion.frames, motion.fps, "library", _range(motion.root_pos[:, 2]),
             motion.joint_pos.shape[1], len(motion.captions), motion.licence,
         )  # fmt: skip
-    problem = ""
+    problem, notes = "", motion.notes
     if isinstance(motion, HumanMotion):
         kind, root = f"person {path.suffix.lower()}", motion.landmark("pelvis")
         joints, rate = 0, "file"
     else:
         kind, root, joints, rate = format_of(path), motion.root_pos, motion.joint_pos.shape[1], motion.rate_from
-        problem = _fault(path, motion)
+        problem, notes = _judged(path, motion)
     texts = beside(motion.file, (len(root) - 1) / motion.fps)
     return Inspected(
         path, kind, motion.name, len(root), motion.fps, rate, _range(root[:, 2]), joints,
-        len(texts.captions), found.licence, (*motion.notes, *texts.notes), problem,
+        len(texts.captions), found.licence, (*notes, *texts.notes), problem,
     )  # fmt: skip
 
 
-def _fault(path: Path, motion: RawMotion) -> str:
-    """The check that a motion of the robot fails, "" if none."""
+def _judged(path: Path, motion: RawMotion) -> tuple[str, tuple[str, ...]]:
+    """The check that a motion of the robot fails, "" if none, and the notes on it."""
     try:
-        check_raw(motion)
+        return "", usable(motion).notes
     except BadInput as error:
-        return reason_of(error, path)
-    return ""
+        return reason_of(error, path), motion.notes
 
 
 def _range(height: np.ndarray) -> tuple[float, float]:

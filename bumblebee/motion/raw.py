@@ -2,8 +2,19 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
+
+
+def is_order(letters: str) -> bool:
+    """Whether letters name an order of a quaternion's parts."""
+    return sorted(letters) == sorted("wxyz")
+
+
+def as_wxyz(values: np.ndarray, order: str) -> np.ndarray:
+    """Quaternions (..., 4) of an order as wxyz."""
+    return values[..., [order.index(part) for part in "wxyz"]]
 
 
 @dataclass(frozen=True)
@@ -27,6 +38,11 @@ class RawMotion:
     """What was detected and not stated by the file: units, an order of joints; for the summary."""
     rate_from: str = "file"
     """Who states the frame rate: the file itself, or a setting."""
+
+    quat_order: str = "wxyz"
+    """Order of the root's quaternion in the file, as it was read."""
+    order_from: Literal["", "file", "known"] = "known"
+    """Who states that order: the file, or a setting or this program (`known`); "": nobody, it is the format's."""
 
     @property
     def where(self) -> str:

@@ -9,7 +9,6 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.cache import Arrays, cached, key_of
-from bumblebee.motion.checks import check_raw
 from bumblebee.motion.grounding import ground
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.human.smpl_body import model_files
@@ -21,8 +20,9 @@ from bumblebee.motion.retarget.refit import VERSION as REFIT
 from bumblebee.motion.retarget.refit import refit
 from bumblebee.motion.retarget.retarget import VERSION, retarget
 from bumblebee.motion.settings import ReadConfig
+from bumblebee.motion.usable import usable
 
-_READER = 2  # version of the readers, like those of the methods part of a cached result's key
+_READER = 3  # version of the readers, like those of the methods part of a cached result's key
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +83,7 @@ def _one(motion: RawMotion | HumanMotion, job: Job, config: ReadConfig) -> Ready
     if isinstance(motion, HumanMotion):
         rate = motion.fps if job.path.suffix.lower() == ".npz" else None
         return Ready(retarget(motion, config.fps, config.retarget), rate)
-    check_raw(motion)
-    return Ready(_on_floor(resample(motion, config.fps), config))
+    return Ready(_on_floor(resample(usable(motion), config.fps), config))
 
 
 def _on_floor(even: RawMotion, config: ReadConfig) -> RawMotion:

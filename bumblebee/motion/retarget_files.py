@@ -94,6 +94,7 @@ def retarget_files(
                 name = names.distinct(safe_stem(job.motion.name if job.motion else "", "motion"), Path(job.place).stem)
                 write_file(folder / f"{name}.{config.to}", made.content)
                 rows.append(Stated(f"{name}.{config.to}", name, config.fps, job.source, job.licence))
+                done.notes += [(job.place, note) for note in (job.motion.notes if job.motion else ())]
                 done.written += 1
                 done.rates.add(config.fps)
             if tell:

@@ -9,9 +9,10 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.kinematics import lowest, make_clip
+from bumblebee.motion.kinematics import make_clip
 from bumblebee.motion.store import write_library
 from bumblebee.robot.facts import joint_names, stand_pose
+from tests.motion.conftest import standing
 
 EFFECTS = """\
 schema: 1
@@ -38,9 +39,7 @@ def motion(frames: int = 24) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     joint_pos = stand_pose() + 0.1 * np.sin(3 * time)[:, None] * np.linspace(0.2, 1, 23)
     half = 0.2 + 0.1 * np.sin(time)
     root_quat = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
-    root_pos = np.stack([0.2 * time, 0 * time, 0.8 + 0 * time], axis=1)
-    root_pos[:, 2] -= lowest(root_pos, root_quat, joint_pos)
-    return root_pos, root_quat, joint_pos
+    return standing(root_quat, joint_pos), root_quat, joint_pos
 
 
 def table(frames: int = 24) -> np.ndarray:

@@ -25,7 +25,7 @@ from bumblebee.motion.store import read_library
 from tests.fuzz.budget import SECONDS, rounds
 from tests.fuzz.motion_files import change_facts, csv, fields, library, policy, shard, table
 
-CONFIG = ReadConfig(csv_fps=30)
+CONFIG = ReadConfig(csv_fps=30, joints_23="asap")
 SHARE = 1 / 7  # of the file's seconds, for each test
 WORDS = ("nan", "inf", "-1e200", "1e400", "0", "", ",", "\n", "1_0", "\0", '"', "-", "९", "1+2j", "#", "true")
 START = int.from_bytes(os.urandom(4), "little") if "BUMBLEBEE_FUZZ_SECONDS" in os.environ else 0

@@ -13,7 +13,7 @@ from bumblebee.motion.store import read_library
 from tests.fuzz.motion_corpus import CAPTIONS, FILES, LIBRARIES
 from tests.fuzz.motion_files import csv, library, table
 
-CONFIG = ReadConfig(csv_fps=30)
+CONFIG = ReadConfig(csv_fps=30, joints_23="asap")
 ROOM = 3 << 30  # bytes of address space beyond what the process has: a bomb ends in MemoryError, not in a dead machine
 
 

@@ -10,7 +10,18 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
-from bumblebee.io.read import npz_arrays, parse_json, parse_yaml, read_bytes, read_text, require_real, require_within
+from bumblebee.io.read import (
+    npz_arrays,
+    open_file,
+    parse_json,
+    parse_yaml,
+    read_bytes,
+    read_text,
+    require_real,
+    require_within,
+)
+from bumblebee.measured.importers.source import open_source
+from bumblebee.measured.model_file import load_model
 
 
 @pytest.mark.parametrize("text", ["[" * 5000 + "]" * 5000, "a: " + "{b: " * 5000, "- " * 5000])
@@ -127,3 +138,28 @@ def test_the_row_of_a_value_that_is_out_of_range_is_named():
         with pytest.raises(BadInput, match="row 1"):
             require_within("x", np.array([[0.0, 1.0], [0.0, bad]]), 1e6)
     require_within("x", np.zeros((2, 2)), 1.0)
+
+
+POINTER = b"version https://git-lfs.github.com/spec/v1\noid sha256:" + b"0" * 64 + b"\nsize 12345\n"
+
+
+@pytest.mark.parametrize("name", ["a.mcap", "a.xml", "a.parquet", "a.hdf5", "a.zip", "a"])
+def test_a_pointer_of_git_lfs_is_named_whatever_its_suffix(tmp_path: Path, name: str):
+    (tmp_path / name).write_bytes(POINTER)
+    for read in (read_bytes, read_text, open_file, load_model, open_source):
+        if read is open_source and name != "a.zip":
+            continue  # it names the files of a folder, and opens none but an archive
+        with pytest.raises(
+            BadInput, match=rf"{name}: expected the file's content, came a Git LFS pointer.*`git lfs pull`"
+        ):
+            read(tmp_path / name)
+    (tmp_path / name).write_bytes(b"version https://git-lfs.github.com/spec/v2")
+    assert read_bytes(tmp_path / name).endswith(b"v2")
+
+
+def test_a_pointer_in_an_archive_is_named(tmp_path: Path):
+    with pytest.raises(BadInput, match="a Git LFS pointer"):
+        stream = io.BytesIO()
+        with zipfile.ZipFile(stream, "w") as archive:
+            archive.writestr("a.npy", POINTER)
+        npz_arrays("a.npz", stream.getvalue())

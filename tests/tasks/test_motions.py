@@ -47,7 +47,7 @@ def ends_with(code: int, capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_a_folder_becomes_a_library_with_held_out_motions(capsys):
     user_files()
-    params("motions: {source: mine, holdout_share: 0.2, read: {csv_fps: 30}}")
+    params("motions: {source: mine, holdout_share: 0.2, read: {csv_fps: 30, joints_23: asap, quaternion: xyzw}}")
     run_stage(motions.main, [])
     index = read_index(Path("data/motions"))
     assert sorted(index["name"]) == [f"walk{number}" for number in range(6)]
@@ -91,7 +91,7 @@ def test_a_wrong_setting_ends_in_one_line_and_status_2(capsys, text, said):
 
 def test_a_full_disk_ends_in_one_line_and_leaves_the_old_library(capsys, monkeypatch):
     user_files()
-    params("motions: {source: mine, read: {csv_fps: 30}}")
+    params("motions: {source: mine, read: {csv_fps: 30, joints_23: asap, quaternion: xyzw}}")
     run_stage(motions.main, [])
     before = [clip.name for clip in read_library(Path("data/motions"))]
     capsys.readouterr()
@@ -107,7 +107,7 @@ def test_a_full_disk_ends_in_one_line_and_leaves_the_old_library(capsys, monkeyp
 
 def test_a_read_that_fails_halfway_leaves_no_clips_behind(capsys, monkeypatch):
     user_files()
-    params("motions: {source: mine, read: {csv_fps: 30, processes: 1}}")
+    params("motions: {source: mine, read: {csv_fps: 30, joints_23: asap, quaternion: xyzw, processes: 1}}")
 
     def broken(*_):
         raise OSError(errno.ENOSPC, "No space left on device", "x")

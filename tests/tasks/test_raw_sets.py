@@ -93,7 +93,7 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (folder / name).symlink_to(HOME / name)
     (folder / "read.py").write_text(READ)
     settings = yaml.safe_load((HOME / "params.yaml").read_text())
-    settings["motions"] = {"source": "data/raw/lab", "read": {"csv_fps": 30}}
+    settings["motions"] = {"source": "data/raw/lab", "read": {"csv_fps": 30, "joints_23": "asap", "quaternion": "xyzw"}}
     (folder / "params.yaml").write_text(yaml.safe_dump(settings))
     stages = yaml.safe_load((HOME / "dvc.yaml").read_text())["stages"]
     kept = {name: stages[name] for name in ("motions", "filter")}

@@ -10,7 +10,7 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.io.limits import Limits
 from bumblebee.io.names import distinct_stems
-from bumblebee.io.read import decode, member_bytes, members, npz_arrays, read_bytes
+from bumblebee.io.read import decode, member_bytes, members, npz_arrays, open_file, read_bytes
 
 LOGS = Limits(ratio=200.0)
 """Of logs: numbers that were measured have noise and pack ten times, not two hundred times."""
@@ -72,6 +72,7 @@ def open_source(place: Path, limits: Limits = LOGS) -> Source:
     if not _is_archive(place):
         return Source(place, (place.name,), limits)
     try:
+        open_file(place, place.stat().st_size).close()
         with zipfile.ZipFile(place) as archive:
             names = [info.filename for info in members(place, archive, limits)]
     except BadInput:

@@ -5,8 +5,9 @@ All have root quaternions xyzw and Unitree's order of joints. ASAP, PHC and H2O 
 vector for each body, the root's first: where the joint angles or the root's quaternion are missing they come from it.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,9 +15,13 @@ from bumblebee import quaternions
 from bumblebee.errors import BadInput
 from bumblebee.io.read import require_real
 from bumblebee.motion.formats import safe_pickle
-from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.formats.config import RobotConfig
+from bumblebee.motion.formats.layouts import arranged, layout_of, layouts, notes_of, require_joints
+from bumblebee.motion.formats.others import refuse_known
+from bumblebee.motion.raw import RawMotion, as_wxyz
+from bumblebee.motion.remedy import say
 from bumblebee.motion.texts import shown
-from bumblebee.robot.facts import joint_names, joints
+from bumblebee.robot.facts import joints
 
 # Of all motions of a file together; a pickle may name one array many times.
 _MAX_FRAMES = 5_000_000
@@ -32,30 +37,40 @@ _FIELDS = {
     "joint_pos": ("dof", "dof_pos"),
 }
 JOINT_FIELDS = _FIELDS["joint_pos"]
+_NAMES = ("joint_names", "dof_names")
 
 
-def read_asap_pickle(path: Path, data: bytes | None = None) -> list[RawMotion]:
+def read_asap_pickle(path: Path, data: bytes | None = None, options: RobotConfig | None = None) -> list[RawMotion]:
     """All motions of one pickle: `{name: {root_trans_offset, root_rot, dof, fps}}`, or one such inner dict.
 
     Args:
         path: the file.
         data: its bytes, where they have been read.
+        options: what the file may leave unsaid.
     """
     content = safe_pickle.load(path, data)
     if not isinstance(content, dict) or not content:
         raise BadInput(path, "a dict of motions", f"a {type(content).__name__}")
-    return read_fields(path, content)
+    refuse_known(path, content)
+    return read_fields(path, content, options)
 
 
-def read_fields(path: Path, content: dict) -> list[RawMotion]:
+def read_fields(path: Path, content: dict, options: RobotConfig | None = None) -> list[RawMotion]:
     """The motions of a dict of motions, or of the fields of a single one."""
+    options = options or RobotConfig()
     if is_motion(content):
-        content, named = {"": content}, False
+        content, several = {"": content}, False
     else:
-        named = len(content) > 1
+        several = len(content) > 1
     _bounded(path, content)
     return [
-        _motion(path, f"{path.stem}_{_said(name)}" if named else path.stem, _said(name) if named else "", motion)
+        _motion(
+            path,
+            f"{path.stem}_{_said(name)}" if several else path.stem,
+            _said(name) if several else "",
+            motion,
+            options,
+        )
         for name, motion in content.items()
     ]
 
@@ -92,14 +107,14 @@ def _bounded(path: Path, motions: dict) -> None:
         raise BadInput(path, f"at most {_MAX_SECONDS:g} s of motion in a file", f"{seconds:.0f} s", "Split the file.")
 
 
-def _motion(path: Path, name: str, part: str, motion: Any) -> RawMotion:
+def _motion(path: Path, name: str, part: str, motion: Any, options: RobotConfig) -> RawMotion:
     where = f"{path}, motion {part!r}" if part else str(path)
     if not isinstance(motion, dict):
         raise BadInput(where, "a dict with root_trans_offset, root_rot, dof and fps", f"a {type(motion).__name__}")
     root_pos = _matrix(where, motion, "root_pos", (3,))
-    joint_pos, notes = _joint_angles(where, motion)
-    root_quat, more = _rotations(where, motion)
-    for field, values in (("root_quat", root_quat), ("joint_pos", joint_pos)):
+    joint_pos, notes = _joint_angles(where, motion, options)
+    root = _rotations(where, motion, options)
+    for field, values in (("root_quat", root.quat), ("joint_pos", joint_pos)):
         if len(values) != len(root_pos):
             names = f"{_FIELDS['root_pos'][0]} and {_FIELDS[field][0]}"
             raise BadInput(where, f"as many frames in {names}", f"{len(root_pos)} and {len(values)}")
@@ -107,45 +122,89 @@ def _motion(path: Path, name: str, part: str, motion: Any) -> RawMotion:
     if fps is None or not 1 <= fps <= 1000:
         came = f"{fps:g}" if fps is not None else f"a {type(motion.get('fps')).__name__}"
         raise BadInput(f"{where}, fps", "a number of frames a second from 1 to 1000", came)
-    angles = actuated(joint_pos)
-    return RawMotion(name, fps, root_pos, root_quat, angles, path, first_row=0, part=part, notes=(*notes, *more))
+    return RawMotion(
+        name, fps, root_pos, root.quat, joint_pos, path, first_row=0, part=part, notes=(*notes, *root.notes),
+        quat_order=root.order, order_from=root.said_by,
+    )  # fmt: skip
 
 
-def _joint_angles(where: str, motion: dict) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Joint angles (T, 23 or 29) [rad], from `pose_aa` where there is no `dof`."""
+def _joint_angles(where: str, motion: dict, options: RobotConfig) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Joint angles (T, 23) [rad], from `pose_aa` where there is no `dof`, and notes."""
     pose = _robot_pose(motion)
-    if _field(motion, "joint_pos") is not None or pose is None:
-        return _matrix(where, motion, "joint_pos", (23, 29)), ()
+    if _field(motion, "joint_pos") is None and pose is not None:
+        names, angles = _of_pose(where, pose)
+        return arranged(angles, names), ("joint angles from pose_aa", *notes_of(names))
+    values = _matrix(where, motion, "joint_pos", (23, 29))
+    names = _joint_names(where, motion, values.shape[1], options)
+    return arranged(values, names), notes_of(names)
+
+
+def _joint_names(where: str, motion: dict, dof: int, options: RobotConfig) -> tuple[str, ...]:
+    """The joints of `dof`: by the file's names, the axes of `pose_aa`, or the settings."""
+    field = next((name for name in _NAMES if motion.get(name) is not None), None)
+    if field is not None:
+        given = motion[field]
+        names = tuple(str(name)[:60] for name in (given.reshape(-1) if isinstance(given, np.ndarray) else given)[:100])
+        require_joints(f"{where}, {field}", names)
+        if len(names) != dof:
+            raise BadInput(f"{where}, {field}", f"{dof} names, as many as joints", str(len(names)))
+        return names
+    pose = _robot_pose(motion)
+    if pose is not None and _dof(pose.shape[1]) == dof and np.isfinite(pose).all() and pose[:, 1:].any():
+        return _of_pose(where, pose)[0]
+    return layout_of(f"{where}, {' or '.join(JOINT_FIELDS)}", dof, options.joints_23)
+
+
+def _of_pose(where: str, pose: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
+    """The joints about whose axes `pose_aa` turns, and their angles (T, n) [rad]."""
     pose = require_real(f"{where}, pose_aa", pose)
-    dof = _dof(pose.shape[1])
-    axes = np.array([joint.axis for joint in joints(dof or 23)])
-    turned = pose[:, 1 : 1 + len(axes)]
-    with np.errstate(all="ignore"):  # what is no number is named by the checks of every motion
-        angles = (turned * axes).sum(axis=2)
-        beside = float(np.abs(turned - angles[..., None] * axes).max(initial=0.0))
+    axes = {joint.name: joint.axis for joint in joints(29)}
+    found = []
+    for names in layouts(_dof(pose.shape[1]) or 23).values():
+        turned, about = pose[:, 1 : 1 + len(names)], np.array([axes[name] for name in names])
+        with np.errstate(all="ignore"):  # what is no number is named by the checks of every motion
+            angles = (turned * about).sum(axis=2)
+            beside = float(np.abs(turned - angles[..., None] * about).max(initial=0.0))
+        found.append((beside, names, angles))
+    beside, names, angles = min(found, key=lambda one: one[0])
     if beside > _OFF_AXIS:
-        wanted = f"rotations about the {len(axes)} joint axes of the G1"
+        wanted = f"rotations about the {len(names)} joint axes of the G1"
         raise BadInput(f"{where}, pose_aa", wanted, f"{beside:.3g} rad beside them", "A motion of another body?")
-    return angles, ("joint angles from pose_aa",)
+    return names, angles
 
 
-def _rotations(where: str, motion: dict) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The root's quaternions (T, 4) [wxyz]; `pose_aa` says their order where there is one."""
+@dataclass(frozen=True)
+class _Root:
+    """The root's quaternions (T, 4) [wxyz], their order in the file and who says it."""
+
+    quat: np.ndarray
+    order: str = "xyzw"
+    said_by: Literal["", "file", "known"] = ""
+    notes: tuple[str, ...] = ()
+
+
+def _rotations(where: str, motion: dict, options: RobotConfig) -> _Root:
+    """The root's rotation; `pose_aa` says the quaternions' order where there is one."""
     pose = _robot_pose(motion)
     told = None
     if pose is not None and pose.any():  # some files carry zeros instead
         with np.errstate(all="ignore"):
             told = quaternions.from_rotation_vector(require_real(f"{where}, pose_aa", pose)[:, 0])
     if _field(motion, "root_quat") is None and told is not None:
-        return told, ("root rotation from pose_aa",)
+        return _Root(told, "wxyz", "known", ("root rotation from pose_aa",))
     given = _matrix(where, motion, "root_quat", (4,))
-    xyzw = given[:, [3, 0, 1, 2]]
-    if told is None or len(told) != len(given) or _apart(xyzw, told) <= _APART:
-        return xyzw, ()
+    if options.quaternion:
+        return _Root(as_wxyz(given, options.quaternion), options.quaternion, "known")
+    xyzw = as_wxyz(given, "xyzw")
+    if told is None or len(told) != len(given):
+        return _Root(xyzw)
+    if _apart(xyzw, told) <= _APART:
+        return _Root(xyzw, said_by="file")
     if _apart(given, told) <= _APART:
-        return given, ("root quaternions wxyz, as pose_aa tells",)
+        return _Root(given, "wxyz", "file", ("root quaternions wxyz, as pose_aa tells",))
     came = f"{_apart(xyzw, told):.2f} rad apart in the median"
-    raise BadInput(f"{where}, root_rot", "the same rotation as in pose_aa", came, "Which of them is right?")
+    which = say({"quaternion": "xyzw"}, {"quaternion": "wxyz"})
+    raise BadInput(f"{where}, root_rot", "the same rotation as in pose_aa", came, f"To read root_rot alone: {which}")
 
 
 def _apart(one: np.ndarray, other: np.ndarray) -> float:
@@ -168,13 +227,6 @@ def _rate(motion: dict) -> float | None:
 def _said(name: object) -> str:
     """A motion's name as it may stand in a line."""
     return shown(str(name), 80)
-
-
-def actuated(joint_pos: np.ndarray) -> np.ndarray:
-    """The 23 actuated of (T, 29) joints in Unitree's order, the wrists dropped; (T, 23) stays."""
-    if joint_pos.shape[1] == len(joint_names()):
-        return joint_pos
-    return joint_pos[:, [joint_names(29).index(name) for name in joint_names()]]
 
 
 def _field(motion: dict, field: str) -> Any:

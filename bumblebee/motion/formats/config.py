@@ -22,3 +22,7 @@ class RobotConfig(Ranged):
     """Order of its Euler angles as SciPy writes it: small letters about the world's axes, capitals about the body's."""
     npz_joints: Literal["", "depth_first", "breadth_first"] = ""
     """Order of the joints in an `.npz` file whose bodies do not tell: depth-first (MuJoCo), breadth-first (Isaac)."""
+    joints_23: Literal["", "asap", "unitree"] = ""
+    """Which 23 joints a file has that names none; see `bumblebee/motion/formats/layouts.py`."""
+    quaternion: Literal["", "xyzw", "wxyz"] = ""
+    """Order of the root's quaternion; empty: the file's, held against the motion."""

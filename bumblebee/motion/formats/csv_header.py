@@ -9,16 +9,20 @@ units and the order must be set.
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.formats.config import RobotConfig
-from bumblebee.robot.facts import WRIST_JOINTS, joint_names
+from bumblebee.motion.formats.layouts import layout_of, notes_of, require_joints
+from bumblebee.motion.raw import is_order
+from bumblebee.motion.remedy import say
+from bumblebee.robot.facts import joint_names
 
 _QUATERNION, _EULER = 7, 6  # columns of the root
 _COUNTERS = ("frame", "frame_id", "frame_index", "index")
 _SOMA = tuple(f"root_{what}{axis}" for what in ("translate", "rotate") for axis in "xyz")
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-_REMEDY = "Say it: motions.read.csv_length, csv_angle and csv_euler (--set csv_length=cm --set csv_angle=deg ...)."
+UNITS = say({"csv_length": "cm", "csv_angle": "deg", "csv_euler": "xyz"})
 
 
 @dataclass(frozen=True)
@@ -28,9 +32,11 @@ class CsvLayout:
     position: tuple[int, ...]
     """Columns of x, y, z."""
     rotation: tuple[int, ...]
-    """Columns of the root's rotation: w, x, y, z of a quaternion, or Euler angles about x, y, z."""
-    joints: tuple[int, ...]
-    """Columns of the 23 joints in the order of `joint_names()`."""
+    """Columns of the root's rotation: a quaternion in `quat_order`, or Euler angles about x, y, z."""
+    first_joint: int
+    """Column of the first joint; the others follow."""
+    names: tuple[str, ...]
+    """The joints in the order of their columns."""
     width: int
     counter: int | None = None
     """Column that numbers the frames."""
@@ -39,6 +45,9 @@ class CsvLayout:
     degrees: bool = False
     euler: str = ""
     """Order of the Euler angles, "" for a quaternion."""
+    quat_order: str = "xyzw"
+    order_from: Literal["", "file", "known"] = ""
+    """Who says the quaternion's order; "": nobody."""
     stated: bool = True
     """Whether units and order are what the file or the user says, not what files of this layout usually have."""
 
@@ -48,20 +57,21 @@ class CsvLayout:
         return next(name for name, metres in _METRES.items() if metres == self.metres)
 
     @property
-    def note(self) -> str:
+    def notes(self) -> tuple[str, ...]:
         """What a person should know of how the file is read."""
         if not self.euler:
-            return ""
+            return notes_of(self.names)
         why = "as set" if self.stated else "as the SOMA retargeter writes (BONES-SEED)"
-        return f"{self.unit}, {'degrees' if self.degrees else 'radians'}, Euler angles {self.euler}: {why}"
+        said = f"{self.unit}, {'degrees' if self.degrees else 'radians'}, Euler angles {self.euler}: {why}"
+        return (said, *notes_of(self.names))
 
 
-def bare_layout(where: object, width: int) -> CsvLayout:
+def bare_layout(where: object, width: int, options: RobotConfig) -> CsvLayout:
     """The layout of a file without a header, by its number of columns."""
     for dof in (29, 23):
         if width == _QUATERNION + dof:
-            joints = tuple(_QUATERNION + joint_names(dof).index(name) for name in joint_names())
-            return CsvLayout((0, 1, 2), (6, 3, 4, 5), joints, width)
+            names = layout_of(where, dof, options.joints_23)
+            return CsvLayout((0, 1, 2), (3, 4, 5, 6), _QUATERNION, names, width, **_order("", options))
     wanted = "36 columns (xyz, quaternion xyzw, 29 joints), or 30 with 23 joints"
     raise BadInput(where, wanted, f"{width} column{'s' * (width != 1)}")
 
@@ -72,7 +82,7 @@ def header_layout(path: Path, cells: list[str], options: RobotConfig) -> CsvLayo
     Args:
         path: the file.
         cells: the names.
-        options: units and order where the names do not say them.
+        options: units and orders where the names do not say them.
     """
     names = [cell.strip().strip('"').lower() for cell in cells]
     first = next((column for column, name in enumerate(names) if _joint(name) in joint_names(29)), len(names))
@@ -80,34 +90,41 @@ def header_layout(path: Path, cells: list[str], options: RobotConfig) -> CsvLayo
     start = 0 if counter is None else 1
     joints = _joints(path, cells, first)
     if first - start == _QUATERNION:
-        rotation = _quaternion(names, start + 3)
-        return CsvLayout(_position(path, names, start), rotation, joints, len(cells), counter)
+        position, rotation = _position(path, names, start), tuple(range(start + 3, start + 7))
+        last = "".join(name[-1:] for name in names[start + 3 : start + 7])
+        return CsvLayout(position, rotation, first, joints, len(cells), counter, **_order(last, options))
     if first - start == _EULER:
-        return _euler(path, names, start, (joints, len(cells), counter), options)
+        return _euler(path, names, start, (first, joints, len(cells), counter), options)
     wanted = "before the joints' columns 3 of the root's position and 4 of its quaternion or 3 Euler angles"
     raise BadInput(f"{path}, row 1", wanted, f"{first - start} columns")
+
+
+def _order(last: str, options: RobotConfig) -> dict[str, Any]:
+    """The quaternion's order: as set, by the last letters of its names, or xyzw, which nobody says."""
+    if options.quaternion:
+        return {"quat_order": options.quaternion, "order_from": "known"}
+    return {"quat_order": last, "order_from": "file"} if is_order(last) else {}
 
 
 def _euler(
     path: Path,
     names: list[str],
     start: int,
-    rest: tuple[tuple[int, ...], int, int | None],
+    rest: tuple[int, tuple[str, ...], int, int | None],
     options: RobotConfig,
 ) -> CsvLayout:
-    joints, width, counter = rest
     soma = tuple(names[start : start + 6]) == _SOMA
     length, angle, order = options.csv_length, options.csv_angle, options.csv_euler
     if not soma and not (length and angle and order):
         missing = [word for word, said in (("length", length), ("angle", angle), ("Euler order", order)) if not said]
         came = f"{', '.join(names[start : start + 6])}"[:160] + f", which say no {' and no '.join(missing)}"
-        raise BadInput(f"{path}, row 1", "units and order of the Euler angles", came, _REMEDY)
+        raise BadInput(f"{path}, row 1", "units and order of the Euler angles", came, UNITS)
     position = _position(path, names, start)
     rotation = tuple(start + 3 + column for column in _axes(path, names[start + 3 : start + 6], start + 4))
     stated = bool(length and angle and order)
     euler = order or "xyz"
     return CsvLayout(
-        position, rotation, joints, width, counter, _METRES[length or "cm"], (angle or "deg") == "deg", euler, stated
+        position, rotation, *rest, _METRES[length or "cm"], (angle or "deg") == "deg", euler, "wxyz", "known", stated
     )
 
 
@@ -115,22 +132,11 @@ def _joint(name: str) -> str:
     return name.removesuffix("_dof").removesuffix("_joint") + "_joint"
 
 
-def _joints(path: Path, cells: list[str], first: int) -> tuple[int, ...]:
-    """Columns of the 23 joints by name; every column from the first joint on must be one."""
-    found: dict[str, int] = {}
-    for column, cell in enumerate(cells[first:], first):
-        name = _joint(cell.strip().strip('"').lower())
-        if name not in joint_names(29):
-            where = f"{path}, row 1, column {column + 1}"
-            raise BadInput(where, "the name of a G1 joint", f"unknown joint {cell.strip()[:60]!r}")
-        if name in found:
-            raise BadInput(f"{path}, row 1", "each joint once", f"{name} in columns {found[name] + 1} and {column + 1}")
-        found[name] = column
-    missing = [name for name in joint_names() if name not in found]
-    if missing:
-        wanted = f"7 root columns, then one for each of the 23 joints (the {len(WRIST_JOINTS)} wrist joints may follow)"
-        raise BadInput(f"{path}, row 1", wanted, f"none for {missing[0]}")
-    return tuple(found[name] for name in joint_names())
+def _joints(path: Path, cells: list[str], first: int) -> tuple[str, ...]:
+    """The joints in the order of their columns; every column from the first joint on must be one."""
+    names = tuple(_joint(cell.strip().strip('"').lower()) for cell in cells[first:])
+    require_joints(f"{path}, row 1", names, "column", first + 1)
+    return names
 
 
 def _position(path: Path, names: list[str], start: int) -> tuple[int, ...]:
@@ -145,10 +151,3 @@ def _axes(path: Path, names: list[str], column: int) -> list[int]:
     if not set(last) & {"x", "y", "z"}:
         return [0, 1, 2]
     raise BadInput(f"{path}, row 1, column {column}", "names that end in x, y and z", ", ".join(names)[:120])
-
-
-def _quaternion(names: list[str], start: int) -> tuple[int, ...]:
-    """Columns of w, x, y, z: by the names' last letters, xyzw where those say nothing."""
-    last = [name[-1:] for name in names[start : start + 4]]
-    order = "".join(last) if sorted(last) == ["w", "x", "y", "z"] else "xyzw"
-    return tuple(start + order.index(part) for part in "wxyz")

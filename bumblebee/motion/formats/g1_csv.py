@@ -13,7 +13,9 @@ from bumblebee.io.read import read_bytes
 from bumblebee.motion.checks import MAX_FRAMES
 from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.csv_header import CsvLayout, bare_layout, header_layout
-from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.formats.layouts import arranged
+from bumblebee.motion.raw import RawMotion, as_wxyz
+from bumblebee.motion.remedy import say
 
 MAX_BYTES = 256 << 20  # an hour at 60 Hz has 80 MB
 _BLOCK = 10_000  # rows that are split into cells at a time
@@ -31,12 +33,13 @@ def read_g1_csv(path: Path, fps: float, data: bytes | None = None, options: Robo
         data: its bytes, where they have been read.
         options: units and Euler order for headers that do not say them.
     """
+    options = options or RobotConfig()
     lines = _lines(path, read_bytes(path, MAX_BYTES) if data is None else data)
     width = lines[0].count(",") + 1
     if width > _WIDEST:  # before anything is split: a line may have a hundred million commas
-        bare_layout(f"{path}, row 1", width)
+        bare_layout(f"{path}, row 1", width, options)
     cells = _header(path, lines[0])
-    layout = header_layout(path, cells, options or RobotConfig()) if cells else bare_layout(f"{path}, row 1", width)
+    layout = header_layout(path, cells, options) if cells else bare_layout(f"{path}, row 1", width, options)
     first_row = 2 if cells else 1
     values = _numbers(path, lines[first_row - 1 :], first_row, layout.width)
     if layout.counter is not None:
@@ -49,11 +52,13 @@ def read_g1_csv(path: Path, fps: float, data: bytes | None = None, options: Robo
         float(fps),
         values[:, layout.position] * layout.metres,
         _rotation(values, layout),
-        values[:, layout.joints] * angle,
+        arranged(values[:, layout.first_joint :], layout.names) * angle,
         path,
         first_row,
-        notes=(layout.note,) if layout.note else (),
+        notes=layout.notes,
         rate_from="setting",
+        quat_order=layout.quat_order,
+        order_from=layout.order_from,
     )
 
 
@@ -61,7 +66,7 @@ def _rotation(values: np.ndarray, layout: CsvLayout) -> np.ndarray:
     """The root's quaternions (T, 4) [wxyz]; not a number where an angle is none."""
     rotation = values[:, layout.rotation]
     if not layout.euler:
-        return rotation
+        return as_wxyz(rotation, layout.quat_order)
     finite = np.isfinite(rotation).all(axis=1)
     quat = np.full((len(values), 4), np.nan)
     angles = rotation[:, ["xyz".index(axis) for axis in layout.euler.lower()]][finite]
@@ -87,11 +92,11 @@ def _units_hold(path: Path, values: np.ndarray, layout: CsvLayout) -> None:
         return  # the checks of every motion name the cell
     height = float(np.median(values[:, layout.position[2]]))
     if not _LOW <= abs(height) * layout.metres <= _HIGH:
-        remedy = "Other units? Set motions.read.csv_length, csv_angle and csv_euler (--set csv_length=m ...)."
+        remedy = f"Other units? {say({'csv_length': 'm', 'csv_angle': 'deg', 'csv_euler': 'xyz'})}"
         raise BadInput(f"{path}, root height", f"{layout.unit}", f"{height:.4g} in the median", remedy)
-    angle = float(np.abs(values[:, layout.joints]).max())
+    angle = float(np.abs(values[:, layout.first_joint :]).max())
     if layout.degrees and angle < _TURN:
-        remedy = "Radians? Set motions.read.csv_length, csv_angle and csv_euler (--set csv_angle=rad ...)."
+        remedy = f"Radians? {say({'csv_length': 'cm', 'csv_angle': 'rad', 'csv_euler': 'xyz'})}"
         raise BadInput(f"{path}, joint angles", "degrees", f"none above {angle:.3g}", remedy)
 
 

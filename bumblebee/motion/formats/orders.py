@@ -12,8 +12,10 @@ from functools import cache
 import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.motion.formats.layouts import arranged
 from bumblebee.motion.kinematics import forward_bodies
-from bumblebee.robot.facts import KEY_BODIES, WRIST_JOINTS, g1_bodies, joint_names
+from bumblebee.motion.remedy import say
+from bumblebee.robot.facts import KEY_BODIES, g1_bodies
 
 NEAR = 0.03  # m: mean distance of a file's bodies from ours; other editions of the G1's model differ by millimetres
 _APART = 2.0  # so many times worse must the next best order be
@@ -27,7 +29,7 @@ class Order:
     """How a file's arrays are laid out."""
 
     joints: str
-    """`DEPTH` or `BREADTH`, "" if the file names its joints."""
+    """`DEPTH` or `BREADTH`, with 23 joints and their layout; "" if the file names its joints."""
     bodies: str
     root: int
     """Place of the pelvis among the bodies."""
@@ -35,8 +37,8 @@ class Order:
     """wxyz or xyzw."""
     error: float
     """Mean distance of the bodies from where forward kinematics puts them [m]."""
-    columns: tuple[int, ...]
-    """Columns of the 23 joints in the order of `joint_names()`."""
+    names: tuple[str, ...]
+    """The joints in the order of their columns."""
 
 
 @cache
@@ -53,16 +55,11 @@ def breadth_first() -> tuple[str, ...]:
 
 
 @cache
-def joint_order(kind: str, dof: int) -> tuple[str, ...]:
-    """Names of the 29 or 23 joints depth-first or breadth-first."""
+def joint_order(kind: str, layout: tuple[str, ...]) -> tuple[str, ...]:
+    """The joints of a layout depth-first or breadth-first."""
     bodies = breadth_first() if kind == BREADTH else tuple(g1_bodies())
-    names = tuple(g1_bodies()[body]["joint"]["name"] for body in bodies if "joint" in g1_bodies()[body])
-    return names if dof == len(names) else tuple(name for name in names if name not in WRIST_JOINTS)
-
-
-def columns_of(names: tuple[str, ...]) -> tuple[int, ...]:
-    """Where the 23 joints of `joint_names()` stand among `names`."""
-    return tuple(names.index(name) for name in joint_names())
+    names = (g1_bodies()[body]["joint"]["name"] for body in bodies if "joint" in g1_bodies()[body])
+    return tuple(name for name in names if name in layout)
 
 
 def body_orders(count: int) -> dict[str, tuple[str, ...]]:
@@ -111,29 +108,36 @@ def detect(
     rival = next((o for o in found if o.error <= limit and not _alike(joints[some], o, best)), None)
     if rival:
         came = f"two that fit ({best.joints}, {rival.joints}; {best.quaternion}, {rival.quaternion})"
-        raise BadInput(f"{where}, joint_pos", "one order of the joints", came, DEMAND)
+        raise BadInput(f"{where}, joint_pos", "one order of the joints", came, demand(named))
     return best
 
 
-DEMAND = "Say it: motions.read.npz_joints (--set npz_joints=...): depth_first (MuJoCo, mjlab) or breadth_first (Isaac)."
+def demand(named: dict[str, tuple[str, ...]]) -> str:
+    """How to say which of several orders of joints a file has: `DEPTH` is MuJoCo's and mjlab's, `BREADTH` Isaac's."""
+    return say(*({key: word for key, word in zip(KEYS, kind.split(), strict=False)} for kind in named))
+
+
+KEYS = ("npz_joints", "joints_23")
+"""The settings of which the name of an order of joints consists."""
 
 
 def _alike(joints: np.ndarray, one: Order, other: Order) -> bool:
     """Whether it makes no difference which of two orders is taken."""
-    return one.quaternion == other.quaternion and np.allclose(joints[:, one.columns], joints[:, other.columns])
+    same = np.allclose(arranged(joints, one.names), arranged(joints, other.names))
+    return one.quaternion == other.quaternion and same
 
 
 def _candidates(
     joints: np.ndarray, body_pos: np.ndarray, body_quat: np.ndarray, named: dict[str, tuple[str, ...]]
 ) -> Iterator[Order]:
     for kind, names in named.items():
-        columns = columns_of(names)
+        angles = arranged(joints, names)
         for bodies, order in body_orders(body_pos.shape[1]).items():
             root = order.index("pelvis")
             for quaternion in ("wxyz", "xyzw"):
                 quat = body_quat[:, root][:, [quaternion.index(part) for part in "wxyz"]]
-                error = _distance(body_pos, order, forward_bodies(body_pos[:, root], quat, joints[:, columns]))
-                yield Order(kind, bodies, root, quaternion, error, columns)
+                error = _distance(body_pos, order, forward_bodies(body_pos[:, root], quat, angles))
+                yield Order(kind, bodies, root, quaternion, error, names)
 
 
 def _distance(body_pos: np.ndarray, order: tuple[str, ...], poses: dict) -> float:

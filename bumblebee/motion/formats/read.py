@@ -13,6 +13,7 @@ from bumblebee.motion.formats.config import RobotConfig
 from bumblebee.motion.formats.g1_csv import read_g1_csv
 from bumblebee.motion.formats.mjlab_npz import is_mjlab, read_mjlab_npz
 from bumblebee.motion.raw import RawMotion
+from bumblebee.motion.remedy import say
 
 PICKLES = (".pkl", ".pickle", ".joblib", ".p")
 SUFFIXES = (".csv", ".npz", *PICKLES)
@@ -22,7 +23,7 @@ __all__ = ["PICKLES", "SUFFIXES", "RobotConfig", "format_of", "is_robot_npz", "r
 
 
 def read_robot(path: Path, data: bytes, options: RobotConfig | None = None) -> list[RawMotion]:
-    """The motions of a file that is on the G1 already, at the file's own rate, unchecked (`checks.check_raw`).
+    """The motions of a file that is on the G1 already, at the file's own rate, unchecked (`usable.usable`).
 
     Args:
         path: the file as it is shown; its suffix and what it holds decide how it is read.
@@ -37,7 +38,7 @@ def read_robot(path: Path, data: bytes, options: RobotConfig | None = None) -> l
     if suffix == ".csv":
         return [_csv(path, data, options)]
     if suffix in PICKLES:
-        return read_asap_pickle(path, data)
+        return read_asap_pickle(path, data, options)
     if suffix == ".npz":
         return _npz(path, npz_arrays(path, data), options)
     raise BadInput(path, f"a motion of the G1 ({', '.join(SUFFIXES)})", f"a file with suffix {suffix[:20]!r}")
@@ -65,8 +66,8 @@ def _csv(path: Path, data: bytes, options: RobotConfig) -> RawMotion:
             path,
             "a frame rate, which a CSV file does not hold",
             "none",
-            "Say it: motions.read.csv_fps, or --csv-fps: LAFAN1's retargets have 30 Hz, g1_moves 60, BONES-SEED 120; "
-            "30 read as 60 makes a walk into a sprint.",
+            "LAFAN1's retargets have 30 Hz, g1_moves 60, BONES-SEED 120; 30 read as 60 makes a walk into a sprint. "
+            + say({"csv_fps": 30}),
         )
     return read_g1_csv(path, options.csv_fps, data, options)
 
@@ -75,6 +76,6 @@ def _npz(path: Path, arrays: dict[str, np.ndarray], options: RobotConfig) -> lis
     if is_mjlab(arrays):
         return [read_mjlab_npz(path, arrays, options)]
     if is_motion(arrays):
-        return read_fields(path, arrays)
+        return read_fields(path, arrays, options)
     came = ", ".join(sorted(arrays)[:8])[:160] or "no arrays"
     raise BadInput(path, "joint_pos and body_pos_w (mjlab, BeyondMimic), or root_pos, root_rot and dof_pos", came)

@@ -40,6 +40,7 @@ class Bvh:
     """For each joint its channels in their order: (`position` or `rotation`, axis 0 to 2)."""
     fps: float
     values: np.ndarray
+    notes: tuple[str, ...] = ()
 
     @property
     def first_channel(self) -> list[int]:
@@ -81,6 +82,7 @@ def parse_bvh(path: Path, data: bytes) -> Bvh:
         tuple(own or () for own in joints.channels),
         fps,
         values,
+        (f"Frames: says {frames:,}, all {len(values):,} rows are read",) if len(values) != frames else (),
     )
 
 
@@ -186,17 +188,17 @@ def rate(text: str) -> float:
 
 
 def _table(path: Path, lines: list[str], frames: int, columns: int) -> np.ndarray:
-    """The rows, (frames, columns)."""
+    """All rows, (T, columns): as many as the file says, or more."""
     while lines and not lines[-1].strip():
         lines.pop()
     if columns == 0:
         raise BadInput(path, "channels in the hierarchy", "none")
-    if len(lines) == frames:
+    if frames <= len(lines) <= MAX_FRAMES:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 values = np.loadtxt(lines, dtype=np.float64, comments=None, ndmin=2)
-            if values.shape == (frames, columns) and (np.abs(values) <= _LARGEST).all():
+            if values.shape == (len(lines), columns) and (np.abs(values) <= _LARGEST).all():
                 return values
         except ValueError:
             pass
@@ -205,7 +207,7 @@ def _table(path: Path, lines: list[str], frames: int, columns: int) -> np.ndarra
 
 def _wrong_row(path: Path, lines: list[str], frames: int, columns: int) -> BadInput:
     """What is wrong with the first row that is."""
-    for number, line in enumerate(lines[:frames], 1):
+    for number, line in enumerate(lines, 1):
         words = line.split()
         where = f"{path}, frame {number}"
         for column, word in enumerate(words, 1):
@@ -215,7 +217,8 @@ def _wrong_row(path: Path, lines: list[str], frames: int, columns: int) -> BadIn
                 return BadInput(f"{where}, value {column}", f"a number up to {_LARGEST:g}", repr(shown(word, 40)), hint)
         if len(words) != columns:
             return BadInput(where, f"{columns} values, as many as channels", str(len(words)), _AGAIN)
-    return BadInput(path, f"{frames:,} frames, as its line Frames: says", f"{len(lines):,}", _AGAIN)
+    wanted = f"{frames:,} frames or more, as its line Frames: says, {MAX_FRAMES:,} at most"
+    return BadInput(path, wanted, f"{len(lines):,}", "Copy the file again, or split it.")
 
 
 def _fits(value: float) -> bool:

@@ -8,12 +8,13 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.human.motion import LANDMARKS
+from bumblebee.motion.remedy import say
 
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "cmu": 0.0254 / 0.45}
 """Metres in a unit; `cmu` is that of CMU's files and their conversion by cgspeed (1 / 0.45 inch)."""
 LEGS = (0.65, 1.1)
 _POSSIBLE = (0.2, 1.5)  # legs of a child, of a stylised figure [m]: beyond, a stated unit is wrong
-_UPRIGHT = 0.7  # of the vector from the feet to the head, the share along an axis that is up: within 45 degrees
+_UPRIGHT = 0.7  # of the leg that stands, the share along an axis that is up: within 45 degrees
 
 _INDEX = {name: i for i, name in enumerate(LANDMARKS)}
 
@@ -38,25 +39,41 @@ def find_unit(where: object, legs: float, stated: str) -> tuple[float, tuple[str
     Raises:
         BadInput: no unit fits, or the stated one cannot be.
     """
+    possible = [name for name, metres in UNITS.items() if _POSSIBLE[0] <= legs * metres <= _POSSIBLE[1]]
+    do = say(*({"unit": name} for name in possible)) if possible else ""
     if stated:
-        if not _POSSIBLE[0] <= legs * UNITS[stated] <= _POSSIBLE[1]:
+        if stated not in possible:
             came = f"legs of {legs * UNITS[stated]:.4g} m with the unit {stated}"
-            raise BadInput(where, f"legs of {_POSSIBLE[0]} to {_POSSIBLE[1]} m", came, "Set another `unit`.")
+            raise BadInput(where, f"legs of {_POSSIBLE[0]} to {_POSSIBLE[1]} m", came, do)
         return UNITS[stated], ()
     fitting = [name for name, metres in UNITS.items() if LEGS[0] <= legs * metres <= LEGS[1]]
     if len(fitting) != 1:
         came = f"legs of {legs:.4g} units, which {' and '.join(fitting) or 'none'} would explain"
         wanted = f"a unit (of {', '.join(UNITS)}) with legs of {LEGS[0]} to {LEGS[1]} m"
-        raise BadInput(where, wanted, came, "Say it: motions.read.unit (--set unit=cm).")
+        raise BadInput(where, wanted, came, do)
     return UNITS[fitting[0]], (f"unit {fitting[0]}, by legs of {legs:.4g} units = {legs * UNITS[fitting[0]]:.3f} m",)
 
 
+AXES = ("x", "y", "z", "-x", "-y", "-z")
+_UP = ("y", "z")
+"""The axes that files have for up; a leg that stands along another one is a person who lies, or other axes."""
+
+
 def upright_axis(positions: np.ndarray) -> str:
-    """The axis along which the head is above the feet, `y` or `z`; "" if it is neither, in most of the frames."""
-    feet = positions[:, [_INDEX["left_ankle"], _INDEX["right_ankle"]]].mean(axis=1)
-    rise = positions[:, _INDEX["head"]] - feet
-    middle = np.median(rise / np.maximum(np.linalg.norm(rise, axis=1, keepdims=True), 1e-9), axis=0)
-    return next((name for name, axis in (("y", 1), ("z", 2)) if middle[axis] > _UPRIGHT), "")
+    """The one of `AXES` along which the leg that stands points up, from ankle to hip; "" if it is none.
+
+    The leg that stands is the one whose ankle moves least, whatever the trunk does. Of 210 motions of people its median
+    share along the up axis was .79 at least; that of the head above the feet .70, where the trunk is held level.
+
+    Args:
+        positions: (T, 18, 3), of a moving person or of a skeleton's own pose alone.
+    """
+    ankles = positions[:, [_INDEX["left_ankle"], _INDEX["right_ankle"]]]
+    rise = positions[:, [_INDEX["left_hip"], _INDEX["right_hip"]]] - ankles
+    moved = np.linalg.norm(np.diff(ankles, axis=0, append=ankles[-1:]), axis=2)
+    leg = np.take_along_axis(rise, moved.argmin(axis=1)[:, None, None], axis=1)[:, 0]
+    middle = np.median(leg / np.maximum(np.linalg.norm(leg, axis=1, keepdims=True), 1e-9), axis=0)
+    return next((name for name, share in zip(AXES, (*middle, *-middle), strict=True) if share > _UPRIGHT), "")
 
 
 def find_up(where: object, moving: str, resting: str, stated: str) -> tuple[str, tuple[str, ...]]:
@@ -74,25 +91,25 @@ def find_up(where: object, moving: str, resting: str, stated: str) -> tuple[str,
     if stated:
         return stated, ()
     told = {axis for axis in (moving, resting) if axis}
-    if len(told) != 1:
-        both = f"{moving} by the motion, {resting} by the skeleton's own pose"
-        wanted = "y or z as the up axis, along which the head is above the feet"
-        raise BadInput(
-            where,
-            wanted,
-            both if told else "a head above the feet along neither",
-            "Say it: motions.read.up (--set up=y).",
-        )
+    if len(told) != 1 or not told <= set(_UP):
+        both = f"a person along {moving} by the motion, along {resting} by the skeleton's own pose"
+        came = both if len(told) > 1 else f"a person along {moving or resting or 'no axis'}"
+        raise BadInput(where, "a person who stands along y or z, which is up then", came, ask_up(*told))
     (axis,) = told
     by = "the motion" if moving else "the skeleton's own pose alone"
     return axis, (f"{axis} is up, by {by}",)
 
 
+def ask_up(*axes: str) -> str:
+    """How to say which axis is up: one of those that the body shows, or y or z for a person who lies."""
+    return say(*({"up": axis} for axis in dict.fromkeys((*sorted(axes), *_UP))))
+
+
 def z_up(positions: np.ndarray, up: str) -> np.ndarray:
     """Positions turned so that z is up; a turn, no mirror: left stays left."""
-    if up == "z":
-        return positions
-    return np.stack([positions[..., 0], -positions[..., 2], positions[..., 1]], axis=-1)
+    x, y, z = np.moveaxis(positions, -1, 0)
+    turned = {"z": (x, y, z), "-z": (x, -y, -z), "y": (x, -z, y), "-y": (x, z, -y), "x": (-z, y, x), "-x": (z, y, -x)}
+    return np.stack(turned[up], axis=-1)
 
 
 def require_right_handed(where: object, positions: np.ndarray) -> None:

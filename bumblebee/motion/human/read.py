@@ -10,7 +10,15 @@ from bumblebee.errors import BadInput
 from bumblebee.motion.human.bvh import Bvh, parse_bvh
 from bumblebee.motion.human.floor import bad_start, on_floor
 from bumblebee.motion.human.forward import adds_positions, bvh_positions, rest_positions
-from bumblebee.motion.human.frame import find_unit, find_up, leg_length, require_right_handed, upright_axis, z_up
+from bumblebee.motion.human.frame import (
+    ask_up,
+    find_unit,
+    find_up,
+    leg_length,
+    require_right_handed,
+    upright_axis,
+    z_up,
+)
 from bumblebee.motion.human.landmarks import find_landmarks
 from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.human.npz import npz_keys
@@ -27,7 +35,7 @@ class HumanConfig(Ranged):
 
     unit: Literal["", "m", "dm", "cm", "mm", "inch", "cmu"] = ""
     """Unit of BVH files; empty: by the length of the legs. `cmu` is 1 / 0.45 inch."""
-    up: Literal["", "y", "z"] = ""
+    up: Literal["", "x", "y", "z", "-x", "-y", "-z"] = ""
     """The up axis; empty: BVH's by the body, that of SMPL files z, where the body stands so."""
     fps: Annotated[float, Range(least=0, most=1000)] = 0.0
     """Frame rate of SMPL files that state none; 0: such a file is refused [Hz]."""
@@ -78,17 +86,16 @@ def _from_bvh(path: Path, data: bytes, options: HumanConfig) -> tuple[float, np.
 
 
 def _added(bvh: Bvh) -> tuple[str, ...]:
-    """A note on joints whose positions were taken as added to their offsets."""
+    """The file's notes, and one on joints whose positions were taken as added to their offsets."""
     names = [bvh.names[joint] for joint in range(len(bvh.names)) if adds_positions(bvh, joint)]
-    return (f"positions of {len(names)} joints are near 0: added to their OFFSET",) if names else ()
+    return (*bvh.notes, *([f"positions of {len(names)} joints are near 0: added to their OFFSET"] if names else []))
 
 
 def _from_smpl(path: Path, data: bytes, options: HumanConfig) -> tuple[float, np.ndarray, tuple[str, ...]]:
-    """The same of an SMPL file: AMASS's have z up, and another axis is not assumed for one that looks so."""
+    """The same of an SMPL file: AMASS's have z up, and another axis is asked for where the body does not stand so."""
     motion = read_smpl(path, data, options.fps)
     shown = upright_axis(motion.positions)
-    if shown == "y" and not options.up:
-        came = "a head above the feet along y: y up, or a person who lies"
-        raise BadInput(path, "z up, as AMASS has it", came, "Say it: motions.read.up, y or z (--set up=y).")
-    doubt = ("z is up, as AMASS has it: the body does not stand so",) if not shown and not options.up else ()
-    return motion.fps, z_up(motion.positions, options.up or "z"), (*motion.notes, *doubt)
+    if shown != "z" and not options.up:
+        came = f"a person who stands along {shown or 'no axis'}: another axis is up, or the person lies"
+        raise BadInput(path, "z up, as AMASS has it", came, ask_up(*filter(None, [shown])))
+    return motion.fps, z_up(motion.positions, options.up or "z"), motion.notes

@@ -16,9 +16,10 @@ from bumblebee.motion.human.bvh import MAX_FRAMES
 from bumblebee.motion.human.forward import axis_angle_positions
 from bumblebee.motion.human.npz import npz_chosen
 from bumblebee.motion.human.smpl_body import GENDERS, PARENTS, find_body
+from bumblebee.motion.rates import RATES, rate_in
+from bumblebee.motion.remedy import say
 from bumblebee.motion.texts import shown
 
-RATES = ("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "framerate")
 _WIDTHS = {72: "smpl", 156: "smplh", 165: "smplx"}
 _NAMES = ("poses", "root_orient", "pose_body", "trans", "betas", "gender", "surface_model_type", *RATES)
 _JOINTS = (0, 1, 4, 7, 10, 2, 5, 8, 11, 9, 12, 15, 16, 18, 20, 17, 19, 21)
@@ -108,23 +109,13 @@ def _betas(path: Path, arrays: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def _rate(path: Path, arrays: dict[str, np.ndarray], fps: float) -> tuple[float, tuple[str, ...]]:
-    found = next((name for name in RATES if name in arrays), None)
-    if found is None:
-        if not fps:
-            raise BadInput(
-                path,
-                f"a frame rate ({', '.join(RATES[:3])})",
-                "none",
-                "Say it: motions.read.smpl_fps (--set smpl_fps=120).",
-            )
-        return fps, (f"{fps:g} Hz, as the settings say",)
-    values = arrays[found]
-    is_number = values.size == 1 and values.dtype.kind in "iuf"
-    rate = float(values.reshape(())) if is_number else float("nan")
-    if not 1 <= rate <= 1000:
-        came = f"{rate:g}" if is_number else f"shape {values.shape}, {values.dtype}"
-        raise BadInput(f"{path}: {found}", "a number of frames a second from 1 to 1000", came)
-    return rate, ()
+    rate = rate_in(path, arrays)
+    if rate is not None:
+        return rate, ()
+    if not fps:
+        wanted = f"a frame rate ({', '.join(RATES[:3])})"
+        raise BadInput(path, wanted, "none", f"AMASS has 120, GVHMR 30. {say({'smpl_fps': 120}, {'smpl_fps': 30})}")
+    return fps, (f"{fps:g} Hz, as the settings say",)
 
 
 def _text(arrays: dict[str, np.ndarray], name: str) -> str:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.checks import check_raw
 from bumblebee.motion.formats import orders
 from bumblebee.motion.formats.read import RobotConfig, is_robot_npz, read_robot
+from bumblebee.motion.usable import usable
 from bumblebee.robot.facts import KEY_BODIES, g1_bodies, joint_names
 from bumblebee.robot.model import RobotConfig as ModelConfig
 from bumblebee.robot.model import build_model
@@ -35,7 +35,7 @@ def arrays(raw, joints="depth_first", bodies=DEPTH, quaternion="wxyz", dof=29):
         mujoco.mj_kinematics(model, data)
         for column, name in enumerate(bodies):
             pos[row, column], quat[row, column] = data.body(name).xpos, data.body(name).xquat
-    order = orders.joint_order(joints, dof)
+    order = orders.joint_order(joints, joint_names(dof))
     quat = quat[..., ["wxyz".index(part) for part in quaternion]]
     return {
         "fps": np.array([50]),
@@ -63,7 +63,7 @@ def same(came, raw):
 
 
 def test_isaacs_order_is_the_one_that_the_field_publishes():
-    place = [joint_names(29).index(name) for name in orders.joint_order("breadth_first", 29)]
+    place = [joint_names(29).index(name) for name in orders.joint_order("breadth_first", joint_names(29))]
     assert place == [0, 6, 12, 1, 7, 13, 2, 8, 14, 3, 9, 15, 22, 4, 10, 16, 23, 5, 11, 17, 24, 18, 25, 19, 26, 20, 27,
                      21, 28]  # fmt: skip
 
@@ -116,13 +116,16 @@ def test_the_root_may_stand_before_the_joints(motions):
 
 def test_names_in_the_file_decide(motions):
     raw = motions.raw(30)
-    names = orders.joint_order("breadth_first", 29)
+    names = orders.joint_order("breadth_first", joint_names(29))
     content = {**arrays(raw, "breadth_first"), "joint_names": np.array([f"robot/{name}" for name in names])}
     same(read(motions, content), raw)
-    content["joint_names"] = np.array([*names[:-1], "left_tail_joint"])[::-1]
-    content["joint_names"][0] = names[1]
-    with pytest.raises(BadInput, match="joint_names: expected the names of 29 G1 joints"):
-        read(motions, content)
+    for wrong, line in (
+        ([*names[:-1], names[1]], f"joint_names: expected each joint once, came {names[1]} in names 2 and 29"),
+        ([*names[:-1], "left_tail_joint"], "joint_names, name 29: expected the name of a G1 joint"),
+        (names[:-1], "joint_names: expected the names of 29 G1 joints, came 28"),
+    ):
+        with pytest.raises(BadInput, match=line):
+            read(motions, {**content, "joint_names": np.array(wrong)})
 
 
 def test_other_bodies_are_read_when_the_order_is_set_and_refused_when_not(motions):
@@ -143,10 +146,10 @@ def test_another_robot_is_refused(motions):
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        ({"fps": None}, "fps: expected one number of frames a second, came none"),
+        ({"fps": None}, "fps: expected one number of frames a second .*, came none"),
         ({"fps": np.array([50, 50])}, r"fps: expected one number .* came shape \(2,\)"),
         ({"fps": np.array("fifty")}, "fps: expected one number"),
-        ({"fps": np.array(0.0)}, "fps: expected a number of frames a second from 1 to 1000, came 0"),
+        ({"fps": np.array(0.0)}, "fps: expected one number of frames a second from 1 to 1000, came 0"),
         ({"joint_pos": np.zeros((30, 28))}, r"joint_pos: expected shape \(T, 29\) .* came \(30, 28\)"),
         ({"joint_pos": np.zeros((0, 29))}, r"joint_pos: expected shape .* came \(0, 29\)"),
         ({"joint_pos": np.zeros(29)}, r"joint_pos: expected shape .* came \(29,\)"),
@@ -171,7 +174,7 @@ def test_a_frame_without_numbers_hides_no_order_and_is_named_by_the_checks(motio
     content = arrays(motions.raw(30), "breadth_first")
     content["body_pos_w"][0] = np.nan
     with pytest.raises(BadInput, match=r"row 0, root position x: expected a finite number, came nan"):
-        check_raw(read(motions, content))
+        usable(read(motions, content))
 
 
 def test_truncated_files_and_pickled_objects_are_refused(motions):

@@ -6,18 +6,11 @@ import joblib
 import numpy as np
 import pytest
 
-from bumblebee import quaternions
 from bumblebee.errors import BadInput
 from bumblebee.motion.formats.asap_pickle import read_asap_pickle
-from bumblebee.robot.facts import joint_names, joints
-
-
-def pose_of(raw, dof=23, extended=3):
-    pose = np.zeros((len(raw.root_pos), 1 + dof + extended, 3))
-    pose[:, 0] = quaternions.rotation_vector(raw.root_quat)
-    for column, joint in enumerate(joints()):
-        pose[:, 1 + joint_names(dof).index(joint.name)] = raw.joint_pos[:, column, None] * np.array(joint.axis)
-    return pose
+from bumblebee.motion.formats.config import RobotConfig
+from bumblebee.robot.facts import joint_names
+from tests.motion.conftest import pose_of
 
 
 def same(came, raw):
@@ -32,6 +25,7 @@ def test_gmr_and_twist_files_are_read_with_what_else_they_carry(motions, tmp_pat
         "root_pos": raw.root_pos,
         "root_rot": raw.root_quat[:, [1, 2, 3, 0]],
         "dof_pos": raw.joint_pos,
+        "dof_names": list(joint_names()),
         "local_body_pos": None,
         "link_body_list": ["pelvis", "torso_link"],
     }
@@ -75,5 +69,10 @@ def test_pose_aa_tells_quaternions_of_the_other_order_and_contradictions(motions
 
 def test_a_pose_of_zeros_says_nothing(motions):
     raw = motions.raw()
-    (came,) = read_asap_pickle(motions.pickle(raw, pose_aa=np.zeros((80, 27, 3))))
+    path = motions.pickle(raw, pose_aa=np.zeros((80, 27, 3)))
+    (came,) = read_asap_pickle(path, options=RobotConfig(joints_23="asap"))
     same(came, raw)
+    with pytest.raises(
+        BadInput, match=r"came 23 joints without names.*--set joints_23=asap or --set joints_23=unitree"
+    ):
+        read_asap_pickle(path)

@@ -7,17 +7,15 @@ import numpy as np
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.checks import check_raw
 from bumblebee.motion.formats.read import RobotConfig, format_of, read_robot
+from bumblebee.motion.usable import usable
 
 SHARED = next((p / "shared/data/motions" for p in Path(__file__).parents if (p / "shared/data/motions").is_dir()), None)
 
 
 def test_a_csv_without_a_rate_is_asked_for_it(motions):
     path = motions.csv(motions.raw())
-    with pytest.raises(
-        BadInput, match=r"expected a frame rate, .*motions\.read\.csv_fps, or --csv-fps.*a sprint"
-    ) as caught:
+    with pytest.raises(BadInput, match=r"expected a frame rate, .*a sprint. Say it: --set csv_fps=30") as caught:
         read_robot(path, path.read_bytes())
     assert "\n" not in str(caught.value)
     (came,) = read_robot(path, path.read_bytes(), RobotConfig(csv_fps=30))
@@ -57,5 +55,5 @@ def test_real_motions_are_read_and_pass_the_checks(folder, count, suffix):
     assert len(paths) == count
     for path in paths[::7]:
         for raw in read_robot(path, path.read_bytes(), RobotConfig(csv_fps=60)):
-            check_raw(raw)
+            usable(raw)
             assert raw.notes == ()

@@ -7,7 +7,8 @@ import pytest
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.human.floor import floor_height
-from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.human.frame import require_right_handed, upright_axis, z_up
+from bumblebee.motion.human.motion import LANDMARKS, HumanMotion
 from bumblebee.motion.human.read import HumanConfig, read_human
 from bumblebee.motion.walk import motion_sources
 from bumblebee.ranges import Unfit
@@ -61,9 +62,8 @@ def lying(frames: int = 40) -> np.ndarray:
 
 
 def test_a_person_who_lies_is_asked_for_the_up_axis():
-    assert "came z by the motion, y by the skeleton's own pose. Say it: motions.read.up (--set up=y)." in line(
-        lambda: read(bvh(values=lying()))
-    )
+    words = line(lambda: read(bvh(values=lying())))
+    assert "along z by the motion, along y by the skeleton's own pose. Say it: --set up=y or --set up=z" in words
     assert np.ptp(read(bvh(values=lying()), up="y").positions[0, :, 2]) < 0.6
 
 
@@ -151,7 +151,7 @@ def test_an_npz_of_something_else_is_one_line():
 
 
 def test_settings_hold_their_ranges():
-    for wrong in ({"unit": "yard"}, {"up": "x"}, {"fps": -1.0}):
+    for wrong in ({"unit": "yard"}, {"up": "w"}, {"fps": -1.0}):
         with pytest.raises(Unfit):
             HumanConfig(**wrong)
 
@@ -160,11 +160,36 @@ def test_an_smpl_file_that_looks_y_up_is_asked_for_its_axis():
     arrays = smpl()
     arrays["poses"][:, 0], arrays["trans"] = 0, np.tile([0.0, 1.15, 0.0], (40, 1))
     words = line(lambda: read_human(Path("a.npz"), npz(arrays)))
-    assert "y up, or a person who lies" in words and "motions.read.up" in words
+    assert "stands along y: another axis is up, or the person lies" in words and "motions.read.up" in words
     (turned,) = read_human(Path("a.npz"), npz(arrays), HumanConfig(up="y"))
     assert turned.landmark("head")[0, 2] > 1.3
     (lies,) = read_human(Path("a.npz"), npz(arrays), HumanConfig(up="z"))
     assert np.ptp(lies.positions[0, :, 2]) < 0.6
+
+
+TURNS = {"x": (2, 1, 0, (1, 1, -1)), "-x": (2, 1, 0, (-1, 1, 1)), "y": (0, 2, 1, (1, 1, -1)),
+         "-y": (0, 2, 1, (1, -1, 1)), "-z": (0, 1, 2, (1, -1, -1))}  # fmt: skip
+
+
+@pytest.mark.parametrize("up", TURNS)
+def test_an_smpl_file_whose_person_does_not_stand_along_z_is_asked_for_and_read_as_set(up):
+    positions = read_human(Path("a.npz"), npz(smpl()))[0].positions
+    *columns, signs = TURNS[up]
+    turned = positions[..., columns] * signs
+    assert upright_axis(turned) == up and upright_axis(turned[:1]) == up
+    np.testing.assert_allclose(np.linalg.norm(np.diff(z_up(turned, up), axis=1), axis=2),
+                               np.linalg.norm(np.diff(positions, axis=1), axis=2), atol=1e-9)  # fmt: skip
+    assert upright_axis(z_up(turned, up)) == "z"
+    require_right_handed("a turn is no mirror", z_up(turned, up))
+
+
+def test_a_person_with_the_trunk_held_level_still_stands():
+    positions = read_human(Path("a.npz"), npz(smpl()))[0].positions.copy()
+    trunk = [LANDMARKS.index(name) for name in ("chest", "neck", "head")]
+    positions[:, trunk] = positions[:, trunk][..., [2, 1, 0]] + [0.0, 0.0, 0.9]
+    positions[:, LANDMARKS.index("left_ankle")] += [0.0, 0.5, 0.7]  # lifted behind, and moved
+    positions[::2, LANDMARKS.index("left_ankle"), 0] += 0.02
+    assert upright_axis(positions) == "z"
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the shared motions are not here")

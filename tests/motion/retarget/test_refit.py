@@ -41,8 +41,9 @@ def test_a_motion_that_floats_ever_higher_stands_after(swaying):
 
 
 def test_feet_that_slide_while_they_float_stand_still_after(swaying):
-    """The test motion walks on at 0.2 m/s without lifting a foot: its soles slide by as much."""
-    floating = replace(swaying, root_pos=swaying.root_pos + np.array([0.0, 0.0, 0.08]))
+    """The robot moves on at 0.2 m/s without lifting a foot: its soles slide by as much."""
+    moved = 0.2 * np.arange(len(swaying.root_pos)) / swaying.fps
+    floating = replace(swaying, root_pos=swaying.root_pos + np.stack([moved, 0 * moved, 0 * moved + 0.08], axis=1))
     after = refit(floating, GroundingConfig(), RetargetConfig())
 
     def sliding(raw):
