@@ -22,7 +22,7 @@ from bumblebee.motion.retarget.refit import refit
 from bumblebee.motion.retarget.retarget import VERSION, retarget
 from bumblebee.motion.settings import ReadConfig
 
-_READER = 2  # version of the readers, like those of the methods part of a cached result's key
+_READER = 3  # version of the readers, like those of the methods part of a cached result's key
 
 
 @dataclass(frozen=True, eq=False)
