@@ -109,6 +109,16 @@ def toes_ahead(positions: np.ndarray) -> float:
     return float(np.median(forward))
 
 
+def knees_ahead(positions: np.ndarray) -> float:
+    """Likewise above 0 where the knees of a body (T, 18, 3) bend ahead, below 0 where they bend back."""
+    across = positions[:, _INDEX["left_hip"]] - positions[:, _INDEX["right_hip"]]
+    forward = np.zeros(len(positions))
+    for side in ("left", "right"):
+        hip, knee, ankle = (positions[:, _INDEX[f"{side}_{joint}"]] for joint in ("hip", "knee", "ankle"))
+        forward += np.einsum("ti,ti->t", np.cross(across, hip - ankle), knee - (hip + ankle) / 2)
+    return float(np.median(forward))
+
+
 def require_right_handed(where: object, positions: np.ndarray) -> None:
     """Refuse a body whose feet point backwards: left and right are exchanged, or the axes are left-handed.
 

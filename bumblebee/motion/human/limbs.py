@@ -140,7 +140,7 @@ def labelled(
             if came:
                 placed = _placed(names, nodes.joints[one], nodes.joints[other], role)
                 (said, long, steps), chain = came
-                here[number] = ((said + placed.weight, long, steps), (chain, placed))
+                here[number] = ((said + max(placed.weight, 0), long, steps), (chain, placed))
                 best = _best(best, here[number]) or best
         higher = [_best(a, b) for a, b in zip(above, direct, strict=True)]
         stack += [(partners, here, higher) for partners in _partners(names, nodes, alike, one, other)]

@@ -62,7 +62,8 @@ def _find(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes) -> R
         for one in limbs.roles
         for number, side in enumerate(("left", "right") if limbs.side >= 0 else ("right", "left"))
     }
-    placed |= {role: (joint, weight(role, words[joint])) for role, joint in _trunk(words, nodes, leg, arm).items()}
+    trunk = _trunk(words, nodes, leg, arm).items()
+    placed |= {role: (joint, max(weight(role, words[joint]), 0)) for role, joint in trunk}
     ordered = {role: placed[role] for role in LANDMARKS if role in placed}
     evidence = {role: _BY[said] for role, (_, said) in ordered.items()}
     sided = {"hip": leg.side != 0, "shoulder": arm.side != 0}

@@ -8,7 +8,7 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.motion.human.bvh import Bvh
 from bumblebee.motion.human.forward import bone_offsets, bvh_positions
-from bumblebee.motion.human.frame import toes_ahead
+from bumblebee.motion.human.frame import knees_ahead, toes_ahead
 from bumblebee.motion.human.motion import LANDMARKS, Role
 from bumblebee.motion.human.roles import NAME, OTHERWISE, PLACE, find_roles
 from bumblebee.motion.human.skeleton_file import Stated, joints_stated
@@ -74,9 +74,12 @@ def _recognised(where: object, bvh: Bvh) -> Skeleton:
     order = _left_first(places, found.sided["hip"], found.sided["shoulder"])
     evidence = {name: found.evidence[LANDMARKS[i]] for name, i in zip(LANDMARKS, order, strict=True)}
     roles = _rows([joints[i] for i in order], bvh, evidence)
+    if not any(found.sided.values()) and knees_ahead(places[:, order]) <= 0:
+        wanted = "names with sides, or toes that point to where the knees bend: they tell left from right"
+        raise UnknownSkeleton(where, wanted, "neither", DO).found(roles)
     guessed = [f"{role.landmark} {role.joint}" for role in roles if role.evidence != NAME]
     note = f"by name but for {', '.join(guessed)} ({PLACE})" if guessed else "by name"
-    note += "" if all(found.sided.values()) else "; left and right by the feet"
+    note += "" if all(found.sided.values()) else "; left and right by knees and toes"
     return Skeleton(tuple(joints[i] for i in order), places[:, order], roles, note)
 
 
