@@ -91,20 +91,19 @@ def _trunk(words: Sequence[str], nodes: Nodes, leg: Limbs, arm: Limbs) -> dict[s
     spine = [*above[: above.index(meet) + 1], *reversed(below[: below.index(meet)])]
     named = [node for node in above if _best(words, nodes, node, "pelvis")[1] > 0]
     found = {"pelvis": _best(words, nodes, (named or [hips])[0], "pelvis")[0]}
-    chest, neck = shoulders, -1
-    if weight("neck", words[nodes.joints[shoulders][0]]) > 0:  # 3ds Max hangs the arms from the neck
-        chest, neck = spine[-2], nodes.joints[shoulders][0]
+    inside = nodes.joints[shoulders]
+    hung = weight("neck", words[inside[0]]) > 0  # 3ds Max hangs the arms from the neck
+    chest = spine[-2] if hung else shoulders
     if chest != hips:
         found["chest"] = _best(words, nodes, chest, "chest")[0]
     chain = _to_head(words, nodes, shoulders, {*arm.pair, *spine})
-    if chain:
-        found["head"] = _best(words, nodes, chain[-1], "head")[0]
-        before = [joint for node in chain[:-1] for joint in nodes.joints[node]]
-        inside = [joint for joint in nodes.joints[shoulders] if weight("neck", words[joint]) > 0]
-        by_name = [joint for joint in before if weight("neck", words[joint]) > 0]
-        neck = next(iter([*([neck] if neck >= 0 else []), *by_name, *before, *inside]), -1)
-    if neck >= 0:
-        found["neck"] = neck
+    if chain and _best(words, nodes, chain[-1], "neck")[1] <= 0:
+        found["head"] = _best(words, nodes, chain.pop(), "head")[0]
+    before = [joint for node in chain for joint in nodes.joints[node]]
+    by_name = [joint for joint in (*inside[:hung], *before) if weight("neck", words[joint]) > 0]
+    behind = [joint for joint in inside if weight("neck", words[joint]) > 0]
+    if necks := [*by_name, *before, *behind]:
+        found["neck"] = necks[0]
     return found
 
 

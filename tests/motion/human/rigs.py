@@ -4,7 +4,7 @@ A skeleton is given as chains of `name=point`: each joint lies in a point of the
 body does to which the point belongs.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -40,7 +40,7 @@ class Rig:
     """How a file writes the person."""
 
     scale: float = 100.0
-    world: Rotation = Rotation.identity()
+    world: Rotation = field(default_factory=Rotation.identity)
     """From y up, facing z, to the file's axes and the way that the person faces."""
     rest: str = "T"
     """The pose with all angles 0: `T`, `down` (arms) or `line` (each bone along x, as some exporters have it)."""
@@ -50,8 +50,9 @@ class Rig:
     frames: int = 40
 
 
-def write(joints: list[tuple[str, str, str]], rig: Rig = Rig()) -> str:  # noqa: B008
+def write(joints: list[tuple[str, str, str]], rig: Rig | None = None) -> str:
     """BVH of joints (name, parent, point), parents first; an end of a chain is a joint named `end`."""
+    rig = rig or Rig()
     rest, places, turns = _motion(rig.frames)
     rows = [(name, next((i for i in range(n) if joints[i][0] == parent), -1), point)
             for n, (name, parent, point) in enumerate(joints)]  # fmt: skip
@@ -122,7 +123,9 @@ def _motion(frames: int) -> tuple[dict, dict, dict]:
         for point, (at, _) in (_LIMBS if side else _TRUNK).items():
             rest[side + point] = np.array(at, float) * (mirror if side else [1, 1, 1])
     joints = {"Hips": "", "Spine": "Hips", "Head": "Spine"}
-    joints |= {f"{s}{part}": (f"{s}{parent}" if parent in _LIMBS else parent) for s in "LR" for part, parent in _PARTS[3:]}
+    joints |= {
+        f"{s}{part}": (f"{s}{parent}" if parent in _LIMBS else parent) for s in "LR" for part, parent in _PARTS[3:]
+    }
     for joint, parent in joints.items():
         if parent:
             places[joint] = places[parent] + turns[parent].apply(rest[joint] - rest[parent])

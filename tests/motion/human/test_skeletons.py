@@ -127,7 +127,10 @@ def test_names_that_are_left_on_the_right_are_asked_for():
 
 
 def test_sides_without_names_are_asked_for_where_knees_and_toes_disagree():
-    heels = [(name, parent, point.replace("ToeEnd", "Heel").replace("Toe", "Heel")) for name, parent, point in unnamed(LAYOUTS[PLAIN])]
+    heels = [
+        (name, parent, point.replace("ToeEnd", "Heel").replace("Toe", "Heel"))
+        for name, parent, point in unnamed(LAYOUTS[PLAIN])
+    ]
     assert "they tell left from right, came neither" in str(refusal(heels))
 
 
@@ -140,10 +143,10 @@ ANIMAL = chains("Root=Hips, Spine1=Spine, Spine2=Chest, Neck=Neck, Head=Head, en
     ("joints", "words"),
     [
         (ANIMAL, "names against the shape: LeftForeLeg as left_elbow"),
-        (chains("Wrist=LHand, Index=LFinger, end=LFingerEnd", "Wrist: Thumb=LThumb, end=LThumbEnd"), "without legs and"),
+        (chains("Wrist=LHand, Index=LFinger, end=LFingerEnd", "Wrist: Thumb=LThumb, end=LThumbEnd"), "without legs"),
         ([j for j in LAYOUTS[PLAIN] if "Toe" not in j[0] and "Toe" not in j[2]], "none for left_toe, right_toe"),
         ([j for j in LAYOUTS[PLAIN] if "Arm" not in f"{j[0]}{j[1]}" and "Hand" not in f"{j[0]}{j[1]}"], "none for"),
-        ([j for j in LAYOUTS[PLAIN] if j[0] != "Head" and j[1] != "Head"], "none for neck"),
+        ([j for j in LAYOUTS[PLAIN] if j[0] != "Head" and j[1] != "Head"], "none for head ("),
         (renamed(LAYOUTS[PLAIN], lambda name: name.replace("LeftLeg", "LeftWrist")), "LeftWrist as left_knee"),
     ],
 )  # fmt: skip
