@@ -78,7 +78,7 @@ def _recognised(where: object, bvh: Bvh) -> Skeleton:
         wanted = "names with sides, or toes that point to where the knees bend: they tell left from right"
         raise UnknownSkeleton(where, wanted, "neither", DO).found(roles)
     guessed = [f"{role.landmark} {role.joint}" for role in roles if role.evidence != NAME]
-    note = f"by name but for {', '.join(guessed)} ({PLACE})" if guessed else "by name"
+    note = f"by name but for {_few(guessed)} ({PLACE})" if guessed else "by name"
     note += "" if all(found.sided.values()) else "; left and right by knees and toes"
     return Skeleton(tuple(joints[i] for i in order), places[:, order], roles, note)
 
