@@ -26,6 +26,9 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="What files leave unsaid: docs/data.md."),
 ]
+Skeleton = Annotated[
+    str, typer.Option("--skeleton", metavar="FILE", help="Which joint of BVH files is which: `inspect` prints it.")
+]
 Rows = Annotated[int, typer.Option("--rows", min=1, help="Rows of the table at most; all are counted.")]
 
 
@@ -34,18 +37,21 @@ def inspect(
     path: Where,
     csv_fps: CsvFps = None,
     settings: Settings = None,
+    skeleton: Skeleton = "",
     rows: Rows = 200,
 ) -> None:
     """A table of motions: format, rate and who says it, length, height, captions, licence; bad files one line each."""
     from bumblebee.motion.inspect import Counts, count
     from bumblebee.motion.inspect import inspect as look
+    from bumblebee.motion.layouts import Layouts
 
-    options = _options(csv_fps, settings)
+    options = _options(csv_fps, settings, skeleton)
     shown_rows: list[Inspected] = []
-    counts, first = Counts(), ""
+    counts, first, layouts = Counts(), "", Layouts()
     for found in look(path, options):
         counts.add(found)
         for row in found:
+            layouts.add(row.skeleton, _place(row.file, path))
             first = first or row.problem
             if row.problem:
                 print(_line(f"{_place(row.file, path)}: {row.problem}"))
@@ -54,6 +60,8 @@ def inspect(
     _print_table(shown_rows, path)
     if counts.motions > len(shown_rows):
         print(f"... and {counts.motions - len(shown_rows):,} more motions (--rows)")
+    if layout := layouts.text():
+        print(layout)
     print(counts)
     if not counts.usable:
         raise BadInput(path, "a motion", f"{count(counts.files, 'file')}, nothing usable; the first: {first}"[:1500])
@@ -67,6 +75,7 @@ def convert(
     fps: Annotated[float | None, typer.Option("--fps", min=1, max=1000, help="Rate of what is written.")] = None,
     csv_fps: CsvFps = None,
     settings: Settings = None,
+    skeleton: Skeleton = "",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what was converted before.")] = False,
 ) -> None:
     """Write motions in another format; without --fps at their own rate, 50 Hz for mjlab and libraries."""
@@ -77,7 +86,7 @@ def convert(
 
     if to not in KINDS:
         raise BadInput("--to", f"one of {', '.join(KINDS)}", repr(to)[:60])
-    config = ConvertConfig(to, fps, _options(csv_fps, settings))
+    config = ConvertConfig(to, fps, _options(csv_fps, settings, skeleton))
     began = time.monotonic()
     done = write(path, out, config, overwrite, lambda line: print(f"skipped: {line}", file=sys.stderr))
     rates = ", ".join(f"{rate:g}" for rate in sorted(done.rates))
@@ -105,6 +114,7 @@ def retarget(
     fps: Annotated[float, typer.Option("--fps", min=5, max=1000, help="Rate of what is written.")] = 50.0,
     csv_fps: CsvFps = None,
     settings: Settings = None,
+    skeleton: Skeleton = "",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what was written before.")] = False,
 ) -> None:
     """Put motions of people on any humanoid, one file each with the root's pose and the joints by name."""
@@ -113,7 +123,7 @@ def retarget(
 
     if to not in ("npz", "csv"):
         raise BadInput("--to", "npz or csv", repr(to)[:60])
-    config = RobotFiles(model, mapping, fps, to, _options(csv_fps, settings))  # type: ignore[arg-type]
+    config = RobotFiles(model, mapping, fps, to, _options(csv_fps, settings, skeleton))  # type: ignore[arg-type]
     if model is None and mapping is None:
         print("Onto the G1; `bumblebee motions convert` writes the formats that its trainers read.")
     began = shown = time.monotonic()
@@ -145,13 +155,14 @@ def play(
     panels: Annotated[int, typer.Option("--panels", min=1, max=40, help="Frames of a filmstrip.")] = 8,
     csv_fps: CsvFps = None,
     settings: Settings = None,
+    skeleton: Skeleton = "",
 ) -> None:
     """Show a motion on the robot: in a window, or with --out as a film or a filmstrip."""
     if out is not None:
         _claim_picture(out, path)
     elif not _display():
         raise BadInput("--out", "film.gif or film.png on a machine without a display", "nothing")
-    clip = _chosen(path, motion, _options(csv_fps, settings))
+    clip = _chosen(path, motion, _options(csv_fps, settings, skeleton))
     if out is None:
         _window(clip)
         return
@@ -162,10 +173,10 @@ def play(
     print(f"written: {out}")
 
 
-def _options(csv_fps: float | None, settings: list[str] | None) -> "FileConfig":
+def _options(csv_fps: float | None, settings: list[str] | None, skeleton: str = "") -> "FileConfig":
     from bumblebee.motion.one_file import stated
 
-    return stated(settings or [], csv_fps=csv_fps)
+    return stated(settings or [], csv_fps=csv_fps, skeleton=skeleton)
 
 
 def _print_table(rows: "list[Inspected]", path: Path) -> None:

@@ -100,6 +100,7 @@ def folders_of(content: dict[str, Any]) -> list[Path]:
     texts = read.get("describe") if isinstance(read, dict) else None
     named = [
         section.get("source"),
+        read.get("skeleton") if isinstance(read, dict) else None,
         *(
             (texts.get(key) for key in ("captions_folder", "captions_csv", "humanml3d"))
             if isinstance(texts, dict)

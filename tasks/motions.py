@@ -88,7 +88,7 @@ def gather(config: MotionsConfig, take: Callable[[Clip], None]) -> Reading:
         )
     texts = config.read.describe
     named = {f"read.describe.{key}": getattr(texts, key) for key in TEXTS}
-    require_watched("motions", {"source": source, **named})
+    require_watched("motions", {"source": source, "read.skeleton": config.read.skeleton, **named})
     files = sum(1 for _ in motion_sources(source))
     with progress(files, "reading motions", "files") as bar:
         return read_each(source, take, config.read, bar.update, paths.RETARGETS)

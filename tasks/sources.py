@@ -23,6 +23,10 @@ def check_sources(found: dict[str, Any], path: Path) -> None:
     if motions.source != "embedded":
         place, wanted = f"{path}: motions.source", "a folder of motions or 'embedded'"
         _require(_at_home(motions.source, place, wanted), place, wanted, either=True)
+    try:
+        motions.read.require_skeleton()
+    except BadInput as error:
+        raise BadInput(f"{path}: motions.read.skeleton: {error.where}", error.expected, error.came, error.do) from None
     texts = motions.read.describe
     for key, wanted in (("captions_folder", "a folder of captions"), ("humanml3d", "HumanML3D's folder")):
         if getattr(texts, key):

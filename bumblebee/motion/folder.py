@@ -71,6 +71,7 @@ def read_each(
     path, config = Path(path), config or ReadConfig()
     if not os.path.lexists(path):
         raise BadInput(path, "a folder with motion files, or a motion file", "no such folder or file")
+    config.require_skeleton()
     say, heard = describer(config.describe, path), _Heard()
     count = 0
     for clip in distinct(_groups(path, config, cache, say, heard, tell or (lambda: None))):

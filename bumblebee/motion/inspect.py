@@ -10,7 +10,7 @@ from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import beside
 from bumblebee.motion.formats.read import format_of
-from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.human.motion import HumanMotion, Role
 from bumblebee.motion.listing import Found, Motion, find_motions, reason_of
 from bumblebee.motion.one_file import FileConfig
 from bumblebee.motion.raw import RawMotion
@@ -37,6 +37,8 @@ class Inspected:
     notes: tuple[str, ...] = ()
     problem: str = ""
     """Why the file or the motion cannot be used, "" if it can."""
+    skeleton: tuple[Role, ...] = ()
+    """Which joint of a BVH file is which landmark, as far as it is known."""
 
     @property
     def seconds(self) -> float:
@@ -93,7 +95,8 @@ def inspect(path: Path, config: FileConfig | None = None) -> Iterator[list[Inspe
 def rows_of(found: Found) -> list[Inspected]:
     """A row for each motion of a file; one with the reason where there is none."""
     if not found.motions:
-        return [Inspected(found.path, format_of(found.path), problem=found.reason or "no motion in it")]
+        reason = found.reason or "no motion in it"
+        return [Inspected(found.path, format_of(found.path), problem=reason, skeleton=found.skeleton)]
     return [_row(found, motion) for motion in found.motions]
 
 
@@ -104,17 +107,17 @@ def _row(found: Found, motion: Motion) -> Inspected:
             path, "library", motion.name, motion.frames, motion.fps, "library", _range(motion.root_pos[:, 2]),
             motion.joint_pos.shape[1], len(motion.captions), motion.licence,
         )  # fmt: skip
-    problem, notes = "", motion.notes
+    problem, notes, skeleton = "", motion.notes, ()
     if isinstance(motion, HumanMotion):
         kind, root = f"person {path.suffix.lower()}", motion.landmark("pelvis")
-        joints, rate = 0, "file"
+        joints, rate, skeleton = 0, "file", motion.skeleton
     else:
         kind, root, joints, rate = format_of(path), motion.root_pos, motion.joint_pos.shape[1], motion.rate_from
         problem, notes = _judged(path, motion)
     texts = beside(motion.file, (len(root) - 1) / motion.fps)
     return Inspected(
         path, kind, motion.name, len(root), motion.fps, rate, _range(root[:, 2]), joints,
-        len(texts.captions), found.licence, (*notes, *texts.notes), problem,
+        len(texts.captions), found.licence, (*notes, *texts.notes), problem, skeleton,
     )  # fmt: skip
 
 

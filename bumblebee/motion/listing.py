@@ -9,7 +9,8 @@ from bumblebee.errors import BadInput
 from bumblebee.io.limits import LIMITS
 from bumblebee.motion import walk
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.human.motion import HumanMotion, Role
+from bumblebee.motion.human.skeleton import UnknownSkeleton
 from bumblebee.motion.licence_table import LICENCES, stated_of
 from bumblebee.motion.licences import licence_of, stated_rate
 from bumblebee.motion.one_file import FileConfig, read_one
@@ -32,6 +33,8 @@ class Found:
     data: bytes = field(default=b"", repr=False)
     source: Source | None = None
     """Where the bytes come from; None for a clip of a library."""
+    skeleton: tuple[Role, ...] = ()
+    """Of a file that is refused for its skeleton: the joints that were found for the landmarks."""
 
     @property
     def licence(self) -> str:
@@ -48,9 +51,10 @@ def find_motions(path: Path, config: FileConfig | None = None) -> Iterator[Found
         config: what files may leave unsaid.
 
     Raises:
-        BadInput: nothing lies at `path`, or nothing that could be a motion.
+        BadInput: nothing lies at `path`, or nothing that could be a motion; a mapping of joints that is none.
     """
     path, config = Path(path), config or FileConfig()
+    config.require_skeleton()
     if not os.path.lexists(path):
         raise BadInput(path, "a motion file, or a folder that holds some", "no such file or folder")
     nothing = True
@@ -73,7 +77,8 @@ def _file(source: Source, config: FileConfig) -> Found:
         rate, rate_from = csv_rate(source, config)
         found = read_one(source.path, data, replace(config, csv_fps=rate))
     except BadInput as error:
-        return Found(source.path, reason=reason_of(error, source.path), data=data)
+        roles = error.roles if isinstance(error, UnknownSkeleton) else ()
+        return Found(source.path, reason=reason_of(error, source.path), data=data, skeleton=roles)
     except Exception as error:  # a mistake of ours about one file must not cost the user all the others
         said = shown(f"it could not be read ({type(error).__name__}: {error}): please report this")
         return Found(source.path, reason=said, data=data)

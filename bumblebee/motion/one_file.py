@@ -14,8 +14,9 @@ from bumblebee.motion.human.motion import HumanMotion
 from bumblebee.motion.human.npz import npz_keys
 from bumblebee.motion.human.read import SUFFIXES as HUMAN
 from bumblebee.motion.human.read import HumanConfig, read_human
+from bumblebee.motion.human.skeleton_file import read_stated
 from bumblebee.motion.raw import RawMotion
-from bumblebee.ranges import Range, Ranged, Unfit
+from bumblebee.ranges import Line, Range, Ranged, Unfit
 
 READ = tuple(dict.fromkeys((*ROBOT, *HUMAN)))
 
@@ -46,6 +47,17 @@ class FileConfig(Ranged):
     """The up axis of human motion; empty: BVH's by the body, that of SMPL files z, where the body stands so."""
     smpl_fps: Annotated[float, Range(least=0, most=1000)] = 0.0
     """Frame rate of SMPL files that state none [Hz]."""
+    skeleton: Line = ""
+    """A YAML file that says which joint of BVH files is which landmark; empty: recognised, or asked for."""
+
+    def require_skeleton(self) -> None:
+        """Refuse a mapping of joints that is none once, before any file is read.
+
+        Raises:
+            BadInput: what is wrong in the file.
+        """
+        if self.skeleton:
+            read_stated(self.skeleton)
 
     @property
     def robot(self) -> RobotConfig:
@@ -55,7 +67,7 @@ class FileConfig(Ranged):
     @property
     def human(self) -> HumanConfig:
         """What concerns motions of people."""
-        return HumanConfig(self.unit, self.up, self.smpl_fps)
+        return HumanConfig(self.unit, self.up, self.smpl_fps, read_stated(self.skeleton) if self.skeleton else None)
 
 
 def stated(settings: Iterable[str], **options: Any) -> FileConfig:

@@ -68,6 +68,15 @@ def test_the_users_motions_are_a_dependency_of_the_stage_that_reads_them(tmp_pat
     assert read(folder / "params.yaml")["motions"]["source"] == str(motions)
 
 
+def test_a_mapping_of_joints_is_a_dependency_of_the_stage_that_reads_motions(tmp_path: Path):
+    folder = workspaces.create(tmp_path / "lab", motions=tmp_path)
+    settings = read(folder / "params.yaml")
+    settings["motions"]["read"] = {"skeleton": "/lab/skeleton.yaml"}
+    (folder / "params.yaml").write_text(yaml.safe_dump(settings))
+    workspaces.create(folder)
+    assert "/lab/skeleton.yaml" in yaml.safe_load((folder / "dvc.yaml").read_text())["stages"]["motions"]["deps"]
+
+
 def test_the_files_that_the_filter_is_given_are_dependencies_of_its_stage(tmp_path: Path):
     named = {"overrule": "word.csv", "policy": {"source": "/lab/policy"}}
     folder = workspaces.create(tmp_path / "lab", filter=named)

@@ -156,6 +156,7 @@ def test_the_command_ends_with_one_line_and_status_2(tmp_path: Path):
     [
         ("motions.source", "nowhere"),
         ("motions.source", "~nobody-of-this-name/motions"),
+        ("motions.read.skeleton", "nowhere.yaml"),
         ("motions.read.describe.captions_folder", "nowhere"),
         ("filter.overrule", "nowhere.csv"),
         ("filter.policy.source", "nowhere"),

@@ -37,6 +37,7 @@ WRONG: list[tuple[str, Any, str]] = [
     *_same("motions.read.csv_fps", 0, -60, NAN, INF),
     *_same("motions.read.fps", 0, 30, NAN),
     *_same("motions.read.max_seconds", -1, 0.01, NAN),
+    *_same("motions.read.skeleton", "a\nb", 5),
     ("motions.read.csv_fps_by_folder", {"lafan1": 0}, "motions.read.csv_fps_by_folder.lafan1"),
     ("motions.read.csv_fps_by_folder", {"": 30}, "motions.read.csv_fps_by_folder."),
     *_same("motions.read.grounding.method", "raise", True),

@@ -43,6 +43,16 @@ def _block(bvh: Bvh, values: np.ndarray, chain: Sequence[int], added: Container[
     return places
 
 
+def bone_offsets(bvh: Bvh) -> np.ndarray:
+    """Offset of each joint from its parent, (J, 3) in the file's unit; the median where positions replace it."""
+    offsets = bvh.offsets.copy()
+    for joint in range(len(bvh.parents)):
+        columns, axes = _positions(bvh, joint)
+        if bvh.parents[joint] >= 0 and columns and not adds_positions(bvh, joint):
+            offsets[joint, axes] = np.median(bvh.values[:, columns], axis=0)
+    return offsets
+
+
 def rest_positions(bvh: Bvh, joints: Sequence[int]) -> np.ndarray:
     """Positions of some joints in the hierarchy's own pose, all angles zero, (len(joints), 3) in the file's unit."""
     places = np.zeros((len(bvh.parents), 3))

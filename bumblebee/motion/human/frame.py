@@ -112,20 +112,36 @@ def z_up(positions: np.ndarray, up: str) -> np.ndarray:
     return np.stack(turned[up], axis=-1)
 
 
-def require_right_handed(where: object, positions: np.ndarray) -> None:
-    """Refuse a body whose feet point backwards: left and right are exchanged, or the axes are left-handed.
+def toes_ahead(positions: np.ndarray) -> float:
+    """Above 0 where the toes of a body (T, 18, 3) point ahead in most of the frames, below 0 where they point back.
 
     Ahead is across the way from the right hip to the left one and up the shank, in right-handed axes, however the
-    person stands or lies; the foot points there.
-
-    Raises:
-        BadInput: in most frames the toes are behind the ankles.
+    person stands or lies.
     """
     across = positions[:, _INDEX["left_hip"]] - positions[:, _INDEX["right_hip"]]
     forward = np.zeros(len(positions))
     for side in ("left", "right"):
         knee, ankle, toe = (positions[:, _INDEX[f"{side}_{joint}"]] for joint in ("knee", "ankle", "toe"))
         forward += np.einsum("ti,ti->t", np.cross(across, knee - ankle), toe - ankle)
-    if np.median(forward) < 0:
+    return float(np.median(forward))
+
+
+def knees_ahead(positions: np.ndarray) -> float:
+    """Likewise above 0 where the knees of a body (T, 18, 3) bend ahead, below 0 where they bend back."""
+    across = positions[:, _INDEX["left_hip"]] - positions[:, _INDEX["right_hip"]]
+    forward = np.zeros(len(positions))
+    for side in ("left", "right"):
+        hip, knee, ankle = (positions[:, _INDEX[f"{side}_{joint}"]] for joint in ("hip", "knee", "ankle"))
+        forward += np.einsum("ti,ti->t", np.cross(across, hip - ankle), knee - (hip + ankle) / 2)
+    return float(np.median(forward))
+
+
+def require_right_handed(where: object, positions: np.ndarray) -> None:
+    """Refuse a body whose feet point backwards: left and right are exchanged, or the axes are left-handed.
+
+    Raises:
+        BadInput: in most frames the toes are behind the ankles.
+    """
+    if toes_ahead(positions) < 0:
         came = "toes that point backwards: left and right exchanged, or left-handed axes"
         raise BadInput(where, "right-handed axes, and left joints on the left", came, "Export the file again.")

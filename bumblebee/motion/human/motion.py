@@ -30,6 +30,15 @@ the toes bend), `chest` the spine joint nearest below the shoulders, `neck` its 
 `shoulder`, `elbow`, `wrist`, `hip`, `knee`, `ankle` the joints' centres."""
 
 
+@dataclass(frozen=True)
+class Role:
+    """The joint of a file that stands for a landmark, and what says so; both "" where none was found."""
+
+    landmark: str
+    joint: str = ""
+    evidence: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class HumanMotion:
     """What a reader of human motion returns, at the file's own rate, float64, nothing resampled or smoothed.
@@ -48,6 +57,9 @@ class HumanMotion:
     """Which motion of the file, where it holds several."""
     notes: tuple[str, ...] = ()
     """What was detected and not stated by the file: units, the up axis, first frames that were cut; for the summary."""
+
+    skeleton: tuple[Role, ...] = ()
+    """For each landmark the joint of the file; none for bodies that are known, such as SMPL's."""
 
     @property
     def where(self) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.motion.human.bvh import Bvh, parse_bvh
 from bumblebee.motion.human.floor import bad_start, on_floor
-from bumblebee.motion.human.forward import adds_positions, bvh_positions, rest_positions
+from bumblebee.motion.human.forward import adds_positions, rest_positions
 from bumblebee.motion.human.frame import (
     ask_up,
     find_unit,
@@ -19,9 +19,10 @@ from bumblebee.motion.human.frame import (
     upright_axis,
     z_up,
 )
-from bumblebee.motion.human.landmarks import find_landmarks
-from bumblebee.motion.human.motion import HumanMotion
+from bumblebee.motion.human.motion import HumanMotion, Role
 from bumblebee.motion.human.npz import npz_keys
+from bumblebee.motion.human.skeleton import find_skeleton
+from bumblebee.motion.human.skeleton_file import Stated
 from bumblebee.motion.human.smpl import is_smpl, read_smpl
 from bumblebee.ranges import Range, Ranged
 
@@ -39,6 +40,8 @@ class HumanConfig(Ranged):
     """The up axis; empty: BVH's by the body, that of SMPL files z, where the body stands so."""
     fps: Annotated[float, Range(least=0, most=1000)] = 0.0
     """Frame rate of SMPL files that state none; 0: such a file is refused [Hz]."""
+    skeleton: Stated | None = None
+    """Which joint of a BVH file is which landmark; None: recognised by tree, lengths and names."""
 
 
 def read_human(path: Path, data: bytes, options: HumanConfig | None = None) -> list[HumanMotion]:
@@ -52,9 +55,9 @@ def read_human(path: Path, data: bytes, options: HumanConfig | None = None) -> l
     Raises:
         BadInput: one line about what cannot be used, or must be stated.
     """
-    options = options or HumanConfig()
+    options, roles = options or HumanConfig(), ()
     if path.suffix.lower() == ".bvh":
-        fps, positions, notes = _from_bvh(path, data, options)
+        fps, positions, notes, roles = _from_bvh(path, data, options)
     elif is_smpl(npz_keys(path, data)):
         fps, positions, notes = _from_smpl(path, data, options)
     else:
@@ -70,19 +73,21 @@ def read_human(path: Path, data: bytes, options: HumanConfig | None = None) -> l
         raise BadInput(path, "a motion of at least 2 frames", f"{len(positions)}")
     require_right_handed(path, positions)
     positions, floor = on_floor(positions, fps)
-    return [HumanMotion(path.stem, fps, positions, path, first_row=1 + cut, notes=(*notes, *floor))]
+    notes = (*notes, *floor)
+    return [HumanMotion(path.stem, fps, positions, path, first_row=1 + cut, notes=notes, skeleton=roles)]
 
 
-def _from_bvh(path: Path, data: bytes, options: HumanConfig) -> tuple[float, np.ndarray, tuple[str, ...]]:
-    """Frame rate, positions (T, 18, 3) [m, z up] and notes."""
+def _from_bvh(
+    path: Path, data: bytes, options: HumanConfig
+) -> tuple[float, np.ndarray, tuple[str, ...], tuple[Role, ...]]:
+    """Frame rate, positions (T, 18, 3) [m, z up], notes and the skeleton's roles."""
     bvh = parse_bvh(path, data)
-    joints, table = find_landmarks(path, bvh.names, bvh.offsets)
-    places = bvh_positions(bvh, joints)
-    metres, by_legs = find_unit(path, leg_length(places), options.unit)
-    resting = upright_axis(rest_positions(bvh, joints)[None])
-    up, by_body = find_up(path, upright_axis(places), resting, options.up)
-    notes = (f"skeleton: {table.name}", *by_legs, *by_body, *_added(bvh))
-    return bvh.fps, z_up(metres * places, up), notes
+    found = find_skeleton(path, bvh, options.skeleton)
+    metres, by_legs = find_unit(path, leg_length(found.places), options.unit)
+    resting = upright_axis(rest_positions(bvh, found.joints)[None])
+    up, by_body = find_up(path, upright_axis(found.places), resting, options.up)
+    notes = (f"skeleton: {found.note}", *by_legs, *by_body, *_added(bvh))
+    return bvh.fps, z_up(metres * found.places, up), notes, found.roles
 
 
 def _added(bvh: Bvh) -> tuple[str, ...]:
