@@ -6,7 +6,8 @@ from pathlib import Path
 from bumblebee.sim.effects import CATALOGUE
 from tasks.policy_filter import PolicyFilter
 
-DOCS = Path(__file__).parent.parent / "docs"
+HOME = Path(__file__).parent.parent
+DOCS = HOME / "docs"
 
 
 def test_the_glossary_counts_the_effects_that_have_a_name():
@@ -25,3 +26,15 @@ def test_the_page_on_data_says_whether_the_policy_filter_is_on_by_default():
 def test_no_page_says_of_the_student_that_it_was_not_run_on_a_gpu():
     assert "Not run on a GPU" not in (DOCS / "training.md").read_text()
     assert "A generalist of the experts" in (DOCS / "results.md").read_text()
+
+
+def test_every_test_that_a_promise_names_is_there():
+    """Cells of docs/trust.md name files, and functions or classes in the file that was named last."""
+    missing, file = [], None
+    for name in re.findall(r"`((?:tests/[\w/.]+|::\w+|tests/[\w/.]+::\w+)[^`]*)`", (DOCS / "trust.md").read_text()):
+        path, _, function = name.partition("::")
+        file = HOME / path.split()[0] if path else file
+        word = re.match(r"\w*", function).group()
+        if file is None or not file.exists() or (word and f"def {word}" not in file.read_text()):
+            missing.append(name)
+    assert missing == []

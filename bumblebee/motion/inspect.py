@@ -107,7 +107,7 @@ def _row(found: Found, motion: Motion) -> Inspected:
             path, "library", motion.name, motion.frames, motion.fps, "library", _range(motion.root_pos[:, 2]),
             motion.joint_pos.shape[1], len(motion.captions), motion.licence,
         )  # fmt: skip
-    problem, notes, skeleton = "", motion.notes, ()
+    problem, notes, skeleton = "", motion.notes, tuple[Role, ...]()
     if isinstance(motion, HumanMotion):
         kind, root = f"person {path.suffix.lower()}", motion.landmark("pelvis")
         joints, rate, skeleton = 0, "file", motion.skeleton

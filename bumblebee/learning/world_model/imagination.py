@@ -21,7 +21,7 @@ from bumblebee.tracking.forward_kinematics import ForwardKinematics
 from bumblebee.tracking.library import ReferenceFrame, over_robot
 from bumblebee.tracking.observations import middle_targets
 from bumblebee.tracking.rewards import Step
-from bumblebee.tracking.terminations import lying
+from bumblebee.tracking.terminations import fallen
 from bumblebee.tracking.terms import expanded, see
 
 Act = Callable[[Tensor], Tensor]
@@ -118,7 +118,7 @@ class Imagination:
 
     def lost(self, step: Step) -> Tensor:
         """Robots (B,) bool whose episode ends as a failure with this step."""
-        return lying(step.state, step.ref, step.root_angle) | (step.key_errors.amax(-1) > self.env.limit)
+        return fallen(step.state, step.ref) | (step.key_errors.amax(-1) > self.env.limit)
 
     def _left(self, starts: Starts) -> Tensor:
         """Control steps (B,) until the clip's end."""

@@ -69,7 +69,10 @@ def nodes_of(names: Sequence[str], parents: Sequence[int], offsets: np.ndarray) 
     """The places of joints with plain names, from the offsets (J, 3) to their parents."""
     length = np.linalg.norm(offsets, axis=1)
     nodes = Nodes([], [], [], np.zeros(0))
-    of, carried, there, bones = [], [], [], []
+    of: list[int] = []  # the node of each joint
+    carried: list[float] = []  # length from the node to the joint
+    there: list[bool] = []  # whether the joint lies in the node
+    bones: list[float] = []
     for joint, parent in enumerate(parents):
         twist = parent >= 0 and is_twist(names[joint])
         if parent >= 0 and (twist or length[joint] == 0):

@@ -55,7 +55,8 @@ def read_human(path: Path, data: bytes, options: HumanConfig | None = None) -> l
     Raises:
         BadInput: one line about what cannot be used, or must be stated.
     """
-    options, roles = options or HumanConfig(), ()
+    options = options or HumanConfig()
+    roles: tuple[Role, ...] = ()
     if path.suffix.lower() == ".bvh":
         fps, positions, notes, roles = _from_bvh(path, data, options)
     elif is_smpl(npz_keys(path, data)):
