@@ -76,6 +76,17 @@ def upright_axis(positions: np.ndarray) -> str:
     return next((name for name, share in zip(AXES, (*middle, *-middle), strict=True) if share > _UPRIGHT), "")
 
 
+def standing_axis(pose: np.ndarray) -> str:
+    """`upright_axis` of a skeleton's own pose (18, 3); "" where the hips are not between head and feet.
+
+    Some files lay every bone along one axis there: that is no person, and says nothing of the axes.
+    """
+    axis = upright_axis(pose[None])
+    place, sign = "xyz".find(axis[-1:] or "-"), -1 if axis.startswith("-") else 1
+    trunk = pose[_INDEX["head"]] - pose[_INDEX["pelvis"]]
+    return axis if axis and sign * trunk[place] > 0 else ""
+
+
 def find_up(where: object, moving: str, resting: str, stated: str) -> tuple[str, tuple[str, ...]]:
     """The up axis, and a note where it was found and not stated.
 

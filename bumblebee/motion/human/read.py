@@ -16,6 +16,7 @@ from bumblebee.motion.human.frame import (
     find_up,
     leg_length,
     require_right_handed,
+    standing_axis,
     upright_axis,
     z_up,
 )
@@ -85,7 +86,7 @@ def _from_bvh(
     bvh = parse_bvh(path, data)
     found = find_skeleton(path, bvh, options.skeleton)
     metres, by_legs = find_unit(path, leg_length(found.places), options.unit)
-    resting = upright_axis(rest_positions(bvh, found.joints)[None])
+    resting = standing_axis(rest_positions(bvh, found.joints))
     up, by_body = find_up(path, upright_axis(found.places), resting, options.up)
     notes = (f"skeleton: {found.note}", *by_legs, *by_body, *_added(bvh))
     return bvh.fps, z_up(metres * found.places, up), notes, found.roles
