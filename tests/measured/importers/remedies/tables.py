@@ -76,6 +76,20 @@ def columns(**names: Any) -> Callable[[Import, str], None]:
     return lambda attempt, line: attempt.map["columns"].update(names)
 
 
+def locked(attempt: Import, line: str) -> None:
+    """Put `_` in the place of the joint that is named, and the joint under `locked`."""
+    joint = re.search(r"came (?:kp 0 of|all but) (\w+)\.", line)[1]
+    attempt.map["joints"] = ["_" if name == joint else name for name in attempt.map["joints"]]
+    attempt.map["locked"] = [joint]
+
+
+def dead_motor(attempt: Import) -> None:
+    """The good log with gains, zero for the knee."""
+    csv_import(attempt, table(200).assign(kp1=40.0, kd1=2.0, off=0.0))
+    attempt.map["columns"] |= {"kp": ["kp1", "off"], "kd": ["kd1", "off"]}
+    attempt.options.add("--model")
+
+
 def option(attempt: Import, line: str) -> None:
     attempt.options.add(re.search(r"--\w+", line)[0])
 
@@ -240,4 +254,7 @@ CASES = (
         "Name it",
         columns(joint_target=["hip_cmd", "knee_cmd"]),
     ),
+    Case("no model of a locked joint", with_columns(joints=["hip", "_"], locked=["knee"]), "Give it", option),
+    Case("a driven joint out", with_columns(joints=["hip", "_"], options=("--model",)), "under locked", locked),
+    Case("a dead motor", dead_motor, "kp 0 of knee", locked),
 )
