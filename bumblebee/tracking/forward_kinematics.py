@@ -1,7 +1,7 @@
 """Forward kinematics in torch: places of bodies from root pose and joint angles, batched and differentiable.
 
 MuJoCo gives no gradients of its kinematics through torch. A kept library (pytorch_kinematics) takes one chain a robot
-and has a parser of its own; here the model is compiled already, and all bodies of a level of the tree are one operation.
+and has a parser of its own; here the model is compiled already, and all bodies of a level are one operation.
 """
 
 from collections.abc import Sequence
