@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from bumblebee.ranges import Factor, Few, Positive, Range, Ranged, Rate, Share, Widths
+from bumblebee.ranges import Factor, Few, PartOf, Positive, Range, Ranged, Rate, Share, Widths
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,15 @@ class WorldModelConfig(Ranged):
     """Learning rate of the model at first; it falls to a tenth along a cosine."""
     policy_rate: Rate = 5e-4
     """Learning rate of the policy at first; it falls likewise."""
-    gamma: Share = 0.97
+    value_hidden: Widths = (512, 256, 128)
+    """Widths of the layers of the value, which says what comes after the imagined steps, ELU."""
+    value_rate: Rate = 1e-3
+    """Learning rate of the value at first; it falls likewise."""
+    value_average: Share = 0.99
+    """Weight of the past in the average of the value's weights, which its targets and the policy see."""
+    trace: Share = 0.95
+    """Lambda of TD(lambda): weight of later imagined rewards against the next value in what the value learns."""
+    gamma: PartOf = 0.99
     """Discount a control step."""
     grad_norm: Positive = 1.0
     """Gradients are scaled down to this norm."""

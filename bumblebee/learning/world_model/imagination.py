@@ -5,7 +5,7 @@ model imagines no contact forces: `stumble` sees none. Torques are the declared 
 """
 
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
@@ -28,25 +28,46 @@ Act = Callable[[Tensor], Tensor]
 """Observations (B, D) -> actions (B, J)."""
 
 
+@dataclass(frozen=True)
+class Rollout:
+    """H imagined control steps of B robots."""
+
+    seen: Tensor
+    """(H + 1, B, D) observations before each step and after the last."""
+    reward: Tensor
+    """(H, B) a second of perfect tracking; 0 after an end."""
+    alive: Tensor
+    """(H + 1, B) bool: no end before this step, or after the last."""
+    over: Tensor
+    """(H, B) bool: the clip ends with this step, which is no failure."""
+
+    @classmethod
+    def of(cls, seen: Tensor, reward: Tensor, lost: Tensor, left: Tensor) -> "Rollout":
+        """From rewards (H, B), failures (H, B) bool and the steps (B,) that were left of the clips."""
+        done = torch.arange(1, len(reward) + 1, device=left.device)[:, None]
+        ends = torch.cat(((left <= 0)[None], lost | (done >= left)))
+        alive = ends.cumsum(0) == 0
+        return cls(seen, torch.where(alive[:-1], reward, 0.0), alive, alive[:-1] & (done >= left) & ~lost)
+
+
 class Imagination:
     """The task of `env` on states of a world model.
 
     Args:
         env: whose settings, references and limits hold; its observation has no history.
         horizon: control steps of a rollout.
-        gamma: discount a control step.
         compiled: whether torch compiles a control step.
     """
 
-    def __init__(self, env: TrackingEnv, horizon: int, gamma: float, compiled: bool = False) -> None:
+    def __init__(self, env: TrackingEnv, horizon: int, compiled: bool = False) -> None:
         device = torch.device(env.device)
-        self.env, self.horizon, self.gamma = env, horizon, gamma
+        self.env, self.horizon = env, horizon
         self.terms = expanded((*env.cfg.observation.terms, *env.cfg.observation.now))
         self.kinematics = ForwardKinematics(env.engine.model, [*KEY_BODIES, *FEET], device)
         servos = servos_of(env.engine.model, list(range(1, env.engine.model.njnt)))
         columns = (servos.gain, servos.bias[:, 2], servos.limit)
         self._kp, self._kd, self._limit = (torch.tensor(c, dtype=torch.float32, device=device) for c in columns)
-        self._ahead = torch.arange(1, horizon + 1, device=device)
+        self._ahead = torch.arange(1, horizon + 2, device=device)
         if compiled:
             self._advance = torch.compile(self._advance, dynamic=False)
 
@@ -60,10 +81,11 @@ class Imagination:
         return middle_targets(ref, self.env.middle) + self.env.scale * action
 
     def references(self, clip: Tensor, frame: Tensor) -> list[ReferenceFrame]:
-        """References of the coming control steps, one lookup for all: `horizon` times (B, ...)."""
+        """References of the coming control steps, one lookup for all: `horizon` + 1 times (B, ...)."""
+        count = self.horizon + 1
         times = (frame + self._ahead[:, None]).flatten() * self.env.dt
-        every = self.env.library.frames(clip.repeat(self.horizon), times)
-        parts = {f.name: getattr(every, f.name).unflatten(0, (self.horizon, -1)).unbind() for f in fields(every)}
+        every = self.env.library.frames(clip.repeat(count), times)
+        parts = {f.name: getattr(every, f.name).unflatten(0, (count, -1)).unbind() for f in fields(every)}
         return [ReferenceFrame(**dict(zip(parts, each, strict=True))) for each in zip(*parts.values(), strict=True)]
 
     def step(self, before: RobotState, after: Tensor, target: Tensor, actions: tuple, ref: ReferenceFrame) -> Step:
@@ -81,40 +103,48 @@ class Imagination:
             limits=self.env.limits,
         )
 
-    def returns(self, act: Act, model: Dynamics, starts: Starts) -> tuple[Tensor, Tensor]:
-        """Discounted rewards (B,) a second of perfect tracking, and the share of steps (B,) before an end."""
+    def rollout(self, act: Act, model: Dynamics, starts: Starts) -> Rollout:
+        """Imagine `horizon` control steps; gradients lead from what is seen and earned to the weights of `act`."""
         first = (starts.body, starts.before, starts.action, starts.earlier)
         body, before, last, earlier = (tensor.requires_grad_() for tensor in first)  # as later steps': compiled once
-        alive = torch.ones_like(body[:, 0])
-        earned, lived, left = torch.zeros_like(alive), torch.zeros_like(alive), self._left(starts)
-        for index, ref in enumerate(self.references(starts.clip, starts.frame)):
-            now = (body, before, last, earlier, starts.context, ref)
-            after, action, target, reward, lost = self._advance(act, model, *now)
-            alive = alive * (index < left)
-            earned = earned + self.gamma**index * torch.where(alive > 0, reward, 0.0)
-            lived = lived + alive / self.horizon
-            alive = alive * ~lost
+        *coming, final = self.references(starts.clip, starts.frame)
+        keys, steps = self.state(body)[0].key_pos_w, []
+        for ref in coming:
+            seen, after, keys, action, target, reward, lost = self._advance(
+                act, model, body, keys, before, last, earlier, starts.context, ref
+            )
+            steps.append((seen, reward, lost))
             body, before, last, earlier = after, target, action, last
-        return earned, lived
+        seen, reward, lost = (list(each) for each in zip(*steps, strict=True))
+        seen.append(see(self.terms, unpacked(body, keys), final, last))
+        return Rollout.of(torch.stack(seen), torch.stack(reward), torch.stack(lost), self._left(starts))
 
     def _advance(
         self,
         act: Act,
         model: Dynamics,
         body: Tensor,
+        keys: Tensor,
         before: Tensor,
         last: Tensor,
         earlier: Tensor,
         context: Tensor,
         ref: ReferenceFrame,
-    ) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
-        """One imagined control step: next state, action, servo targets, reward, and whose episode it ends."""
-        state, _ = self.state(body)
-        action = act(see(self.terms, state, ref, last))
+    ) -> tuple[Tensor, ...]:
+        """One imagined control step.
+
+        Returns:
+            What was seen, the next state and its key bodies, action, servo targets, reward, and whose episode it ends
+            as a failure.
+        """
+        state = unpacked(body, keys)
+        seen = see(self.terms, state, ref, last)
+        action = act(seen)
         target = self.targets(ref, action)
         after = model(body, target, before, context)
         step = self.step(state, after, target, (action, last, earlier), ref)
-        return after, action, target, self.env.reward(step) / self.env.dt, self.lost(step)
+        reward = self.env.reward(step) / self.env.dt
+        return seen, after, step.state.key_pos_w, action, target, reward, self.lost(step)
 
     def lost(self, step: Step) -> Tensor:
         """Robots (B,) bool whose episode ends as a failure with this step."""

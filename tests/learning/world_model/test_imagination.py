@@ -3,8 +3,12 @@
 import pytest
 import torch
 
+from bumblebee.learning.policy import new_actor, shape_of
 from bumblebee.learning.world_model.body import packed
+from bumblebee.learning.world_model.collector import Collector
+from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.imagination import Imagination
+from bumblebee.learning.world_model.memory import Memory
 from bumblebee.motion.embedded import make_library
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import EnvConfig, Randomisation
@@ -27,7 +31,7 @@ def env() -> TrackingEnv:
 
 def test_observation_reward_and_end_are_those_of_the_environment_over_whole_episodes(env: TrackingEnv) -> None:
     """With the simulator's own next states, torques and contact forces, everything is equal but for rounding."""
-    imagination = Imagination(env, horizon=1, gamma=1.0)
+    imagination = Imagination(env, horizon=1)
     before = torch.zeros(2, WORLDS, env.num_actions)  # the last action and the one before it
     generator, compared, ended = torch.Generator().manual_seed(0), 0, 0
     for _ in range(STEPS):
@@ -59,7 +63,7 @@ def test_observation_reward_and_end_are_those_of_the_environment_over_whole_epis
 
 
 def test_the_reward_has_gradients_with_respect_to_the_state_also_at_the_reference(env: TrackingEnv) -> None:
-    imagination = Imagination(env, horizon=1, gamma=1.0)
+    imagination = Imagination(env, horizon=1)
     frames = torch.zeros(WORLDS, dtype=torch.long)
     ref = imagination.references(torch.arange(WORLDS) % len(env.library), frames)[0]
     still = torch.zeros(WORLDS, env.num_actions)
@@ -72,7 +76,7 @@ def test_the_reward_has_gradients_with_respect_to_the_state_also_at_the_referenc
 
 
 def test_servos_torques_are_those_of_the_engine_where_it_holds_still(env: TrackingEnv) -> None:
-    imagination = Imagination(env, horizon=1, gamma=1.0)
+    imagination = Imagination(env, horizon=1)
     state, ref = env.now
     target = imagination.targets(ref, torch.zeros(WORLDS, env.num_actions))
     step = imagination.step(state, packed(state), target, (target, target, target), ref)
@@ -81,3 +85,24 @@ def test_servos_torques_are_those_of_the_engine_where_it_holds_still(env: Tracki
     by_hand += model.actuator_biasprm[:, 2] * state.joint_vel.numpy()
     limit = model.actuator_forcerange[:, 1]
     torch.testing.assert_close(step.torque, torch.tensor(by_hand.clip(-limit, limit), dtype=torch.float32))
+
+
+def test_a_rollout_gives_the_policy_gradients_through_what_it_sees_last_and_traces_as_one_graph(
+    env: TrackingEnv,
+) -> None:
+    torch.manual_seed(0)
+    memory = Memory(2, torch.zeros(WORLDS, 0), env.num_actions)
+    actor = new_actor(shape_of(env, (16,)))
+    collect = Collector(env, memory, 0.1)
+    for _ in range(2):
+        collect(lambda seen: actor({"policy": seen}))
+    model, starts = Dynamics(env.num_actions, (16,), env.dt), memory.starts(4)
+    imagination, weights, found = Imagination(env, horizon=3), list(actor.mlp.parameters()), []
+    for backend in (None, "aot_eager"):
+        if backend is not None:
+            imagination._advance = torch.compile(imagination._advance, backend=backend, fullgraph=True, dynamic=False)
+        rollout = imagination.rollout(lambda seen: actor({"policy": seen}), model, starts)
+        found.append((rollout.seen, *torch.autograd.grad(rollout.seen[-1].sum() + rollout.reward.sum(), weights)))
+    assert rollout.seen.shape == (4, 4, actor.obs_dim) and rollout.reward.shape == (3, 4)
+    assert all(torch.isfinite(gradient).all() and gradient.any() for gradient in found[0][1:])
+    torch.testing.assert_close(*found, rtol=1e-3, atol=1e-3)

@@ -1,0 +1,126 @@
+"""The two updates: the model learns to predict what was seen, the policy to earn more in what the model imagines."""
+
+from copy import deepcopy
+from typing import Any
+
+import torch
+from rsl_rl.models import MLPModel
+from torch import Tensor
+
+from bumblebee.learning.update_graph import Recorded
+from bumblebee.learning.world_model.config import WorldModelConfig
+from bumblebee.learning.world_model.critic import Critic, error, objective, targets
+from bumblebee.learning.world_model.descent import Descent
+from bumblebee.learning.world_model.dynamics import Dynamics
+from bumblebee.learning.world_model.imagination import Imagination
+from bumblebee.learning.world_model.memory import Memory
+
+
+class ModelUpdate:
+    """A gradient step of the model on windows of the memory; recorded on a GPU.
+
+    Args:
+        model: what learns.
+        memory: full when this is called.
+        config: batch, window and rate.
+    """
+
+    def __init__(self, model: Dynamics, memory: Memory, config: WorldModelConfig) -> None:
+        self.model, self._memory, self._config = model, memory, config
+        self.descent = Descent(list(model.parameters()), config.model_rate, config.grad_norm)
+        self.told = {"loss_model": torch.zeros((), device=model.mean.device)}
+        self._recorded = Recorded(self._step, model.mean.device, lambda: [])
+
+    def __call__(self) -> None:
+        """Learn once."""
+        self._recorded()
+
+    def decay(self, done: float) -> None:
+        """Set the learning rate for a training of which the share `done` lies behind."""
+        self.descent.decay(done)
+
+    def state_dict(self) -> dict[str, Any]:
+        """The model and its optimiser."""
+        return {"model": self.model.state_dict(), "descent": self.descent.state_dict()}
+
+    def load_state_dict(self, saved: dict[str, Any]) -> None:
+        """Go on from what `state_dict` gave."""
+        self.model.load_state_dict(saved["model"])
+        self.descent.load_state_dict(saved["descent"])
+
+    def _step(self) -> None:
+        window = self._memory.windows(self._config.window, self._config.model_batch)
+        predicted = self.model.unrolled(window.bodies[0], window.targets, window.before, window.context)
+        loss = self.model.loss(predicted, window.bodies[1:], window.valid)
+        self.descent(loss)
+        self.told["loss_model"].copy_(loss.detach())
+
+
+class PolicyUpdate:
+    """A gradient step of the policy through imagined rollouts, and one of the value on the same; recorded on a GPU.
+
+    Args:
+        actor: the policy.
+        model: what imagines; it does not learn here.
+        imagination: the task.
+        memory: where rollouts begin; full when this is called.
+        config: batch, horizon, discount and rates.
+    """
+
+    def __init__(
+        self, actor: MLPModel, model: Dynamics, imagination: Imagination, memory: Memory, config: WorldModelConfig
+    ) -> None:
+        device = model.mean.device
+        self.actor, self.average = actor, deepcopy(actor).requires_grad_(False)
+        self.critic = Critic(actor.obs_dim, config.value_hidden).to(device)
+        self._model, self._imagination, self._memory, self._config = model, imagination, memory, config
+        self.descents = {
+            "policy": Descent(list(actor.mlp.parameters()), config.policy_rate, config.grad_norm),
+            "value": Descent(list(self.critic.network.parameters()), config.value_rate, config.grad_norm),
+        }
+        names = ("imagined", "alive", "value", "loss_value")
+        self.told = {name: torch.zeros((), device=device) for name in names}
+        self._recorded = Recorded(self._step, device, lambda: [])
+
+    def __call__(self) -> None:
+        """Learn once."""
+        self._recorded()
+
+    def decay(self, done: float) -> None:
+        """Set the learning rates for a training of which the share `done` lies behind."""
+        for descent in self.descents.values():
+            descent.decay(done)
+
+    def state_dict(self) -> dict[str, Any]:
+        """The networks and their optimisers."""
+        kept = {name: getattr(self, name).state_dict() for name in ("actor", "average", "critic")}
+        return kept | {"descents": {name: descent.state_dict() for name, descent in self.descents.items()}}
+
+    def load_state_dict(self, saved: dict[str, Any]) -> None:
+        """Go on from what `state_dict` gave."""
+        for name in ("actor", "average", "critic"):
+            getattr(self, name).load_state_dict(saved[name])
+        for name, descent in self.descents.items():
+            descent.load_state_dict(saved["descents"][name])
+
+    def _step(self) -> None:
+        config = self._config
+        rollout = self._imagination.rollout(self._act, self._model, self._memory.starts(config.policy_batch))
+        seen = self.actor.obs_normalizer(rollout.seen)
+        last = self.critic.steady(seen[-1])
+        self.descents["policy"](-objective(rollout, last, config.gamma))
+        own, kept = (list(network.mlp.parameters()) for network in (self.actor, self.average))
+        torch._foreach_lerp_(kept, own, 1 - config.average)
+        with torch.no_grad():
+            wanted = targets(rollout, self.critic.steady(seen), config.gamma, config.trace)
+        loss = error(rollout, self.critic(seen[:-1].detach()), wanted)
+        self.descents["value"](loss)
+        self.critic.follow(1 - config.value_average)
+        alive = rollout.alive[:-1].float().mean()
+        found = (rollout.reward.mean(), alive, wanted.mean(), loss)
+        for told, value in zip(self.told.values(), found, strict=True):
+            told.copy_(value.detach())
+
+    def _act(self, seen: Tensor) -> Tensor:
+        """Mean actions (B, J) of the policy that learns."""
+        return self.actor({"policy": seen})
