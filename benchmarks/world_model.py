@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
     save_tensors(options.out / RESUME, trainer.state_dict())
     trainer.policy().save(options.out)
     print(f"trained {trainer.frames / 1e6:.1f} M steps in {trainer._seconds / 60:.1f} min", flush=True)
-    if options.jobs and trainer._seconds >= 60 * options.minutes:
+    if options.jobs and (trainer._seconds >= 60 * options.minutes or not clock.over):
         report(
             [Tried("world_model", options.out, Manner(settings.env.observation))],
             options.motions,
