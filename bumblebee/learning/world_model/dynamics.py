@@ -1,6 +1,7 @@
 """The world model: from a state and servo targets to the state one control step later."""
 
 from collections.abc import Sequence
+from copy import deepcopy
 
 import torch
 from torch import Tensor, nn
@@ -60,6 +61,15 @@ class Dynamics(nn.Module):
     def step(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
         """`forward`, which may be replaced by a compiled one where windows are predicted."""
         return self(body, target, before, context)
+
+    def frozen(self) -> "Dynamics":
+        """A twin on the same numbers from now on, whose weights want no gradient; compiled code would compute it."""
+        twin = deepcopy(self)
+        for own, other in zip(self.modules(), twin.modules(), strict=True):
+            other._buffers.update(own._buffers)
+        for own, other in zip(self.parameters(), twin.parameters(), strict=True):
+            other.requires_grad_(False).data = own.data
+        return twin
 
     @torch.no_grad()
     def normalise(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor, after: Tensor) -> None:

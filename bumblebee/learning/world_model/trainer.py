@@ -73,12 +73,10 @@ class WorldModelTrainer:
         drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
         context = torch.tensor(context_of(env.engine.model, drawn, env.num_envs), dtype=torch.float32, device=device)
         model = Dynamics(env.num_actions, config.model_hidden, env.dt, context.shape[1]).to(device)
-        if config.compile:
-            model.step = torch.compile(model.step, dynamic=False)
         self.memory = Memory(config.memory, context, env.num_actions)
         self.imagination = Imagination(env, config.horizon, config.compile)
+        self.policy_update = PolicyUpdate(actor, model.frozen(), self.imagination, self.memory, config)
         self.model_update = ModelUpdate(model, self.memory, config)
-        self.policy_update = PolicyUpdate(actor, model, self.imagination, self.memory, config)
         self._collect = Collector(env, self.memory, config.noise)
         self.iteration, self._seconds = 0, 0.0
         self._resume()

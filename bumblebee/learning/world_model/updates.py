@@ -27,6 +27,8 @@ class ModelUpdate:
 
     def __init__(self, model: Dynamics, memory: Memory, config: WorldModelConfig) -> None:
         self.model, self._memory, self._config = model, memory, config
+        if config.compile:
+            model.step = torch.compile(model.step, dynamic=False)
         self.descent = Descent(list(model.parameters()), config.model_rate, config.grad_norm)
         self.told = {"loss_model": torch.zeros((), device=model.mean.device)}
         self._recorded = Recorded(self._step, model.mean.device, lambda: [])
@@ -61,7 +63,7 @@ class PolicyUpdate:
 
     Args:
         actor: the policy.
-        model: what imagines; it does not learn here.
+        model: what imagines; frozen, see `Dynamics.frozen`.
         imagination: the task.
         memory: where rollouts begin; full when this is called.
         config: batch, horizon, discount and rates.

@@ -2,6 +2,7 @@
 
 import pytest
 import torch
+from torch._dynamo.utils import counters
 
 from bumblebee.learning.policy import new_actor, shape_of
 from bumblebee.learning.world_model.body import packed
@@ -98,6 +99,7 @@ def test_a_rollout_gives_the_policy_gradients_through_what_it_sees_last_and_trac
         collect(lambda seen: actor({"policy": seen}))
     model, starts = Dynamics(env.num_actions, (16,), env.dt), memory.starts(4)
     imagination, weights, found = Imagination(env, horizon=3), list(actor.mlp.parameters()), []
+    graphs = counters["stats"]["unique_graphs"]
     for backend in (None, "aot_eager"):
         if backend is not None:
             imagination._advance = torch.compile(imagination._advance, backend=backend, fullgraph=True, dynamic=False)
@@ -106,3 +108,4 @@ def test_a_rollout_gives_the_policy_gradients_through_what_it_sees_last_and_trac
     assert rollout.seen.shape == (4, 4, actor.obs_dim) and rollout.reward.shape == (3, 4)
     assert all(torch.isfinite(gradient).all() and gradient.any() for gradient in found[0][1:])
     torch.testing.assert_close(*found, rtol=1e-3, atol=1e-3)
+    assert counters["stats"]["unique_graphs"] - graphs == 1, "the first step must look like the later ones"
