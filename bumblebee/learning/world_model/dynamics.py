@@ -73,7 +73,7 @@ class Dynamics(nn.Module):
 
     @torch.no_grad()
     def normalise(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor, after: Tensor) -> None:
-        """Take the spreads of inputs and of changes from first transitions (B, ...)."""
+        """Take the spreads of inputs and of changes from first transitions (B, ...), none of them broken."""
         seen, change = self.seen(body, target, before, context), change_of(body, after, self.dt)
         self.mean.copy_(seen.mean(0))
         self.std.copy_(seen.std(0).clamp(min=1e-2))

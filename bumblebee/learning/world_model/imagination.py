@@ -4,7 +4,7 @@ Observation, reward and the ends of episodes are those of `bumblebee.tracking`, 
 model imagines no contact forces: `stumble` sees none. Torques are the declared servos' at the end of the control step.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import torch
@@ -33,7 +33,7 @@ class Rollout:
     """H imagined control steps of B robots."""
 
     seen: Tensor
-    """(H + 1, B, D) observations before each step and after the last."""
+    """(H + 1, B, D) exact observations before each step and after the last."""
     reward: Tensor
     """(H, B) a second of perfect tracking; 0 after an end."""
     alive: Tensor
@@ -109,9 +109,9 @@ class Imagination:
         body, before, last, earlier = (tensor.requires_grad_() for tensor in first)  # as later steps': compiled once
         *coming, final = self.references(starts.clip, starts.frame)
         keys, steps = self.state(body)[0].key_pos_w, []
-        for ref in coming:
+        for ref, noise in zip(coming, self._noise(len(body)), strict=True):
             seen, after, keys, action, target, reward, lost = self._advance(
-                act, model, body, keys, before, last, earlier, starts.context, ref
+                act, model, body, keys, before, last, earlier, starts.context, ref, noise
             )
             steps.append((seen, reward, lost))
             body, before, last, earlier = after, target, action, last
@@ -130,6 +130,7 @@ class Imagination:
         earlier: Tensor,
         context: Tensor,
         ref: ReferenceFrame,
+        noise: Tensor | None,
     ) -> tuple[Tensor, ...]:
         """One imagined control step.
 
@@ -139,12 +140,19 @@ class Imagination:
         """
         state = unpacked(body, keys)
         seen = see(self.terms, state, ref, last)
-        action = act(seen)
+        action = act(seen if noise is None else seen + noise)
         target = self.targets(ref, action)
         after = model(body, target, before, context)
         step = self.step(state, after, target, (action, last, earlier), ref)
         reward = self.env.reward(step) / self.env.dt
         return seen, after, step.state.key_pos_w, action, target, reward, self.lost(step)
+
+    def _noise(self, robots: int) -> Sequence[Tensor | None]:
+        """Errors of the sensors, (B, D) for each step, as the environment draws them."""
+        levels = self.env.groups["policy"].levels
+        if levels is None:
+            return [None] * self.horizon
+        return (levels * torch.empty(self.horizon, robots, len(levels), device=levels.device).uniform_(-1, 1)).unbind()
 
     def lost(self, step: Step) -> Tensor:
         """Robots (B,) bool whose episode ends as a failure with this step."""

@@ -15,6 +15,8 @@ from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory
 
+_FIRST = 65_536  # transitions that the model is normalised by
+
 
 class ModelUpdate:
     """A gradient step of the model on windows of the memory; recorded on a GPU.
@@ -32,6 +34,14 @@ class ModelUpdate:
         self.descent = Descent(list(model.parameters()), config.model_rate, config.grad_norm)
         self.told = {"loss_model": torch.zeros((), device=model.mean.device)}
         self._recorded = Recorded(self._step, model.mean.device, lambda: [])
+
+    def begin(self) -> None:
+        """Normalise the model by the first full memory, and let it learn alone for a while."""
+        window = self._memory.windows(1, _FIRST)
+        columns = (window.bodies[0], window.targets[0], window.before, window.context, window.bodies[1])
+        self.model.normalise(*(column[window.valid[0]] for column in columns))
+        for _ in range(self._config.warm_up):
+            self()
 
     def __call__(self) -> None:
         """Learn once."""
@@ -75,6 +85,7 @@ class PolicyUpdate:
         device = model.mean.device
         self.actor, self.average = actor, deepcopy(actor).requires_grad_(False)
         self.critic = Critic(actor.obs_dim, config.value_hidden).to(device)
+        self._seen = deepcopy(actor.obs_normalizer).train()
         self._model, self._imagination, self._memory, self._config = model, imagination, memory, config
         self.descents = {
             "policy": Descent(list(actor.mlp.parameters()), config.policy_rate, config.grad_norm),
@@ -87,6 +98,12 @@ class PolicyUpdate:
     def __call__(self) -> None:
         """Learn once."""
         self._recorded()
+
+    def look(self, seen: Tensor) -> None:
+        """Normalise by these observations (N, D) too, in tensors that stay where they are."""
+        self._seen.update(seen)
+        for network in (self.actor, self.average):
+            network.obs_normalizer.load_state_dict(self._seen.state_dict())
 
     def decay(self, done: float) -> None:
         """Set the learning rates for a training of which the share `done` lies behind."""
@@ -104,6 +121,7 @@ class PolicyUpdate:
             getattr(self, name).load_state_dict(saved[name])
         for name, descent in self.descents.items():
             descent.load_state_dict(saved["descents"][name])
+        self._seen.load_state_dict(self.actor.obs_normalizer.state_dict())
 
     def _step(self) -> None:
         config = self._config
