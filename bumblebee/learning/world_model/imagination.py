@@ -33,7 +33,9 @@ class Rollout:
     """H imagined control steps of B robots."""
 
     seen: Tensor
-    """(H + 1, B, D) exact observations before each step and after the last."""
+    """(H, B, D) exact observations before each step, without gradients."""
+    after: Tensor
+    """(B, D) exact observations after the last step."""
     reward: Tensor
     """(H, B) a second of perfect tracking; 0 after an end."""
     alive: Tensor
@@ -42,12 +44,12 @@ class Rollout:
     """(H, B) bool: the clip ends with this step, which is no failure."""
 
     @classmethod
-    def of(cls, seen: Tensor, reward: Tensor, lost: Tensor, left: Tensor) -> "Rollout":
-        """From rewards (H, B), failures (H, B) bool and the steps (B,) that were left of the clips."""
+    def of(cls, seen: Tensor, after: Tensor, reward: Tensor, lost: Tensor, left: Tensor) -> "Rollout":
+        """From observations, rewards (H, B), failures (H, B) bool and the steps (B,) that were left of the clips."""
         done = torch.arange(1, len(reward) + 1, device=left.device)[:, None]
         ends = torch.cat(((left <= 0)[None], lost | (done >= left)))
         alive = ends.cumsum(0) == 0
-        return cls(seen, torch.where(alive[:-1], reward, 0.0), alive, alive[:-1] & (done >= left) & ~lost)
+        return cls(seen, after, torch.where(alive[:-1], reward, 0.0), alive, alive[:-1] & (done >= left) & ~lost)
 
 
 class Imagination:
@@ -104,7 +106,7 @@ class Imagination:
         )
 
     def rollout(self, act: Act, model: Dynamics, starts: Starts) -> Rollout:
-        """Imagine `horizon` control steps; gradients lead from what is seen and earned to the weights of `act`."""
+        """Imagine `horizon` control steps; rewards and the last observation have gradients to the weights of `act`."""
         first = (starts.body, starts.before, starts.action, starts.earlier)
         body, before, last, earlier = (tensor.requires_grad_() for tensor in first)  # as later steps': compiled once
         *coming, final = self.references(starts.clip, starts.frame)
@@ -115,9 +117,9 @@ class Imagination:
             )
             steps.append((seen, reward, lost))
             body, before, last, earlier = after, target, action, last
-        seen, reward, lost = (list(each) for each in zip(*steps, strict=True))
-        seen.append(see(self.terms, unpacked(body, keys), final, last))
-        return Rollout.of(torch.stack(seen), torch.stack(reward), torch.stack(lost), self._left(starts))
+        seen, reward, lost = zip(*steps, strict=True)
+        after = see(self.terms, unpacked(body, keys), final, last)
+        return Rollout.of(torch.stack(seen), after, torch.stack(reward), torch.stack(lost), self._left(starts))
 
     def _advance(
         self,
@@ -145,7 +147,7 @@ class Imagination:
         after = model(body, target, before, context)
         step = self.step(state, after, target, (action, last, earlier), ref)
         reward = self.env.reward(step) / self.env.dt
-        return seen, after, step.state.key_pos_w, action, target, reward, self.lost(step)
+        return seen.detach(), after, step.state.key_pos_w, action, target, reward, self.lost(step)
 
     def _noise(self, robots: int) -> Sequence[Tensor | None]:
         """Errors of the sensors, (B, D) for each step, as the environment draws them."""

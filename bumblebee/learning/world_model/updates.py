@@ -126,14 +126,15 @@ class PolicyUpdate:
     def _step(self) -> None:
         config = self._config
         rollout = self._imagination.rollout(self._act, self._model, self._memory.starts(config.policy_batch))
-        seen = self.actor.obs_normalizer(rollout.seen)
-        last = self.critic.steady(seen[-1])
+        seen, after = self.actor.obs_normalizer(rollout.seen), self.actor.obs_normalizer(rollout.after)
+        last = self.critic.steady(after)
         self.descents["policy"](-objective(rollout, last, config.gamma))
         own, kept = (list(network.mlp.parameters()) for network in (self.actor, self.average))
         torch._foreach_lerp_(kept, own, 1 - config.average)
         with torch.no_grad():
-            wanted = targets(rollout, self.critic.steady(seen), config.gamma, config.trace)
-        loss = error(rollout, self.critic(seen[:-1].detach()), wanted)
+            values = torch.cat((self.critic.steady(seen), last[None]))
+            wanted = targets(rollout, values, config.gamma, config.trace)
+        loss = error(rollout, self.critic(seen), wanted)
         self.descents["value"](loss)
         self.critic.follow(1 - config.value_average)
         alive = rollout.alive[:-1].float().mean()

@@ -105,8 +105,8 @@ def test_a_rollout_gives_the_policy_gradients_through_what_it_sees_last_and_trac
         if backend is not None:
             imagination._advance = torch.compile(imagination._advance, backend=backend, fullgraph=True, dynamic=False)
         rollout = imagination.rollout(lambda seen: actor({"policy": seen}), model, starts)
-        found.append((rollout.seen, *torch.autograd.grad(rollout.seen[-1].sum() + rollout.reward.sum(), weights)))
-    assert rollout.seen.shape == (4, 4, actor.obs_dim) and rollout.reward.shape == (3, 4)
+        found.append((rollout.seen, *torch.autograd.grad(rollout.after.sum() + rollout.reward.sum(), weights)))
+    assert rollout.seen.shape == (3, 4, actor.obs_dim) and rollout.reward.shape == (3, 4)
     assert all(torch.isfinite(gradient).all() and gradient.any() for gradient in found[0][1:])
     torch.testing.assert_close(*found, rtol=1e-3, atol=1e-3)
     assert counters["stats"]["unique_graphs"] - graphs == 1, "the first step must look like the later ones"
@@ -146,5 +146,5 @@ def test_the_imagined_policy_sees_through_the_environments_sensors() -> None:
         act, Dynamics(noisy.num_actions, (16,), noisy.dt), memory.starts(64)
     )
     levels = noisy.groups["policy"].levels
-    error = (torch.stack(shown) - rollout.seen[:2]).abs().amax((0, 1))
+    error = (torch.stack(shown) - rollout.seen).abs().amax((0, 1))
     assert (error <= levels + 1e-5).all() and (error >= 0.8 * levels - 1e-5).all()

@@ -1,18 +1,21 @@
 """Training through a model on two waving clips, tiny and on a CPU."""
 
 import shutil
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import torch
+from rsl_rl.models import MLPModel
 
+from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.learning.world_model.trainer import CHECKPOINT, WorldModelTrainer
 from bumblebee.learning.world_model.updates import ModelUpdate
-from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.config import EnvConfig, Randomisation
 from tests.learning.tiny import env_of
 
 TASK = EnvConfig(num_worlds=8, threads=1)
@@ -116,3 +119,42 @@ def test_policy_and_value_and_model_learn(trained: WorldModelTrainer) -> None:
     for part in (".policy.actor.mlp", ".policy.average.mlp", ".policy.critic.network", ".policy.critic.average"):
         assert any(not torch.equal(before[name], after[name]) for name in before if name.startswith(part)), part
     assert any(not torch.equal(before[name], after[name]) for name in before if name.startswith(".model.model.layers"))
+
+
+def test_training_lowers_the_models_held_out_error_and_raises_the_imagined_reward(tmp_path: Path) -> None:
+    """From a policy that pushes every joint to one side; held out are steps of other worlds."""
+    alike = Randomisation(friction=(1.0, 1.0), gains=0.0, mass=0.0, push=0.0)
+    task = replace(TASK, num_worlds=32, threshold_end=0.8, observation_noise=0.0, randomisation=alike)
+    sizes = {"model_hidden": (128, 128), "model_batch": 256, "model_updates": 40, "window": 2, "memory": 32}
+    rates = {"policy_rate": 3e-3, "model_rate": 2e-3, "average": 0.8}
+    trainer = WorldModelTrainer(
+        env_of(task), replace(SMALL, iterations=12, checkpoint_every=100, **sizes, **rates), tmp_path
+    )
+    model, update = trainer.model_update.model, trainer.policy_update
+    with torch.no_grad():
+        update.actor.mlp[-1].bias.fill_(1.0)
+    first, untrained = deepcopy(update.actor), deepcopy(model)
+    trainer.train()
+    other = env_of(task, seed=1)
+    held_out = Memory(64, trainer.memory.context, other.num_actions)
+    collect = Collector(other, held_out, 0.08)
+    for _ in range(64):
+        collect(lambda seen: update.actor({"policy": seen}))
+    torch.manual_seed(0)
+    window, starts = held_out.windows(2, 300), held_out.starts(300)
+    first.obs_normalizer.load_state_dict(update.actor.obs_normalizer.state_dict())
+    for name in ("mean", "std", "scale"):
+        getattr(untrained, name).copy_(getattr(model, name))
+
+    @torch.no_grad()
+    def error(by: Dynamics) -> float:
+        predicted = by.unrolled(window.bodies[0], window.targets, window.before, window.context)
+        return float(by.loss(predicted, window.bodies[1:], window.valid))
+
+    @torch.no_grad()
+    def imagined(actor: MLPModel) -> float:
+        rollout = trainer.imagination.rollout(lambda seen: actor({"policy": seen}), model, starts)
+        return float(rollout.reward.mean())
+
+    assert error(model) < 0.7 * error(untrained)
+    assert imagined(first) + 0.2 < imagined(update.average)
