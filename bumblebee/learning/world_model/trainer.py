@@ -20,7 +20,8 @@ from bumblebee.learning.world_model.context import context_of
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory
-from bumblebee.learning.world_model.updates import ModelUpdate, PolicyUpdate
+from bumblebee.learning.world_model.model_update import ModelUpdate
+from bumblebee.learning.world_model.policy_update import PolicyUpdate
 from bumblebee.progress import progress
 from bumblebee.sim.warp_limits import within_memory
 from bumblebee.tracking.env import TrackingEnv

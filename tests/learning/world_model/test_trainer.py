@@ -13,8 +13,8 @@ from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.memory import Memory
+from bumblebee.learning.world_model.model_update import ModelUpdate
 from bumblebee.learning.world_model.trainer import CHECKPOINT, WorldModelTrainer
-from bumblebee.learning.world_model.updates import ModelUpdate
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from tests.learning.tiny import env_of
 
