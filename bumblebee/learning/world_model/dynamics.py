@@ -1,5 +1,6 @@
 """The world model: from a state and servo targets to the state one control step later."""
 
+import math
 from collections.abc import Sequence
 from copy import deepcopy
 
@@ -14,6 +15,16 @@ ANGLE, SPEED = 0.1, 1.5
 """The same for joint angles [rad] and joint velocities [rad/s]."""
 
 
+def past_targets(delay: float, dt: float) -> int:
+    """How many earlier targets may act in a control step of `dt` [s], of servos late by `delay` [s]; at least 1."""
+    return max(math.ceil(delay / dt - 1e-6), 1)
+
+
+def handed_on(target: Tensor, before: Tensor) -> Tensor:
+    """What was given before the next step (B, P J), from this step's targets (B, J) and those before it (B, P J)."""
+    return torch.cat((target, before[:, : -target.shape[1]]), dim=-1)
+
+
 class Dynamics(nn.Module):
     """Predicts what one control step changes beyond uniform motion.
 
@@ -22,12 +33,14 @@ class Dynamics(nn.Module):
         hidden: widths of the layers.
         dt: control period [s].
         context: entries of the vector that says in what a world differs; 0 where all are alike.
+        past: P, earlier targets that may still act, see `past_targets`.
     """
 
-    def __init__(self, joints: int, hidden: Sequence[int], dt: float, context: int = 0) -> None:
+    def __init__(self, joints: int, hidden: Sequence[int], dt: float, context: int = 0, past: int = 1) -> None:
         super().__init__()
-        self.dt = dt
-        size, layers = 10 + 4 * joints + context, []
+        self.dt, self._past = dt, past
+        seen = size = 10 + (3 + past) * joints + context
+        layers: list[nn.Module] = []
         for width in hidden:
             layers += [nn.Linear(size, width), nn.LayerNorm(width), nn.SiLU()]
             size = width
@@ -36,15 +49,15 @@ class Dynamics(nn.Module):
             last.weight.mul_(0.1)
             last.bias.zero_()
         self.layers = nn.Sequential(*layers, last)
-        self.register_buffer("mean", torch.zeros(10 + 4 * joints + context))
-        self.register_buffer("std", torch.ones(10 + 4 * joints + context))
+        self.register_buffer("mean", torch.zeros(seen))
+        self.register_buffer("std", torch.ones(seen))
         self.register_buffer("scale", torch.ones(12 + 2 * joints))
         self.register_buffer("spread", torch.tensor([*SPREADS, *[ANGLE] * joints, *[SPEED] * joints]))
 
     def seen(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
-        """The network's input (B, 10 + 4 J + C) before it is normalised."""
+        """The network's input (B, 10 + (3 + P) J + C) before it is normalised."""
         angle = joint_pos(body)
-        return torch.cat((features(body), target - angle, before - angle, context), dim=-1)
+        return torch.cat((features(body), target - angle, before - angle.repeat(1, self._past), context), dim=-1)
 
     def forward(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
         """The next state (B, 13 + 2 J).
@@ -52,7 +65,7 @@ class Dynamics(nn.Module):
         Args:
             body: (B, 13 + 2 J).
             target: (B, J) [rad] that the servos are given for this control step.
-            before: (B, J) [rad] that they had before it; of use where commands are late.
+            before: (B, P J) [rad] that they were given before it, the last one first; commands may be late.
             context: (B, C).
         """
         seen = (self.seen(body, target, before, context) - self.mean) / self.std
@@ -85,13 +98,13 @@ class Dynamics(nn.Module):
         Args:
             body: (B, 13 + 2 J) at first.
             targets: (K, B, J) [rad].
-            before: (B, J) [rad] before the first.
+            before: (B, P J) [rad] before the first.
             context: (B, C).
         """
         states, body = [], body.requires_grad_()  # as later steps': compiled once
         for target in targets.unbind():
             body = self.step(body, target, before, context)
-            before = target
+            before = handed_on(target, before)
             states.append(body)
         return torch.stack(states)
 

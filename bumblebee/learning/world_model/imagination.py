@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from bumblebee.learning.world_model.body import joint_pos, unpacked
-from bumblebee.learning.world_model.dynamics import Dynamics
+from bumblebee.learning.world_model.dynamics import Dynamics, handed_on
 from bumblebee.learning.world_model.memory import Starts
 from bumblebee.robot.facts import FEET, KEY_BODIES
 from bumblebee.sim.engine import RobotState
@@ -116,7 +116,7 @@ class Imagination:
                 act, model, body, keys, before, last, earlier, starts.context, ref, noise
             )
             steps.append((seen, reward, lost))
-            body, before, last, earlier = after, target, action, last
+            body, before, last, earlier = after, handed_on(target, before), action, last
         seen, reward, lost = zip(*steps, strict=True)
         after = see(self.terms, unpacked(body, keys), final, last)
         return Rollout.of(torch.stack(seen), after, torch.stack(reward), torch.stack(lost), self._left(starts))

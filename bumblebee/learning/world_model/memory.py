@@ -15,7 +15,7 @@ class Windows:
     targets: Tensor
     """(K, B, J) [rad] that the servos were given."""
     before: Tensor
-    """(B, J) [rad] that they had before."""
+    """(B, P J) [rad] the P before these, the last one first."""
     context: Tensor
     """(B, C)."""
     valid: Tensor
@@ -44,12 +44,14 @@ class Memory:
         steps: T.
         context: (N, C), in what the worlds differ.
         joints: J.
+        past: P, servo targets before a step's own that are kept with it.
     """
 
-    def __init__(self, steps: int, context: Tensor, joints: int) -> None:
+    def __init__(self, steps: int, context: Tensor, joints: int, past: int = 1) -> None:
         n, device = len(context), context.device
         self.steps, self.worlds, self.context = steps, n, context
-        sizes = {"body": 13 + 2 * joints, **dict.fromkeys(("target", "before", "action", "earlier"), joints)}
+        sizes = {"body": 13 + 2 * joints, "before": past * joints}
+        sizes |= dict.fromkeys(("target", "action", "earlier"), joints)
         self.columns = {name: torch.zeros(steps, n, size, device=device) for name, size in sizes.items()}
         self.clip, self.frame = (torch.zeros(steps, n, dtype=torch.long, device=device) for _ in range(2))
         self.broken = torch.ones(steps, n, dtype=torch.bool, device=device)

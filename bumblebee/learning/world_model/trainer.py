@@ -17,7 +17,7 @@ from bumblebee.learning.policy import Policy, load_policy, new_actor, shape_of
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.context import context_of
-from bumblebee.learning.world_model.dynamics import Dynamics
+from bumblebee.learning.world_model.dynamics import Dynamics, past_targets
 from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.learning.world_model.model_update import ModelUpdate
@@ -71,8 +71,10 @@ class WorldModelTrainer:
         actor = (origin.actor if origin is not None else new_actor(self.shape)).to(device)
         drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
         context = torch.tensor(context_of(env.engine.model, drawn, env.num_envs), dtype=torch.float32, device=device)
-        model = Dynamics(env.num_actions, config.model_hidden, env.dt, context.shape[1]).to(device)
-        self.memory = Memory(config.memory, context, env.num_actions)
+        delay = float(env.engine.model.actuator_delay.max()) + env.cfg.randomisation.delay[1]
+        past = past_targets(delay, env.dt)
+        model = Dynamics(env.num_actions, config.model_hidden, env.dt, context.shape[1], past).to(device)
+        self.memory = Memory(config.memory, context, env.num_actions, past)
         self.imagination = Imagination(env, config.horizon, config.compile)
         self.policy_update = PolicyUpdate(actor, model.frozen(), self.imagination, self.memory, config)
         self.model_update = ModelUpdate(model, self.memory, config)

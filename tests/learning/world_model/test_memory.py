@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from bumblebee.learning.world_model.collector import Collector
+from bumblebee.learning.world_model.dynamics import Dynamics, past_targets
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from tests.learning.tiny import env_of
@@ -76,6 +77,29 @@ def test_every_row_follows_from_the_one_before_or_from_a_reset() -> None:
     coming = env.library.frames(memory.clip.flatten(), (memory.frame.flatten() + 1) * env.dt).hold_pos
     taken = (memory.columns["target"] - coming.unflatten(0, (50, 8))) / env.scale
     torch.testing.assert_close(after["action"][goes], taken[:-1][goes], atol=1e-4, rtol=1e-4)
+
+
+def test_as_many_earlier_targets_are_kept_as_may_still_act() -> None:
+    """Commands that are two control steps late at most; a step's own targets may then act in the two after it."""
+    late = Randomisation(delay=(0.02, 0.04), push=0.0)
+    env = env_of(EnvConfig(num_worlds=4, threads=1, randomisation=late, episode_seconds=0.2))
+    past = past_targets(0.04, env.dt)
+    assert [past_targets(delay, 0.02) for delay in (0.0, 0.02, 0.021, 0.04)] == [1, 1, 2, 2] and past == 2
+    memory = Memory(20, torch.zeros(4, 0), env.num_actions, past)
+    collect, resets = Collector(env, memory, 0.5), []
+    for _ in range(20):
+        collect(lambda seen: torch.zeros(len(seen), env.num_actions))
+        resets.append(env.episode_length_buf == 0)
+    last, earlier = memory.columns["before"].chunk(2, dim=-1)
+    fresh = torch.stack(resets)[:-1]
+    assert torch.equal(last[1:][~fresh], memory.columns["target"][:-1][~fresh])
+    assert torch.equal(earlier[1:][~fresh], last[:-1][~fresh])
+    assert fresh.any() and torch.equal(earlier[1:][fresh], last[1:][fresh])
+    window = memory.windows(3, 10)
+    model = Dynamics(env.num_actions, (8,), env.dt, past=past)
+    found = model.unrolled(window.bodies[0], window.targets, window.before, window.context)
+    before = torch.cat((window.targets[1], window.targets[0]), dim=-1)
+    torch.testing.assert_close(found[2], model(found[1], window.targets[2], before, window.context))
 
 
 def test_a_push_breaks_a_window() -> None:
