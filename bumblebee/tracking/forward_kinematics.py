@@ -121,7 +121,7 @@ class _Places(torch.autograd.Function):
         return root[:, None] + found, turned
 
     @staticmethod
-    def backward(ctx: Any, pull: Tensor, twist: Tensor) -> tuple[Tensor | None, ...]:  # type: ignore[override]
+    def backward(ctx: Any, pull: Tensor, twist: Tensor) -> tuple[Tensor | None, ...]:
         quat, found, turned, axes, origins, carries = ctx.saved_tensors
         tw, tv, qw, qv = twist[..., :1], twist[..., 1:], turned[..., :1], turned[..., 1:]
         moment = (qw * tv - tw * qv - torch.linalg.cross(tv, qv)) / 2 + torch.linalg.cross(found, pull)

@@ -1,7 +1,7 @@
 """The world model: from a state and servo targets to the state one control step later."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 
 import torch
@@ -13,6 +13,9 @@ SPREADS = (0.05, 0.05, 0.05, 0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.6, 0.6, 0.6)
 """Errors of the root's place [m], turn [rad], velocity [m/s] and angular velocity [rad/s] that count as one."""
 ANGLE, SPEED = 0.1, 1.5
 """The same for joint angles [rad] and joint velocities [rad/s]."""
+
+Predict = Callable[[Tensor, Tensor, Tensor, Tensor], Tensor]
+"""What `Dynamics.forward` does."""
 
 
 def past_targets(delay: float, dt: float) -> int:
@@ -35,6 +38,11 @@ class Dynamics(nn.Module):
         context: entries of the vector that says in what a world differs; 0 where all are alike.
         past: P, earlier targets that may still act, see `past_targets`.
     """
+
+    mean: Tensor
+    std: Tensor
+    scale: Tensor
+    spread: Tensor
 
     def __init__(self, joints: int, hidden: Sequence[int], dt: float, context: int = 0, past: int = 1) -> None:
         super().__init__()
@@ -71,17 +79,13 @@ class Dynamics(nn.Module):
         seen = (self.seen(body, target, before, context) - self.mean) / self.std
         return moved(body, self.layers(seen.clamp(-10, 10)) * self.scale, self.dt)
 
-    def step(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
-        """`forward`, which may be replaced by a compiled one where windows are predicted."""
-        return self(body, target, before, context)
-
     def frozen(self) -> "Dynamics":
         """A twin on the same numbers from now on, whose weights want no gradient; compiled code would compute it."""
         twin = deepcopy(self)
         for own, other in zip(self.modules(), twin.modules(), strict=True):
             other._buffers.update(own._buffers)
-        for own, other in zip(self.parameters(), twin.parameters(), strict=True):
-            other.requires_grad_(False).data = own.data
+        for weight, shared in zip(self.parameters(), twin.parameters(), strict=True):
+            shared.requires_grad_(False).data = weight.data
         return twin
 
     @torch.no_grad()
@@ -92,7 +96,9 @@ class Dynamics(nn.Module):
         self.std.copy_(seen.std(0).clamp(min=1e-2))
         self.scale.copy_(change.square().mean(0).sqrt().clamp(min=1e-5))
 
-    def unrolled(self, body: Tensor, targets: Tensor, before: Tensor, context: Tensor) -> Tensor:
+    def unrolled(
+        self, body: Tensor, targets: Tensor, before: Tensor, context: Tensor, step: Predict | None = None
+    ) -> Tensor:
         """Predictions in a row, each from the last: (K, B, 13 + 2 J).
 
         Args:
@@ -100,10 +106,11 @@ class Dynamics(nn.Module):
             targets: (K, B, J) [rad].
             before: (B, P J) [rad] before the first.
             context: (B, C).
+            step: what predicts in place of `forward`, a compiled one.
         """
         states, body = [], body.requires_grad_()  # as later steps': compiled once
         for target in targets.unbind():
-            body = self.step(body, target, before, context)
+            body = (step or self)(body, target, before, context)
             before = handed_on(target, before)
             states.append(body)
         return torch.stack(states)

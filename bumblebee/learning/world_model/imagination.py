@@ -70,8 +70,7 @@ class Imagination:
         columns = (servos.gain, servos.bias[:, 2], servos.limit)
         self._kp, self._kd, self._limit = (torch.tensor(c, dtype=torch.float32, device=device) for c in columns)
         self._ahead = torch.arange(1, horizon + 2, device=device)
-        if compiled:
-            self._advance = torch.compile(self._advance, dynamic=False)
+        self._advanced = torch.compile(self._advance, dynamic=False) if compiled else self._advance
 
     def state(self, body: Tensor) -> tuple[RobotState, Tensor]:
         """What the task sees of states (B, 13 + 2 J), and the feet's orientations (B, 2, 4)."""
@@ -112,14 +111,15 @@ class Imagination:
         *coming, final = self.references(starts.clip, starts.frame)
         keys, steps = self.state(body)[0].key_pos_w, []
         for ref, noise in zip(coming, self._noise(len(body)), strict=True):
-            seen, after, keys, action, target, reward, lost = self._advance(
+            seen, after, keys, action, target, reward, lost = self._advanced(
                 act, model, body, keys, before, last, earlier, starts.context, ref, noise
             )
             steps.append((seen, reward, lost))
             body, before, last, earlier = after, handed_on(target, before), action, last
-        seen, reward, lost = zip(*steps, strict=True)
-        after = see(self.terms, unpacked(body, keys), final, last)
-        return Rollout.of(torch.stack(seen), after, torch.stack(reward), torch.stack(lost), self._left(starts))
+        shown, rewards, losses = (torch.stack(each) for each in zip(*steps, strict=True))
+        return Rollout.of(
+            shown, see(self.terms, unpacked(body, keys), final, last), rewards, losses, self._left(starts)
+        )
 
     def _advance(
         self,

@@ -24,8 +24,7 @@ class ModelUpdate:
 
     def __init__(self, model: Dynamics, memory: Memory, config: WorldModelConfig) -> None:
         self.model, self._memory, self._config = model, memory, config
-        if config.compile:
-            model.step = torch.compile(model.step, dynamic=False)
+        self._predict = torch.compile(model.forward, dynamic=False) if config.compile else model.forward
         self.descent = Descent(list(model.parameters()), config.model_rate, config.grad_norm)
         self.told = {"loss_model": torch.zeros((), device=model.mean.device)}
         self._recorded = Recorded(self._step, model.mean.device, lambda: [])
@@ -57,7 +56,8 @@ class ModelUpdate:
 
     def _step(self) -> None:
         window = self._memory.windows(self._config.window, self._config.model_batch)
-        predicted = self.model.unrolled(window.bodies[0], window.targets, window.before, window.context)
+        first = (window.bodies[0], window.targets, window.before, window.context)
+        predicted = self.model.unrolled(*first, self._predict)
         loss = self.model.loss(predicted, window.bodies[1:], window.valid)
         self.descent(loss)
         self.told["loss_model"].copy_(loss.detach())

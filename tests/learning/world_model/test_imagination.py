@@ -103,7 +103,7 @@ def test_a_rollout_gives_the_policy_gradients_through_what_it_sees_last_and_trac
     graphs = counters["stats"]["unique_graphs"]
     for backend in (None, "aot_eager"):
         if backend is not None:
-            imagination._advance = torch.compile(imagination._advance, backend=backend, fullgraph=True, dynamic=False)
+            imagination._advanced = torch.compile(imagination._advance, backend=backend, fullgraph=True, dynamic=False)
         rollout = imagination.rollout(lambda seen: actor({"policy": seen}), model, starts)
         found.append((rollout.seen, *torch.autograd.grad(rollout.after.sum() + rollout.reward.sum(), weights)))
     assert rollout.seen.shape == (3, 4, actor.obs_dim) and rollout.reward.shape == (3, 4)
