@@ -94,6 +94,7 @@ class TrackingEnv(VecEnv):
         self._dones = torch.zeros(n, dtype=torch.bool, device=device)
         self._time_outs = torch.zeros_like(self._dones)
         self._push_clock = push_phase(config.randomisation, n, self.dt, device)
+        self._pushed = torch.zeros_like(self._dones)
         self._restart(torch.ones_like(self._dones))
         engine.settle()
         self._state, self._ref = self._read(), self._coming()
@@ -135,6 +136,11 @@ class TrackingEnv(VecEnv):
     def now(self) -> tuple[RobotState, ReferenceFrame]:
         """The robots now, and the reference at the end of the coming control step; the next step writes over them."""
         return self._state, self._ref
+
+    @property
+    def pushed(self) -> Tensor:
+        """Worlds (B,) bool that were pushed at the end of the last step; the next step writes over it."""
+        return self._pushed
 
     @property
     def limit(self) -> Tensor:
@@ -247,9 +253,13 @@ class TrackingEnv(VecEnv):
         config = self.cfg.randomisation
         self._push_clock += 1
         if config.push and config.push_regular:
-            self.engine.push(regular_push(config, self._push_clock, self.dt, self._generator))
-        elif (push := draw_push(config, self.num_envs, self.dt, self._generator)) is not None:
+            push: Tensor | None = regular_push(config, self._push_clock, self.dt, self._generator)
+        else:
+            push = draw_push(config, self.num_envs, self.dt, self._generator)
+        self._pushed.zero_()
+        if push is not None:
             self.engine.push(push)
+            self._pushed.copy_(push.any(-1))
 
     def _restart(self, over: Tensor) -> None:
         """Put the robots `over` (B,) bool at new starts."""

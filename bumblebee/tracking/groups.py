@@ -46,22 +46,23 @@ class Group:
             self._look = torch.compile(self._look, dynamic=False)
         levels = noise * config.noise * noise_levels(self.parts + self.parts_now)
         self._size = sum(size for _, size in self.parts)
-        self._levels = levels.to(device) if bool(levels.any()) else None
-        kinds = 1 if self._levels is None else 2
+        self.levels = levels.to(device) if bool(levels.any()) else None
+        """Largest error (D + N,) of each entry of a control step; None: it is exact."""
+        kinds = 1 if self.levels is None else 2
         kept = kinds if config.history > 1 else 0
         self._worlds, self._stays = worlds, device.type == "cuda"
         self._rings = [History(worlds, self._size, config.history, device) for _ in range(kept)]
         whole = torch.zeros(worlds, config.history * self._size + len(levels) - self._size, device=device)
         self.exact = whole
         """(B, H * D + N) without noise, N of it the newest step's alone."""
-        self.noisy = whole if self._levels is None else whole.clone()
+        self.noisy = whole if self.levels is None else whole.clone()
         """(B, H * D + N) as sensors would have it."""
 
     def draws(self, generator: torch.Generator) -> Tensor | None:
         """Numbers (B, D + N) from -1 to 1 for the next look's noise; None for a group that is exact."""
-        if self._levels is None:
+        if self.levels is None:
             return None
-        drawn = torch.empty(self._worlds, len(self._levels), device=self._levels.device)
+        drawn = torch.empty(self._worlds, len(self.levels), device=self.levels.device)
         return drawn.uniform_(-1, 1, generator=generator)
 
     def look(
@@ -80,8 +81,8 @@ class Group:
         exact = self._look(state, ref, action)
         drawn = self.draws(generator) if begun is None else begun()
         rows = [exact]
-        if self._levels is not None and drawn is not None:
-            rows.append(torch.addcmul(exact, self._levels, drawn))
+        if self.levels is not None and drawn is not None:
+            rows.append(torch.addcmul(exact, self.levels, drawn))
         if self._rings:
             for ring, row in zip(self._rings, rows, strict=True):
                 ring.add(row[:, : self._size], fresh)

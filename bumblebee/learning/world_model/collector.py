@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from bumblebee.learning.world_model.body import packed
+from bumblebee.learning.world_model.dynamics import handed_on
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.observations import middle_targets
@@ -22,28 +23,32 @@ class Collector:
 
     def __init__(self, env: TrackingEnv, memory: Memory, noise: float) -> None:
         self._env, self._memory = env, memory
-        self._noise = noise * torch.linspace(0, 2, env.num_envs, device=memory.done.device)[:, None]
-        self._last = torch.zeros(env.num_envs, env.num_actions, device=memory.done.device)
+        self._noise = noise * torch.linspace(0, 2, env.num_envs, device=memory.broken.device)[:, None]
+        self._last = torch.zeros(env.num_envs, env.num_actions, device=memory.broken.device)
         self._earlier = torch.zeros_like(self._last)
+        self._past = memory.columns["before"].shape[-1] // env.num_actions
         self._before = self._held()
 
     @torch.no_grad()
-    def __call__(self, act: Callable[[Tensor], Tensor]) -> None:
-        """One control step; `act` maps observations (N, D) to actions (N, J)."""
+    def __call__(self, act: Callable[[Tensor], Tensor]) -> Tensor:
+        """One control step; `act` maps observations (N, D) to actions (N, J). Gives back the observations."""
         env = self._env
-        action = act(env.get_observations()["policy"])
+        seen = env.get_observations()["policy"]
+        action = act(seen)
         action = action + self._noise * torch.randn_like(action)
         state, ref = env.now
         target = middle_targets(ref, env.middle) + env.scale * action
         shown = {"before": self._before, "action": self._last, "earlier": self._earlier}
         self._memory.begin(env.clip, env.frame, body=packed(state), target=target, **shown)
         _, _, done, _ = env.step(action)
-        self._memory.end(done)
+        self._memory.end(done | env.pushed)
         fresh = done[:, None]
-        self._before = torch.where(fresh, self._held(), target)
+        self._before = torch.where(fresh, self._held(), handed_on(target, self._before))
         self._earlier = self._last.masked_fill(fresh, 0.0)
         self._last = action.masked_fill(fresh, 0.0)
+        return seen
 
     def _held(self) -> Tensor:
-        """Targets (N, J) [rad] that a robot's servos are held at when its episode begins in this frame."""
-        return self._env.library.frames(self._env.clip, self._env.frame * self._env.dt).hold_pos
+        """Targets (N, P J) [rad] that a robot's servos are held at when its episode begins in this frame."""
+        ref = self._env.library.frames(self._env.clip, self._env.frame * self._env.dt)
+        return ref.hold_pos.repeat(1, self._past)

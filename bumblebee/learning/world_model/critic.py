@@ -49,15 +49,16 @@ def targets(rollout: Rollout, values: Tensor, gamma: float, trace: float) -> Ten
 
     Args:
         rollout: H imagined steps of B robots.
-        values: (H + 1, B) of what it sees.
+        values: (H + 1, B) before each step and after the last.
         gamma: discount a control step.
         trace: lambda, the weight of later rewards against the next value.
     """
+    goes = rollout.alive[1:]
+    at_once = torch.where(goes, (1 - trace) * values[1:], torch.where(rollout.over, values[:-1], 0.0))
+    own, share = (1 - gamma) * rollout.reward + gamma * at_once, gamma * trace * goes
     found, coming = [], values[-1]
-    for step in reversed(range(len(rollout.reward))):
-        mixed = torch.lerp(values[step + 1], coming, trace)
-        after = torch.where(rollout.alive[step + 1], mixed, torch.where(rollout.over[step], values[step], 0.0))
-        coming = (1 - gamma) * rollout.reward[step] + gamma * after
+    for step in reversed(range(len(own))):
+        coming = torch.addcmul(own[step], share[step], coming)
         found.append(coming)
     return torch.stack(found[::-1])
 

@@ -24,8 +24,9 @@ class Descent:
         device = self.weights[0].device
         self.rate = torch.tensor(rate, device=device)
         self._adam = torch.optim.Adam(self.weights, lr=self.rate, fused=True, capturable=device.type == "cuda")
-        for weight in self.weights:
-            weight.grad = torch.zeros_like(weight)
+        self._gradients = [torch.zeros_like(weight) for weight in self.weights]
+        for weight, gradient in zip(self.weights, self._gradients, strict=True):
+            weight.grad = gradient
 
     def decay(self, done: float) -> None:
         """Set the rate for a training of which the share `done` lies behind."""
@@ -33,7 +34,7 @@ class Descent:
 
     def __call__(self, loss: Tensor) -> None:
         """One step down the gradient of `loss` ()."""
-        torch._foreach_copy_([weight.grad for weight in self.weights], torch.autograd.grad(loss, self.weights))
+        torch._foreach_copy_(self._gradients, torch.autograd.grad(loss, self.weights))
         torch.nn.utils.clip_grad_norm_(self.weights, self._norm)
         self._adam.step()
 

@@ -1,6 +1,8 @@
 """The world model: from a state and servo targets to the state one control step later."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from copy import deepcopy
 
 import torch
 from torch import Tensor, nn
@@ -12,6 +14,19 @@ SPREADS = (0.05, 0.05, 0.05, 0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.6, 0.6, 0.6)
 ANGLE, SPEED = 0.1, 1.5
 """The same for joint angles [rad] and joint velocities [rad/s]."""
 
+Predict = Callable[[Tensor, Tensor, Tensor, Tensor], Tensor]
+"""What `Dynamics.forward` does."""
+
+
+def past_targets(delay: float, dt: float) -> int:
+    """How many earlier targets may act in a control step of `dt` [s], of servos late by `delay` [s]; at least 1."""
+    return max(math.ceil(delay / dt - 1e-6), 1)
+
+
+def handed_on(target: Tensor, before: Tensor) -> Tensor:
+    """What was given before the next step (B, P J), from this step's targets (B, J) and those before it (B, P J)."""
+    return torch.cat((target, before[:, : -target.shape[1]]), dim=-1)
+
 
 class Dynamics(nn.Module):
     """Predicts what one control step changes beyond uniform motion.
@@ -21,12 +36,19 @@ class Dynamics(nn.Module):
         hidden: widths of the layers.
         dt: control period [s].
         context: entries of the vector that says in what a world differs; 0 where all are alike.
+        past: P, earlier targets that may still act, see `past_targets`.
     """
 
-    def __init__(self, joints: int, hidden: Sequence[int], dt: float, context: int = 0) -> None:
+    mean: Tensor
+    std: Tensor
+    scale: Tensor
+    spread: Tensor
+
+    def __init__(self, joints: int, hidden: Sequence[int], dt: float, context: int = 0, past: int = 1) -> None:
         super().__init__()
-        self.dt = dt
-        size, layers = 10 + 4 * joints + context, []
+        self.dt, self._past = dt, past
+        seen = size = 10 + (3 + past) * joints + context
+        layers: list[nn.Module] = []
         for width in hidden:
             layers += [nn.Linear(size, width), nn.LayerNorm(width), nn.SiLU()]
             size = width
@@ -35,15 +57,15 @@ class Dynamics(nn.Module):
             last.weight.mul_(0.1)
             last.bias.zero_()
         self.layers = nn.Sequential(*layers, last)
-        self.register_buffer("mean", torch.zeros(10 + 4 * joints + context))
-        self.register_buffer("std", torch.ones(10 + 4 * joints + context))
+        self.register_buffer("mean", torch.zeros(seen))
+        self.register_buffer("std", torch.ones(seen))
         self.register_buffer("scale", torch.ones(12 + 2 * joints))
         self.register_buffer("spread", torch.tensor([*SPREADS, *[ANGLE] * joints, *[SPEED] * joints]))
 
     def seen(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
-        """The network's input (B, 10 + 4 J + C) before it is normalised."""
+        """The network's input (B, 10 + (3 + P) J + C) before it is normalised."""
         angle = joint_pos(body)
-        return torch.cat((features(body), target - angle, before - angle, context), dim=-1)
+        return torch.cat((features(body), target - angle, before - angle.repeat(1, self._past), context), dim=-1)
 
     def forward(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
         """The next state (B, 13 + 2 J).
@@ -51,37 +73,45 @@ class Dynamics(nn.Module):
         Args:
             body: (B, 13 + 2 J).
             target: (B, J) [rad] that the servos are given for this control step.
-            before: (B, J) [rad] that they had before it; of use where commands are late.
+            before: (B, P J) [rad] that they were given before it, the last one first; commands may be late.
             context: (B, C).
         """
         seen = (self.seen(body, target, before, context) - self.mean) / self.std
         return moved(body, self.layers(seen.clamp(-10, 10)) * self.scale, self.dt)
 
-    def step(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor) -> Tensor:
-        """`forward`, which may be replaced by a compiled one where windows are predicted."""
-        return self(body, target, before, context)
+    def frozen(self) -> "Dynamics":
+        """A twin on the same numbers from now on, whose weights want no gradient; compiled code would compute it."""
+        twin = deepcopy(self)
+        for own, other in zip(self.modules(), twin.modules(), strict=True):
+            other._buffers.update(own._buffers)
+        for weight, shared in zip(self.parameters(), twin.parameters(), strict=True):
+            shared.requires_grad_(False).data = weight.data
+        return twin
 
     @torch.no_grad()
     def normalise(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor, after: Tensor) -> None:
-        """Take the spreads of inputs and of changes from first transitions (B, ...)."""
+        """Take the spreads of inputs and of changes from first transitions (B, ...), none of them broken."""
         seen, change = self.seen(body, target, before, context), change_of(body, after, self.dt)
         self.mean.copy_(seen.mean(0))
         self.std.copy_(seen.std(0).clamp(min=1e-2))
         self.scale.copy_(change.square().mean(0).sqrt().clamp(min=1e-5))
 
-    def unrolled(self, body: Tensor, targets: Tensor, before: Tensor, context: Tensor) -> Tensor:
+    def unrolled(
+        self, body: Tensor, targets: Tensor, before: Tensor, context: Tensor, step: Predict | None = None
+    ) -> Tensor:
         """Predictions in a row, each from the last: (K, B, 13 + 2 J).
 
         Args:
             body: (B, 13 + 2 J) at first.
             targets: (K, B, J) [rad].
-            before: (B, J) [rad] before the first.
+            before: (B, P J) [rad] before the first.
             context: (B, C).
+            step: what predicts in place of `forward`, a compiled one.
         """
         states, body = [], body.requires_grad_()  # as later steps': compiled once
         for target in targets.unbind():
-            body = self.step(body, target, before, context)
-            before = target
+            body = (step or self)(body, target, before, context)
+            before = handed_on(target, before)
             states.append(body)
         return torch.stack(states)
 

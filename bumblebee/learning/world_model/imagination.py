@@ -4,14 +4,14 @@ Observation, reward and the ends of episodes are those of `bumblebee.tracking`, 
 model imagines no contact forces: `stumble` sees none. Torques are the declared servos' at the end of the step.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
 
 from bumblebee.learning.world_model.body import joint_pos, unpacked
-from bumblebee.learning.world_model.dynamics import Dynamics
+from bumblebee.learning.world_model.dynamics import Dynamics, handed_on
 from bumblebee.learning.world_model.memory import Starts
 from bumblebee.robot.facts import FEET, KEY_BODIES
 from bumblebee.sim.engine import RobotState
@@ -33,7 +33,9 @@ class Rollout:
     """H imagined control steps of B robots."""
 
     seen: Tensor
-    """(H + 1, B, D) observations before each step and after the last."""
+    """(H, B, D) exact observations before each step, without gradients."""
+    after: Tensor
+    """(B, D) exact observations after the last step."""
     reward: Tensor
     """(H, B) a second of perfect tracking; 0 after an end."""
     alive: Tensor
@@ -42,12 +44,12 @@ class Rollout:
     """(H, B) bool: the clip ends with this step, which is no failure."""
 
     @classmethod
-    def of(cls, seen: Tensor, reward: Tensor, lost: Tensor, left: Tensor) -> "Rollout":
-        """From rewards (H, B), failures (H, B) bool and the steps (B,) that were left of the clips."""
+    def of(cls, seen: Tensor, after: Tensor, reward: Tensor, lost: Tensor, left: Tensor) -> "Rollout":
+        """From observations, rewards (H, B), failures (H, B) bool and the steps (B,) that were left of the clips."""
         done = torch.arange(1, len(reward) + 1, device=left.device)[:, None]
         ends = torch.cat(((left <= 0)[None], lost | (done >= left)))
         alive = ends.cumsum(0) == 0
-        return cls(seen, torch.where(alive[:-1], reward, 0.0), alive, alive[:-1] & (done >= left) & ~lost)
+        return cls(seen, after, torch.where(alive[:-1], reward, 0.0), alive, alive[:-1] & (done >= left) & ~lost)
 
 
 class Imagination:
@@ -68,8 +70,7 @@ class Imagination:
         columns = (servos.gain, servos.bias[:, 2], servos.limit)
         self._kp, self._kd, self._limit = (torch.tensor(c, dtype=torch.float32, device=device) for c in columns)
         self._ahead = torch.arange(1, horizon + 2, device=device)
-        if compiled:
-            self._advance = torch.compile(self._advance, dynamic=False)
+        self._advanced = torch.compile(self._advance, dynamic=False) if compiled else self._advance
 
     def state(self, body: Tensor) -> tuple[RobotState, Tensor]:
         """What the task sees of states (B, 13 + 2 J), and the feet's orientations (B, 2, 4)."""
@@ -104,20 +105,21 @@ class Imagination:
         )
 
     def rollout(self, act: Act, model: Dynamics, starts: Starts) -> Rollout:
-        """Imagine `horizon` control steps; gradients lead from what is seen and earned to the weights of `act`."""
+        """Imagine `horizon` control steps; rewards and the last observation have gradients to the weights of `act`."""
         first = (starts.body, starts.before, starts.action, starts.earlier)
         body, before, last, earlier = (tensor.requires_grad_() for tensor in first)  # as later steps': compiled once
         *coming, final = self.references(starts.clip, starts.frame)
         keys, steps = self.state(body)[0].key_pos_w, []
-        for ref in coming:
-            seen, after, keys, action, target, reward, lost = self._advance(
-                act, model, body, keys, before, last, earlier, starts.context, ref
+        for ref, noise in zip(coming, self._noise(len(body)), strict=True):
+            seen, after, keys, action, target, reward, lost = self._advanced(
+                act, model, body, keys, before, last, earlier, starts.context, ref, noise
             )
             steps.append((seen, reward, lost))
-            body, before, last, earlier = after, target, action, last
-        seen, reward, lost = (list(each) for each in zip(*steps, strict=True))
-        seen.append(see(self.terms, unpacked(body, keys), final, last))
-        return Rollout.of(torch.stack(seen), torch.stack(reward), torch.stack(lost), self._left(starts))
+            body, before, last, earlier = after, handed_on(target, before), action, last
+        shown, rewards, losses = (torch.stack(each) for each in zip(*steps, strict=True))
+        return Rollout.of(
+            shown, see(self.terms, unpacked(body, keys), final, last), rewards, losses, self._left(starts)
+        )
 
     def _advance(
         self,
@@ -130,6 +132,7 @@ class Imagination:
         earlier: Tensor,
         context: Tensor,
         ref: ReferenceFrame,
+        noise: Tensor | None,
     ) -> tuple[Tensor, ...]:
         """One imagined control step.
 
@@ -139,12 +142,19 @@ class Imagination:
         """
         state = unpacked(body, keys)
         seen = see(self.terms, state, ref, last)
-        action = act(seen)
+        action = act(seen if noise is None else seen + noise)
         target = self.targets(ref, action)
         after = model(body, target, before, context)
         step = self.step(state, after, target, (action, last, earlier), ref)
         reward = self.env.reward(step) / self.env.dt
-        return seen, after, step.state.key_pos_w, action, target, reward, self.lost(step)
+        return seen.detach(), after, step.state.key_pos_w, action, target, reward, self.lost(step)
+
+    def _noise(self, robots: int) -> Sequence[Tensor | None]:
+        """Errors of the sensors, (B, D) for each step, as the environment draws them."""
+        levels = self.env.groups["policy"].levels
+        if levels is None:
+            return [None] * self.horizon
+        return (levels * torch.empty(self.horizon, robots, len(levels), device=levels.device).uniform_(-1, 1)).unbind()
 
     def lost(self, step: Step) -> Tensor:
         """Robots (B,) bool whose episode ends as a failure with this step."""

@@ -15,11 +15,11 @@ class Windows:
     targets: Tensor
     """(K, B, J) [rad] that the servos were given."""
     before: Tensor
-    """(B, J) [rad] that they had before."""
+    """(B, P J) [rad] the P before these, the last one first."""
     context: Tensor
     """(B, C)."""
     valid: Tensor
-    """(K, B) bool: no episode ended in this step or an earlier one of the window."""
+    """(K, B) bool: this step and those before it in the window led to the state after them."""
 
 
 @dataclass(frozen=True)
@@ -44,15 +44,17 @@ class Memory:
         steps: T.
         context: (N, C), in what the worlds differ.
         joints: J.
+        past: P, servo targets before a step's own that are kept with it.
     """
 
-    def __init__(self, steps: int, context: Tensor, joints: int) -> None:
+    def __init__(self, steps: int, context: Tensor, joints: int, past: int = 1) -> None:
         n, device = len(context), context.device
         self.steps, self.worlds, self.context = steps, n, context
-        sizes = {"body": 13 + 2 * joints, **dict.fromkeys(("target", "before", "action", "earlier"), joints)}
+        sizes = {"body": 13 + 2 * joints, "before": past * joints}
+        sizes |= dict.fromkeys(("target", "action", "earlier"), joints)
         self.columns = {name: torch.zeros(steps, n, size, device=device) for name, size in sizes.items()}
         self.clip, self.frame = (torch.zeros(steps, n, dtype=torch.long, device=device) for _ in range(2))
-        self.done = torch.ones(steps, n, dtype=torch.bool, device=device)
+        self.broken = torch.ones(steps, n, dtype=torch.bool, device=device)
         self.oldest = torch.zeros((), dtype=torch.long, device=device)
         self.added = 0
 
@@ -67,9 +69,9 @@ class Memory:
             self.columns[name][self._at] = value
         self.clip[self._at], self.frame[self._at] = clip, frame
 
-    def end(self, done: Tensor) -> None:
-        """Finish the step with whose episodes it ended (N,) bool; the next one comes after it."""
-        self.done[self._at] = done
+    def end(self, broken: Tensor) -> None:
+        """Finish the step; the next state is not what it led to where it is `broken` (N,) bool: reset or pushed."""
+        self.broken[self._at] = broken
         self.added += 1
         self.oldest.fill_(self._at)
 
@@ -79,22 +81,22 @@ class Memory:
 
     def windows(self, size: int, batch: int) -> Windows:
         """Draw stretches of `size` steps."""
-        step = torch.randint(self.steps - size, (batch,), device=self.done.device)
-        world = torch.randint(self.worlds, (batch,), device=self.done.device)
+        step = torch.randint(self.steps - size, (batch,), device=self.broken.device)
+        world = torch.randint(self.worlds, (batch,), device=self.broken.device)
         rows = torch.stack([self._row(step + k, world) for k in range(size + 1)])  # (K + 1, B)
-        ended = self.done.flatten()[rows[:-1]]
+        broken = self.broken.flatten()[rows[:-1]]
         return Windows(
             bodies=self._of("body", rows),
             targets=self._of("target", rows[:-1]),
             before=self._of("before", rows[0]),
             context=self.context[world],
-            valid=ended.cumsum(0) == 0,
+            valid=broken.cumsum(0) == 0,
         )
 
     def starts(self, batch: int) -> Starts:
         """Draw states to imagine from."""
-        step = torch.randint(self.steps, (batch,), device=self.done.device)
-        world = torch.randint(self.worlds, (batch,), device=self.done.device)
+        step = torch.randint(self.steps, (batch,), device=self.broken.device)
+        world = torch.randint(self.worlds, (batch,), device=self.broken.device)
         rows = self._row(step, world)
         body, before, action, earlier = (self._of(name, rows) for name in ("body", "before", "action", "earlier"))
         return Starts(

@@ -17,15 +17,15 @@ from bumblebee.learning.policy import Policy, load_policy, new_actor, shape_of
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.context import context_of
-from bumblebee.learning.world_model.dynamics import Dynamics
+from bumblebee.learning.world_model.dynamics import Dynamics, past_targets
 from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory
-from bumblebee.learning.world_model.updates import ModelUpdate, PolicyUpdate
+from bumblebee.learning.world_model.model_update import ModelUpdate
+from bumblebee.learning.world_model.policy_update import PolicyUpdate
 from bumblebee.progress import progress
 from bumblebee.sim.warp_limits import within_memory
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.randomisation import draw_fields
-from bumblebee.tracking.terms import see
 
 CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
 
@@ -69,24 +69,23 @@ class WorldModelTrainer:
         ):
             raise BadInput(parent, f"a policy of the shape {self.shape}", str(origin.shape), "Start from another one.")
         actor = (origin.actor if origin is not None else new_actor(self.shape)).to(device)
-        self._normalised = origin is not None
         drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
         context = torch.tensor(context_of(env.engine.model, drawn, env.num_envs), dtype=torch.float32, device=device)
-        model = Dynamics(env.num_actions, config.model_hidden, env.dt, context.shape[1]).to(device)
-        if config.compile:
-            model.step = torch.compile(model.step, dynamic=False)
-        self.memory = Memory(config.memory, context, env.num_actions)
+        delay = float(env.engine.model.actuator_delay.max()) + env.cfg.randomisation.delay[1]
+        past = past_targets(delay, env.dt)
+        model = Dynamics(env.num_actions, config.model_hidden, env.dt, context.shape[1], past).to(device)
+        self.memory = Memory(config.memory, context, env.num_actions, past)
         self.imagination = Imagination(env, config.horizon, config.compile)
+        self.policy_update = PolicyUpdate(actor, model.frozen(), self.imagination, self.memory, config)
         self.model_update = ModelUpdate(model, self.memory, config)
-        self.policy_update = PolicyUpdate(actor, model, self.imagination, self.memory, config)
         self._collect = Collector(env, self.memory, config.noise)
-        self.iteration, self._seconds = 0, 0.0
+        self.iteration, self._seconds, self._frames_before = 0, 0.0, 0
         self._resume()
 
     @property
     def frames(self) -> int:
         """Control steps seen so far, of all worlds."""
-        return self.memory.added * self.env.num_envs
+        return self._frames_before + self.memory.added * self.env.num_envs
 
     def train(self, what: str = "policy", enough: Callable[[], bool] = lambda: False) -> None:
         """Train up to the configured iterations, or until it is `enough`; a line of `curve.csv` each."""
@@ -120,7 +119,7 @@ class WorldModelTrainer:
             "policy": self.policy_update.state_dict(),
             "iteration": self.iteration,
             "seconds": self._seconds,
-            "added": self.memory.added,
+            "frames": self.frames,
             "failure": self.env.sampler.failure.cpu(),
         }
 
@@ -128,9 +127,8 @@ class WorldModelTrainer:
         """Go on from what `state_dict` gave."""
         self.model_update.load_state_dict(saved["model"])
         self.policy_update.load_state_dict(saved["policy"])
-        self.iteration, self._seconds = saved["iteration"], saved["seconds"]
+        self.iteration, self._seconds, self._frames_before = (saved[n] for n in ("iteration", "seconds", "frames"))
         self.env.sampler.failure.copy_(saved["failure"])
-        self._normalised = True
 
     def save_checkpoint(self) -> None:
         """Write networks, optimisers and counts, whole or not at all."""
@@ -149,11 +147,13 @@ class WorldModelTrainer:
         for update in updates:
             update.decay(done)
         for _ in range(config.steps):
-            self._collect(self._act)
+            seen = self._collect(self._act)
+        self.policy_update.look(seen)
         if not self.memory.full:
             while not self.memory.full:
-                self._collect(self._act)
-            self._first_look()
+                self.policy_update.look(self._collect(self._act))
+            if self.iteration == 0:
+                self.model_update.begin()
         env.engine.check()
         for _ in range(config.model_updates):
             self.model_update()
@@ -171,21 +171,3 @@ class WorldModelTrainer:
     def _act(self, seen: Tensor) -> Tensor:
         """Actions (N, J) of the policy that learns, without exploration."""
         return self.policy_update.actor({"policy": seen})
-
-    def _first_look(self) -> None:
-        """Normalise both networks by the first full memory, and let the model learn alone for a while."""
-        if not self._normalised:
-            window, model = self.memory.windows(1, 65_536), self.model_update.model
-            model.normalise(window.bodies[0], window.targets[0], window.before, window.context, window.bodies[1])
-            starts = self.memory.starts(65_536)
-            with torch.no_grad():
-                state, _ = self.imagination.state(starts.body)
-                ref = self.imagination.references(starts.clip, starts.frame)[0]
-                seen = see(self.imagination.terms, state, ref, starts.action)
-                for actor in (self.policy_update.actor, self.policy_update.average):
-                    actor.train()
-                    actor.obs_normalizer.update(seen)
-                    actor.eval()
-            self._normalised = True
-        for _ in range(self.config.warm_up):
-            self.model_update()

@@ -11,7 +11,7 @@ GAMMA, H = 0.9, 4
 def rollout(reward: torch.Tensor, lost: torch.Tensor | None = None, left: int = 100) -> Rollout:
     steps, robots = reward.shape
     lost = torch.zeros(steps, robots, dtype=torch.bool) if lost is None else lost
-    return Rollout.of(torch.zeros(steps + 1, robots, 2), reward, lost, torch.full((robots,), left))
+    return Rollout.of(torch.zeros(steps, robots, 2), torch.zeros(robots, 2), reward, lost, torch.full((robots,), left))
 
 
 def lost_at(step: int) -> torch.Tensor:

@@ -2,13 +2,14 @@
 
 import pytest
 import torch
+from torch._dynamo.utils import counters
 
 from bumblebee.learning.policy import new_actor, shape_of
 from bumblebee.learning.world_model.body import packed
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.imagination import Imagination
-from bumblebee.learning.world_model.memory import Memory
+from bumblebee.learning.world_model.memory import Memory, Starts
 from bumblebee.motion.embedded import make_library
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import EnvConfig, Randomisation
@@ -16,6 +17,7 @@ from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.terms import see
+from tests.learning.tiny import env_of
 
 WORLDS, STEPS = 8, 60
 
@@ -98,11 +100,51 @@ def test_a_rollout_gives_the_policy_gradients_through_what_it_sees_last_and_trac
         collect(lambda seen: actor({"policy": seen}))
     model, starts = Dynamics(env.num_actions, (16,), env.dt), memory.starts(4)
     imagination, weights, found = Imagination(env, horizon=3), list(actor.mlp.parameters()), []
+    graphs = counters["stats"]["unique_graphs"]
     for backend in (None, "aot_eager"):
         if backend is not None:
-            imagination._advance = torch.compile(imagination._advance, backend=backend, fullgraph=True, dynamic=False)
+            imagination._advanced = torch.compile(imagination._advance, backend=backend, fullgraph=True, dynamic=False)
         rollout = imagination.rollout(lambda seen: actor({"policy": seen}), model, starts)
-        found.append((rollout.seen, *torch.autograd.grad(rollout.seen[-1].sum() + rollout.reward.sum(), weights)))
-    assert rollout.seen.shape == (4, 4, actor.obs_dim) and rollout.reward.shape == (3, 4)
+        found.append((rollout.seen, *torch.autograd.grad(rollout.after.sum() + rollout.reward.sum(), weights)))
+    assert rollout.seen.shape == (3, 4, actor.obs_dim) and rollout.reward.shape == (3, 4)
     assert all(torch.isfinite(gradient).all() and gradient.any() for gradient in found[0][1:])
     torch.testing.assert_close(*found, rtol=1e-3, atol=1e-3)
+    assert counters["stats"]["unique_graphs"] - graphs == 1, "the first step must look like the later ones"
+
+
+def test_references_are_those_of_the_coming_steps_and_a_rollout_stops_at_the_clips_end(env: TrackingEnv) -> None:
+    imagination = Imagination(env, horizon=3)
+    first, *_, last = imagination.references(env.clip, env.frame)
+    torch.testing.assert_close(first.joint_pos, env.now[1].joint_pos)
+    torch.testing.assert_close(last.key_pos_w, env.library.frames(env.clip, (env.frame + 4) * env.dt).key_pos_w)
+    clip = torch.arange(WORLDS) % len(env.library)
+    frame = env.library.length[clip] - 3  # two steps lead to the last frame
+    ref, still = env.library.frames(clip, frame * env.dt), torch.zeros(WORLDS, env.num_actions)
+    body = torch.cat((ref.root_pos_w, ref.root_quat_w, torch.zeros(WORLDS, 6), ref.joint_pos, 0 * still), dim=-1)
+    starts = Starts(body, ref.hold_pos, still, still.clone(), clip, frame, torch.zeros(WORLDS, 0))
+    model = Dynamics(env.num_actions, (16,), env.dt)
+    with torch.no_grad():
+        model.layers[-1].weight.zero_()  # it stands still
+        rollout = imagination.rollout(lambda seen: torch.zeros(len(seen), env.num_actions), model, starts)
+    assert rollout.alive[:2].all() and rollout.over[1].all()
+    assert not rollout.alive[2:].any() and rollout.over.sum() == WORLDS and not rollout.reward[2].any()
+
+
+def test_the_imagined_policy_sees_through_the_environments_sensors() -> None:
+    """As noisy as there; the value sees what is true."""
+    task = EnvConfig(num_worlds=4, threads=1)
+    noisy = env_of(task)
+    memory, shown = Memory(2, torch.zeros(4, 0), noisy.num_actions), []
+    for _ in range(2):
+        Collector(noisy, memory, 0.0)(lambda seen: torch.zeros(len(seen), noisy.num_actions))
+
+    def act(seen: torch.Tensor) -> torch.Tensor:
+        shown.append(seen)
+        return torch.zeros(len(seen), noisy.num_actions)
+
+    rollout = Imagination(noisy, horizon=2).rollout(
+        act, Dynamics(noisy.num_actions, (16,), noisy.dt), memory.starts(64)
+    )
+    levels = noisy.groups["policy"].levels
+    error = (torch.stack(shown) - rollout.seen).abs().amax((0, 1))
+    assert (error <= levels + 1e-5).all() and (error >= 0.8 * levels - 1e-5).all()

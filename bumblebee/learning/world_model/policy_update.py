@@ -1,4 +1,4 @@
-"""The two updates: the model learns to predict what was seen, the policy to earn more in what the model imagines."""
+"""The policy's update: it learns to earn more in what the model imagines, and the value what comes after that."""
 
 from copy import deepcopy
 from typing import Any
@@ -16,52 +16,12 @@ from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory
 
 
-class ModelUpdate:
-    """A gradient step of the model on windows of the memory; recorded on a GPU.
-
-    Args:
-        model: what learns.
-        memory: full when this is called.
-        config: batch, window and rate.
-    """
-
-    def __init__(self, model: Dynamics, memory: Memory, config: WorldModelConfig) -> None:
-        self.model, self._memory, self._config = model, memory, config
-        self.descent = Descent(list(model.parameters()), config.model_rate, config.grad_norm)
-        self.told = {"loss_model": torch.zeros((), device=model.mean.device)}
-        self._recorded = Recorded(self._step, model.mean.device, lambda: [])
-
-    def __call__(self) -> None:
-        """Learn once."""
-        self._recorded()
-
-    def decay(self, done: float) -> None:
-        """Set the learning rate for a training of which the share `done` lies behind."""
-        self.descent.decay(done)
-
-    def state_dict(self) -> dict[str, Any]:
-        """The model and its optimiser."""
-        return {"model": self.model.state_dict(), "descent": self.descent.state_dict()}
-
-    def load_state_dict(self, saved: dict[str, Any]) -> None:
-        """Go on from what `state_dict` gave."""
-        self.model.load_state_dict(saved["model"])
-        self.descent.load_state_dict(saved["descent"])
-
-    def _step(self) -> None:
-        window = self._memory.windows(self._config.window, self._config.model_batch)
-        predicted = self.model.unrolled(window.bodies[0], window.targets, window.before, window.context)
-        loss = self.model.loss(predicted, window.bodies[1:], window.valid)
-        self.descent(loss)
-        self.told["loss_model"].copy_(loss.detach())
-
-
 class PolicyUpdate:
     """A gradient step of the policy through imagined rollouts, and one of the value on the same; recorded on a GPU.
 
     Args:
         actor: the policy.
-        model: what imagines; it does not learn here.
+        model: what imagines; frozen, see `Dynamics.frozen`.
         imagination: the task.
         memory: where rollouts begin; full when this is called.
         config: batch, horizon, discount and rates.
@@ -73,6 +33,7 @@ class PolicyUpdate:
         device = model.mean.device
         self.actor, self.average = actor, deepcopy(actor).requires_grad_(False)
         self.critic = Critic(actor.obs_dim, config.value_hidden).to(device)
+        self._seen = deepcopy(actor.obs_normalizer).train()
         self._model, self._imagination, self._memory, self._config = model, imagination, memory, config
         self.descents = {
             "policy": Descent(list(actor.mlp.parameters()), config.policy_rate, config.grad_norm),
@@ -85,6 +46,12 @@ class PolicyUpdate:
     def __call__(self) -> None:
         """Learn once."""
         self._recorded()
+
+    def look(self, seen: Tensor) -> None:
+        """Normalise by these observations (N, D) too, in tensors that stay where they are."""
+        self._seen.update(seen)
+        for network in (self.actor, self.average):
+            network.obs_normalizer.load_state_dict(self._seen.state_dict())
 
     def decay(self, done: float) -> None:
         """Set the learning rates for a training of which the share `done` lies behind."""
@@ -102,18 +69,20 @@ class PolicyUpdate:
             getattr(self, name).load_state_dict(saved[name])
         for name, descent in self.descents.items():
             descent.load_state_dict(saved["descents"][name])
+        self._seen.load_state_dict(self.actor.obs_normalizer.state_dict())
 
     def _step(self) -> None:
         config = self._config
         rollout = self._imagination.rollout(self._act, self._model, self._memory.starts(config.policy_batch))
-        seen = self.actor.obs_normalizer(rollout.seen)
-        last = self.critic.steady(seen[-1])
+        seen, after = self.actor.obs_normalizer(rollout.seen), self.actor.obs_normalizer(rollout.after)
+        last = self.critic.steady(after)
         self.descents["policy"](-objective(rollout, last, config.gamma))
         own, kept = (list(network.mlp.parameters()) for network in (self.actor, self.average))
         torch._foreach_lerp_(kept, own, 1 - config.average)
         with torch.no_grad():
-            wanted = targets(rollout, self.critic.steady(seen), config.gamma, config.trace)
-        loss = error(rollout, self.critic(seen[:-1].detach()), wanted)
+            values = torch.cat((self.critic.steady(seen), last[None]))
+            wanted = targets(rollout, values, config.gamma, config.trace)
+        loss = error(rollout, self.critic(seen), wanted)
         self.descents["value"](loss)
         self.critic.follow(1 - config.value_average)
         alive = rollout.alive[:-1].float().mean()
