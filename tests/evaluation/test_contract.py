@@ -36,11 +36,11 @@ def contract() -> Contract:
     )
 
 
-def test_the_rules_of_loss_are_those_of_the_evaluations_that_were_frozen_before() -> None:
+def test_the_rules_of_loss_stay_those_that_are_frozen() -> None:
     """What a fall is, and how far a key body may be off, decide the hash; results under another are not compared."""
-    clips = [clip("b", "stand"), clip("a")]
+    clips = [clip("b", 0.1), clip("a")]
     frozen = freeze(clips, (0, 1), engines={"nominal": {"timestep": 0.005}}, fall=FALL_RULE)
-    assert frozen.sha256 == "7b8e9925e985b503b586b964caa3b8047b6a4c8175eb988650f560c2cac2af8f"
+    assert frozen.sha256 == "2cc348b091de7ccde4f168223a4a7e8dbc4ca6af69106f7840b2e0d676d6d099"
 
 
 def test_each_fields_change_changes_the_hash() -> None:
