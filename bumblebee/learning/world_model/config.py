@@ -22,7 +22,7 @@ class WorldModelConfig(Ranged):
     """Control steps that the policy imagines in a row when it learns."""
     model_updates: Few = 6
     """Gradient steps of the model an iteration."""
-    policy_updates: Few = 4
+    policy_updates: Few = 6
     """Gradient steps of the policy an iteration."""
     model_batch: Annotated[int, Range(least=1, most=10_000_000)] = 1024
     """Windows of a gradient step of the model."""
@@ -44,7 +44,7 @@ class WorldModelConfig(Ranged):
     """Weight of the past in the average of the value's weights, which its targets and the policy see."""
     trace: Share = 0.95
     """Lambda of TD(lambda): weight of later imagined rewards against the next value in what the value learns."""
-    gamma: PartOf = 0.99
+    gamma: PartOf = 0.97
     """Discount a control step."""
     grad_norm: Positive = 1.0
     """Gradients are scaled down to this norm."""
