@@ -11,8 +11,8 @@ import tempfile
 from pathlib import Path
 
 HOME = Path(__file__).parent.parent
-PROCESSES = ("tests/e2e", "tests/flows", "tests/learning", "tests/tasks")
-"""Where programs, servers and ranks are started and waited for: about as long as all that computes."""
+PROCESSES = ("tests/e2e", "tests/flows", "tests/learning", "tests/measured", "tests/motion", "tests/tasks")
+"""Where programs, servers, ranks and files are waited for: about as long as all that computes."""
 
 
 def commands(options: list[str]) -> tuple[list[str], list[str]]:

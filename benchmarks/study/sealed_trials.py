@@ -27,7 +27,7 @@ from benchmarks.study.others import manner
 from benchmarks.study.robots import DECLARED, RobotsConfig
 from benchmarks.study.trying import SEALED_TRIALS
 from bumblebee.baselines.library import MovingLibrary
-from bumblebee.baselines.trial import Judge, Manner
+from bumblebee.baselines.trial import ThreeRules
 from bumblebee.deploy.episodes import Episode, episode_generator, start_states
 from bumblebee.deploy.odometry import placed
 from bumblebee.deploy.robots import CONTROL_HZ
@@ -40,6 +40,7 @@ from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.evaluation.thinning import thin
 from bumblebee.learning.policy import Policy, load_policy
+from bumblebee.learning.rollout import Manner, Tick
 from bumblebee.motion.clip import Clip
 from bumblebee.tracking.groups import Group
 from bumblebee.tracking.observations import action_middle, action_scale, joint_targets
@@ -80,7 +81,7 @@ def follow_sealed(
     normal = [rng.standard_normal((clip.frames, draws(joints))) for rng, clip in zip(rngs, clips, strict=True)]
     place = placed(noise, qpos[:, :3], rngs, dt)
     group = Group(how.seen, (n, joints, len(library.ahead)), 0.0, torch.device("cpu"))
-    generator, judge = torch.Generator(), Judge(clips, dt)
+    generator, judge = torch.Generator(), ThreeRules(clips)
     act, action, everyone = policy.follower(), torch.zeros(n, joints), np.arange(n)
     alive = everyone
     for tick in range(int(library.length.max()) - 1):
@@ -93,10 +94,11 @@ def follow_sealed(
         robots.step(alive, ServoCommand(target[alive]))
         true = robots.truth()
         broken = torch.as_tensor(~np.isfinite(true.joint_pos).all(1))
-        alive = np.flatnonzero(judge.see(robot_state(true), ref, tick + 1 < library.length, broken).numpy())
+        seen = Tick(robot_state(true), ref, tick + 1 < library.length, broken)
+        alive = np.flatnonzero(judge.see(seen).numpy())
         if not len(alive):
             break
-    return judge.table()
+    return judge.table(dt)
 
 
 def chosen_clips(motions: Motions, config: RobotsConfig) -> list[Clip]:
