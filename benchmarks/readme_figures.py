@@ -8,6 +8,7 @@ import argparse
 import contextlib
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -25,7 +26,6 @@ from bumblebee.report.truth import hits
 from bumblebee.report.wording import percent
 from flows import workspace as workspaces
 from tasks import paths
-from tasks.lineage import git_sha
 from tasks.report import collect
 from tasks.sections import loop
 
@@ -80,13 +80,19 @@ def measured(workspace: Path, minutes: float | None) -> Json:
     if results.sealed is None or not results.rounds:
         raise BadInput(workspace, "a round with the sealed stand-in robot", "none", "make demo")
     return {
-        "commit": git_sha()[:12],
+        "commit": code_of((workspace / paths.REPORT).read_text()),
         "date": datetime.now(UTC).date().isoformat(),
         "minutes": minutes,
         "processors": os.cpu_count(),
         "motions": len(results.contract["motions"]),
         **_round(results),
     }
+
+
+def code_of(page: str) -> str:
+    """The commit that a report says it was made with."""
+    said = re.search(r"code ([0-9a-f]{7,40}(?:-dirty)?|unknown)", page)
+    return said[1] if said else "unknown"
 
 
 def _round(results: LoopResults) -> Json:

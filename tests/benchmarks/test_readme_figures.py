@@ -26,3 +26,8 @@ def test_a_page_without_the_marks_is_refused():
 def test_a_workspace_without_a_finished_demo_is_refused(tmp_path):
     with pytest.raises(BadInput, match="make demo"):
         figures.measured(tmp_path, None)
+
+
+def test_the_commit_is_the_one_that_the_report_names():
+    assert figures.code_of("<p>2026-11-27 07:29 UTC · code 2add48cbae0f · evaluation contract 1</p>") == "2add48cbae0f"
+    assert figures.code_of("<p>nothing</p>") == "unknown"
