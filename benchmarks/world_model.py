@@ -21,6 +21,7 @@ from benchmarks.baselines.trial import Tried, report
 from benchmarks.motion_pack import read_pack
 from bumblebee.baselines.trial import Manner
 from bumblebee.files import save_tensors
+from bumblebee.learning.checkpoint import load_checkpoint
 from bumblebee.learning.ppo import CURVE
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.trainer import WorldModelTrainer
@@ -32,7 +33,7 @@ _SAVE_EVERY, _TELL_EVERY = 120.0, 20.0  # s
 
 @dataclass(frozen=True)
 class Settings:
-    """What `--set` changes."""
+    """Settings that `--set` changes."""
 
     env: EnvConfig = field(default_factory=EnvConfig)
     learner: WorldModelConfig = field(default_factory=WorldModelConfig)
@@ -70,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     config = replace(settings.learner, iterations=_ENDLESS, checkpoint_every=_ENDLESS)
     trainer = WorldModelTrainer(made, config, options.out, options.seed, options.parent)
     if (options.out / RESUME).exists():
-        trainer.load_state_dict(torch.load(options.out / RESUME, weights_only=True, map_location="cpu"))
+        trainer.load_state_dict(load_checkpoint(options.out / RESUME))
         print(f"goes on after {trainer.iteration} iterations, {trainer._seconds / 60:.1f} min", flush=True)
 
     marks: list[tuple[int, float]] = []

@@ -212,7 +212,7 @@ def _print_table(rows: "list[Inspected]", path: Path) -> None:
 
 
 def _print_notes(notes: list[tuple[str, str]]) -> None:
-    """What was detected and not stated, in few lines: (place, note) of each motion."""
+    """Facts that were detected and not stated, in few lines: (place, note) of each motion."""
     from bumblebee.motion.few_lines import few_lines
 
     for told in few_lines(notes):

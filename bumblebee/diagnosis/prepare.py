@@ -53,7 +53,11 @@ def gather(session: Session, config: DiagnosisConfig, rng: np.random.Generator, 
     )
     # A small model costs little to simulate: more windows.
     extent = session.thresholds.extent
-    more = float(np.clip(extent.cheap_model / session.plant.model.nv, 1.0, extent.more)) if config.grow else 1.0
+    more = (
+        float(np.clip(session.thresholds.time_steps.small_model / session.plant.model.nv, 1.0, extent.more))
+        if config.grow
+        else 1.0
+    )
     say("what noise in the starts becomes, by simulation")
     problem = _problem(session, fitted, round(more * config.max_windows), config, rng)
     holdout = _holdout(session, fitted, config, more, rng)
@@ -94,7 +98,7 @@ def _holdout(
 def _last_windows(session: Session, config: DiagnosisConfig) -> int:
     """How many windows of 1 s judge the last fit, of fitted and other rollouts each: more where they cost little."""
     extent = session.thresholds.extent
-    if not config.grow or session.plant.model.nv > extent.small_model:
+    if not config.grow or session.plant.model.nv > session.thresholds.time_steps.small_model:
         return config.max_long_windows
     work = session.plant.model.nv * extent.long_window / session.steps[0]
     return round(float(np.clip(extent.last_work / work, 1.0, extent.more_last)) * config.max_long_windows)

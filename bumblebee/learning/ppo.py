@@ -195,6 +195,9 @@ class Trainer:
             wanted, came = getattr(here, field), getattr(there, field)
             if wanted != came:
                 raise BadInput(f"{name}: {field}", f"{wanted} as in `env`", str(came), "Start from another policy.")
+        if not parent.critic_state:
+            wanted = "a policy with its critic, as PPO leaves it"
+            raise BadInput(f"{name}: critic", wanted, "none", "Start from another policy.")
         self.algorithm.actor.load_state_dict(parent.actor.state_dict())
         self.algorithm.critic.load_state_dict(parent.critic_state)
 

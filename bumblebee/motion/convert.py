@@ -61,7 +61,7 @@ class Converted:
     skipped: list[tuple[str, str]] = field(default_factory=list)
     """Files and motions that gave nothing: place, reason."""
     notes: list[tuple[str, str]] = field(default_factory=list)
-    """What was detected and not stated in those that were written, and captions that were not used: place, note."""
+    """Facts detected and not stated in the written motions, and captions that were not used: place, note."""
     rates: set[float] = field(default_factory=set)
 
 

@@ -34,7 +34,7 @@ class Found:
     source: Source | None = None
     """Where the bytes come from; None for a clip of a library."""
     skeleton: tuple[Role, ...] = ()
-    """Of a file that is refused for its skeleton: the joints that were found for the landmarks."""
+    """For a file that is refused for its skeleton: the joints that were found for the landmarks."""
 
     @property
     def licence(self) -> str:

@@ -55,7 +55,7 @@ class ForwardKinematics(nn.Module):
 
 
 def _tables(chains: Chains) -> dict[str, np.ndarray]:
-    """What `_Places` takes after its inputs, in its order."""
+    """Constants that `_Places` takes after its inputs, in its order."""
     return {
         "column": chains.column.ravel(),
         "even": _after(chains.turn),

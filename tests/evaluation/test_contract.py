@@ -37,7 +37,7 @@ def contract() -> Contract:
 
 
 def test_the_rules_of_loss_stay_those_that_are_frozen() -> None:
-    """What a fall is, and how far a key body may be off, decide the hash; results under another are not compared."""
+    """The rules of a fall and of key bodies decide the hash; results under another are not compared."""
     clips = [clip("b", 0.1), clip("a")]
     frozen = freeze(clips, (0, 1), engines={"nominal": {"timestep": 0.005}}, fall=FALL_RULE)
     assert frozen.sha256 == "2cc348b091de7ccde4f168223a4a7e8dbc4ca6af69106f7840b2e0d676d6d099"

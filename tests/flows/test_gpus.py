@@ -31,7 +31,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def seen(stack: ExitStack, workspace: Path, stage: str) -> str | None:
-    """What a stage that starts now and runs on is told to see."""
+    """Devices that a stage which starts now and runs on is told to see."""
     return stack.enter_context(loop.devices_of(workspace, stage)).get(gpus.VARIABLE)
 
 

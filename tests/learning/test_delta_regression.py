@@ -87,7 +87,7 @@ def test_one_rollout_alone_leaves_nothing_to_judge_by(weak: Recordings) -> None:
 
 
 def test_repeats_of_a_motion_are_left_out_together(weak: Recordings) -> None:
-    """Of one motion nothing is left to judge by, however often it was recorded; without names likewise."""
+    """One motion leaves nothing to judge by, however often it was recorded; without names likewise."""
     engine = make_engine("mujoco", load_model(), 60, 1)
     for name in ("kick", ""):
         same = replace(weak, motions=(name,) * len(weak.ids))

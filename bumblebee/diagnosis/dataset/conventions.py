@@ -22,7 +22,7 @@ class _Convention:
     """What a rule of the checks says about a whole logger."""
 
     remedy: str = ""
-    """What to set in the map of an import; empty where the finding says what to do."""
+    """Setting in the map of an import; empty where the finding says what to do."""
     by_joint: bool = True
     """Whether each joint has its own; False: the check names the worst joint of a column."""
     of_all: bool = True

@@ -32,7 +32,7 @@ class Lead:
 
 @dataclass(frozen=True, eq=False)
 class Leads:
-    """What the first step of a search finds."""
+    """Findings of the first step of a search."""
 
     together: list[Lead]
     """Effects of many joints that were fitted together, as the declared model is far off; each explains what all do."""
@@ -73,7 +73,7 @@ def leads(
 
 
 def _together(run: SearchState) -> list[Lead]:
-    """What the search began with and is sure, the surest first."""
+    """Sure effects that the search began with, the surest first."""
     if not run.fit.chosen:
         return []
     declared = gauss_newton(run.problem, (), (), run.weights, iterations=0)

@@ -40,7 +40,8 @@ class TimeSteps:
     coarse: float = 0.005
     """The same for sensitivities."""
     small_model: int = 12
-    """Degrees of freedom above which the search takes longer steps; the last fit and all that is reported do not."""
+    """Degrees of freedom of the largest robot that is cheap to simulate. A larger one is searched in longer steps (the
+    last fit and all that is reported is not) and has more time, in proportion; a smaller one has more windows."""
     search: float = 0.002
     """Step for residuals of the search of larger models at most [s]: it costs half."""
     uneven: float = 0.02
@@ -48,10 +49,6 @@ class TimeSteps:
     own: float = 0.5
     """Share of the declared model's squared error that its own, longer step must leave at most, to be kept to: logs of
     a simulation of that model have its step's error in them."""
-    own_horizon: float = 0.2
-    """Length of the windows over which the steps are compared [s]."""
-    own_windows: int = 40
-    """Number of these windows at most."""
 
 
 @dataclass(frozen=True)
@@ -128,12 +125,8 @@ class Smoothing:
 
     half_span: float = 0.01
     """Time to either side that a fit is over [s]."""
-    terms: int = 4
-    """Terms of its polynomial: a cubic."""
     neighbours: int = 2
     """Neighbours on either side from which on there is something to gain."""
-    spans: int = 4
-    """Times the neighbours on one side that a rollout has rows at least."""
     beyond: float = 1.5
     """Half spans within which a neighbour must lie: a gap in the log has no neighbours beyond it."""
     white: float = 0.5
@@ -171,21 +164,9 @@ class VelocityLatency:
 
 
 @dataclass(frozen=True)
-class DeclaredContacts:
-    """Of contacts that the declared model closes in measured poses."""
-
-    windows: int = 1000
-    """Poses at most, spread over the rollouts, in which closed contacts are looked for."""
-
-
-@dataclass(frozen=True)
 class Extent:
     """Of how much of the logs and of time a diagnosis takes."""
 
-    small_model: int = 12
-    """Degrees of freedom up to which the search has the set time; for more it has longer, in proportion."""
-    cheap_model: int = 12
-    """Degrees of freedom below which there are more windows, in inverse proportion: they cost little to simulate."""
     more: float = 2.5
     """Times as many windows at most, for the smallest models."""
     long_window: float = 1.0
@@ -210,5 +191,4 @@ class DatasetThresholds:
     noise: Noise = field(default_factory=Noise)
     smoothing: Smoothing = field(default_factory=Smoothing)
     velocity_latency: VelocityLatency = field(default_factory=VelocityLatency)
-    contacts: DeclaredContacts = field(default_factory=DeclaredContacts)
     extent: Extent = field(default_factory=Extent)

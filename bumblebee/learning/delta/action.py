@@ -74,7 +74,7 @@ class DeltaConfig(Ranged):
     ppo: PpoConfig = field(default_factory=lambda: DELTA_PPO)
     """The algorithm; its `initial_std` is in radians of correction."""
     engine: EngineName = "mujoco"
-    """What replays the recordings: `mujoco_warp` on a GPU."""
+    """Engine that replays the recordings: `mujoco_warp` on a GPU."""
     buffers: Buffers = field(default_factory=Buffers)
     """Room for contacts on a GPU."""
     num_envs: Annotated[int, Range(least=1, most=1000000)] = 256

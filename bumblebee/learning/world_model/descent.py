@@ -39,7 +39,7 @@ class Descent:
         self._adam.step()
 
     def state_dict(self) -> dict[str, Any]:
-        """What the next step depends on, beside weights and rate."""
+        """State of the optimiser, beside weights and rate."""
         return self._adam.state_dict()
 
     def load_state_dict(self, saved: dict[str, Any]) -> None:

@@ -24,7 +24,7 @@ def past_targets(delay: float, dt: float) -> int:
 
 
 def handed_on(target: Tensor, before: Tensor) -> Tensor:
-    """What was given before the next step (B, P J), from this step's targets (B, J) and those before it (B, P J)."""
+    """Earlier targets for the next step (B, P J), from this step's targets (B, J) and those before it (B, P J)."""
     return torch.cat((target, before[:, : -target.shape[1]]), dim=-1)
 
 

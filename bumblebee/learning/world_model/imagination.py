@@ -73,7 +73,7 @@ class Imagination:
         self._advanced = torch.compile(self._advance, dynamic=False) if compiled else self._advance
 
     def state(self, body: Tensor) -> tuple[RobotState, Tensor]:
-        """What the task sees of states (B, 13 + 2 J), and the feet's orientations (B, 2, 4)."""
+        """The task's view of states (B, 13 + 2 J), and the feet's orientations (B, 2, 4)."""
         place, turn = self.kinematics(body[:, :3], body[:, 3:7], joint_pos(body))
         return unpacked(body, place[:, : len(KEY_BODIES)]), turn[:, len(KEY_BODIES) :]
 
@@ -90,7 +90,7 @@ class Imagination:
         return [ReferenceFrame(**dict(zip(parts, each, strict=True))) for each in zip(*parts.values(), strict=True)]
 
     def step(self, before: RobotState, after: Tensor, target: Tensor, actions: tuple, ref: ReferenceFrame) -> Step:
-        """What the reward of a control step depends on, its state after it (B, 13 + 2 J)."""
+        """Inputs of a control step's reward, from its state after it (B, 13 + 2 J)."""
         state, feet = self.state(after)
         torque = self._kp * (target - state.joint_pos) + self._kd * state.joint_vel
         return Step(

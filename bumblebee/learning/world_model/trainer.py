@@ -54,7 +54,7 @@ class WorldModelTrainer:
     ) -> None:
         if env.cfg.observation.history > 1:
             came = f"{env.cfg.observation.history} steps"
-            raise BadInput("env.observation.history", "1 for the learner world_model", came, "Set learner: ppo.")
+            raise BadInput("env.observation.history", "1, for a learner through a model", came, "Set it to 1.")
         origin = None if parent is None else load_policy(parent)
         if origin is not None:
             config = replace(config, hidden=origin.shape.hidden)

@@ -23,7 +23,7 @@ class Finding:
     fatal: bool
     """True: the file is set aside; False: it is used, and the person is told."""
     do: str = ""
-    """What the person can do about it, where the rule has one remedy."""
+    """Action that mends it, where the rule has one remedy."""
 
     @property
     def message(self) -> str:

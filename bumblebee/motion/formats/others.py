@@ -51,7 +51,7 @@ _FIELDS = (
 
 
 def what_it_is(path: Path, data: bytes) -> tuple[str, str]:
-    """What a file of a suffix that is not read is, and what can be done with it.
+    """Name what a file of a suffix that is not read is, and what can be done with it.
 
     Args:
         path: the file; its suffix is asked first.

@@ -56,7 +56,7 @@ class HumanMotion:
     part: str = ""
     """Which motion of the file, where it holds several."""
     notes: tuple[str, ...] = ()
-    """What was detected and not stated by the file: units, the up axis, first frames that were cut; for the summary."""
+    """Facts that were detected and not stated by the file: units, the up axis, first frames that were cut."""
 
     skeleton: tuple[Role, ...] = ()
     """For each landmark the joint of the file; none for bodies that are known, such as SMPL's."""

@@ -99,7 +99,7 @@ def _added(bvh: Bvh) -> tuple[str, ...]:
 
 
 def _from_smpl(path: Path, data: bytes, options: HumanConfig) -> tuple[float, np.ndarray, tuple[str, ...]]:
-    """The same of an SMPL file: AMASS's have z up, and another axis is asked for where the body does not stand so."""
+    """Frame rate, positions and notes of an SMPL file: z is up as in AMASS's, or asked for where the body lies."""
     motion = read_smpl(path, data, options.fps)
     shown = upright_axis(motion.positions)
     if shown != "z" and not options.up:

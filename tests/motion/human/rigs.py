@@ -101,7 +101,7 @@ def chains(*texts: str, sides: str = "Left|Right") -> list[tuple[str, str, str]]
 
 
 def _motion(frames: int) -> tuple[dict, dict, dict]:
-    """Of each point: its place at rest, its places (T, 3) [m], and the turns (T) of its part; y up, facing z."""
+    """For each point: its place at rest, its places (T, 3) [m], and the turns (T) of its part; y up, facing z."""
     time = np.arange(frames) * 0.02
     sway, lift = np.sin(2 * np.pi * 0.8 * time), 0.5 - 0.5 * np.cos(2 * np.pi * 0.8 * time)
     still = 0 * time

@@ -26,7 +26,7 @@ SLIDE = MODEL.replace("KNEE", 'type="slide"').replace("ACTUATOR", '<position joi
 
 @dataclass
 class Import:
-    """What a user types and has: `bumblebee import SOURCE OUT --kind KIND --columns MAP --model MODEL`."""
+    """Command and files of a user: `bumblebee import SOURCE OUT --kind KIND --columns MAP --model MODEL`."""
 
     folder: Path
     kind: str = "csv"
@@ -64,7 +64,7 @@ class Case:
     bad: Callable[[Import], None]
     """Makes the input."""
     line: str
-    """What the refusal says, a regular expression."""
+    """Text of the refusal, a regular expression."""
     mend: Callable[[Import, str], None]
     """Does what the line says, and takes from it what to do."""
 
