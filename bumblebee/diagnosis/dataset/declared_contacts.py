@@ -23,10 +23,10 @@ from bumblebee.diagnosis.simulation import (
     select,
     vary,
 )
+from bumblebee.diagnosis.thresholds.dataset import DeclaredContacts
 from bumblebee.measured.rollout import Rollout
 
 Pair = tuple[int, int]
-_POSES = 1000  # at most, spread over the rollouts, in which closed contacts are looked for
 
 
 def without_contradicted(
@@ -35,6 +35,7 @@ def without_contradicted(
     layout: Layout,
     rollouts: Sequence[Rollout],
     sigma: np.ndarray,
+    rule: DeclaredContacts,
 ) -> tuple[mujoco.MjSpec, list[str], list[str]]:
     """The model without the closed contacts that the logs contradict; a warning on these and a note on the others.
 
@@ -47,10 +48,11 @@ def without_contradicted(
         layout: readings that are compared.
         rollouts: as read.
         sigma: (D,) noise of every signal.
+        rule: how many poses are looked at.
     """
     periods = [float(np.median(np.diff(r.time))) for r in rollouts]
     span = max(plant.thresholds.windows.first_output, *periods)
-    starts = choose_starts(rollouts, range(len(rollouts)), span, _POSES, plant.thresholds.windows)
+    starts = choose_starts(rollouts, range(len(rollouts)), span, rule.windows, plant.thresholds.windows)
     closed = _closed(spec.compile(), plant, np.array([rollouts[i].joint_pos[k] for i, k, _ in starts]))
     if not closed:
         return spec, [], []

@@ -15,8 +15,6 @@ from bumblebee.diagnosis.simulation import Layout, Plant, choose_starts, cut, re
 from bumblebee.diagnosis.thresholds.dataset import TimeSteps
 from bumblebee.measured.rollout import Rollout
 
-_HORIZON, _WINDOWS = 0.2, 40  # s, and windows at most, over which the steps are compared
-
 
 def agreed_steps(
     plant: Plant, declared: float, layout: Layout, rollouts: Sequence[Rollout], sigma: np.ndarray, rule: TimeSteps
@@ -36,7 +34,7 @@ def agreed_steps(
     own = step_for(period, declared, rule)
     if own <= usual[0][0] or abs(own / declared - 1) > rule.uneven:
         return *usual, []
-    starts = choose_starts(rollouts, range(len(rollouts)), _HORIZON, _WINDOWS, plant.thresholds.windows)
+    starts = choose_starts(rollouts, range(len(rollouts)), rule.own_horizon, rule.own_windows, plant.thresholds.windows)
     if not starts:
         return *usual, []
     windows = cut(plant, layout, rollouts, starts)

@@ -130,7 +130,7 @@ def make_session(
     has_pos = all(r.base_pos is not None for r in long)
     layout = layout_of(plant, has_pos)
     sigma = estimate_noise(long, layout, rules.noise)
-    spec, contradicted, contact_notes = without_contradicted(spec, plant, layout, long, sigma)
+    spec, contradicted, contact_notes = without_contradicted(spec, plant, layout, long, sigma, rules.contacts)
     if contradicted:
         plant, _ = make_plants(spec, long, model)
     train, holdout = split(long, rules.split)

@@ -21,9 +21,6 @@ from bumblebee.diagnosis.simulation import Layout
 from bumblebee.diagnosis.thresholds.dataset import Smoothing
 from bumblebee.measured.rollout import Rollout
 
-_TERMS = 4  # of a cubic
-_SPANS = 4  # times the neighbours on one side that a rollout has rows at least
-
 
 @dataclass(frozen=True, eq=False)
 class _Smoothed:
@@ -45,7 +42,7 @@ def smooth_rollouts(
     parts = layout.slices["joint_pos"], layout.slices["joint_vel"]
     for rollout in rollouts:
         near = round(rule.half_span / float(np.median(np.diff(rollout.time))))
-        if near < rule.neighbours or rollout.frames < _SPANS * near:
+        if near < rule.neighbours or rollout.frames < rule.spans * near:
             out.append(rollout)
             left.append(sigma**2)
             continue
@@ -60,7 +57,7 @@ def smooth_rollouts(
 
 def _smooth(rollout: Rollout, near: int, sigma_pos: np.ndarray, sigma_vel: np.ndarray, rule: Smoothing) -> _Smoothed:
     """The local fits over `near` ticks to either side."""
-    span, terms = rule.half_span, _TERMS
+    span, terms = rule.half_span, rule.terms
     rows = np.clip(np.arange(rollout.frames)[:, None] + np.arange(-near, near + 1), 0, rollout.frames - 1)
     shift = rollout.time[rows] - rollout.time[:, None]
     inside = np.abs(shift) <= rule.beyond * span  # a gap in the log has no neighbours beyond it

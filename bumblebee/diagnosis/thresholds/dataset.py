@@ -49,6 +49,10 @@ class TimeSteps:
     own: float = 0.5
     """Share of the declared model's squared error that its own, longer step must leave at most, to be kept to: logs of
     a simulation of that model have its step's error in them."""
+    own_horizon: float = 0.2
+    """Length of the windows over which the steps are compared [s]."""
+    own_windows: int = 40
+    """Number of these windows at most."""
 
 
 @dataclass(frozen=True)
@@ -125,8 +129,12 @@ class Smoothing:
 
     half_span: float = 0.01
     """Time to either side that a fit is over [s]."""
+    terms: int = 4
+    """Terms of its polynomial: a cubic."""
     neighbours: int = 2
     """Neighbours on either side from which on there is something to gain."""
+    spans: int = 4
+    """Times the neighbours on one side that a rollout has rows at least."""
     beyond: float = 1.5
     """Half spans within which a neighbour must lie: a gap in the log has no neighbours beyond it."""
     white: float = 0.5
@@ -164,6 +172,14 @@ class VelocityLatency:
 
 
 @dataclass(frozen=True)
+class DeclaredContacts:
+    """Numbers for contacts that the declared model closes in measured poses."""
+
+    windows: int = 1000
+    """Poses at most, spread over the rollouts, in which closed contacts are looked for."""
+
+
+@dataclass(frozen=True)
 class Extent:
     """Of how much of the logs and of time a diagnosis takes."""
 
@@ -191,4 +207,5 @@ class DatasetThresholds:
     noise: Noise = field(default_factory=Noise)
     smoothing: Smoothing = field(default_factory=Smoothing)
     velocity_latency: VelocityLatency = field(default_factory=VelocityLatency)
+    contacts: DeclaredContacts = field(default_factory=DeclaredContacts)
     extent: Extent = field(default_factory=Extent)
