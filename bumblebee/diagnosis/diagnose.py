@@ -121,7 +121,7 @@ def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], No
 
 def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator, say: Callable[[str], None]) -> _Found:
     """The effects of the catalogue, then what lies beyond it."""
-    larger = max(1.0, material.session.plant.model.nv / material.session.thresholds.time_steps.small_model)
+    larger = max(1.0, material.session.plant.model.nv / max(1, material.session.thresholds.time_steps.small_model))
     time = Budget(larger * config.search_seconds, "among the catalogue's effects", "search_seconds")
     found = search(material.problem, material.holdout, material.remade, config.search, say, time)
     say(f"the last fit, of {len(found.fit.chosen)} effects")
