@@ -22,7 +22,7 @@ from benchmarks.motion_pack import read_pack
 from bumblebee.baselines.trial import Manner
 from bumblebee.files import save_tensors
 from bumblebee.learning.checkpoint import load_checkpoint
-from bumblebee.learning.ppo import CURVE
+from bumblebee.learning.learner import CURVE
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.trainer import WorldModelTrainer
 from bumblebee.tracking.config import EnvConfig

@@ -1,9 +1,14 @@
 """Settings of the world-model learner, a section of params.yaml."""
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
 from bumblebee.ranges import Factor, Few, PartOf, Positive, Range, Ranged, Rate, Share, Widths
+from bumblebee.tracking.config import EnvConfig
+
+_CONTROL_HZ = 50  # of the policy
 
 
 @dataclass(frozen=True)
@@ -63,3 +68,17 @@ class WorldModelConfig(Ranged):
         """Refuse windows that the memory cannot hold."""
         super().__post_init__()
         self.require(self.window < self.memory, "window", "fewer steps than `memory`")
+
+    def misfits(self, task: EnvConfig, longest: float = math.inf) -> Iterator[tuple[str, str, object]]:
+        """Settings of a training that this learner cannot take: which, what was expected and what came.
+
+        Args:
+            task: its task.
+            longest: control steps of the longest motion, where it is known.
+        """
+        if (history := task.observation.history) > 1:
+            yield "env.observation.history", "1 with the learner `world_model`, which imagines no history", history
+        steps = int(min(round(task.episode_seconds * _CONTROL_HZ), longest))
+        if self.window >= steps:
+            whole = f"at most {steps - 1}, as the longest episode has {steps} control steps"
+            yield "world_model.window", whole, self.window

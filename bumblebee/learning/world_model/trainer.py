@@ -1,8 +1,6 @@
 """The world-model learner around the tracking environment: collect, fit the model, improve the policy through it."""
 
 import math
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,9 +9,9 @@ import torch
 from torch import Tensor
 
 from bumblebee.errors import BadInput
-from bumblebee.learning.checkpoint import load_checkpoint, save_checkpoint
-from bumblebee.learning.curve import CurveWriter
-from bumblebee.learning.policy import Policy, load_policy, new_actor, shape_of
+from bumblebee.learning.learner import Learner, parent_policy
+from bumblebee.learning.policy import Policy, new_actor, shape_of
+from bumblebee.learning.ranks import Ranks
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.context import context_of
@@ -22,16 +20,12 @@ from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.learning.world_model.model_update import ModelUpdate
 from bumblebee.learning.world_model.policy_update import PolicyUpdate
-from bumblebee.progress import progress
-from bumblebee.sim.warp_limits import within_memory
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.randomisation import draw_fields
 
-CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
 
-
-class WorldModelTrainer:
-    """Trains one policy in `env` through a model of it, and can be killed at any time.
+class WorldModelTrainer(Learner):
+    """Trains one policy in `env` through a model of it.
 
     Args:
         env: the task; its policy sees no history.
@@ -39,10 +33,13 @@ class WorldModelTrainer:
         folder: for the checkpoint and the curve; a checkpoint found there is continued.
         seed: of the networks and of the exploration.
         parent: folder of a policy to start from, if any; a child has its parent's layers, whatever `config` says.
+        ranks: the processes that train this policy together.
 
     Raises:
-        BadInput: for a task whose policy sees a history, or a parent of another shape.
+        BadInput: for a task or motions that it cannot learn from, or a parent of another shape.
     """
+
+    name = "world_model"
 
     def __init__(
         self,
@@ -51,23 +48,19 @@ class WorldModelTrainer:
         folder: Path,
         seed: int = 0,
         parent: Path | None = None,
+        ranks: Ranks | None = None,
     ) -> None:
-        if env.cfg.observation.history > 1:
-            came = f"{env.cfg.observation.history} steps"
-            raise BadInput("env.observation.history", "1, for a learner through a model", came, "Set it to 1.")
-        origin = None if parent is None else load_policy(parent)
+        for name, expected, came in config.misfits(env.cfg, int(env.library.length.max()) - 1):
+            raise BadInput(name, expected, str(came))
+        origin = None if parent is None else parent_policy(parent, env)
         if origin is not None:
             config = replace(config, hidden=origin.shape.hidden)
-        self.env, self.config, self.folder = env, config, Path(folder)
+        super().__init__(env, config, folder, ranks)
         torch.manual_seed(seed)
         device = torch.device(env.device)
         if device.type == "cuda":
             torch.set_float32_matmul_precision("high")
         self.shape = shape_of(env, config.hidden)
-        if origin is not None and replace(origin.shape, critic_observation=0) != replace(
-            self.shape, critic_observation=0
-        ):
-            raise BadInput(parent, f"a policy of the shape {self.shape}", str(origin.shape), "Start from another one.")
         actor = (origin.actor if origin is not None else new_actor(self.shape)).to(device)
         drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
         context = torch.tensor(context_of(env.engine.model, drawn, env.num_envs), dtype=torch.float32, device=device)
@@ -79,7 +72,7 @@ class WorldModelTrainer:
         self.policy_update = PolicyUpdate(actor, model.frozen(), self.imagination, self.memory, config)
         self.model_update = ModelUpdate(model, self.memory, config)
         self._collect = Collector(env, self.memory, config.noise)
-        self.iteration, self._seconds, self._frames_before = 0, 0.0, 0
+        self._frames_before = 0
         self._resume()
 
     @property
@@ -87,24 +80,9 @@ class WorldModelTrainer:
         """Control steps seen so far, of all worlds."""
         return self._frames_before + self.memory.added * self.env.num_envs
 
-    def train(self, what: str = "policy", enough: Callable[[], bool] = lambda: False) -> None:
-        """Train up to the configured iterations, or until it is `enough`; a line of `curve.csv` each."""
-        curve = CurveWriter(self.folder / CURVE, self.iteration)
-        with progress(self.config.iterations, f"train {what}", "iterations", start=self.iteration) as bar:
-            while self.iteration < self.config.iterations and not enough():
-                began = time.monotonic()
-                with within_memory(self.env.num_envs):
-                    scalars = self._iterate()
-                self._seconds += time.monotonic() - began
-                self.iteration += 1
-                row = {"frames": self.frames, "seconds": self._seconds, **scalars}
-                for name, value in row.items():
-                    curve.add_scalar(name, value, self.iteration)
-                curve.flush()
-                bar.update(1, f"success {row['success']:.2f}, key error {row['key_error']:.3f} m")
-                if self.iteration % self.config.checkpoint_every == 0:
-                    self.save_checkpoint()
-        curve.stop()
+    def _coming(self) -> int:
+        fill = max(self.config.memory - self.memory.added - self.config.steps, 0)
+        return super()._coming() + fill * self.env.num_envs
 
     def policy(self) -> Policy:
         """The average of the policy as it is now; a copy."""
@@ -130,14 +108,12 @@ class WorldModelTrainer:
         self.iteration, self._seconds, self._frames_before = (saved[n] for n in ("iteration", "seconds", "frames"))
         self.env.sampler.failure.copy_(saved["failure"])
 
-    def save_checkpoint(self) -> None:
-        """Write networks, optimisers and counts, whole or not at all."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        save_checkpoint(self.folder / CHECKPOINT, self.state_dict())
+    def own_state(self) -> dict[str, Any]:
+        """Nothing yet: new episodes fill the memory of a training that goes on."""
+        return {}
 
-    def _resume(self) -> None:
-        if (self.folder / CHECKPOINT).exists():
-            self.load_state_dict(load_checkpoint(self.folder / CHECKPOINT))
+    def load_own_state(self, saved: dict[str, Any]) -> None:
+        """Nothing yet."""
 
     def _iterate(self) -> dict[str, float]:
         config, env = self.config, self.env

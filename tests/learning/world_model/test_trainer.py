@@ -9,12 +9,13 @@ import pytest
 import torch
 from rsl_rl.models import MLPModel
 
+from bumblebee.learning.learner import CHECKPOINT
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.learning.world_model.model_update import ModelUpdate
-from bumblebee.learning.world_model.trainer import CHECKPOINT, WorldModelTrainer
+from bumblebee.learning.world_model.trainer import WorldModelTrainer
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from tests.learning.tiny import env_of
 
