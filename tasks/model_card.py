@@ -99,6 +99,8 @@ def _made(card: Mapping[str, Any], parent: str | None, licences: Mapping[str, in
         yield f"- stage: {card['stage']}" + "".join(
             f", {key} {card[key]}" for key in ("cluster", "round") if card.get(key) is not None
         )
+    if "learner" in card:
+        yield f"- learner: {card['learner']}"
     if card.get("frames"):
         yield f"- training: {card['frames']:,} control steps on {len(card.get('training_clips', []))} clips"
     if card.get("kept") == "parent":

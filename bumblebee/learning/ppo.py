@@ -134,8 +134,12 @@ class Trainer(Learner):
 
     def _start_from(self, parent: Policy, name: str) -> None:
         if not parent.critic_state:
-            wanted = "a policy with its critic, as PPO leaves it"
-            raise BadInput(f"{name}: critic", wanted, "none", "Start from another policy.")
+            wanted, do = "a policy with its critic, as PPO leaves it", "Set `learner: world_model`, which needs none."
+            raise BadInput(f"{name}: critic", wanted, "none", do)
+        here, there = shape_of(self.env, self.config.hidden), parent.shape
+        if here.critic_observation != there.critic_observation:
+            wanted = f"{here.critic_observation} entries as in `env`"
+            raise BadInput(f"{name}: critic", wanted, str(there.critic_observation), "Start from another policy.")
         self.algorithm.actor.load_state_dict(parent.actor.state_dict())
         self.algorithm.critic.load_state_dict(parent.critic_state)
 

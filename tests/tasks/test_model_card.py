@@ -38,7 +38,9 @@ def test_every_part_of_an_observation_has_meaning_unit_and_frame() -> None:
 def test_the_card_says_what_it_takes_gives_and_is_worth(policy_folder) -> None:  # noqa: F811
     folder = policy_folder()
     (folder / "card.json").write_text(
-        json.dumps({"stage": "experts", "cluster": "c0", "round": 0, "frames": 2048, "config": {"seed": 3}})
+        json.dumps(
+            {"stage": "experts", "cluster": "c0", "round": 0, "frames": 2048, "learner": "ppo", "config": {"seed": 3}}
+        )
     )
     card = model_card("expert-c0", "expert-c0-r0", folder, "base", Evaluated("a" * 64, "stand_in", RESULT), {"MIT": 2})
     for said in (
@@ -49,6 +51,7 @@ def test_the_card_says_what_it_takes_gives_and_is_worth(policy_folder) -> None: 
         "error of joint angles: 0.05 rad (95 % interval 0.04 to 0.06)",
         "- from: base",
         "- seed: 3",
+        "- learner: ppo",
         "- licences of the motions: MIT (2)",
         "Simulation only",
         "No safety layer",

@@ -79,6 +79,6 @@ class WorldModelConfig(Ranged):
         if (history := task.observation.history) > 1:
             yield "env.observation.history", "1 with the learner `world_model`, which imagines no history", history
         steps = int(min(round(task.episode_seconds * _CONTROL_HZ), longest))
-        if self.window >= steps:
-            whole = f"at most {steps - 1}, as the longest episode has {steps} control steps"
-            yield "world_model.window", whole, self.window
+        for name in ("window", "horizon"):
+            if (came := getattr(self, name)) > steps:
+                yield f"world_model.{name}", f"at most {steps} control steps, the longest episode", came
