@@ -1,8 +1,9 @@
 """The world-model learner around the tracking environment: collect, fit the model, improve the policy through it."""
 
+import contextlib
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,9 @@ from bumblebee.errors import BadInput
 from bumblebee.learning.checkpoint import load_checkpoint, save_checkpoint
 from bumblebee.learning.curve import CurveWriter
 from bumblebee.learning.policy import Policy, load_policy, new_actor, shape_of
+from bumblebee.learning.ppo import _random_state, _set_random_state
+from bumblebee.learning.ranks import Ranks
+from bumblebee.learning.world_model.accuracy import Accuracy, accuracy
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.context import context_of
@@ -27,7 +31,7 @@ from bumblebee.sim.warp_limits import within_memory
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.randomisation import draw_fields
 
-CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
+CHECKPOINT, CURVE, ERRORS = "checkpoint.pt", "curve.csv", "model_error.csv"
 
 
 class WorldModelTrainer:
@@ -39,9 +43,11 @@ class WorldModelTrainer:
         folder: for the checkpoint and the curve; a checkpoint found there is continued.
         seed: of the networks and of the exploration.
         parent: folder of a policy to start from, if any; a child has its parent's layers, whatever `config` says.
+        ranks: the processes that train this policy together, each with such a trainer around its own worlds.
 
     Raises:
-        BadInput: for a task whose policy sees a history, or a parent of another shape.
+        BadInput: for a task whose policy sees a history, too few worlds, or a parent of another shape; for windows or
+            rollouts that are longer than episodes.
     """
 
     def __init__(
@@ -51,14 +57,16 @@ class WorldModelTrainer:
         folder: Path,
         seed: int = 0,
         parent: Path | None = None,
+        ranks: Ranks | None = None,
     ) -> None:
+        _check_sizes(env, config)
         if env.cfg.observation.history > 1:
             came = f"{env.cfg.observation.history} steps"
             raise BadInput("env.observation.history", "1, for a learner through a model", came, "Set it to 1.")
         origin = None if parent is None else load_policy(parent)
         if origin is not None:
             config = replace(config, hidden=origin.shape.hidden)
-        self.env, self.config, self.folder = env, config, Path(folder)
+        self.env, self.config, self.folder, self.ranks = env, config, Path(folder), ranks or Ranks()
         torch.manual_seed(seed)
         device = torch.device(env.device)
         if device.type == "cuda":
@@ -70,40 +78,55 @@ class WorldModelTrainer:
             raise BadInput(parent, f"a policy of the shape {self.shape}", str(origin.shape), "Start from another one.")
         actor = (origin.actor if origin is not None else new_actor(self.shape)).to(device)
         drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
-        context = torch.tensor(context_of(env.engine.model, drawn, env.num_envs), dtype=torch.float32, device=device)
+        context = context_of(env.engine.model, drawn, env.num_envs, self.ranks).to(device)
         delay = float(env.engine.model.actuator_delay.max()) + env.cfg.randomisation.delay[1]
         past = past_targets(delay, env.dt)
         model = Dynamics(env.num_actions, config.model_hidden, env.dt, context.shape[1], past).to(device)
         self.memory = Memory(config.memory, context, env.num_actions, past)
         self.imagination = Imagination(env, config.horizon, config.compile)
-        self.policy_update = PolicyUpdate(actor, model.frozen(), self.imagination, self.memory, config)
-        self.model_update = ModelUpdate(model, self.memory, config)
+        self.policy_update = PolicyUpdate(actor, model.frozen(), self.imagination, self.memory, config, self.ranks)
+        self.model_update = ModelUpdate(model, self.memory, config, self.ranks)
         self._collect = Collector(env, self.memory, config.noise)
         self.iteration, self._seconds, self._frames_before = 0, 0.0, 0
+        self._kept: int | None = None
+        if self.ranks.count > 1:
+            torch.manual_seed(self.ranks.seed(seed))  # the networks are alike everywhere, the noise is not
         self._resume()
 
     @property
     def frames(self) -> int:
         """Control steps seen so far, of all worlds."""
-        return self._frames_before + self.memory.added * self.env.num_envs
+        return self._frames_before + self.memory.added * self.env.num_envs * self.ranks.count
 
     def train(self, what: str = "policy", enough: Callable[[], bool] = lambda: False) -> None:
         """Train up to the configured iterations, or until it is `enough`; a line of `curve.csv` each."""
-        curve = CurveWriter(self.folder / CURVE, self.iteration)
-        with progress(self.config.iterations, f"train {what}", "iterations", start=self.iteration) as bar:
-            while self.iteration < self.config.iterations and not enough():
+        with self._told(what) as tell:
+            while self.iteration < self.config.iterations and not self.ranks.decide(enough):
                 began = time.monotonic()
                 with within_memory(self.env.num_envs):
                     scalars = self._iterate()
                 self._seconds += time.monotonic() - began
                 self.iteration += 1
-                row = {"frames": self.frames, "seconds": self._seconds, **scalars}
+                tell({"frames": self.frames, "seconds": self._seconds, **scalars})
+                if self.iteration % self.config.checkpoint_every == 0:
+                    self.save_checkpoint()
+
+    @contextlib.contextmanager
+    def _told(self, what: str) -> Iterator[Callable[[dict[str, float]], None]]:
+        """What writes an iteration's row to the curve; on the first rank alone."""
+        if not self.ranks.first:
+            yield lambda row: None
+            return
+        curve = CurveWriter(self.folder / CURVE, self.iteration)
+        with progress(self.config.iterations, f"train {what}", "iterations", start=self.iteration) as bar:
+
+            def tell(row: dict[str, float]) -> None:
                 for name, value in row.items():
                     curve.add_scalar(name, value, self.iteration)
                 curve.flush()
                 bar.update(1, f"success {row['success']:.2f}, key error {row['key_error']:.3f} m")
-                if self.iteration % self.config.checkpoint_every == 0:
-                    self.save_checkpoint()
+
+            yield tell
         curve.stop()
 
     def policy(self) -> Policy:
@@ -112,8 +135,12 @@ class WorldModelTrainer:
         actor.load_state_dict(self.policy_update.average.state_dict())
         return Policy(actor, {}, self.shape)
 
+    def accuracy(self) -> Accuracy:
+        """Errors of the model as it is now on the held-out worlds; all ranks must ask."""
+        return accuracy(self.model_update.model, self.memory, self.ranks)
+
     def state_dict(self) -> dict[str, Any]:
-        """Networks, optimisers and counts: what a training goes on from, with new episodes."""
+        """Networks, optimisers and counts, which are those of all ranks."""
         return {
             "model": self.model_update.state_dict(),
             "policy": self.policy_update.state_dict(),
@@ -129,45 +156,113 @@ class WorldModelTrainer:
         self.policy_update.load_state_dict(saved["policy"])
         self.iteration, self._seconds, self._frames_before = (saved[n] for n in ("iteration", "seconds", "frames"))
         self.env.sampler.failure.copy_(saved["failure"])
+        self._kept = self.iteration
+
+    def own_state(self) -> dict[str, Any]:
+        """What this rank alone goes on from: its worlds, its memory and its noise."""
+        parts = {"env": self.env, "memory": self.memory, "collector": self._collect}
+        return {name: part.state_dict() for name, part in parts.items()} | {"random": _random_state()}
+
+    def load_own_state(self, saved: dict[str, Any]) -> None:
+        """Go on from what `own_state` gave, after `load_state_dict`."""
+        frames = self.frames
+        for name, part in {"env": self.env, "memory": self.memory, "collector": self._collect}.items():
+            part.load_state_dict(saved[name])
+        self._frames_before += frames - self.frames
+        _set_random_state(saved["random"])
 
     def save_checkpoint(self) -> None:
-        """Write networks, optimisers and counts, whole or not at all."""
+        """Write all that the next iteration depends on, of all ranks, whole or not at all; all ranks must call it.
+
+        Raises:
+            BadInput: for a model that predicts no better than uniform motion; the checkpoint before it stands.
+        """
+        found = self.accuracy()
+        if not found.loss <= found.still:
+            came = f"a loss of {found.loss:.3g} after a control step, and {found.still:.3g} for uniform motion"
+            raise self._diverged("a model that predicts better than uniform motion", came, "model_rate")
+        each = self.ranks.gather(self.own_state())
+        self._kept = self.iteration
+        if each is None:
+            return
         self.folder.mkdir(parents=True, exist_ok=True)
-        save_checkpoint(self.folder / CHECKPOINT, self.state_dict())
+        save_checkpoint(self.folder / CHECKPOINT, {"shared": self.state_dict(), "ranks": each})
+        errors = CurveWriter(self.folder / ERRORS, self.iteration - 1)
+        for name, value in found.by_horizon.items():
+            errors.add_scalar(name, value, self.iteration)
+        errors.stop()
 
     def _resume(self) -> None:
-        if (self.folder / CHECKPOINT).exists():
-            self.load_state_dict(load_checkpoint(self.folder / CHECKPOINT))
+        path = self.folder / CHECKPOINT
+        if not path.exists():
+            return
+        content = load_checkpoint(path)
+        try:
+            each = content["ranks"]
+            self.load_state_dict(content["shared"])
+            if len(each) == self.ranks.count:
+                self.load_own_state(each[self.ranks.rank])
+        except (KeyError, RuntimeError, ValueError) as error:  # as torch says that names or sizes differ
+            wanted, do = "a checkpoint of these settings", "Remove it to train from the start."
+            raise BadInput(path, wanted, f"another: {error}", do) from None
+        if len(each) != self.ranks.count and self.ranks.first:
+            print(f"{path}: of {len(each)} GPUs, goes on with {self.ranks.count} and new episodes", flush=True)
 
     def _iterate(self) -> dict[str, float]:
         config, env = self.config, self.env
-        done = min(self.iteration / max(config.iterations, 1), 1.0)
-        env.progress = done
+        env.progress = done = min(self.iteration / max(config.iterations, 1), 1.0)
         updates = (self.model_update, self.policy_update)
         for update in updates:
             update.decay(done)
         for _ in range(config.steps):
             seen = self._collect(self._act)
-        self.policy_update.look(seen)
+        self._look(seen)
         if not self.memory.full:
             while not self.memory.full:
-                self.policy_update.look(self._collect(self._act))
+                self._look(self._collect(self._act))
             if self.iteration == 0:
                 self.model_update.begin()
         env.engine.check()
+        self.ranks.add(env.statistics.sums)
+        self.ranks.add(env.sampler.failure)
+        env.sampler.failure.div_(self.ranks.count)
         for _ in range(config.model_updates):
             self.model_update()
         for _ in range(config.policy_updates):
             self.policy_update()
         told = {name: float(value) for update in updates for name, value in update.told.items()}
+        told = self.ranks.mean(told, env.device)
         for name, value in told.items():
             if not math.isfinite(value):
-                raise FloatingPointError(
-                    f"the world model's training: {name} is no number at iteration {self.iteration}"
-                )
+                part = next((part for part in ("model", "value") if part in name), "policy")
+                raise self._diverged("finite losses and gradients", f"{name} {value}", f"{part}_rate")
         rate = float(self.policy_update.descents["policy"].rate)
         return env.statistics.take() | told | {"learning_rate": rate, "threshold": env.threshold}
+
+    def _look(self, seen: Tensor) -> None:
+        """Let the policy be normalised by observations (N, D) too, unless what was collected is no numbers."""
+        if (fault := self.memory.fault()) is not None:
+            do = "Look for it in the motions and the robot's model."
+            raise BadInput("what the simulator gave", "numbers", fault, do)
+        self.policy_update.look(seen)
+
+    def _diverged(self, expected: str, came: str, setting: str) -> BadInput:
+        """The line for a training that leads nowhere."""
+        stands = "No checkpoint was written." if self._kept is None else f"The checkpoint of {self._kept} stands."
+        came = f"{came}, at iteration {self.iteration}"
+        return BadInput(f"training, {setting}", expected, came, f"{stands} Lower `{setting}`.")
 
     def _act(self, seen: Tensor) -> Tensor:
         """Actions (N, J) of the policy that learns, without exploration."""
         return self.policy_update.actor({"policy": seen})
+
+
+def _check_sizes(env: TrackingEnv, config: WorldModelConfig) -> None:
+    """Refuse a task in which windows or rollouts of these settings never come to their end."""
+    if env.num_envs < 2:
+        raise BadInput("env.num_worlds", "at least 2, of which one is held out", str(env.num_envs), "Set it to 2.")
+    longest = min(env.max_episode_length, int(env.library.length.max()) - 1)
+    for name in ("window", "horizon"):
+        if (came := getattr(config, name)) > longest:
+            wanted = f"at most {longest} control steps, the longest episode"
+            raise BadInput(name, wanted, str(came), f"Set it to {longest} or fewer.")
