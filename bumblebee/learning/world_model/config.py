@@ -78,6 +78,8 @@ class WorldModelConfig(Ranged):
         """
         if (history := task.observation.history) > 1:
             yield "env.observation.history", "1 with the learner `world_model`, which imagines no history", history
+        if task.num_worlds < 2:
+            yield "env.num_worlds", "at least 2 with the learner `world_model`, which holds one out", task.num_worlds
         steps = int(min(round(task.episode_seconds * _CONTROL_HZ), longest))
         for name in ("window", "horizon"):
             if (came := getattr(self, name)) > steps:
