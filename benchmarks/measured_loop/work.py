@@ -58,7 +58,8 @@ class Work:
         self.task = replace(config.env, **seen_by(config.env, self.policy))
         self.clips = [cut(clip, config.seconds) for clip in make_library()]
         families = [clip.family for clip in self.clips]
-        table = pd.DataFrame({"name": [clip.name for clip in self.clips], "cluster": families, "family": families})
+        names = [clip.name for clip in self.clips]
+        table = pd.DataFrame({"name": names, "cluster": families, "family": families, "split": "train"})
         self.recorded = sorted(thin(table, config.motions))
         self.use = {name: SETS[i % len(SETS)] for i, name in enumerate(self.recorded)}
 
