@@ -22,7 +22,7 @@ from bumblebee.sim.sensors import load_model
 from tests.learning.swaying import ANKLES, record, weakened
 
 DT, JOINTS = 0.02, 23
-CONFIG = ResidualConfig(hidden=(32,), window=4, batch=32, updates=60, rate=3e-3, check_every=20)
+CONFIG = ResidualConfig(hidden=(32,), window=8, batch=48, updates=80, rate=3e-3, check_every=20)
 
 
 class Lab:
