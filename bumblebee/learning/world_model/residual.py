@@ -14,8 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from bumblebee.learning.delta import Gain, compare
-from bumblebee.learning.delta.gain import by_rollout, state_error
+from bumblebee.learning.delta import Gain, by_rollout, compare, state_error
 from bumblebee.learning.world_model.body import joint_pos
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.measured import Measured
