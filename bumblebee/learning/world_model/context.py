@@ -24,4 +24,5 @@ def context_of(model: mujoco.MjModel, values: Mapping[str, np.ndarray], worlds: 
     every = np.concatenate(columns, axis=1)
     spread = every.std(0)
     every = ((every - every.mean(0)) / np.where(spread > 0, spread, 1.0))[:, spread > 1e-9]
-    return np.unique(every.round(6), axis=1)
+    _, first = np.unique(every.round(6), axis=1, return_index=True)
+    return every[:, np.sort(first)]  # in the model's order, whatever the draw: a model that goes on reads them alike

@@ -3,12 +3,15 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 from bumblebee.errors import BadInput
+from bumblebee.learning.world_model.context import context_of
 from bumblebee.learning.world_model.continuing import ContinuedTrainer, Frame, Parent, continue_model, fitting
 from bumblebee.learning.world_model.residual import new_residual
+from bumblebee.sim.sensors import load_model
 from tests.learning.tiny import env_of
 from tests.learning.world_model.test_trainer import SMALL, TASK
 
@@ -95,3 +98,17 @@ def test_a_policy_learns_through_the_residual_and_the_model_learns_from_the_simu
     assert again.iteration == 1
     for key, value in again.policy_update.actor.mlp.state_dict().items():
         assert torch.equal(value, actors[1][key]), key
+
+
+def test_the_numbers_in_which_worlds_differ_keep_their_order_from_draw_to_draw() -> None:
+    model, rng = load_model(), np.random.default_rng(0)
+    for _ in range(5):
+        mass, gain = 1 + 0.1 * rng.standard_normal(40), 1 + 0.1 * rng.standard_normal(40)
+        values = {
+            "body_mass": mass[:, None] * model.body_mass,
+            "actuator_gainprm": gain[:, None, None] * model.actuator_gainprm,
+        }
+        context = context_of(model, values, 40)
+        assert context.shape == (40, 2)
+        for column, own in zip(context.T, (mass, gain), strict=True):
+            np.testing.assert_allclose(column, (own - own.mean()) / own.std(), atol=1e-5)
