@@ -1,6 +1,6 @@
 """Card of a policy that `train` wrote: facts for programs (card.json) and for people (README.md)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from bumblebee.learning.trial import success_by_family
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.licence_terms import counted
 
+SPLITS = {"train": "trained on", "test": "held out"}
 _WORST = 5  # motions named that the policy loses first
 
 
@@ -55,11 +56,11 @@ def readme(card: dict[str, Any], contract: dict[str, Any], trials: pd.DataFrame,
     )
 
 
-def tried(trials: pd.DataFrame) -> Iterator[str]:
-    """Lines on success and errors, apart for motions trained on and held out, and the motions that are lost first."""
+def tried(trials: pd.DataFrame, splits: Mapping[str, str] = SPLITS) -> Iterator[str]:
+    """Lines on success and errors of each split, and the motions that are lost first."""
     yield "Each motion from its first frame to its last, in MuJoCo at 200 Hz on the declared model, without noise:"
     yield ""
-    for split, what in (("train", "trained on"), ("test", "held out")):
+    for split, what in splits.items():
         own = trials[trials["split"] == split]
         if not len(own):
             yield f"- {what}: none"
