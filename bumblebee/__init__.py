@@ -18,7 +18,7 @@ _OFFERED = {
     "robot.facts": ("joint_names",),
     "errors": ("BadInput",),
 }
-__all__ = [name for names in _OFFERED.values() for name in names]  # noqa: PLE0604
+__all__ = [name for names in _OFFERED.values() for name in names]
 
 
 def __getattr__(name: str) -> Any:

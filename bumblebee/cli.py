@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from bumblebee import __version__
-from bumblebee.commands import COMMANDS, Commands, missing, quiet_mujoco
+from bumblebee.commands import COMMANDS, Commands, missing
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput, plain
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 
@@ -65,6 +65,7 @@ def diagnose(
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
     from bumblebee.diagnosis.quick import QuickConfig, first_look, told
     from bumblebee.diagnosis.report import examples, plot, summary
+    from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     held_out = read_held_out(held) if held else None
@@ -101,6 +102,7 @@ def replay(
     from bumblebee.diagnosis.places import claim_file, inputs_of
     from bumblebee.diagnosis.replay import replay
     from bumblebee.sim.effects import read_effects
+    from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     claim_file(out, overwrite, inputs_of(model, dataset, effects))
@@ -121,6 +123,7 @@ def gap(
     from bumblebee.diagnosis.output import write_gap
     from bumblebee.diagnosis.places import GAP, claim_folder, inputs_of
     from bumblebee.diagnosis.report import gap_summary
+    from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     if out:

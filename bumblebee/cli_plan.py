@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from bumblebee.commands import quiet_mujoco
 from bumblebee.errors import BadInput, plain
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
@@ -47,6 +46,7 @@ def plan(
     from bumblebee.diagnosis.places import inputs_of, model_files
     from bumblebee.diagnosis.plan import PlanConfig, claim_plan, make_plan, read_findings, summary, write_plan
     from bumblebee.measured.model_file import load_spec
+    from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     inputs = model_files(model) if dataset is None else inputs_of(model, dataset)

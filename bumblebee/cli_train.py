@@ -35,11 +35,11 @@ def train(
     from bumblebee.api.policy_card import tried
     from bumblebee.api.training import TrainConfig
     from bumblebee.api.training import train as fit
-    from bumblebee.commands import quiet_mujoco
     from bumblebee.io.write import refuse_overlap
     from bumblebee.motion.few_lines import few_lines
     from bumblebee.motion.folder import ReadConfig, read_folder
     from bumblebee.motion.one_file import stated
+    from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     chosen = {"minutes": minutes, "gpu": gpu, "start": start, "learner": learner, "held_out": held_out}
@@ -49,8 +49,13 @@ def train(
     reading = read_folder(folder, files)
     for told in few_lines(zip(reading.skipped["file"], reading.skipped["reason"], strict=True)):
         print(plain(f"skipped: {told.line}: {told.whose}"))
-    print(f"{len(reading.clips)} motions of at most {_PIECE:g} s read, {len(reading.skipped)} files skipped", flush=True)
-    made = fit(reading.clips, out, overwrite=overwrite, say=lambda text: print(plain(text), flush=True), **asdict(config))
+    counts = f"{len(reading.clips)} motions of at most {_PIECE:g} s read, {len(reading.skipped)} files skipped"
+    print(counts, flush=True)
+
+    def say(text: str) -> None:
+        print(plain(text), flush=True)
+
+    made = fit(reading.clips, out, overwrite=overwrite, say=say, **asdict(config))
     for told in few_lines(zip(made.dropped["motion"], made.dropped["explanation"], strict=True)):
         print(plain(f"dropped: {told.line}: {told.whose}"))
     print("\n".join(line for line in tried(made.trials) if line))
@@ -73,9 +78,9 @@ def evaluate(
     from bumblebee.api.policies import evaluate as run
     from bumblebee.api.policies import load_policy
     from bumblebee.api.policy_card import tried
-    from bumblebee.commands import quiet_mujoco
     from bumblebee.io.write import refuse_existing, try_output, write_file
     from bumblebee.motion.one_file import stated
+    from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     if out is not None:

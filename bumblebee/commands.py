@@ -29,7 +29,6 @@ LOOK, TRAIN, MEASURE, LAB = "Look", "Train", "Measure", "Run the loop and a lab"
 TABLE: dict[str, tuple[Command, ...]] = {
     LOOK: (
         Command("motions", "bumblebee.cli_motions:app", "Inspect, convert, retarget and play motions."),
-        Command("view", "bumblebee.cli_view:view", "Show a motion, a policy or a rollout in the browser."),
         Command("robot", "bumblebee.cli_robot:app", "Print joints, limits, gains and contacts of a model."),
         Command("doctor", "bumblebee.cli_doctor:doctor", "Say what this machine lacks, each with a remedy."),
         Command("settings", "flows.cli_settings:settings", "Print every key of params.yaml with its meaning."),
@@ -63,7 +62,8 @@ class Commands(TyperGroup):
     """The commands of the table."""
 
     def __init__(self, **settings: Any) -> None:
-        super().__init__(**settings | {"commands": dict.fromkeys(COMMANDS)})  # names alone: what a typo is compared with
+        names = dict.fromkeys(COMMANDS)  # a typo is compared with them
+        super().__init__(**settings | {"commands": names})
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names, those of one kind together."""
@@ -108,10 +108,3 @@ def _app_of(function: Callable[..., Any]) -> typer.Typer:
     app = typer.Typer(add_completion=False)
     app.command()(function)
     return app
-
-
-def quiet_mujoco() -> None:
-    """Keep MuJoCo's warnings off the terminal and out of MUJOCO_LOG.TXT: what diverges in a search is judged so."""
-    import mujoco
-
-    mujoco.set_mju_user_warning(lambda text: None)

@@ -19,8 +19,8 @@ VIEW = "bumblebee.cli_view"
 
 
 def demo(
-    view: Annotated[bool, typer.Option("--view", help="Play the shipped policy in the browser; trains nothing.")] = False,
-    motions: Annotated[Path | None, typer.Option("--motions", help="Motion files in place of the embedded ones.")] = None,
+    view: Annotated[bool, typer.Option("--view", help="Play the shipped policy in the browser.")] = False,
+    motions: Annotated[Path | None, typer.Option("--motions", help="Motion files, not the embedded ones.")] = None,
     name: Annotated[str, typer.Option("--name", help="Workspace under runs/; by default after --motions.")] = "",
     workspace: Annotated[Path | None, typer.Option("--workspace", help="An existing workspace, as it is.")] = None,
     profile: Annotated[str, typer.Option("--profile", help="File of profiles/ on top of params.yaml.")] = "",
@@ -32,7 +32,7 @@ def demo(
     if view:
         if find_spec(VIEW) is None:
             raise BadInput("--view", "the viewer", "a version without it", "Run `bumblebee motions play`.")
-        import_module(VIEW).view_demo()
+        import_module(VIEW).play_shipped_policy()
         return
     require_checkout("demo")
     from bumblebee.last_line import guarded

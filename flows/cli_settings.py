@@ -44,8 +44,14 @@ def _class(section: str) -> type:
     return getattr(import_module(module), name)
 
 
-def keys(place: str, kind: type) -> Iterator[tuple[str, str, str, str]]:
-    """Rows of a settings class, those of classes in it too: key, default, what it may be, meaning."""
+def keys(place: str, kind: type, made: Any = None) -> Iterator[tuple[str, str, str, str]]:
+    """Rows of a settings class, those of classes in it too: key, default, what it may be, meaning.
+
+    Args:
+        place: the class's own key.
+        kind: the class.
+        made: its defaults in the section that it stands in; None for the class's own.
+    """
     from bumblebee.ranges import annotations, describe
 
     said = meanings(kind)
@@ -53,18 +59,21 @@ def keys(place: str, kind: type) -> Iterator[tuple[str, str, str, str]]:
         if not field.init:
             continue
         hint, name = annotations(kind)[field.name], f"{place}.{field.name}"
-        inner = next((one for one in (hint, *get_args(hint)) if is_dataclass(one)), None)
+        inner = next((one for one in (hint, *get_args(hint)) if isinstance(one, type) and is_dataclass(one)), None)
         if inner is not None:
-            yield from keys(name, inner)  # type: ignore[arg-type]
+            yield from keys(name, inner, _default(field, made))
         else:
-            yield name, _default(field), describe(hint), said.get(field.name, "")
+            yield name, _shown(_default(field, made)), describe(hint), said.get(field.name, "")
 
 
-def _default(field: "Field[Any]") -> str:
-    value = field.default if field.default is not MISSING else None
-    if field.default is MISSING and field.default_factory is not MISSING:
-        value = field.default_factory()
-    elif field.default is MISSING:
+def _default(field: "Field[Any]", made: Any) -> Any:
+    if made is not None:
+        return getattr(made, field.name)
+    return field.default_factory() if field.default_factory is not MISSING else field.default
+
+
+def _shown(value: Any) -> str:
+    if value is MISSING:
         return "(must be given)"
     if isinstance(value, bool) or value is None:
         return {True: "true", False: "false", None: "null"}[value]

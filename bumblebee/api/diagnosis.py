@@ -43,8 +43,8 @@ def gap(session: "Session") -> dict[str, Any]:
     Raises:
         BadInput: something that is no session.
     """
-    from bumblebee.commands import quiet_mujoco
     from bumblebee.diagnosis.gap import gap as compare
+    from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     return compare(_session(session)).document
@@ -73,11 +73,11 @@ def diagnose(
     Raises:
         BadInput: something that is no session, or a folder that exists.
     """
-    from bumblebee.commands import quiet_mujoco
     from bumblebee.diagnosis.config import DiagnosisConfig
     from bumblebee.diagnosis.diagnose import diagnose as find
     from bumblebee.diagnosis.output import write_diagnosis
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder
+    from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     if out is not None:
@@ -101,8 +101,8 @@ def replay(session: "Session", effects: "Sequence[Effect]" = ()) -> dict[str, An
     Raises:
         BadInput: something that is no session, or an effect at a place that the model does not have.
     """
-    from bumblebee.commands import quiet_mujoco
     from bumblebee.diagnosis.replay import replay as compute
+    from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     return compute(_session(session), effects)
@@ -125,9 +125,9 @@ def plan(model: str | Path, *, runs: int = 4, seconds: float = 8.0, seed: int = 
     Raises:
         BadInput: no model, or one without joints that a drive moves.
     """
-    from bumblebee.commands import quiet_mujoco
     from bumblebee.diagnosis.plan import PlanConfig, make_plan
     from bumblebee.measured.model_file import load_spec
+    from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
     spec, path = load_spec(Path(model)), Path(model)

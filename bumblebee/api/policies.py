@@ -40,8 +40,8 @@ def load_policy(folder: str | Path = SHIPPED) -> "Policy | Deployed":
         torch.Size([1, 23])
     """
     from bumblebee.deploy.policy import ExportedPolicy
-    from bumblebee.learning import pretrained
     from bumblebee.learning import policy as trained
+    from bumblebee.learning import pretrained
 
     place = pretrained.FOLDER if str(folder) == SHIPPED else Path(folder).expanduser()
     if (place / "policy.onnx").exists() and not (place / trained.FILE).exists():
