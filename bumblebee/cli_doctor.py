@@ -9,7 +9,14 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-EXTRAS = ("", "loop", "orchestration", "gpu", "logs", "lab")
+INSTALL = {
+    "": "in the checkout: make setup",
+    "loop": "in the checkout: pip install -e '.[loop]'; then ask again",
+    "orchestration": "in the checkout: pip install -e '.[orchestration]'; then ask again",
+    "gpu": "in the checkout: pip install -e '.[gpu]'; then ask again",
+    "logs": "in the checkout: pip install -e '.[logs]'; then ask again",
+    "lab": "in the checkout: pip install -e '.[lab]'; then ask again",
+}
 NEEDED = ("", "loop", "orchestration")
 _DISK, _MEMORY = 3.0, 4.0  # GB: what README says the loop needs; what its largest stage held
 
@@ -43,11 +50,10 @@ def packages() -> Said:
     if not installed(DISTRIBUTION):
         yield False, True, f"{DISTRIBUTION} as an installed package; in the checkout: pip install -e ."
         return
-    for extra in EXTRAS:
+    for extra in INSTALL:
         missing = [name for name in required(DISTRIBUTION, extra) if not installed(name)]
         what = f"packages of the extra `{extra}`" if extra else "packages of the library"
-        install = f"in the checkout: pip install -e '.[{extra}]'" if extra else "in the checkout: make setup"
-        yield not missing, extra in NEEDED, what + (f": no {', '.join(missing)}; {install}" if missing else "")
+        yield not missing, extra in NEEDED, what + (f": no {', '.join(missing)}; {INSTALL[extra]}" if missing else "")
 
 
 def required(distribution: str, extra: str) -> list[str]:

@@ -40,6 +40,12 @@ def test_the_list_of_commands_imports_neither_numbers_nor_networks():
     assert subprocess.run([sys.executable, "-c", code], cwd=HOME, capture_output=True, check=False).returncode == 0
 
 
+def test_without_a_command_all_are_listed(capsys):
+    assert run() == 0
+    said = capsys.readouterr().out
+    assert [name for name in COMMANDS if f"\n  {name} " not in said] == []
+
+
 def test_a_mistyped_command_names_the_near_one(capsys):
     assert run("diagnos") == 2
     assert "Did you mean 'diagnose'?" in capsys.readouterr().err

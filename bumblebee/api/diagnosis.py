@@ -9,7 +9,7 @@ from bumblebee.errors import BadInput
 if TYPE_CHECKING:
     from bumblebee.diagnosis.dataset import Session
     from bumblebee.diagnosis.diagnose import Diagnosis
-    from bumblebee.diagnosis.plan.plan import Plan
+    from bumblebee.diagnosis.plan import Plan
     from bumblebee.sim.effects import Effect
 
 
