@@ -55,7 +55,7 @@ def keys(place: str, kind: type, made: Any = None) -> Iterator[tuple[str, str, s
     from bumblebee.ranges import annotations, describe
 
     said = meanings(kind)
-    for field in fields(kind):  # type: ignore[arg-type]
+    for field in fields(kind):
         if not field.init:
             continue
         hint, name = annotations(kind)[field.name], f"{place}.{field.name}"

@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from bumblebee.api import checks
 from bumblebee.errors import BadInput
@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from bumblebee.learning.ppo import Trainer
     from bumblebee.learning.world_model.trainer import WorldModelTrainer
 
-    Learner = Trainer | WorldModelTrainer
-
+Learner: TypeAlias = "Trainer | WorldModelTrainer"
 SHIPPED, NOTHING = "shipped", "nothing"
 CARD = "card.json"
 _FIRST = 3  # iterations that measure the speed: the first of them loads kernels
@@ -121,7 +120,7 @@ def train(
         return _kept(learner, split, config, out, dropped, say)
 
 
-def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> "Learner":
+def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> Learner:
     """The learner of `config` around the task on the training clips; it goes on from a checkpoint in `folder`."""
     import torch
 
@@ -151,7 +150,7 @@ def parent_of(start: str) -> Path | None:
     return {SHIPPED: pretrained.FOLDER, NOTHING: None}.get(start, Path(start).expanduser())
 
 
-def train_for(learner: "Learner", seconds: float) -> None:
+def train_for(learner: Learner, seconds: float) -> None:
     """Train until `seconds` of training are done in all, those before a kill included; the curriculum follows the time.
 
     The first iterations measure the speed, so that the progress bar's total is right from the start.
@@ -192,7 +191,7 @@ def _checkpoints(out: Path, clips: Sequence[Clip], config: TrainConfig) -> Itera
 
 
 def _kept(
-    learner: "Learner",
+    learner: Learner,
     clips: Sequence[Clip],
     config: TrainConfig,
     out: Path,
