@@ -5,15 +5,21 @@ mkdocs calls the functions by their names. On GitHub a page names another as `do
 
 import posixpath
 import re
+import sys
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
+sys.path.insert(0, str(Path(__file__).parent))  # mkdocs loads a hook by its file alone
+from settings_page import settings_page
+
 HOME = Path(__file__).parent.parent.parent
 ROOT_PAGES = {"contributing.md": "CONTRIBUTING.md", "security.md": "SECURITY.md", "changelog.md": "CHANGELOG.md"}
-NAMED = re.compile(r"(?<![\[`])`(?:docs/)?([\w./-]+\.md|CONTRIBUTING\.md|SECURITY\.md|CHANGELOG\.md|reports/|decisions/)`(?![`\]])")
+NAMED = re.compile(r"(?<![\[`])`(?:docs/)?([\w./-]+\.md|reports/|decisions/)`(?![`\]])")
+FETCHED = re.compile(r"""<(?:script|img|iframe)[^>]*\ssrc=["']?(?:https?:)?//|<link[^>]*\shref=["']?(?:https?:)?//""")
 FOLDERS = {"reports/": "reports/README.md", "decisions/": "decisions/index.md"}
 
 
@@ -22,6 +28,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for page, source in ROOT_PAGES.items():
         files.append(File.generated(config, page, abs_src_path=str(HOME / source)))
     files.append(File.generated(config, "decisions/index.md", content=decisions()))
+    files.append(File.generated(config, "settings.md", content=settings_page()))
     return files
 
 
@@ -51,3 +58,10 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
     fenced = re.split(r"(^```.*?^```$)", markdown, flags=re.MULTILINE | re.DOTALL)
     return "".join(part if part.startswith("```") else NAMED.sub(linked, part) for part in fenced)
+
+
+def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
+    """Refuse a page whose scripts, styles or pictures come from the network."""
+    if fetched := FETCHED.search(output):
+        raise PluginError(f"{page.file.src_uri}: nothing may come from the network, found {fetched[0][:80]}")
+    return output
