@@ -27,6 +27,7 @@ def settings_page() -> str:
     while waiting := [path for path in tables if path not in written]:
         written.add(waiting[0])
         found = loader.modules_collection[waiting[0]]
+        found = found.final_target if isinstance(found, griffe.Alias) else found
         for path in [path for _, nested in _fields(found) for path in _tables(loader, nested)]:
             tables.setdefault(path, path.rpartition(".")[2])
         text.append(_table(tables[waiting[0]], found, loader))
