@@ -139,8 +139,7 @@ def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> Le
     trained_on = [clip for clip in clips if clip.split == "train"]
     env = TrackingEnv(MotionLibrary(trained_on, own.ahead, device=engine.device), engine, own, config.seed)
     settings = algorithm(config.learner, config.gpu, parent is not None)
-    kinds: dict[str, Any] = {"ppo": Trainer, "world_model": WorldModelTrainer}
-    return kinds[config.learner](env, settings, folder, config.seed, parent)
+    return make_learner(settings, env, folder, config.seed, parent)
 
 
 def parent_of(start: str) -> Path | None:
