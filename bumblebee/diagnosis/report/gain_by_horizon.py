@@ -70,7 +70,7 @@ def gain_of(document: Mapping[str, Any], rules: ReportThresholds) -> GainByHoriz
 
 
 def worse_measures(error: Mapping[str, Any], rule: Verdicts) -> list[tuple[str, str]]:
-    """(horizon, "base" or kind of joints) where the corrected model's RMS position error is larger than the declared."""
+    """(horizon, "base" or kind of joints) where the corrected model's RMS position error is larger."""
     return [(horizon, what) for horizon, what, *_ in worse_rows(error, rule)]
 
 
