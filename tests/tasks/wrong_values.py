@@ -221,7 +221,7 @@ WRONG: list[tuple[str, Any, str]] = [
     *_same("publish.promotion.people", 0, 10),
     ("publish.promotion.people", 2, "publish.promotion.mode"),  # which is auto
     *_same("publish.promotion.group", 1, "a\nb"),
-    *_same("report.title", "", "a\nb"),
+    *_same("report.title", "a\nb"),
     *_same("report.film", "yes"),
     *_same("report.seed", -1),
 ]
