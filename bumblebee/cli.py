@@ -13,13 +13,14 @@ from typing import Annotated
 
 import typer
 
-from bumblebee import __version__, cli_motions, cli_plan
+from bumblebee import __version__, cli_motions, cli_plan, cli_view
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput, plain
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 
 app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
 app.add_typer(cli_motions.app, name="motions")
 app.command()(cli_plan.plan)
+cli_view.register(app)
 for _plugin in sorted(entry_points(group="bumblebee.commands")):
     with suppress(ImportError):  # what it needs is not installed
         app.add_typer(_plugin.load(), name=_plugin.name)

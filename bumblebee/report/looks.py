@@ -23,6 +23,7 @@ _POINTS = 20  # of a ring
 # Unitree's mesh files that are no link's own: (link, place of the mesh in the link's frame of `robot/g1.yaml`, colour).
 _MORE = {
     "pelvis_contour_link": ("pelvis", (0, 0, 0), "shell"),
+    "waist_support_link": ("torso_link", (0.0039635, 0, -0.044), "shell"),
     "logo_link": ("torso_link", (0.0039635, 0, -0.044), "dark"),
     "head_link": ("torso_link", (0.0039635, 0, -0.044), "dark"),
     "left_rubber_hand": ("left_wrist_yaw_link", (0.0415, 0.003, 0), "dark"),
@@ -43,9 +44,15 @@ def meshes_of_user(folder: Path | None = None) -> Path | None:
     named = os.environ.get(MESHES, "")
     chosen = folder or (Path(named) if named else None)
     if chosen is not None and not (chosen / "pelvis.STL").is_file():
-        remedy = "Name the folder `meshes` of Unitree's G1 description, or leave it out: the G1 is then drawn from primitives."
+        remedy = "Name the folder `meshes` of Unitree's G1 description, or none: primitives are drawn then."
         raise BadInput("--meshes" if folder else MESHES, "a folder with pelvis.STL", str(chosen), remedy)
     return chosen
+
+
+def is_g1(spec: mujoco.MjSpec) -> bool:
+    """Whether a spec has the G1's links."""
+    names = {body.name for body in spec.bodies}
+    return names >= set(_table()["shapes"])
 
 
 def dress(spec: mujoco.MjSpec, meshes: Path | None = None, tint: tuple[float, ...] | None = None) -> None:
