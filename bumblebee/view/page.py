@@ -121,7 +121,7 @@ class Page:
         self._picture.choose(source.robots)
         self._time.max = max(round((source.frames - 1) / source.fps, 2), 0.01)
         live = isinstance(source, LivePolicy)
-        self._push.visible, self._others.visible = live, len(source.robots) > 1
+        self._push.visible = self._others.visible = live
         self._picture.show_others(self._others.value or not live)
         self._plots.visible = bool(source.curves)
         self._signal.options = tuple(source.curves) or ("none",)
@@ -166,15 +166,17 @@ class Page:
         series = [uplot.Series(label="s")]
         for name, colour in zip(source.lines, _COLOURS, strict=False):
             series.append(uplot.Series(label=name, stroke=colour, width=1.5))
-        series.append(uplot.Series(label="now", stroke="#d9480f", points={"show": True, "size": 9, "fill": "#d9480f"}))
+        series.append(uplot.Series(label="now", stroke="#d9480f", width=1.5))
         with self._plots:
             self._plot = self._picture.server.gui.add_uplot(
                 self._plotted(source), tuple(series), scales={"x": uplot.Scale(time=False)}, height=200
             )
 
     def _plotted(self, source: Source) -> tuple[np.ndarray, ...]:
-        """Seconds, a line for each robot, and the point where the film is."""
+        """Seconds, a line for each robot, and the cursor."""
         lines = source.curves.get(self._signal.value) or next(iter(source.curves.values()))
-        now = np.full(source.frames, np.nan)
-        now[self._frame] = lines[0][self._frame]
-        return np.arange(source.frames) / source.fps, *(np.asarray(line, float) for line in lines), now
+        values = [np.nan_to_num(np.asarray(line, dtype=np.float64)) for line in lines]
+        low, high = min(line.min() for line in values), max(line.max() for line in values)
+        now = np.full(source.frames, low)  # a line upright at the cursor; uPlot scales no NaN
+        now[self._frame] = high
+        return np.arange(source.frames) / source.fps, *values, now
