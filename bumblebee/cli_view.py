@@ -1,7 +1,5 @@
 """Command line: `bumblebee view`, `bumblebee demo --view`."""
 
-import contextlib
-import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -52,11 +50,46 @@ def view(
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="What files leave unsaid: docs/data.md.")
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Write replay.html, for no server, instead.")
+    ] = None,
+    name: Annotated[str, typer.Option("--name", help="Which of several the replay shows: its name.")] = "",
+    seconds: Annotated[float, typer.Option("--seconds", min=0.1, max=120, help="Length of the replay at most.")] = 10.0,
     port: Port = PORT,
     meshes: Meshes = None,
     ticks: Ticks = None,
 ) -> None:
     """Show motions, a policy live, or measured rollouts beside their simulation, in the browser."""
+    if out is not None:
+        _claim(out, [given for given in (path, motions, model, effects) if given])
+    entries, title, make = _found(path, motions, model, effects, settings or [])
+    if out is None:
+        _play(entries, title, port, meshes, ticks, make)
+        return
+    from bumblebee.io.write import write_file
+    from bumblebee.report.looks import meshes_of_user
+    from bumblebee.view.replay import record
+    from bumblebee.view.sources import named
+
+    text = record(named(entries, name, path).make(), meshes_of_user(meshes), seconds, make)
+    write_file(out, text)
+    print(f"written: {out}, {len(text) / 1e6:.1f} MB; it opens in a browser without a server")
+
+
+def _claim(out: Path, inputs: list[Path]) -> None:
+    from bumblebee.io.write import refuse_existing, refuse_overlap, try_output
+
+    if out.suffix != ".html":
+        raise BadInput(out, "a name that ends in .html", repr(out.suffix)[:20])
+    refuse_overlap(out, inputs)
+    refuse_existing(out)
+    try_output(out)
+
+
+def _found(
+    path: Path, motions: Path | None, model: Path | None, effects: Path | None, settings: list[str]
+) -> "tuple[list[Entry], str, Callable[[], MjSpec] | None]":
+    """What lies at the path: its entries, the page's title, and the spec of a robot of its own."""
     from bumblebee.motion.one_file import stated
     from bumblebee.view.what import is_dataset, is_policy, motion_entries, policy_entries
 
@@ -67,14 +100,12 @@ def view(
         from bumblebee.sim.effects import read_effects
         from bumblebee.view.measured import spec_of, window_entries
 
-        found = window_entries(declared, path, read_effects(effects) if effects else ())
+        entries = window_entries(declared, path, read_effects(effects) if effects else ())
         title = "Measured, and simulated in pale blue" + (" (declared) and green (corrected)" if effects else "")
-        _play(found, title, port, meshes, ticks, spec_of(declared))
-        return
+        return entries, title, spec_of(declared)
     if is_policy(path):
-        _play(policy_entries(path, motions, stated(settings or [])), f"{path.name}, live", port, meshes, ticks)
-        return
-    _play(motion_entries(path, stated(settings or [])), f"Motions of {path.name}", port, meshes, ticks)
+        return policy_entries(path, motions, stated(settings)), f"{path.name}, live", None
+    return motion_entries(path, stated(settings)), f"Motions of {path.name}", None
 
 
 def play_shipped_policy(port: int = PORT, meshes: Path | None = None, ticks: int | None = None) -> None:
@@ -107,7 +138,7 @@ def _play(
     from bumblebee.report.looks import meshes_of_user
     from bumblebee.view.page import Page
     from bumblebee.view.scene import Picture
-    from bumblebee.view.server import address, open_server, show_page
+    from bumblebee.view.server import address, open_server, show_page, stop
 
     server = open_server(port)
     try:
@@ -117,5 +148,4 @@ def _play(
     except KeyboardInterrupt:
         return
     finally:
-        with contextlib.redirect_stdout(io.StringIO()):  # its own farewell
-            server.stop()
+        stop(server)

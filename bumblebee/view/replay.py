@@ -1,13 +1,15 @@
 """A 3D replay in one file: the page's own client with the recording in it, for `file://` and without a network."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
+import mujoco
 import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.view.scene import Picture
-from bumblebee.view.server import open_server
+from bumblebee.view.server import open_server, stop
 from bumblebee.view.sources import Source
 
 LARGEST = 3_000_000
@@ -43,14 +45,21 @@ def replay_html(source: Source, picture: Picture, seconds: float = 10.0) -> str:
     text = recording.as_html()
     assert not _FOREIGN.search(text)
     if len(text.encode()) > LARGEST:
-        raise BadInput("--seconds", f"a replay of at most {LARGEST / 1e6:g} MB", f"{len(text) / 1e6:.1f} MB", "Show less.")
+        raise BadInput(
+            "--seconds", f"a replay of at most {LARGEST / 1e6:g} MB", f"{len(text) / 1e6:.1f} MB", "Show less."
+        )
     return text
 
 
-def record(source: Source, meshes: Path | None = None, seconds: float = 10.0, **made: object) -> str:
+def record(
+    source: Source,
+    meshes: Path | None = None,
+    seconds: float = 10.0,
+    make: Callable[[], mujoco.MjSpec] | None = None,
+) -> str:
     """`replay_html` by a server of its own, which is gone afterwards."""
     server = open_server(0)
     try:
-        return replay_html(source, Picture(server, meshes, **made), seconds)  # type: ignore[arg-type]
+        return replay_html(source, Picture(server, meshes, make), seconds)
     finally:
-        server.stop()
+        stop(server)

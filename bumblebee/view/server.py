@@ -31,6 +31,12 @@ def open_server(port: int) -> viser.ViserServer:
     return server
 
 
+def stop(server: viser.ViserServer) -> None:
+    """End the server, without its own farewell."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
 def address(server: viser.ViserServer) -> str:
     """The page's address."""
     return f"http://{HOST}:{server.get_port()}"

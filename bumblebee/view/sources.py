@@ -6,6 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
+from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from bumblebee.view.drawing import GHOST, Drawn, states
 
@@ -95,6 +96,19 @@ def found(entries: Sequence[Entry], words: str) -> list[Entry]:
     """Entries whose name, group and text hold every one of the words, in any case."""
     wanted = words.lower().split()
     return [e for e in entries if all(word in f"{e.name} {e.group} {e.text}".lower() for word in wanted)]
+
+
+def named(entries: Sequence[Entry], name: str, where: object) -> Entry:
+    """The entry of a name; without one, the first.
+
+    Raises:
+        BadInput: no entry has the name.
+    """
+    chosen = [entry for entry in entries if name in ("", entry.name)]
+    if not chosen:
+        some = ", ".join(entry.name for entry in entries[:8])
+        raise BadInput(where, f"something called {name!r}", f"{len(entries)} others: {some}", "Name one with --name.")
+    return chosen[0]
 
 
 def clip_states(clip: Clip) -> np.ndarray:

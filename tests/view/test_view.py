@@ -1,5 +1,6 @@
 """The browser's pages: what is played, how a push acts, and one line for what cannot be shown."""
 
+import re
 import socket
 from pathlib import Path
 
@@ -11,11 +12,13 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import write_rollout
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import kinds
+from bumblebee.motion.formats.write import write_motion
 from bumblebee.robot.facts import joint_names
 from bumblebee.view.drawing import GHOST, Drawn, drawing, states
 from bumblebee.view.live import LivePolicy
 from bumblebee.view.measured import window_entries
 from bumblebee.view.page import Page
+from bumblebee.view.replay import LARGEST
 from bumblebee.view.scene import Picture
 from bumblebee.view.server import open_server
 from bumblebee.view.shipped import shipped_policy
@@ -132,6 +135,21 @@ def test_what_cannot_be_shown_is_one_line(tmp_path: Path, made: tuple[str, ...],
         (tmp_path / name).mkdir() if name.endswith("/") else (tmp_path / name).write_text("{}")
     with pytest.raises(BadInput, match=line):
         run(["view", str(tmp_path), "--port", "0", "--ticks", "1"])
+
+
+def test_a_replay_is_one_small_file_that_asks_for_nothing(tmp_path: Path, clip, capsys: pytest.CaptureFixture):
+    path = write_motion(tmp_path / "motions", clip, "asap")
+    out = tmp_path / "replay.html"
+    order = ["view", str(path), "--out", str(out), "--seconds", "0.2"]
+    assert run([*order]) == 0
+    text = out.read_text()
+    assert len(text) < LARGEST
+    assert "__VISER_EMBED_DATA__" in text
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=.https?:", text)
+    with pytest.raises(BadInput, match="expected a new name"):
+        run(order)
+    with pytest.raises(BadInput, match="expected something called 'jump'"):
+        run([*order[:3], str(tmp_path / "other.html"), "--name", "jump"])
 
 
 def test_demo_without_view_names_the_loop():
