@@ -29,6 +29,7 @@ LOOK, TRAIN, MEASURE, LAB = "Look", "Train", "Measure", "Run the loop and a lab"
 TABLE: dict[str, tuple[Command, ...]] = {
     LOOK: (
         Command("motions", "bumblebee.cli_motions:app", "Inspect, convert, retarget and play motions."),
+        Command("view", "bumblebee.cli_view:view", "Show motions, a policy live, or measured rollouts in the browser."),
         Command("robot", "bumblebee.cli_robot:app", "Print joints, limits, gains and contacts of a model."),
         Command("doctor", "bumblebee.cli_doctor:doctor", "Say what this machine lacks, each with a remedy."),
         Command("settings", "flows.cli_settings:settings", "Print every key of params.yaml with its meaning."),

@@ -18,7 +18,7 @@ FLOORS = [
     {"learning", "evaluation"},
     {"deploy", "baselines"},
     {"report"},
-    {"api"},
+    {"api", "view"},
 ]
 ONLY = {"clustering": {"motion"}, "tracking": {"motion", "sim"}, "diagnosis": {"sim", "measured"}}
 # Below the ground floor: known to everybody.

@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from bumblebee.api import checks
 from bumblebee.errors import BadInput
@@ -18,11 +18,9 @@ from bumblebee.ranges import Few, Name, PartOf, Range, Ranged, Seed
 if TYPE_CHECKING:
     import pandas as pd
 
+    from bumblebee.learning.learner import Learner
     from bumblebee.learning.policy import Policy
-    from bumblebee.learning.ppo import Trainer
-    from bumblebee.learning.world_model.trainer import WorldModelTrainer
 
-Learner: TypeAlias = "Trainer | WorldModelTrainer"
 SHIPPED, NOTHING = "shipped", "nothing"
 CARD = "card.json"
 _FIRST = 3  # iterations that measure the speed: the first of them loads kernels
@@ -120,13 +118,12 @@ def train(
         return _kept(learner, split, config, out, dropped, say)
 
 
-def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> Learner:
+def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> "Learner":
     """The learner of `config` around the task on the training clips; it goes on from a checkpoint in `folder`."""
     import torch
 
     from bumblebee.api.recipes import algorithm, task
-    from bumblebee.learning.ppo import Trainer
-    from bumblebee.learning.world_model.trainer import WorldModelTrainer
+    from bumblebee.learning import learners
     from bumblebee.sim.engine_choice import make_engine
     from bumblebee.tracking.env import TrackingEnv
     from bumblebee.tracking.library import MotionLibrary
@@ -139,7 +136,7 @@ def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> Le
     trained_on = [clip for clip in clips if clip.split == "train"]
     env = TrackingEnv(MotionLibrary(trained_on, own.ahead, device=engine.device), engine, own, config.seed)
     settings = algorithm(config.learner, config.gpu, parent is not None)
-    return make_learner(settings, env, folder, config.seed, parent)
+    return learners.make_learner(settings, env, folder, config.seed, parent)
 
 
 def parent_of(start: str) -> Path | None:
@@ -149,7 +146,7 @@ def parent_of(start: str) -> Path | None:
     return {SHIPPED: pretrained.FOLDER, NOTHING: None}.get(start, Path(start).expanduser())
 
 
-def train_for(learner: Learner, seconds: float) -> None:
+def train_for(learner: "Learner", seconds: float) -> None:
     """Train until `seconds` of training are done in all, those before a kill included; the curriculum follows the time.
 
     The first iterations measure the speed, so that the progress bar's total is right from the start.
@@ -190,7 +187,7 @@ def _checkpoints(out: Path, clips: Sequence[Clip], config: TrainConfig) -> Itera
 
 
 def _kept(
-    learner: Learner,
+    learner: "Learner",
     clips: Sequence[Clip],
     config: TrainConfig,
     out: Path,
