@@ -50,9 +50,7 @@ def view(
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="What files leave unsaid: docs/data.md.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Write replay.html, for no server, instead.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Write replay.html, for no server, instead.")] = None,
     name: Annotated[str, typer.Option("--name", help="Which of several the replay shows: its name.")] = "",
     seconds: Annotated[float, typer.Option("--seconds", min=0.1, max=120, help="Length of the replay at most.")] = 10.0,
     port: Port = PORT,
