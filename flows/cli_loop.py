@@ -3,19 +3,17 @@
 import argparse
 import subprocess
 import sys
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from bumblebee.cli_view import PORT, Meshes, Port, Ticks, play_shipped_policy
 from bumblebee.errors import BadInput
 
 Name = Annotated[str, typer.Option("--name", help="Workspace under runs/; without, the checkout itself.")]
 PrefectPort = Annotated[int, typer.Option("--prefect-port", help="Port of Prefect's server; 0: a free one.")]
 MlflowPort = Annotated[int, typer.Option("--mlflow-port", help="Port of MLflow's server; 0: a free one.")]
-VIEW = "bumblebee.cli_view"
 
 
 def demo(
@@ -27,12 +25,13 @@ def demo(
     seed: Annotated[str, typer.Option("--seed", help="Seed of the sealed robot, or `null`: it lacks nothing.")] = "",
     prefect_port: PrefectPort = 0,
     mlflow_port: MlflowPort = 0,
+    port: Port = PORT,
+    meshes: Meshes = None,
+    ticks: Ticks = None,
 ) -> None:
     """Run the whole loop, as `make demo` does; status 3: a gate waits for an answer."""
     if view:
-        if find_spec(VIEW) is None:
-            raise BadInput("--view", "the viewer", "a version without it", "Run `bumblebee motions play`.")
-        import_module(VIEW).play_shipped_policy()
+        play_shipped_policy(port, meshes, ticks)
         return
     require_checkout("demo")
     from bumblebee.last_line import guarded

@@ -198,7 +198,7 @@ def _kept(
     from bumblebee.api.policies import evaluate, follow, load_policy
     from bumblebee.api.policy_card import card_of, readme
     from bumblebee.learning.export import CONTRACT, export_policy
-    from bumblebee.learning.ppo import CURVE
+    from bumblebee.learning.learner import CURVE
     from bumblebee.report.playback import write_pictures
 
     policy, parent = learner.policy(), parent_of(config.start)

@@ -85,18 +85,23 @@ class Page:
             self._signal = gui.add_dropdown("Signal", ("none",))
         self._plot: viser.GuiUplotHandle | None = None
 
-        self._words.on_update(lambda event: self._wish(self._search))
-        self._menu.on_update(lambda event: event.client_id is not None and self._wish(self._chosen))
-        self._button.on_click(lambda event: self._wish(self._toggle))
-        self._time.on_update(lambda event: event.client_id is not None and self._wish(self._scrub))
-        self._signal.on_update(lambda event: event.client_id is not None and self._wish(self._new_plot))
-        follow.on_update(lambda event: self._wish(lambda: self._picture.follow(follow.value)))
-        self._others.on_update(lambda event: self._wish(lambda: self._picture.show_others(self._others.value)))
-        ways.on_click(lambda event: self._wish(lambda: self._pushed(ways.value, strength.value)))
+        self._words.on_update(self._asked(self._search))
+        self._menu.on_update(self._asked(self._chosen))
+        self._button.on_click(self._asked(self._toggle))
+        self._time.on_update(self._asked(self._scrub))
+        self._signal.on_update(self._asked(self._new_plot))
+        follow.on_update(self._asked(lambda: self._picture.follow(follow.value)))
+        self._others.on_update(self._asked(lambda: self._picture.show_others(self._others.value)))
+        ways.on_click(self._asked(lambda: self._pushed(ways.value, strength.value)))
 
-    def _wish(self, act: Callable[[], None]) -> None:
-        """Keep what was asked for until the loop does it: the page's callbacks run in threads of their own."""
-        self._wishes.put(act)
+    def _asked(self, act: Callable[[], None]) -> Callable[[viser.GuiEvent], None]:
+        """A callback that keeps what a person asked for until the loop does it; callbacks run in other threads."""
+
+        def keep(event: viser.GuiEvent) -> None:
+            if event.client_id is not None:  # None: this program set the value
+                self._wishes.put(act)
+
+        return keep
 
     @staticmethod
     def _label(entry: Entry) -> str:
@@ -106,7 +111,7 @@ class Page:
         labels = [self._label(entry) for entry in found(self._entries, self._words.value)][:_LISTED]
         self._menu.options = labels or ("nothing found",)
         if labels:
-            self._menu.value = labels[0]
+            self._menu.value = labels[0]  # type: ignore[misc]
             self._chosen()
 
     def _chosen(self) -> None:
@@ -149,7 +154,7 @@ class Page:
         source = self._source
         if source is None:
             return
-        self._time.value = round(self._frame / source.fps, 2)
+        self._time.value = round(self._frame / source.fps, 2)  # type: ignore[misc]
         text = "  \n".join(part for part in (self._entry.text, source.said()) if part)
         if self._note.content != text:
             self._note.content = text

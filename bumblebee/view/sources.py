@@ -19,8 +19,6 @@ MOTION = Drawn("motion")
 class Source(Protocol):
     """What the page plays."""
 
-    frames: int
-    """Number of frames."""
     fps: float
     """Frames a second at real speed."""
     robots: Sequence[Drawn]
@@ -29,6 +27,10 @@ class Source(Protocol):
     """Name of a signal -> (frames,) values of each robot that is in `lines`; empty where there is nothing to plot."""
     lines: Sequence[str]
     """Names of the lines in each plot."""
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
 
     def seek(self, frame: int) -> None:
         """Go to a frame."""

@@ -150,8 +150,3 @@ def test_a_replay_is_one_small_file_that_asks_for_nothing(tmp_path: Path, clip, 
         run(order)
     with pytest.raises(BadInput, match="expected something called 'jump'"):
         run([*order[:3], str(tmp_path / "other.html"), "--name", "jump"])
-
-
-def test_demo_without_view_names_the_loop():
-    with pytest.raises(BadInput, match="make demo"):
-        run(["demo"])
