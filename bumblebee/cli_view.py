@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from bumblebee.view.sources import Entry
 
 PORT = 8765
-Port = Annotated[int, typer.Option("--port", min=0, max=65535, help="Port of the page on this machine; 0 takes a free one.")]
+Port = Annotated[
+    int, typer.Option("--port", min=0, max=65535, help="Port of the page on this machine; 0 takes a free one.")
+]
 Meshes = Annotated[
     Path | None,
     typer.Option("--meshes", help="Folder of Unitree's G1 meshes (*.STL); without, a shape made of primitives."),
