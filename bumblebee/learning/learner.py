@@ -85,9 +85,13 @@ class Learner(ABC):
         _set_random_state(saved["random"])
 
     def train(self, what: str = "policy", enough: Callable[[], bool] = lambda: False) -> None:
-        """Train up to the configured iterations, or until it is `enough`; a line of `curve.csv` each."""
+        """Train up to the configured iterations, or until it is `enough`; a line of `curve.csv` each.
+
+        `enough` may set `config` anew, whose iterations are the schedules' length: when to end is its answer alone.
+        """
+        last = self.config.iterations
         with self._told(what) as tell:
-            while self.iteration < self.config.iterations and not self.ranks.decide(enough):
+            while self.iteration < last and not self.ranks.decide(enough):
                 began, before = time.monotonic(), self.frames
                 with within_memory(self.env.num_envs):
                     scalars = self._iterate()
