@@ -29,8 +29,8 @@ from bumblebee.tracking.starts import start_state
 from bumblebee.tracking.statistics import Statistics
 from bumblebee.tracking.stretches import StretchSampler
 from bumblebee.tracking.terminations import fallen, threshold_at
-from bumblebee.tracking.terrain import Ground
 from bumblebee.tracking.terms import expanded, see
+from bumblebee.tracking.terrain import Ground
 from bumblebee.tracking.threads import Aside, one_thread
 
 ActionAdapter = Callable[[RobotState, Tensor, Tensor], Tensor]
