@@ -64,7 +64,10 @@ def try_relatives(folder: Path, motions: Path, kind: str, robots: str = "none") 
 
 
 def table_of(trials: pd.DataFrame) -> str:
-    """Markdown: success by key bodies and by the pelvis rule, 95 % intervals over motions, a row for each policy, a column for each kind and split."""
+    """Markdown: success by key bodies and by the pelvis rule, with 95 % intervals over motions.
+
+    A row for each policy, a column for each kind and split.
+    """
     kinds = [(kind, split) for kind in dict.fromkeys(trials["kind"]) for split in ("train", "test")]
     lines = ["| policy | " + " | ".join(f"{kind}, {split}" for kind, split in kinds) + " |"]
     lines.append("|" + "---|" * (len(kinds) + 1))

@@ -104,12 +104,11 @@ def _known() -> dict[Part, Reflection]:
     turn, keys = joint_reflection(), body_reflection(KEY_BODIES)
     but_pelvis = body_reflection([name for name in KEY_BODIES if name != "pelvis"])
     polar = ("gravity_b", "root_lin_vel_b", "ref_lin_vel_b", "root_pos_b", "target_lin_vel_b")
-    polar += ("ref_lin_vel_o", "root_pos_o")
     rotations = ("ref_rotation", "rotation", "root_rotation_g", "target_root_rotation_g", "target_root_rotation_b")
     turned = ("joint_pos", "joint_vel", "last_action", "ref_joint_pos", "ref_joint_vel", "torque")
     bodies = ("key_error_b", "target_key_pos_g", "target_key_pos_b")
     sets = (
-        ((*polar, "target_root_pos_g", "target_root_pos_b"), _POLAR),
+        ((*polar, "target_root_pos_g", "target_root_pos_b", "ref_lin_vel_o", "root_pos_o"), _POLAR),
         (("root_ang_vel_b", "ref_ang_vel", "target_ang_vel"), _AXIAL),
         (("root_height", "ref_height", "time_left", "threshold"), _SAME),
         (rotations, _COLUMNS),

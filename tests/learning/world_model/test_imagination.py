@@ -1,5 +1,7 @@
 """The task is one and the same in the simulator and in imagination."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 from torch._dynamo.utils import counters
@@ -23,27 +25,20 @@ from tests.learning.tiny import env_of
 WORLDS, STEPS = 8, 60
 
 
-def env_that_shows(*terms: str, critic: tuple[str, ...] = ()) -> TrackingEnv:
-    config = EnvConfig(
-        num_worlds=WORLDS,
-        threads=1,
-        observation=ObservationConfig(terms),
-        critic=critic,
-        observation_noise=0.0,
-        randomisation=Randomisation(push=0.0, gains=0.0),
-    )
-    engine = make_engine("mujoco", task_model(config), WORLDS, 1)
-    return TrackingEnv(MotionLibrary(make_library()[::12], config.ahead), engine, config, seed=3)
+CONFIG = EnvConfig(
+    num_worlds=WORLDS, threads=1, observation_noise=0.0, randomisation=Randomisation(push=0.0, gains=0.0)
+)
 
 
 @pytest.fixture(scope="module")
 def env() -> TrackingEnv:
-    return env_that_shows("demo")
+    engine = make_engine("mujoco", task_model(CONFIG), WORLDS, 1)
+    return TrackingEnv(MotionLibrary(make_library()[::12], CONFIG.ahead), engine, CONFIG, seed=3)
 
 
 def test_a_policy_of_imu_and_encoders_sees_the_same_in_both_and_its_critic_the_state() -> None:
     """Over whole episodes; the critic's further terms are those of a policy that sees them, and mirrored like them."""
-    env, full = env_that_shows("imu", critic=("demo",)), env_that_shows("demo")
+    env, full = env_of(replace(CONFIG, observation=ObservationConfig(("imu",)), critic=("demo",))), env_of(CONFIG)
     imagination, generator, ended = Imagination(env, horizon=1), torch.Generator().manual_seed(0), 0
     for _ in range(STEPS):
         (state, ref), last = env.now, env._action
