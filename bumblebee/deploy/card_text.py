@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from bumblebee.deploy.describe import action_sentence, joint_table, observation_size, observation_table
+from bumblebee.deploy.describe import action_sentence, joint_table, observation_size, observation_table, sensors_line
 from bumblebee.motion.licence_terms import UNKNOWN, restrictions
 from bumblebee.robot.facts import KEY_BODIES
 
@@ -34,6 +34,8 @@ def summary(contract: Mapping[str, Any]) -> str:
 
 
 def _takes(contract: dict[str, Any]) -> Iterator[str]:
+    yield sensors_line(contract)
+    yield ""
     history, now = int(contract.get("history", 1)), contract.get("observation_now", [])
     step = sum(part["size"] for part in contract["observation"])
     yield (
