@@ -69,7 +69,7 @@ def true_effects() -> list[Effect]:
 
 
 def sealed() -> list[dict]:
-    """The same in the words of the stand-in's sealed file."""
+    """The robot in the words of the stand-in's sealed file."""
     kind, robot = KINDS["encoder_offset"], declared_g1()
     drawn = {"axis": 0, "number": 8, "other": "right_knee_joint"}
     return [

@@ -71,7 +71,7 @@ def _claim(out: Path, inputs: list[Path]) -> None:
 def _found(
     path: Path, motions: Path | None, model: Path | None, effects: Path | None, settings: list[str]
 ) -> "tuple[list[Entry], str, Callable[[], MjSpec] | None]":
-    """What lies at the path: its entries, the page's title, and the spec of a robot of its own."""
+    """Find what lies at the path: its entries, the page's title, and the spec of a robot of its own."""
     from bumblebee.motion.one_file import stated
     from bumblebee.view.what import is_dataset, is_policy, motion_entries, policy_entries
 

@@ -22,7 +22,7 @@ class Command:
     target: str
     """`module:name` of a function or of a `typer.Typer`."""
     says: str
-    """What it does, in a few words."""
+    """Purpose in a few words."""
 
 
 LOOK, TRAIN, MEASURE, LAB = "Look", "Train", "Measure", "Run the loop and a lab"

@@ -45,7 +45,7 @@ class TrainingConfig(Ranged):
     env: EnvConfig = field(default_factory=EnvConfig)
     """The task."""
     learner: LearnerName = "ppo"
-    """What trains: `ppo`, or `world_model`, through a model of the robot; each has the section of its name."""
+    """Learner: `ppo`, or `world_model`, through a model of the robot; each has the section of its name."""
     ppo: PpoConfig = field(default_factory=PpoConfig)
     """PPO, where it trains."""
     world_model: WorldModelConfig = field(default_factory=WorldModelConfig)

@@ -1,4 +1,4 @@
-"""What the documentation site is made of; `make check` builds it strictly, so that every link leads somewhere."""
+"""The documentation site; `make check` builds it strictly, so that every link leads somewhere."""
 
 import sys
 from pathlib import Path

@@ -45,7 +45,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 
 def run(options: argparse.Namespace) -> None:
-    """What is not done yet, or the tables."""
+    """Print the steps that are left, or the tables."""
     if options.table:
         print(tables(options.out))
         return

@@ -1,4 +1,4 @@
-"""What the four arms share, fixed beforehand; a run is held to it by `benchmarks.study.settings.freeze`."""
+"""Settings that the four arms share, fixed beforehand; a run is held to it by `benchmarks.study.settings.freeze`."""
 
 from dataclasses import dataclass, field
 
@@ -40,7 +40,7 @@ class Loop:
     record_seed: int = 4_610
     try_seed: int = 4_690
     base: str = BASES[1]
-    """What the robot knows of its base's place."""
+    """How the robot knows its base's place: `mocap` or `odometry`."""
     env: EnvConfig = field(
         default_factory=lambda: EnvConfig(
             num_worlds=128, threads=1, physics_hz=200.0, threshold_start=0.4, randomisation=ALIKE

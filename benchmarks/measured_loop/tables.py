@@ -1,4 +1,4 @@
-"""What a run shows: replay and success of the four arms, paired by motion, with intervals over motions."""
+"""Tables of a run: replay and success of the four arms, paired by motion, with intervals over motions."""
 
 import json
 from pathlib import Path

@@ -38,7 +38,7 @@ from tasks.seal import found
 from tasks.stand_in import cut
 
 SETS = ("learn", "learn", "learn", "stop", "judge", "judge")
-"""What the recordings of six motions in a row are for."""
+"""Use of the recordings of each six motions in a row."""
 RESIDUAL, CARD, TRIED = "residual.pt", "card.json", "tried.csv"
 
 
@@ -86,7 +86,7 @@ class Work:
                 _write(folder, made)
 
     def diagnosis(self, name: str) -> None:
-        """What the declared model lacks, by the recordings that do not judge."""
+        """Diagnose the declared model by the recordings that do not judge."""
         out = self.folder / name / "diagnosis"
         if out.exists():
             return

@@ -31,7 +31,7 @@ def task(gpu: bool, threads: int) -> EnvConfig:
 
 
 def algorithm(learner: str, gpu: bool, from_policy: bool) -> PpoConfig | WorldModelConfig:
-    """Settings of the learner of that name; a third learner adds a row here and one in `training.LEARNERS`."""
+    """Settings of the learner of that name, by machine and start."""
     if learner == "world_model":
         return WorldModelConfig(compile=gpu)
     if from_policy:

@@ -165,8 +165,8 @@ def train_for(learner: "Learner", seconds: float) -> None:
 
     learner.config = replace(learner.config, iterations=begin + 100 * _FIRST)
     learner.train("speed", measured)
-    if learner._seconds < seconds:
-        since = marks[-2]
+    since = marks[-2:][0]
+    while learner._seconds < seconds:  # once, unless it grows faster than it was measured
         enough()
         learner.train("policy", enough)
     learner.save_checkpoint()
@@ -175,8 +175,11 @@ def train_for(learner: "Learner", seconds: float) -> None:
 @contextlib.contextmanager
 def _checkpoints(out: Path, clips: Sequence[Clip], config: TrainConfig) -> Iterator[Path]:
     """A folder beside `out` that survives a kill and is emptied when motions or settings change; gone at the end."""
-    facts = [(clip.name, clip.split, clip.joint_pos.tobytes(), clip.root_pos.tobytes()) for clip in clips]
-    key = hashlib.sha256(repr((facts, replace(config, minutes=1.0))).encode()).hexdigest()[:16]
+    made_of = hashlib.sha256(repr(replace(config, minutes=1.0)).encode())
+    for clip in clips:
+        made_of.update(repr((clip.name, clip.split, clip.joint_pos.shape)).encode())
+        made_of.update(clip.joint_pos.tobytes() + clip.root_pos.tobytes() + clip.root_quat.tobytes())
+    key = made_of.hexdigest()[:16]
     place = out.absolute().with_name(f".{out.name}.training")
     for old in place.glob("*"):
         if old.name != key:

@@ -29,7 +29,7 @@ _SEEN = ("ahead", "terms", "history", "now", "action", "transformer", "observati
 
 
 class Schedule(Protocol):
-    """What the loop reads of a learner's settings."""
+    """Settings of a learner that the loop reads."""
 
     iterations: int
     steps: int
@@ -65,7 +65,7 @@ class Learner(ABC):
 
     @abstractmethod
     def state_dict(self) -> dict[str, Any]:
-        """What all ranks share and go on from: networks, optimisers and counts."""
+        """State that all ranks share and go on from: networks, optimisers and counts."""
 
     @abstractmethod
     def load_state_dict(self, saved: dict[str, Any]) -> None:
@@ -76,7 +76,7 @@ class Learner(ABC):
         """Learn for one iteration; its row of the curve, with `success` and `key_error` [m]."""
 
     def own_state(self) -> dict[str, Any]:
-        """What this rank alone goes on from: its worlds and its noise."""
+        """State that this rank alone goes on from: its worlds and its noise."""
         return {"env": self.env.state_dict(), "random": _random_state()}
 
     def load_own_state(self, saved: dict[str, Any]) -> None:
@@ -133,7 +133,7 @@ class Learner(ABC):
             print(f"{path}: of {len(each)} GPUs, goes on with {self.ranks.count} and new episodes", flush=True)
 
     def _made_of(self) -> dict[str, Any]:
-        """What a checkpoint is of, as plain values: the learner, the robot, and what its policy sees and gives."""
+        """Identity of a checkpoint as plain values: the learner, the robot, and what its policy sees and gives."""
         shape = {name: _plain(value) for name, value in asdict(shape_of(self.env, self.config.hidden)).items()}
         return {"learner": self.name, "robot": ROBOT, **shape}
 
@@ -144,7 +144,7 @@ class Learner(ABC):
 
     @contextlib.contextmanager
     def _told(self, what: str) -> Iterator[Callable[[dict[str, float], int], None]]:
-        """What writes an iteration's row to the curve and counts its frames; on the first rank alone."""
+        """Give a function that writes an iteration's row to the curve and counts frames; on the first rank alone."""
         if not self.ranks.first:
             yield lambda row, frames: None
             return

@@ -1,4 +1,4 @@
-"""What a finished loop still fails at, each with one thing to do next that works as printed."""
+"""Failures of a finished loop, each with one thing to do next that works as printed."""
 
 from bumblebee.report.effect_words import named
 from bumblebee.report.names import label, last_policy, pair

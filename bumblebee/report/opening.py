@@ -193,7 +193,7 @@ def _left_over(diagnosis: Json) -> str:
 
 
 def _remarks(turn: RoundResults) -> list[str]:
-    """What a share of 0 % means, and what was undone at the joint."""
+    """Explain a share of 0 %, and say what was undone at the joint."""
     nothing = any(_share(effect).startswith("0") for effect in turn.diagnosis["effects"])
     return [line for line in (_NOTHING if nothing else "", compensation_line(turn.compensation)) if line]
 

@@ -71,7 +71,7 @@ class Block:
     bars: tuple[Bar, ...] = ()
     strips: tuple[Strip, ...] = ()
     folded: str = ""
-    """What a table that opens on a click is called."""
+    """Title of a table that opens on a click."""
     panels: tuple[str, ...] = ()
     """Headings over the parts of a film that stand side by side in it."""
     facts: dict[str, str] = field(default_factory=dict)

@@ -22,7 +22,7 @@ READINGS = {
     "height": "height of the pelvis above the floor, from odometry",
     "place": "place of the pelvis in the plane from where the clip begins, from odometry",
 }
-"""What a policy may need to read, and what that is."""
+"""Readings that a policy may need, each explained."""
 
 
 def needed(terms: Sequence[str], joints: int = 23, ahead: int = 0) -> tuple[str, ...]:

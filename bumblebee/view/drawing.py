@@ -23,7 +23,7 @@ class Drawn:
     """One robot in the picture."""
 
     name: str
-    """What it is called in the page; unique in a picture."""
+    """Name in the page; unique in a picture."""
     tint: tuple[float, float, float, float] | None = None
     """RGBA of all its parts; None for its own colours."""
 

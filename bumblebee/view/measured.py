@@ -45,7 +45,7 @@ def window_entries(model: Path, dataset: Path, effects: Sequence[Effect] = ()) -
 
 
 def spec_of(model: Path) -> Callable[[], mujoco.MjSpec]:
-    """What draws a model: the G1 in its visible shape, any other robot by its own geoms."""
+    """Spec to draw a model from: the G1 in its visible shape, any other robot by its own geoms."""
     return lambda: load_spec(model)
 
 

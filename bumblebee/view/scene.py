@@ -15,7 +15,7 @@ _FIELD = np.radians(45.0)  # vertical field of view
 
 
 class Picture:
-    """What is drawn now; another set of robots makes a new scene.
+    """Robots that are drawn now; another set of robots makes a new scene.
 
     Args:
         server: where the page is.

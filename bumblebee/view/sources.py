@@ -17,7 +17,7 @@ MOTION = Drawn("motion")
 
 
 class Source(Protocol):
-    """What the page plays."""
+    """Frames that the page plays."""
 
     fps: float
     """Frames a second at real speed."""

@@ -1,4 +1,4 @@
-"""What lies at a path, and how it is shown: motions, a policy, or measured rollouts."""
+"""Tell what lies at a path, and how it is shown: motions, a policy, or measured rollouts."""
 
 from collections.abc import Callable
 from functools import partial

@@ -3,7 +3,7 @@
 import doctest
 import json
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
@@ -104,3 +104,32 @@ def test_a_training_that_was_killed_goes_on(monkeypatch):
     monkeypatch.setattr("bumblebee.learning.ppo.Trainer._iterate", lambda self: pytest.fail("trained again"))
     bb.train(STAND, "policy", minutes=0.005, worlds=8)
     assert iterations[0] >= 1 and not Path(".policy.training").exists()
+
+
+@dataclass(frozen=True)
+class Ends:
+    iterations: int = 0
+
+
+class Hastens:
+    """A learner whose iterations get faster: by the first ones, fewer would do."""
+
+    def __init__(self, folder: Path) -> None:
+        self.config, self.iteration, self._seconds, self.saved = Ends(), 0, 0.0, folder / "saved"
+
+    def train(self, what, enough):
+        last = self.config.iterations
+        while self.iteration < last and not enough():
+            self._seconds += 1.0 if self.iteration < 4 else 0.125
+            self.iteration += 1
+
+    def save_checkpoint(self):
+        self.saved.touch()
+
+
+def test_a_training_takes_the_time_that_it_was_given_however_fast_it_becomes(tmp_path):
+    learner = Hastens(tmp_path)
+    training.train_for(learner, 20.0)
+    assert learner._seconds == 20.0 and learner.saved.exists()
+    training.train_for(learner, 20.0)  # killed after its end, it has nothing left to do
+    assert learner._seconds == 20.0

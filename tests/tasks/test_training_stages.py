@@ -71,7 +71,7 @@ MODEL = {
 def test_a_world_model_trains_base_expert_and_refinement_and_no_later_stage_sees_a_difference(
     workspace: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The same files, contract and columns as PPO's; PPO, which needs a critic, says how to go on from there."""
+    """Files, contract and columns are PPO's; PPO, which needs a critic, says how to go on from there."""
     base.main()
     folders = ("models/base", "models/experts/r0/c1", "models/experts/r1/c1")
     files, contract = contents(Path(folders[0]))

@@ -1,4 +1,4 @@
-"""What a policy must read: the rows of each set of observations, and nothing else, depend on it."""
+"""Readings that a policy takes: the rows of each set of observations, and nothing else, depend on it."""
 
 import pytest
 import torch

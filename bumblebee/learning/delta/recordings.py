@@ -40,7 +40,7 @@ class Recordings:
     motions: tuple[str, ...]
 
     def to(self, device: torch.device | str) -> "Recordings":
-        """The same on a device."""
+        """Copy to a device."""
         moved = {name: getattr(self, name).to(device) for name in ("qpos", "qvel", "targets", "start", "length")}
         return Recordings(**moved, ids=self.ids, motions=self.motions)
 

@@ -37,7 +37,7 @@ def joint_pos(body: Tensor) -> Tensor:
 
 
 def name_of(entry: int, size: int) -> str:
-    """What an entry of a state of `size` = 13 + 2 J entries is."""
+    """Name an entry of a state of `size` = 13 + 2 J entries."""
     joints = (size - ROOT) // 2
     if entry < ROOT:
         return ("root position", "root orientation", "root velocity", "root angular velocity")[

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -30,7 +29,7 @@ FILE = "model.pt"
 
 @dataclass(frozen=True)
 class Frame:
-    """What fixes a world model."""
+    """Facts that fix a world model."""
 
     joints: tuple[str, ...]
     """Names in column order."""
@@ -82,12 +81,11 @@ def new_model(frame: Frame) -> Dynamics:
 def context_in(env: TrackingEnv) -> Tensor:
     """In what the worlds of `env` differ, (N, C), as its world model is told."""
     drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
-    context: np.ndarray = context_of(env.engine.model, drawn, env.num_envs)
-    return torch.tensor(context, dtype=torch.float32, device=env.device)
+    return context_of(env.engine.model, drawn, env.num_envs).to(env.device)
 
 
 def frame_of(env: TrackingEnv, hidden: tuple[int, ...]) -> Frame:
-    """What a world model of `env` is like."""
+    """Facts of a world model of `env`."""
     delay = float(env.engine.model.actuator_delay.max()) + env.cfg.randomisation.delay[1]
     return Frame(joint_names(), tuple(hidden), env.dt, context_in(env).shape[1], past_targets(delay, env.dt))
 

@@ -36,7 +36,7 @@ class Measured:
     """(N, 13 + 2 J) states as the robot's sensors read them, see `body`."""
 
     def to(self, device: torch.device | str) -> "Measured":
-        """The same on a device."""
+        """Copy to a device."""
         return Measured(self.recordings.to(device), self.bodies.to(device))
 
     @property

@@ -117,12 +117,13 @@ class WorldModelTrainer(Learner):
         """Go on from what `state_dict` gave."""
         self.model_update.load_state_dict(saved["model"])
         self.policy_update.load_state_dict(saved["policy"])
-        self.iteration, self._seconds, self._frames_before = (saved[n] for n in ("iteration", "seconds", "frames"))
+        self.iteration, self._seconds = saved["iteration"], saved["seconds"]
+        self._frames_before += saved["frames"] - self.frames
         self.env.sampler.failure.copy_(saved["failure"])
         self._kept = self.iteration
 
     def own_state(self) -> dict[str, Any]:
-        """What this rank alone goes on from: its worlds, its noise and its memory."""
+        """State that this rank alone goes on from: its worlds, its noise and its memory."""
         return super().own_state() | {"memory": self.memory.state_dict(), "collector": self._collect.state_dict()}
 
     def load_own_state(self, saved: dict[str, Any]) -> None:

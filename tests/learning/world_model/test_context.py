@@ -1,4 +1,4 @@
-"""What tells the model in what worlds differ: a column means one thing, whatever was drawn."""
+"""The model is told in what worlds differ: a column means one thing, whatever was drawn."""
 
 import numpy as np
 import torch

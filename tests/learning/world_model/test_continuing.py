@@ -95,7 +95,7 @@ def test_a_policy_learns_through_the_residual_and_the_model_learns_from_the_simu
     actors = [each.policy_update.actor.mlp.state_dict() for each in trained.values()]
     assert any(not torch.equal(actors[0][key], value) for key, value in actors[1].items())
     again = ContinuedTrainer(env_of(ALIKE), config, tmp_path / "with", parent, wrong)
-    assert again.iteration == 1
+    assert again.iteration == 1 and again.frames == trained["with"].frames
     for key, value in again.policy_update.actor.mlp.state_dict().items():
         assert torch.equal(value, actors[1][key]), key
 

@@ -19,7 +19,7 @@ CONFIG = replace(SMALL, iterations=3, checkpoint_every=2, model_updates=2, polic
 
 
 def trained(folder: Path, ranks: Ranks) -> dict[str, Any]:
-    """What is known at the end of a training that begins, or goes on from the checkpoint of the folder."""
+    """Networks and curve at the end of a training that begins, or goes on from the checkpoint of the folder."""
     trainer = WorldModelTrainer(env_of(TASK, seed=ranks.seed(3)), CONFIG, folder, seed=3, ranks=ranks)
     began = trainer.iteration
     trainer.train()
