@@ -52,7 +52,7 @@ def show_page(url: str) -> str:
         except webbrowser.Error:
             pass
     away = f"from another machine: ssh -L {port}:{HOST}:{port} <this machine>"
-    return f"{url}   (no browser was found here: open the address in one; {away}; Ctrl-C ends it)"
+    return f"{url}   (no browser can be opened here: open the address in one; {away}; Ctrl-C ends it)"
 
 
 def has_display() -> bool:
