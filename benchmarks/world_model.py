@@ -19,9 +19,12 @@ import torch
 from benchmarks.baselines.__main__ import SETTINGS, Clock, _tell, main, make_env, training_clips
 from benchmarks.baselines.methods import RANDOMISATIONS, changed, method
 from benchmarks.baselines.trial import Tried, report
+from benchmarks.baselines.variety import MARK, mirrored
 from benchmarks.motion_pack import read_pack
 from bumblebee.baselines.trial import Manner
+from bumblebee.errors import BadInput
 from bumblebee.learning.learner import CURVE
+from bumblebee.learning.ranks import check_gpus, join, launch, leave, started_together, this_command
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.trainer import WorldModelTrainer
 from bumblebee.tracking.config import EnvConfig
@@ -44,6 +47,8 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--motions", type=Path, required=True, help="file of benchmarks.motion_pack")
     parser.add_argument("--out", type=Path, required=True, help="folder for results; a run found there goes on")
     parser.add_argument("--minutes", type=float, default=6.0, help="training in all")
+    parser.add_argument("--iterations", type=int, help="training in all, instead of --minutes")
+    parser.add_argument("--gpus", type=int, default=1, help="train on so many together; needs --iterations")
     parser.add_argument("--call-minutes", type=float, help="end this call after so long")
     parser.add_argument("--engine", choices=("mujoco", "mujoco_warp"), default="mujoco_warp")
     parser.add_argument("--worlds", type=int, default=4096)
@@ -51,6 +56,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=12, help="processes that try the policy; 0: none is tried")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--randomisation", choices=tuple(RANDOMISATIONS), default="light")
+    parser.add_argument("--reflected", action="store_true", help="learn from each motion's reflection too")
     parser.add_argument("--parent", type=Path, help="folder of a policy to start from")
     parser.add_argument("--set", nargs="*", default=[], metavar="PATH=VALUE")
     return parser.parse_args(arguments)
@@ -58,6 +64,11 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def run(options: argparse.Namespace) -> int:
     """Train and try; 0 when done, also if the call was over before."""
+    if options.gpus > 1 and not started_together():
+        if not options.iterations:
+            raise BadInput("--gpus", "--iterations with it: all GPUs follow one schedule", "none")
+        check_gpus(options.gpus)
+        return launch(options.gpus, this_command())
     sizes = {"engine": options.engine, "num_worlds": options.worlds, "physics_hz": 200.0, "threads": options.threads}
     env = replace(EnvConfig(), **sizes, randomisation=RANDOMISATIONS[options.randomisation])
     settings = changed(Settings(env), options.set)
@@ -65,10 +76,15 @@ def run(options: argparse.Namespace) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / SETTINGS).write_text(json.dumps(asdict(settings), indent=1) + "\n")
     torch.set_num_threads(options.threads)
+    ranks = join(on_gpu=options.engine == "mujoco_warp")
     clock = Clock(options.call_minutes)
-    made = make_env(replace(method("ours"), env=settings.env), training_clips(rows), options.seed, 1.0)
-    config = replace(settings.learner, iterations=_ENDLESS, checkpoint_every=_ENDLESS)
-    trainer = WorldModelTrainer(made, config, options.out, options.seed, options.parent)
+    learned = training_clips(rows)
+    if options.reflected:
+        copies = [replace(row, clip=mirrored(row.clip)) for row in learned]
+        learned += [replace(row, clip=replace(row.clip, name=row.clip.name + MARK)) for row in copies]
+    made = make_env(replace(method("ours"), env=settings.env), learned, ranks.seed(options.seed), 1.0, ranks.device)
+    config = replace(settings.learner, iterations=options.iterations or _ENDLESS, checkpoint_every=_ENDLESS)
+    trainer = WorldModelTrainer(made, config, options.out, options.seed, options.parent, ranks)
     if trainer.iteration:
         print(f"goes on after {trainer.iteration} iterations, {trainer._seconds / 60:.1f} min", flush=True)
 
@@ -76,27 +92,30 @@ def run(options: argparse.Namespace) -> int:
 
     def enough() -> bool:
         marks.append((trainer.iteration, trainer._seconds))
-        if len(marks) > _FIRST:  # the first ones load kernels and record graphs
+        if len(marks) > _FIRST and not options.iterations:  # the first ones load kernels and record graphs
             (began, before), (now, seconds) = marks[_FIRST], marks[-1]
             left = 60 * options.minutes - seconds
             total = now + max(round(left * (now - began + 1) / (seconds - before + 0.1)), 1)
             trainer.config = replace(trainer.config, iterations=total)
         if clock.due("tell", _TELL_EVERY):
             _tell(options.out / CURVE)
-        if clock.due("save", _SAVE_EVERY):
+        if options.gpus == 1 and clock.due("save", _SAVE_EVERY):  # the ranks must save together
             trainer.save_checkpoint()
-        return trainer._seconds >= 60 * options.minutes or clock.over
+        return (not options.iterations and trainer._seconds >= 60 * options.minutes) or clock.over
 
     trainer.train("world model", enough)
     trainer.save_checkpoint()
+    errors = trainer.accuracy().by_horizon
+    leave()
+    if not ranks.first:
+        return 0
     trainer.policy().save(options.out)
     print(f"trained {trainer.frames / 1e6:.1f} M steps in {trainer._seconds / 60:.1f} min", flush=True)
-    errors = trainer.accuracy().by_horizon
     print(
         "model, RMS in held-out worlds: " + ", ".join(f"{name} {value:.1f}" for name, value in errors.items()),
         flush=True,
     )
-    if options.jobs and (trainer._seconds >= 60 * options.minutes or not clock.over):
+    if options.jobs and not clock.over:
         report(
             [Tried("world_model", options.out, Manner(settings.env.observation))],
             options.motions,

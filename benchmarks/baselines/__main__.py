@@ -57,10 +57,11 @@ def training_clips(rows: list[Packed]) -> list[Packed]:
     return [row for row in [*whole, *rest] if row.clip.split == "train"]
 
 
-def make_env(own: Method, rows: list[Packed], seed: int, share: float) -> TrackingEnv:
+def make_env(own: Method, rows: list[Packed], seed: int, share: float, device: str = "cuda") -> TrackingEnv:
     """The method's task; embedded motions are drawn `share` times as often for their length."""
     task = own.env
-    engine = make_engine(task.engine, task_model(task), task.num_worlds, task.threads, buffers=task.buffers)
+    sizes = task_model(task), task.num_worlds, task.threads
+    engine = make_engine(task.engine, *sizes, buffers=task.buffers, device=device)
     clips = [row.clip for row in rows]
     factors = grouped(shares(rows, share), clips)
     if own.baseline is None:

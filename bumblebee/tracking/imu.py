@@ -13,7 +13,7 @@ from bumblebee.sim.rotations import conjugate, matrix, turned, two_columns
 from bumblebee.tracking.library import ReferenceFrame
 
 _PELVIS = KEY_BODIES.index("pelvis")
-_OTHERS = [index for index in range(len(KEY_BODIES)) if index != _PELVIS]
+_OTHERS = len(KEY_BODIES) - 1
 
 
 def imu_layout(joints: int = 23, ahead: int = 0) -> list[tuple[str, int]]:
@@ -24,8 +24,8 @@ def imu_layout(joints: int = 23, ahead: int = 0) -> list[tuple[str, int]]:
         ("joint_pos", joints),
         ("joint_vel", joints),
         ("last_action", joints),
-        ("key_pos_b", 3 * len(_OTHERS)),
-        ("posture_error", 3 * len(_OTHERS)),
+        ("key_pos_b", 3 * _OTHERS),
+        ("posture_error", 3 * _OTHERS),
         ("ref_rotation", 6),
         ("ref_lin_vel_o", 3),
         ("ref_ang_vel", 3),
@@ -42,12 +42,11 @@ def observe_imu(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> 
     """Observation (B, D), parts as in `imu_layout`; arguments as of `tracking.observations.observe`."""
     to_base, to_ref = (matrix(conjugate(quat)) for quat in (state.root_quat_w, ref.root_quat_w))
     keys = state.key_pos_w if state.read_key_pos_w is None else state.read_key_pos_w
-    own = turned((keys - state.root_pos_w[:, None])[:, _OTHERS], to_base)
-    shifts = ((ref.key_pos_w - ref.root_pos_w[:, None])[:, _OTHERS], ref.root_lin_vel_w[:, None])
+    own = turned(_others(keys - state.root_pos_w[:, None]), to_base)
+    shifts = (_others(ref.key_pos_w - ref.root_pos_w[:, None]), ref.root_lin_vel_w[:, None])
     wanted = turned(torch.cat((*shifts, ref.ahead_root_pos_w - ref.root_pos_w[:, None]), dim=1), to_ref)
     columns = two_columns(torch.cat((ref.root_quat_w[:, None], ref.ahead_root_quat_w), dim=1)).flatten(1, 2)
     turns = turned(columns, to_base).unflatten(1, (-1, 2)).mT.flatten(2)  # (B, 1 + A, 6)
-    count = len(_OTHERS)
     parts = [
         -to_base[:, :, 2],
         state.root_ang_vel_b,
@@ -55,14 +54,19 @@ def observe_imu(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> 
         state.joint_vel,
         last_action,
         own.flatten(1),
-        (wanted[:, :count] - own).flatten(1),
+        (wanted[:, :_OTHERS] - own).flatten(1),
         turns[:, 0],
-        wanted[:, count],
+        wanted[:, _OTHERS],
         ref.root_ang_vel_b,
         ref.root_pos_w[:, 2:],
         ref.hold_pos,
         ref.joint_vel,
     ]
     for i in range(ref.ahead):
-        parts += [wanted[:, count + 1 + i], turns[:, 1 + i], ref.ahead_joint_pos[:, i]]
+        parts += [wanted[:, _OTHERS + 1 + i], turns[:, 1 + i], ref.ahead_joint_pos[:, i]]
     return torch.cat(parts, dim=-1)
+
+
+def _others(points: Tensor) -> Tensor:
+    """Of key bodies (B, K, 3) all but the pelvis; slices, since a list of numbers would be copied from the host."""
+    return torch.cat((points[:, :_PELVIS], points[:, _PELVIS + 1 :]), dim=1)

@@ -4,6 +4,7 @@ import math
 
 import pytest
 import torch
+from torch.utils._python_dispatch import TorchDispatchMode
 
 from bumblebee.errors import BadInput
 from bumblebee.sim.engine import RobotState
@@ -116,3 +117,23 @@ def test_an_unknown_term_is_named() -> None:
     """With the names that there are."""
     with pytest.raises(BadInput, match=r"'gravitation'.*gravity_b"):
         expanded(["joint_pos", "gravitation"])
+
+
+class Called(TorchDispatchMode):
+    """Names of the operations that are called within."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.names: set[str] = set()
+
+    def __torch_dispatch__(self, func, types, args=(), kwargs=None):
+        self.names.add(func.overloadpacket.__name__)
+        return func(*args, **(kwargs or {}))
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_a_term_copies_nothing_from_the_host_so_that_a_gpu_can_record_it(name: str) -> None:
+    seen = example()
+    with Called() as called:
+        TERMS[name](seen)
+    assert not called.names & {"index", "_local_scalar_dense", "nonzero"}

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import torch
+from tensordict import TensorDict
 from torch import Tensor
 
 from bumblebee.learning.world_model.body import packed
@@ -30,11 +31,11 @@ class Collector:
         self._before = self._held()
 
     @torch.no_grad()
-    def __call__(self, act: Callable[[Tensor], Tensor]) -> Tensor:
-        """One control step; `act` maps observations (N, D) to actions (N, J). Gives back the observations."""
+    def __call__(self, act: Callable[[Tensor], Tensor]) -> TensorDict:
+        """One control step; `act` maps observations (N, D) to actions (N, J). Gives back what was seen, in groups."""
         env = self._env
-        seen = env.get_observations()["policy"]
-        action = act(seen)
+        seen = env.get_observations()
+        action = act(seen["policy"])
         action = action + self._noise * torch.randn_like(action)
         state, ref = env.now
         target = middle_targets(ref, env.middle) + env.scale * action

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from copy import deepcopy
 
 import torch
-from rsl_rl.modules import MLP
+from rsl_rl.modules import MLP, EmpiricalNormalization
 from torch import Tensor, nn
 
 from bumblebee.learning.world_model.imagination import Rollout
@@ -19,7 +19,7 @@ class Critic(nn.Module):
     """A network of the value, and a slow average of it that the targets are made of.
 
     Args:
-        observation: D, entries of a normalised observation.
+        observation: V, entries of what it sees.
         hidden: widths of the layers, ELU.
     """
 
@@ -30,13 +30,14 @@ class Critic(nn.Module):
             self.network[-1].weight.zero_()
             self.network[-1].bias.zero_()
         self.average = deepcopy(self.network).requires_grad_(False)
+        self.normalizer = EmpiricalNormalization(observation).eval()
 
     def forward(self, seen: Tensor) -> Tensor:
-        """Values (...) of normalised observations (..., D), by the network that learns."""
+        """Values (...) of normalised observations (..., V), by the network that learns."""
         return self.network(seen).squeeze(-1)
 
     def steady(self, seen: Tensor) -> Tensor:
-        """Values (...) of normalised observations (..., D), by the average."""
+        """Values (...) of normalised observations (..., V), by the average."""
         return self.average(seen).squeeze(-1)
 
     def follow(self, share: float) -> None:

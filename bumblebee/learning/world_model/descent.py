@@ -14,7 +14,10 @@ _LOWEST = 0.1  # of the learning rate, at the end of its cosine
 
 
 class Descent:
-    """Adam at a rate that falls along a cosine, with bounded gradients.
+    """Muon and Adam at a rate that falls along a cosine, with bounded gradients.
+
+    Muon takes the matrices between hidden layers, Adam all else. A recorded step must not ask the rate's tensor for its
+    number, as torch's Muon does: it takes a step of rate 1, of which the rate's share is kept.
 
     Args:
         weights: what learns, all on one device.
@@ -26,7 +29,11 @@ class Descent:
         self.weights, self._first, self._norm = list(weights), rate, grad_norm
         device = self.weights[0].device
         self.rate, self.steepness = torch.tensor(rate, device=device), torch.zeros((), device=device)
-        self._adam = torch.optim.Adam(self.weights, lr=self.rate, fused=True, capturable=device.type == "cuda")
+        matrices = [weight for weight in self.weights if weight.ndim == 2]
+        self._inner = matrices[1:-1]
+        rest = [weight for weight in self.weights if weight.ndim != 2] + matrices[:1] + matrices[1:][-1:]
+        self._adam = torch.optim.Adam(rest, lr=self.rate, fused=True, capturable=device.type == "cuda")
+        self._muon = _muon(self._inner) if self._inner else None
         self._gradients = [torch.zeros_like(weight) for weight in self.weights]
         for weight, gradient in zip(self.weights, self._gradients, strict=True):
             weight.grad = gradient
@@ -50,22 +57,35 @@ class Descent:
         """Go one step down the gradient; `steepness` () is its norm before it is bounded."""
         self.steepness.copy_(torch.nn.utils.clip_grad_norm_(self.weights, self._norm))
         self._adam.step()
+        if self._muon is not None:
+            inner = [weight.detach() for weight in self._inner]
+            before = [weight.clone() for weight in inner]
+            self._muon.step()
+            torch._foreach_copy_(inner, [old.lerp(new, self.rate) for old, new in zip(before, inner, strict=True)])
 
     def state_dict(self) -> dict[str, Any]:
-        """State of the optimiser, beside weights and rate."""
-        return self._adam.state_dict()
+        """State of the optimisers, beside weights and rate."""
+        return {"adam": self._adam.state_dict()} | ({"muon": self._muon.state_dict()} if self._muon else {})
 
     def load_state_dict(self, saved: dict[str, Any]) -> None:
         """Go on from what `state_dict` gave."""
-        self._adam.load_state_dict(saved)
+        self._adam.load_state_dict(saved["adam"])
+        if self._muon is not None:
+            self._muon.load_state_dict(saved["muon"])
         for group in self._adam.param_groups:
             group["lr"] = self.rate
 
 
-class Learning:
-    """A gradient step of several networks, which ranks take together; recorded on a GPU.
+def _muon(matrices: list[nn.Parameter]) -> torch.optim.Muon:
+    """Muon at a rate of 1, with steps as large as Adam's and no decay."""
+    return torch.optim.Muon(matrices, lr=1.0, weight_decay=0.0, adjust_lr_fn="match_rms_adamw")
 
-    Several ranks exchange their gradients between two halves, of which the first alone is then recorded.
+
+class Learning:
+    """A gradient step of several networks, which ranks take together; one rank alone records it on a GPU.
+
+    Several ranks exchange their gradients between two halves. The first could be recorded alone, but on two H100 CUDA
+    refused to (its backward pass reaches for the legacy stream).
 
     Args:
         differentiate: takes the gradients of all `descents`.
@@ -82,16 +102,17 @@ class Learning:
         ranks: Ranks,
     ) -> None:
         self._differentiate, self._apply, self._descents, self._ranks = differentiate, apply, descents, ranks
-        recorded = self._whole if ranks.count == 1 else differentiate
-        self._recorded = Recorded(recorded, descents[0].rate.device, lambda: [])
+        self._recorded = Recorded(self._whole, descents[0].rate.device, lambda: [])
 
     def __call__(self) -> None:
         """Learn once."""
-        self._recorded()
-        if self._ranks.count > 1:
-            for descent in self._descents:
-                descent.exchange(self._ranks)
-            self._apply()
+        if self._ranks.count == 1:
+            self._recorded()
+            return
+        self._differentiate()
+        for descent in self._descents:
+            descent.exchange(self._ranks)
+        self._apply()
 
     def _whole(self) -> None:
         self._differentiate()

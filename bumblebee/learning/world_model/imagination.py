@@ -22,7 +22,7 @@ from bumblebee.tracking.library import ReferenceFrame, over_robot
 from bumblebee.tracking.observations import middle_targets
 from bumblebee.tracking.rewards import Step
 from bumblebee.tracking.terminations import fallen
-from bumblebee.tracking.terms import expanded, see
+from bumblebee.tracking.terms import expanded, parts, see
 
 Act = Callable[[Tensor], Tensor]
 """Observations (B, D) -> actions (B, J)."""
@@ -33,9 +33,9 @@ class Rollout:
     """H imagined control steps of B robots."""
 
     seen: Tensor
-    """(H, B, D) exact observations before each step, without gradients."""
+    """(H, B, V) what the value sees before each step, exact and without gradients."""
     after: Tensor
-    """(B, D) exact observations after the last step."""
+    """(B, V) what it sees after the last step."""
     reward: Tensor
     """(H, B) a second of perfect tracking; 0 after an end."""
     alive: Tensor
@@ -45,7 +45,7 @@ class Rollout:
 
     @classmethod
     def of(cls, seen: Tensor, after: Tensor, reward: Tensor, lost: Tensor, left: Tensor) -> "Rollout":
-        """From observations, rewards (H, B), failures (H, B) bool and the steps (B,) that were left of the clips."""
+        """From what the value sees, rewards and failures (H, B), and the steps (B,) that were left of the clips."""
         done = torch.arange(1, len(reward) + 1, device=left.device)[:, None]
         ends = torch.cat(((left <= 0)[None], lost | (done >= left)))
         alive = ends.cumsum(0) == 0
@@ -65,6 +65,10 @@ class Imagination:
         device = torch.device(env.device)
         self.env, self.horizon = env, horizon
         self.terms = expanded((*env.cfg.observation.terms, *env.cfg.observation.now))
+        self.beside = expanded(env.cfg.critic)
+        every = (*env.cfg.observation.terms, *env.cfg.observation.now, *env.cfg.critic)
+        self.value_size = sum(size for _, size in parts(every, env.num_actions, len(env.library.ahead)))
+        """V, what the value sees: the policy's observation without noise, and the task's terms for the critic."""
         self.kinematics = ForwardKinematics(env.engine.model, [*KEY_BODIES, *FEET], device)
         servos = servos_of(env.engine.model, list(range(1, env.engine.model.njnt)))
         columns = (servos.gain, servos.bias[:, 2], servos.limit)
@@ -117,9 +121,12 @@ class Imagination:
             steps.append((seen, reward, lost))
             body, before, last, earlier = after, handed_on(target, before), action, last
         shown, rewards, losses = (torch.stack(each) for each in zip(*steps, strict=True))
-        return Rollout.of(
-            shown, see(self.terms, unpacked(body, keys), final, last), rewards, losses, self._left(starts)
-        )
+        after = self._valued(see(self.terms, unpacked(body, keys), final, last), unpacked(body, keys), final, last)
+        return Rollout.of(shown, after, rewards, losses, self._left(starts))
+
+    def _valued(self, seen: Tensor, state: RobotState, ref: ReferenceFrame, last: Tensor) -> Tensor:
+        """What the value sees (B, V) where the policy sees `seen` (B, D)."""
+        return torch.cat((seen, see(self.beside, state, ref, last)), dim=-1) if self.beside else seen
 
     def _advance(
         self,
@@ -137,8 +144,8 @@ class Imagination:
         """One imagined control step.
 
         Returns:
-            What was seen, the next state and its key bodies, action, servo targets, reward, and whose episode it ends
-            as a failure.
+            What the value sees, the next state and its key bodies, action, servo targets, reward, and whose episode
+            ends as a failure.
         """
         state = unpacked(body, keys)
         seen = see(self.terms, state, ref, last)
@@ -147,7 +154,8 @@ class Imagination:
         after = model(body, target, before, context)
         step = self.step(state, after, target, (action, last, earlier), ref)
         reward = self.env.reward(step) / self.env.dt
-        return seen.detach(), after, step.state.key_pos_w, action, target, reward, self.lost(step)
+        shown = self._valued(seen, state, ref, last).detach()
+        return shown, after, step.state.key_pos_w, action, target, reward, self.lost(step)
 
     def _noise(self, robots: int) -> Sequence[Tensor | None]:
         """Errors of the sensors, (B, D) for each step, as the environment draws them."""

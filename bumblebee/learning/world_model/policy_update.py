@@ -41,8 +41,8 @@ class PolicyUpdate:
     ) -> None:
         device = model.mean.device
         self.actor, self.average = actor, deepcopy(actor).requires_grad_(False)
-        self.critic = Critic(actor.obs_dim, config.value_hidden).to(device)
-        self._seen = deepcopy(actor.obs_normalizer).train()
+        self.critic = Critic(imagination.value_size, config.value_hidden).to(device)
+        self._seen, self._valued = (deepcopy(n).train() for n in (actor.obs_normalizer, self.critic.normalizer))
         self._model, self._imagination, self._memory, self._config = model, imagination, memory, config
         self.descents = {
             "policy": Descent(list(actor.mlp.parameters()), config.policy_rate, config.grad_norm),
@@ -56,9 +56,11 @@ class PolicyUpdate:
         """Learn once."""
         self._learn()
 
-    def look(self, seen: Tensor) -> None:
-        """Normalise by these observations (N, D) too, in tensors that stay where they are."""
+    def look(self, seen: Tensor, exact: Tensor) -> None:
+        """Normalise by these observations (N, D) too, and the value by what it sees (N, V), where the tensors are."""
         self._seen.update(seen)
+        self._valued.update(exact)
+        self.critic.normalizer.load_state_dict(self._valued.state_dict())
         for network in (self.actor, self.average):
             network.obs_normalizer.load_state_dict(self._seen.state_dict())
 
@@ -79,12 +81,13 @@ class PolicyUpdate:
         for name, descent in self.descents.items():
             descent.load_state_dict(saved["descents"][name])
         self._seen.load_state_dict(self.actor.obs_normalizer.state_dict())
+        self._valued.load_state_dict(self.critic.normalizer.state_dict())
 
     def _differentiate(self) -> None:
         """Gradients of both networks; the value's depends on the policy by what was imagined alone."""
         config = self._config
         rollout = self._imagination.rollout(self._act, self._model, self._memory.starts(config.policy_batch))
-        seen, after = self.actor.obs_normalizer(rollout.seen), self.actor.obs_normalizer(rollout.after)
+        seen, after = self.critic.normalizer(rollout.seen), self.critic.normalizer(rollout.after)
         last = self.critic.steady(after)
         self.descents["policy"].differentiate(-objective(rollout, last, config.gamma))
         with torch.no_grad():

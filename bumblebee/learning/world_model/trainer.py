@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from tensordict import TensorDict
 from torch import Tensor
 
 from bumblebee.errors import BadInput
@@ -183,12 +184,12 @@ class WorldModelTrainer(Learner):
         rate = float(self.policy_update.descents["policy"].rate)
         return env.statistics.take() | told | {"learning_rate": rate, "threshold": env.threshold}
 
-    def _look(self, seen: Tensor) -> None:
-        """Let the policy be normalised by observations (N, D) too, unless what was collected is no numbers."""
+    def _look(self, seen: TensorDict) -> None:
+        """Let policy and value be normalised by what was seen too, unless what was collected is no numbers."""
         if (fault := self.memory.fault()) is not None:
             do = "Look for it in the motions and the robot's model."
             raise BadInput("what the simulator gave", "numbers", fault, do)
-        self.policy_update.look(seen)
+        self.policy_update.look(seen["policy"], seen["critic"][:, : self.imagination.value_size])
 
     def _diverged(self, expected: str, came: str, setting: str) -> BadInput:
         """The line for a training that leads nowhere."""

@@ -174,3 +174,26 @@ def test_the_imagined_policy_sees_through_the_environments_sensors() -> None:
     levels = noisy.groups["policy"].levels
     error = (torch.stack(shown) - rollout.seen).abs().amax((0, 1))
     assert (error <= levels + 1e-5).all() and (error >= 0.8 * levels - 1e-5).all()
+
+
+def test_the_value_sees_the_environments_terms_for_the_critic_and_the_policy_does_not() -> None:
+    task = EnvConfig(num_worlds=4, threads=1, observation=ObservationConfig(terms=("imu",)), critic=("demo",))
+    own = env_of(task)
+    imagination, shown = Imagination(own, horizon=2), []
+    memory = Memory(2, torch.zeros(4, 0), own.num_actions)
+    for _ in range(2):
+        seen = Collector(own, memory, 0.0)(lambda seen: torch.zeros(len(seen), own.num_actions))
+    assert imagination.value_size > seen["policy"].shape[1]
+
+    def act(seen: torch.Tensor) -> torch.Tensor:
+        shown.append(seen)
+        return torch.zeros(len(seen), own.num_actions)
+
+    with torch.no_grad():
+        rollout = imagination.rollout(act, Dynamics(own.num_actions, (16,), own.dt), memory.starts(4))
+    assert rollout.seen.shape == (2, 4, imagination.value_size) == (2, *rollout.after.shape)
+    assert shown[0].shape == seen["policy"].shape
+    state, ref = own.now
+    exact = see(imagination.terms, state, ref, torch.zeros(4, own.num_actions))
+    valued = imagination._valued(exact, state, ref, torch.zeros(4, own.num_actions))
+    torch.testing.assert_close(valued, own.get_observations()["critic"][:, : imagination.value_size])

@@ -62,7 +62,7 @@ def test_the_policies_are_normalised_by_all_that_was_seen_in_tensors_that_stay(t
     assert own.count == looks * TASK.num_worlds
     places = {name: value.data_ptr() for name, value in own.state_dict().items()}
     mean = own.mean
-    update.look(torch.full((4, update.actor.obs_dim), 9.0))
+    update.look(torch.full((4, update.actor.obs_dim), 9.0), torch.full((4, update.actor.obs_dim), 9.0))
     assert places == {name: value.data_ptr() for name, value in own.state_dict().items()}
     assert not torch.equal(own.mean, mean)
     assert torch.equal(own.mean, kept.mean) and torch.equal(own.std, kept.std)
