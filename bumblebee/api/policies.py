@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from bumblebee.deploy.policy import ExportedPolicy
     from bumblebee.learning.policy import Policy
 
-SHIPPED = "shipped"
 PHYSICS_HZ = 200.0
 
 
-def load_policy(folder: str | Path = SHIPPED) -> "Policy | Deployed":
+def load_policy(folder: str | Path = "shipped") -> "Policy | Deployed":
     """Load a policy of the G1.
 
     Args:
-        folder: what `train` or `bumblebee fetch` wrote, or `"shipped"` for the policy that comes along.
+        folder: what `train` or `bumblebee fetch` wrote, or a policy that comes along: `"shipped"`,
+            `"randomised"` (for robots with delays and other gains) or `"imu"` (likewise, and without odometry).
 
     Returns:
         A function of observations (N, D) that gives mean actions (N, 23), one control step of 0.02 s each.
@@ -43,7 +43,7 @@ def load_policy(folder: str | Path = SHIPPED) -> "Policy | Deployed":
     from bumblebee.learning import policy as trained
     from bumblebee.learning import pretrained
 
-    place = pretrained.FOLDER if str(folder) == SHIPPED else Path(folder).expanduser()
+    place = pretrained.SHIPPED.get(str(folder)) or Path(folder).expanduser()
     if (place / "policy.onnx").exists() and not (place / trained.FILE).exists():
         return Deployed(ExportedPolicy.load(place))
     return trained.load_policy(place)

@@ -3,8 +3,11 @@
 from dataclasses import replace
 
 from bumblebee.learning.config import PpoConfig
+from bumblebee.learning.policy import Shape
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.needs import needed
+from bumblebee.tracking.terms import expanded
 
 GENTLE = PpoConfig(learning_rate=1e-4, learning_rate_range=(1e-5, 1e-3), desired_kl=0.01, desired_kl_end=0.01)
 """PPO from a policy that can follow motions already: higher rates make it forget (docs/training.md)."""
@@ -28,6 +31,13 @@ def task(gpu: bool, threads: int) -> EnvConfig:
     drawn = {"sampler_stretch": 1.0, "sampler_memory": 0.98, "sampler_floor": 0.1}
     shrinks = {"threshold_end": 0.35, "threshold_share": 0.4}
     return EnvConfig(engine="mujoco_warp", num_worlds=4096, physics_hz=200.0, **drawn, **shrinks)  # type: ignore[arg-type]
+
+
+def as_seen_by(task: EnvConfig, shape: Shape) -> EnvConfig:
+    """The task for a policy of this shape; one that cannot know its place is compared in the robot's own place."""
+    knows = "place" in needed(expanded((*shape.terms, *shape.now)), shape.actions, len(shape.ahead))
+    place = "world" if knows else "own"
+    return replace(task, observation=shape.seen, ahead=shape.ahead, action=shape.action, place=place)
 
 
 def algorithm(learner: str, gpu: bool, from_policy: bool) -> PpoConfig | WorldModelConfig:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from bumblebee.learning.learner import Learner
     from bumblebee.learning.policy import Policy
 
-SHIPPED, NOTHING = "shipped", "nothing"
+NOTHING = "nothing"
 CARD = "card.json"
 _FIRST = 3  # iterations that measure the speed: the first of them loads kernels
 
@@ -34,10 +34,10 @@ class TrainConfig(Ranged):
     """Time of the training itself [min]; trials before and after come on top."""
     gpu: bool = False
     """Whether MuJoCo Warp simulates on an NVIDIA GPU (the extra `gpu`); without, MuJoCo on CPU threads."""
-    start: Name = SHIPPED
-    """`shipped` for the policy that comes along, `nothing`, or the folder of a policy to go on from."""
-    learner: Literal["ppo", "world_model"] = "ppo"
-    """`ppo`, or `world_model`, which learns through a model of the robot."""
+    start: Name = "shipped"
+    """A policy that comes along (`shipped`, `randomised`, `imu`), `nothing`, or a policy's folder to go on from."""
+    learner: Literal["ppo", "world_model"] | None = None
+    """`ppo`, or `world_model`, which learns through a model of the robot; None: PPO on a CPU, the other on a GPU."""
     held_out: PartOf = 0.15
     """Share of the motions that the policy does not train on, by a hash of their names, in families of 4 or more."""
     worlds: Annotated[int, Range(least=1, most=1_000_000)] | None = None
@@ -122,8 +122,9 @@ def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> "L
     """The learner of `config` around the task on the training clips; it goes on from a checkpoint in `folder`."""
     import torch
 
-    from bumblebee.api.recipes import algorithm, task
+    from bumblebee.api.recipes import algorithm, as_seen_by, task
     from bumblebee.learning import learners
+    from bumblebee.learning.policy import load_policy
     from bumblebee.sim.engine_choice import make_engine
     from bumblebee.tracking.env import TrackingEnv
     from bumblebee.tracking.library import MotionLibrary
@@ -132,10 +133,11 @@ def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> "L
     torch.set_num_threads(config.threads)
     own, parent = task(config.gpu, config.threads), parent_of(config.start)
     own = own if config.worlds is None else replace(own, num_worlds=config.worlds)
+    own = own if parent is None else as_seen_by(own, load_policy(parent).shape)
     engine = make_engine(own.engine, task_model(own), own.num_worlds, own.threads, buffers=own.buffers)
     trained_on = [clip for clip in clips if clip.split == "train"]
     env = TrackingEnv(MotionLibrary(trained_on, own.ahead, device=engine.device), engine, own, config.seed)
-    settings = algorithm(config.learner, config.gpu, parent is not None)
+    settings = algorithm(config.learner or ("world_model" if config.gpu else "ppo"), config.gpu, parent is not None)
     return learners.make_learner(settings, env, folder, config.seed, parent)
 
 
@@ -143,7 +145,7 @@ def parent_of(start: str) -> Path | None:
     """Folder of the policy to start from; None for nothing."""
     from bumblebee.learning import pretrained
 
-    return {SHIPPED: pretrained.FOLDER, NOTHING: None}.get(start, Path(start).expanduser())
+    return None if start == NOTHING else pretrained.SHIPPED.get(start) or Path(start).expanduser()
 
 
 def train_for(learner: "Learner", seconds: float) -> None:

@@ -12,7 +12,9 @@ import pytest
 
 import bumblebee as bb
 from bumblebee.api import training
+from bumblebee.api.recipes import as_seen_by
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from bumblebee.tracking.config import EnvConfig
 from tests.deploy.conftest import nod
 
 PAGE = Path(__file__).parents[2] / "docs" / "api.md"
@@ -92,6 +94,17 @@ def test_wrong_arguments_are_one_line_with_what_to_do():
         with pytest.raises(bb.BadInput, match=re.escape(said)):
             call()
     assert not Path("p").exists()
+
+
+def test_a_child_sees_what_its_parent_sees_and_is_compared_where_it_can_know_it_is():
+    here, there = (as_seen_by(EnvConfig(), bb.load_policy(name).shape) for name in ("shipped", "imu"))
+    assert here == EnvConfig()
+    assert there.observation.terms == ("imu",) and there.ahead == (0.1, 0.3, 0.6, 1.0) and there.place == "own"
+
+
+def test_ppo_from_a_policy_without_a_critic_is_one_line_that_names_the_other_learner():
+    with pytest.raises(bb.BadInput, match="world_model"):
+        bb.train(STAND, "policy", minutes=0.005, worlds=8, start="imu")
 
 
 def test_a_training_that_was_killed_goes_on(monkeypatch):

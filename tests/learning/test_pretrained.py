@@ -10,17 +10,18 @@ from bumblebee.learning.policy import FILE, load_policy
 from bumblebee.learning.trial import World, try_policy
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.sim.sensors import load_model
-from bumblebee.tracking.config import EnvConfig
-from bumblebee.tracking.observations import layout
+from bumblebee.tracking.config import EnvConfig, ObservationConfig
+from bumblebee.tracking.needs import needed
+from bumblebee.tracking.terms import expanded, parts
 
 
 @pytest.mark.parametrize("folder", pretrained.NAMES, ids=lambda folder: folder.name)
 def test_it_is_small_and_of_the_layout_that_the_task_has(folder: Path) -> None:
-    """At most 4 MB with its critic; its observation and look-ahead are the environment's defaults."""
-    assert (folder / FILE).stat().st_size <= 4e6
+    """At most 8 MB with its critic, if it has one; its observation has the parts that its shape names."""
+    assert (folder / FILE).stat().st_size <= 8e6
     policy = load_policy(folder)
-    assert policy.shape.ahead == EnvConfig().ahead
-    assert policy.shape.observation == sum(size for _, size in layout(23, len(policy.shape.ahead)))
+    seen = parts((*policy.shape.terms, *policy.shape.now), 23, len(policy.shape.ahead))
+    assert policy.shape.observation == sum(size for _, size in seen)
     assert policy.shape.actions == 23
     assert policy(torch.zeros(2, policy.shape.observation)).isfinite().all()
     assert all(value.isfinite().all() for value in policy.critic_state.values())
@@ -34,4 +35,10 @@ def test_it_follows_embedded_motions_without_training(folder: Path, physics_hz: 
     policy = load_policy(folder)
     trials = try_policy(policy, clips, World(load_model(physics_hz=physics_hz), threads=1), policy.shape.ahead)
     assert trials["success"].all()
-    assert trials["key_error"].mean() < 0.03  # m
+    assert trials["key_error"].mean() < 0.04  # m
+
+
+def test_the_default_policy_has_the_tasks_own_observation_and_the_imu_policy_needs_no_odometry() -> None:
+    default, imu = (load_policy(pretrained.SHIPPED[name]).shape for name in ("shipped", "imu"))
+    assert (default.seen, default.ahead) == (ObservationConfig(), EnvConfig().ahead)
+    assert needed(expanded(imu.terms), 23, len(imu.ahead)) == ("imu", "heading", "encoders")

@@ -6,5 +6,9 @@ FOLDER = Path(__file__).parent
 """A policy's folder, as `load_policy` reads it."""
 RANDOMISED = FOLDER / "randomised"
 """Another one: it learnt on robots that differ, with delays, and follows less closely."""
-NAMES = {FOLDER: "pretrained", RANDOMISED: "pretrained-randomised"}
+IMU = FOLDER / "imu"
+"""A third one: it learnt on such robots too, and sees what an IMU and encoders give, without odometry."""
+NAMES = {FOLDER: "pretrained", RANDOMISED: "pretrained-randomised", IMU: "pretrained-imu"}
 """What a policy's card calls the parent that it began from."""
+SHIPPED = {"shipped": FOLDER, "randomised": RANDOMISED, "imu": IMU}
+"""Names by which a user asks for them."""

@@ -1,0 +1,1 @@
+"""The policy that needs an IMU and encoders alone; README.md is its card."""
