@@ -19,7 +19,6 @@ import torch
 from benchmarks.baselines.__main__ import SETTINGS, Clock, _tell, main, make_env, training_clips
 from benchmarks.baselines.methods import RANDOMISATIONS, changed, method
 from benchmarks.baselines.trial import Tried, report
-from benchmarks.baselines.variety import MARK, mirrored
 from benchmarks.motion_pack import read_pack
 from bumblebee.baselines.trial import Manner
 from bumblebee.errors import BadInput
@@ -28,6 +27,7 @@ from bumblebee.learning.ranks import check_gpus, join, launch, leave, started_to
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.trainer import WorldModelTrainer
 from bumblebee.tracking.config import EnvConfig
+from bumblebee.tracking.reflection import reflected
 
 _ENDLESS, _FIRST = 10**9, 10
 _SAVE_EVERY, _TELL_EVERY = 120.0, 20.0  # s
@@ -56,7 +56,6 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=12, help="processes that try the policy; 0: none is tried")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--randomisation", choices=tuple(RANDOMISATIONS), default="light")
-    parser.add_argument("--reflected", action="store_true", help="learn from each motion's reflection too")
     parser.add_argument("--parent", type=Path, help="folder of a policy to start from")
     parser.add_argument("--set", nargs="*", default=[], metavar="PATH=VALUE")
     return parser.parse_args(arguments)
@@ -79,9 +78,8 @@ def run(options: argparse.Namespace) -> int:
     ranks = join(on_gpu=options.engine == "mujoco_warp")
     clock = Clock(options.call_minutes)
     learned = training_clips(rows)
-    if options.reflected:
-        copies = [replace(row, clip=mirrored(row.clip)) for row in learned]
-        learned += [replace(row, clip=replace(row.clip, name=row.clip.name + MARK)) for row in copies]
+    if settings.learner.symmetry:
+        learned += [replace(row, clip=reflected(row.clip)) for row in learned]
     made = make_env(replace(method("ours"), env=settings.env), learned, ranks.seed(options.seed), 1.0, ranks.device)
     config = replace(settings.learner, iterations=options.iterations or _ENDLESS, checkpoint_every=_ENDLESS)
     trainer = WorldModelTrainer(made, config, options.out, options.seed, options.parent, ranks)

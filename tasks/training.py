@@ -16,7 +16,7 @@ from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.export import export_policy
 from bumblebee.learning.learner import CURVE, Learner
 from bumblebee.learning.learners import Name as LearnerName
-from bumblebee.learning.learners import make_learner
+from bumblebee.learning.learners import make_learner, played
 from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.learning.ranks import Ranks, check_gpus, join, launch, leave, this_command
 from bumblebee.learning.trial import Trials, World, success_by_family, try_policy
@@ -147,8 +147,9 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     world, buffers = job.world, own.buffers
     model = task_model(own, job.model)
     engine = make_engine(own.engine, model, own.num_worlds, own.threads, world.hooks, buffers, ranks.device)
-    library = MotionLibrary(job.clips, own.ahead, device=engine.device)
-    env = TrackingEnv(library, engine, own, ranks.seed(config.seed), world.action_adapter, job.share)
+    clips, share = played(config.algorithm, job.clips, job.share)
+    library = MotionLibrary(clips, own.ahead, device=engine.device)
+    env = TrackingEnv(library, engine, own, ranks.seed(config.seed), world.action_adapter, share)
     trainer = make_learner(config.algorithm, env, folder, config.seed, job.parent, ranks)
     # A child has its parent's layers: card and run say which.
     config = replace(config, **{config.learner: trainer.config})

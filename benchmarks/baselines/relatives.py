@@ -12,6 +12,7 @@ keep theirs). A policy that follows a motion and loses its reflection has learne
 import argparse
 import multiprocessing
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ import torch
 
 from benchmarks.baselines.methods import RANDOMISATIONS
 from benchmarks.baselines.trial import PHYSICS_HZ, rate
-from benchmarks.baselines.variety import another, at_tempo, flies, mirrored, with_arms
+from benchmarks.baselines.variety import another, at_tempo, flies, with_arms
 from benchmarks.motion_pack import read_pack, whole_motions
 from bumblebee.baselines.trial import Manner, follow
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
@@ -29,6 +30,7 @@ from bumblebee.learning.policy import load_policy
 from bumblebee.motion.clip import Clip
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.model import task_model
+from bumblebee.tracking.reflection import reflected
 
 FASTER = 1.1
 
@@ -41,7 +43,7 @@ def _armed(clips: Sequence[Clip]) -> list[Clip]:
 
 RELATIVES: dict[str, Callable[[Sequence[Clip]], list[Clip]]] = {
     "itself": list,
-    "mirrored": lambda clips: [mirrored(clip) for clip in clips],
+    "mirrored": lambda clips: [replace(reflected(clip), name=clip.name) for clip in clips],
     "other arms": _armed,
     "faster": lambda clips: [clip if flies(clip) else at_tempo(clip, FASTER) for clip in clips],
 }

@@ -18,7 +18,6 @@ from bumblebee.motion.kinematics import lowest, make_clip
 from bumblebee.motion.raw import RawMotion
 from bumblebee.motion.resample import resample
 from bumblebee.robot.facts import joint_names
-from bumblebee.tracking.mirror import joint_reflection
 
 TEMPO = (0.8, 1.2)
 """Range of the factor on the speed of a copy."""
@@ -86,13 +85,6 @@ def at_tempo(clip: Clip, factor: float) -> Clip:
     raw = RawMotion(clip.name, clip.fps * factor, clip.root_pos, clip.root_quat, clip.joint_pos, Path(clip.name))
     made = resample(raw, clip.fps)
     return _remade(clip, made.root_pos, made.root_quat, made.joint_pos)
-
-
-def mirrored(clip: Clip) -> Clip:
-    """The clip with left and right exchanged."""
-    order, sign = joint_reflection()
-    joints = clip.joint_pos[:, order] * np.array(sign)
-    return _remade(clip, clip.root_pos * [1, -1, 1], clip.root_quat * [1, -1, 1, -1], joints)
 
 
 def flies(clip: Clip) -> bool:

@@ -43,7 +43,7 @@ def as_seen_by(task: EnvConfig, shape: Shape) -> EnvConfig:
 def algorithm(learner: str, gpu: bool, from_policy: bool) -> PpoConfig | WorldModelConfig:
     """Settings of the learner of that name, by machine and start."""
     if learner == "world_model":
-        return WorldModelConfig(compile=gpu)
+        return WorldModelConfig(compile=gpu, symmetry=True)
     if from_policy:
         return GENTLE
     return FROM_NOTHING if gpu else replace(PpoConfig(), symmetry=True)

@@ -135,9 +135,9 @@ def make_learner(clips: Sequence[Clip], config: TrainConfig, folder: Path) -> "L
     own = own if config.worlds is None else replace(own, num_worlds=config.worlds)
     own = own if parent is None else as_seen_by(own, load_policy(parent).shape)
     engine = make_engine(own.engine, task_model(own), own.num_worlds, own.threads, buffers=own.buffers)
-    trained_on = [clip for clip in clips if clip.split == "train"]
-    env = TrackingEnv(MotionLibrary(trained_on, own.ahead, device=engine.device), engine, own, config.seed)
     settings = algorithm(config.learner or ("world_model" if config.gpu else "ppo"), config.gpu, parent is not None)
+    trained_on, _ = learners.played(settings, [clip for clip in clips if clip.split == "train"])
+    env = TrackingEnv(MotionLibrary(trained_on, own.ahead, device=engine.device), engine, own, config.seed)
     return learners.make_learner(settings, env, folder, config.seed, parent)
 
 

@@ -1,6 +1,6 @@
 """The learners there are: which one a name in the settings, and its section, stand for."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -10,11 +10,23 @@ from bumblebee.learning.ppo import Trainer
 from bumblebee.learning.ranks import Ranks
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.trainer import WorldModelTrainer
+from bumblebee.motion.clip import Clip
 from bumblebee.tracking.env import TrackingEnv
+from bumblebee.tracking.reflection import with_reflections
+from bumblebee.tracking.sampler import ClipShares
 
 Name = Literal["ppo", "world_model"]
 Config = PpoConfig | WorldModelConfig
 _LEARNERS: dict[type, Callable[..., Learner]] = {PpoConfig: Trainer, WorldModelConfig: WorldModelTrainer}
+
+
+def played(
+    config: Config, clips: Sequence[Clip], share: ClipShares | None = None
+) -> tuple[list[Clip], ClipShares | None]:
+    """Clips that a learner's worlds play, and how often: PPO reflects samples instead, as it learns from them."""
+    if isinstance(config, WorldModelConfig) and config.symmetry:
+        return with_reflections(clips, share)
+    return list(clips), share
 
 
 def make_learner(

@@ -9,15 +9,14 @@ import pytest
 import torch
 
 from benchmarks.baselines import relatives, variety
-from benchmarks.baselines.variety import ARMS, another, at_tempo, flies, mirrored, shares, varied, with_arms
+from benchmarks.baselines.variety import ARMS, another, at_tempo, flies, shares, varied, with_arms
 from benchmarks.motion_pack import Packed, write_pack
 from bumblebee.learning.policy import Policy, Shape, new_actor
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.motion.kinematics import forward_key_positions, make_clip
 from bumblebee.quaternions import from_axis_angle
-from bumblebee.robot.facts import KEY_BODIES, joint_names
-from bumblebee.tracking.mirror import other_side
+from bumblebee.robot.facts import joint_names
 from bumblebee.tracking.observations import layout
 
 CLIPS = make_library(EmbeddedConfig(limit=3))
@@ -88,16 +87,6 @@ def test_at_another_tempo_it_goes_through_the_same_places_in_another_time(factor
     assert np.allclose(made.joint_pos[whole], clip.joint_pos[index], atol=1e-5)
     assert np.allclose(made.root_pos[whole], clip.root_pos[index], atol=1e-5)
     assert np.allclose(np.abs((made.root_quat[whole] * clip.root_quat[index]).sum(1)), 1.0, atol=1e-5)
-
-
-def test_a_mirrored_motion_has_the_other_sides_key_bodies_and_mirrored_twice_is_itself():
-    clip = CLIPS[0]
-    made = mirrored(clip)
-    order = [KEY_BODIES.index(other_side(name)) for name in KEY_BODIES]
-    assert np.allclose(made.key_pos, clip.key_pos[:, order] * [1, -1, 1], atol=2e-3)  # the robot is symmetric to 2 mm
-    assert not np.allclose(made.joint_pos, clip.joint_pos, atol=0.1)
-    again = mirrored(made)
-    assert np.allclose(again.joint_pos, clip.joint_pos) and np.allclose(again.root_quat, clip.root_quat, atol=1e-6)
 
 
 def test_relatives_of_a_motion_are_tried_and_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -59,6 +59,8 @@ class WorldModelConfig(Ranged):
     """Standard deviation of the exploration, in units of the action; worlds have from none to twice as much."""
     warm_up: Annotated[int, Range(least=1, most=1_000_000)] = 200
     """Gradient steps of the model before the policy's first."""
+    symmetry: bool = False
+    """Learn from every motion's reflection too, left and right exchanged."""
     compile: bool = False
     """Whether torch compiles a control step of model and task, minutes once; it needs a C compiler on the machine."""
     checkpoint_every: Annotated[int, Range(least=1, most=1_000_000_000)] = 50
