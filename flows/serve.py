@@ -15,6 +15,7 @@ from flows import workspace as workspaces
 from flows.attend import attend, ended_in_order
 from flows.demo import add_ports, announce
 from flows.environment import environment
+from flows.first_look import MODELS
 from flows.owned import require_own
 from flows.servers import Addresses, require_port, servers
 from tasks.lab_serve import read_serve
@@ -43,7 +44,8 @@ def started(options: argparse.Namespace) -> int:
             with servers(folder, options.prefect_port, options.mlflow_port, door) as addresses:
                 announce(folder, addresses)
                 if door is not None:
-                    print(f"people     {door.prefect} and {door.mlflow}, each with a login of their own", flush=True)
+                    pages = f"{door.prefect} and {door.mlflow}/{MODELS}"
+                    print(f"people     {pages}, each with a login of their own", flush=True)
                 try:
                     gate_answer.resume_answered(folder, addresses.prefect)
                 except (BadInput, OSError) as error:  # a gate's file, or the server: the pages are open all the same

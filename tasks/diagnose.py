@@ -12,6 +12,7 @@ from bumblebee.diagnosis.output import fill
 from bumblebee.diagnosis.report import summary
 from bumblebee.ranges import Range, Ranged, Seed
 from tasks import paths
+from tasks.run_form import Metric, milliseconds
 from tasks.stage import load, log_run, output_folder, run_stage
 
 Windows = Annotated[int, Range(least=8, most=100_000)]
@@ -50,14 +51,12 @@ def main(round: int) -> None:
     log_run("diagnose", round=round, params=config, metrics=_metrics(result.document))
 
 
-def _metrics(document: dict) -> dict[str, float]:
-    """Headline numbers: effects found and joint error by horizon."""
-    metrics = {"effects": float(len(document["effects"]))}
+def _metrics(document: dict) -> dict[str, Metric]:
+    """Number of effects found, and the joint error [rad] over the horizon [ms]."""
+    metrics: dict[str, Metric] = {"effects": float(len(document["effects"]))}
     for part in ("before", "after", "floor"):
-        for horizon, measures in document["error"][part].items():
-            value = measures["joint_pos_rmse"]["value"]
-            if value is not None:
-                metrics[f"joint_pos_rmse_{horizon}s_{part}"] = value
+        errors = {h: measures["joint_pos_rmse"]["value"] for h, measures in document["error"][part].items()}
+        metrics[f"joint_pos_rmse/{part}"] = {milliseconds(h): e for h, e in errors.items() if e is not None}
     return metrics
 
 

@@ -177,9 +177,8 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
         (out / "card.json").write_text(json.dumps(card, indent=1) + "\n")
         after.assign(before=before["success"], key_error_before=before["key_error"]).to_csv(out / "trials.csv")
     _tell(job, card)
-    metrics = {f"{when}/{family}": rate for when in ("before", "after") for family, rate in card[when].items()}
-    rate = trainer.frames / max(float(curve["seconds"].iloc[-1]), 1e-9)
-    metrics |= {"frames_per_second": round(rate), "unstable_worlds": card["unstable_worlds"]}
+    before_rates, last = card["before"], int(curve.iloc[-1, 0])
+    metrics = {f"success/{family}": {0: before_rates[family], last: rate} for family, rate in card["after"].items()}
     log_run(
         job.stage,
         cluster=job.cluster,
