@@ -177,7 +177,7 @@ def compensate(
     ] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """What a policy's runner can undo at the joints of the G1, without training; no other robot has such a runner."""
+    """List what a policy's runner can undo at the joints of the G1, without training; no other robot has a runner."""
     from bumblebee.deploy.compensation_evidence import require_proven
     from bumblebee.deploy.compensation_file import claim_compensation, table_of, write_compensation
     from bumblebee.deploy.compensation_plan import compensate_file

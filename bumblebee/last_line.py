@@ -84,7 +84,7 @@ def disk_line(error: OSError) -> str | None:
 
 
 def sqlite_line(error: Exception) -> str | None:
-    """The same for a database of SQLite's that could not be written, such as DVC's; None for any other error."""
+    """Line for a database of SQLite's that could not be written, such as DVC's; None for any other error."""
     if not isinstance(error, sqlite3.OperationalError) or str(error) not in _SQLITE:
         return None
     return str(BadInput(_here(), "a disk that takes the output", str(error), _DO))

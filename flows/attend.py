@@ -1,4 +1,4 @@
-"""What a keeper does while the loop runs in a process of its own: wait, pass on what ends it, notice a lost server."""
+"""Work of a keeper while the loop runs in a process of its own: wait, pass on what ends it, notice a lost server."""
 
 import os
 import signal

@@ -33,7 +33,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def started(options: argparse.Namespace) -> int:
-    """What the options ask for, until it is done or a signal ends it."""
+    """Do what the options ask for, until it is done or a signal ends it."""
     with ended_in_order():
         try:
             require_port("--prefect-port", options.prefect_port)
@@ -162,7 +162,7 @@ def shown(folder: Path) -> str:
 
 
 def summarise(folder: Path) -> None:
-    """What there is now: registered models and the report."""
+    """Print what there is now: registered models and the report."""
     published = folder / paths.PUBLISHED
     if published.exists():
         models = json.loads(published.read_text())["models"]

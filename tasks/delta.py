@@ -41,7 +41,7 @@ _WORLDS_TO_JUDGE = 64
 
 @dataclass(frozen=True)
 class Simulator:
-    """What a delta action corrects."""
+    """Simulator that a delta action corrects."""
 
     model: mujoco.MjModel
     """With foot sensors."""
@@ -117,7 +117,7 @@ def train(simulator: Simulator, round: int, cluster: str, config: DeltaConfig) -
 
 
 def card(trained: Trained, round: int, cluster: str, config: DeltaConfig) -> dict[str, object]:
-    """What is told about a delta action."""
+    """Card of a delta action."""
     return {
         "round": round,
         "cluster": cluster,

@@ -32,9 +32,9 @@ class DiagnoseConfig(Ranged):
     """Time after which the search for effects begins nothing new [s], for up to 12 degrees of freedom and in proportion
     longer for more; what was found by then is fitted and reported, and a note says that time ran out."""
     beyond_seconds: Annotated[float, Range(above=0, most=1e6)] = 100.0
-    """The same for the search for what is in no catalogue [s]."""
+    """Time limit of the search for what is in no catalogue [s]."""
     seed: Seed = 0
-    """Of the perturbed starts."""
+    """Seed of the perturbed starts."""
 
 
 def main(round: int) -> None:

@@ -48,7 +48,7 @@ ENGINES = ("nominal", "stand_in")
 
 @dataclass(frozen=True)
 class EvaluateConfig(Ranged):
-    """What is evaluated."""
+    """Settings of the evaluation."""
 
     seeds: Annotated[tuple[Seed, ...], Size()] = (0,)
     """One episode for each seed, motion and policy."""
@@ -138,7 +138,7 @@ def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
 
 
 def settings(engine: str) -> dict[str, Any]:
-    """What the contract says about an engine, from the model that it runs; of the sealed robot only the file's hash."""
+    """Settings of an engine in the contract, from the model that it runs; of the sealed robot only the file's hash."""
     if engine == "nominal":
         return {**engine_settings(NominalRobots(1, 1).model), "sensor_noise": None}
     if not paths.SEALED_ROBOT.exists():
@@ -237,7 +237,7 @@ def headline(summary: dict) -> dict[str, float]:
 
 
 def tell(summary: dict) -> None:
-    """The same as a table on the terminal."""
+    """Print the summary as a table on the terminal."""
     print(f"{'policy':<28}{'engine':<10}{'success [95 %]':<24}{'MPJPE rad':>10}{'MPKPE mm':>10}")
     for r in summary["results"]:
         if r["split"] == r["group"] == "all":

@@ -86,7 +86,7 @@ def away(text: str) -> BadInput | None:
 
 
 def _plain(run: dict[str, Any]) -> dict[str, Any]:
-    """The same in what JSON knows."""
+    """The run in what JSON knows."""
     curve = None if run["curve"] is None else str(run["curve"])
     return {**run, "params": registry.flatten(run["params"]), "curve": curve}
 

@@ -238,7 +238,7 @@ def log_run(
 
 
 def _origin_tags(origin: str) -> dict[str, str]:
-    """What to filter runs by: commit, DVC's stage, and the hash of all inputs, which are in lineage.json."""
+    """Tags to filter runs by: commit, DVC's stage, and the hash of all inputs, which are in lineage.json."""
     digest = hashlib.sha256(origin.encode()).hexdigest()
     return {"git_sha": git_sha(), "dvc_stage": os.environ.get("DVC_STAGE", ""), "lineage": digest}
 
@@ -324,7 +324,7 @@ def _signature(model: Any) -> Any:
 
 
 def describe(name: str, text: str) -> None:
-    """What the page of the registered model says."""
+    """Set the text on the page of the registered model."""
     prepare().update_registered_model(name, fitted(text, LONGEST_DESCRIPTION, CARD))
 
 
@@ -397,7 +397,7 @@ def version_tags(name: str, version: str) -> dict[str, str] | None:
 
 
 def version_card(name: str, version: str) -> str:
-    """What the page of a version says."""
+    """Text on the page of a version."""
     found = _version(name, version)
     return "" if found is None else str(found.description or "")
 

@@ -1,4 +1,4 @@
-"""What every stage shares: its command line, its parameters, outputs that appear whole or not at all.
+"""Services that every stage shares: its command line, its parameters, outputs that appear whole or not at all.
 
 A stage's module reads:
 
@@ -121,7 +121,7 @@ def output_folder(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def output_file(path: str | Path) -> Iterator[Path]:
-    """The same for a single file; the name to write to keeps the suffix."""
+    """A file to write a stage's output into, whole or never; the name to write to keeps the suffix."""
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     fresh = target.parent / f".writing-{target.name}"

@@ -1,4 +1,4 @@
-"""What base, experts and refine share: train a policy, try it before and after, write its folder."""
+"""Training of base, experts and refine: train a policy, try it before and after, write its folder."""
 
 import json
 import os
@@ -41,7 +41,7 @@ class TrainingConfig(Ranged):
     """One training of a tracking policy."""
 
     seed: Seed = 0
-    """Of the network, the draws of clips and frames, and the differences between the worlds."""
+    """Seed of the network, the draws of clips and frames, and the differences between the worlds."""
     env: EnvConfig = field(default_factory=EnvConfig)
     """The task."""
     learner: LearnerName = "ppo"
@@ -71,7 +71,7 @@ class TrainingConfig(Ranged):
 
 @dataclass(frozen=True)
 class Job:
-    """What is trained where, on what, from what."""
+    """Job of a training: what is trained where, on what, from what."""
 
     stage: str
     name: str

@@ -1,4 +1,4 @@
-"""What all tests share: no network, no telemetry, one thread, nothing of the user's own settings."""
+"""Surroundings of all tests: no network, no telemetry, one thread, nothing of the user's own settings."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""What pages say of the code's settings and counts is so."""
+"""Pages say true things of the code's settings and counts."""
 
 import re
 from pathlib import Path

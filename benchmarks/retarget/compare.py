@@ -44,7 +44,7 @@ def judged(
 
 
 def against(motion: HumanMotion, raw: RawMotion, reference: Clip | None = None, fps: float = FPS) -> dict[str, float]:
-    """What a retargeted motion is worth, however it was made (another's result, too).
+    """Measures of a retargeted motion, however it was made (another's result, too).
 
     `landmark_mm` is the mean distance of the robot's landmarks from those of the person scaled to its size, both
     relative to the pelvis; `joint_rad`, `keypoint_mm`, `keypoint_local_mm` are those against the reference.

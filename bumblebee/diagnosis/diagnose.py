@@ -58,7 +58,7 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What search, last fit and the look beyond the catalogue gave."""
+    """Outcome of search, last fit and the look beyond the catalogue."""
 
     search: Search
     last: Refined
@@ -66,7 +66,7 @@ class _Found:
     """Around the last fit."""
     beyond: Discovery | None
     budgets: tuple[Budget, ...]
-    """Of the search and of the look beyond the catalogue, with what they left out."""
+    """Budgets of the search and of the look beyond the catalogue, with what they left out."""
 
     @property
     def judging(self) -> Problem:
@@ -87,7 +87,7 @@ def diagnose(
 
 
 def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], None]) -> Diagnosis:
-    """The same on the threads that there are."""
+    """Diagnose on the threads that there are."""
     rng = np.random.default_rng(config.seed)
     material = gather(session, config, rng, say)
     found = _found(material, config, rng, say)

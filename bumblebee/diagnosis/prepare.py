@@ -1,4 +1,4 @@
-"""What a diagnosis works on: windows to fit, windows to accept by, candidates."""
+"""Material of a diagnosis: windows to fit, windows to accept by, candidates."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

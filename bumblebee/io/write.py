@@ -174,7 +174,7 @@ def swap(fresh: Path, out: Path) -> None:
 
 
 def _copied(fresh: Path, out: Path) -> Path:
-    """The same folder on the disk of `out`, from which a rename is enough."""
+    """Copy of the folder on the disk of `out`, from which a rename is enough."""
     near = Path(tempfile.mkdtemp(dir=out.parent, prefix=left_overs.prefix(out), suffix=".part"))
     try:
         shutil.copytree(fresh, near, dirs_exist_ok=True)

@@ -63,7 +63,7 @@ def key_of(parts: Mapping[str, object]) -> str:
 
 
 def cached(folder: Path, key: str, make: Callable[[], Arrays], most_bytes: int = MOST_BYTES) -> Arrays:
-    """What `make` returns, from the cache where it is there.
+    """Arrays that `make` returns, from the cache where they are there.
 
     Args:
         folder: the cache; made if it is not there.

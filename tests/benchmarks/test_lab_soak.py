@@ -32,7 +32,7 @@ def run(name: str) -> Event:
 
 
 def left(seed: int) -> Event:
-    """What a loop leaves."""
+    """Event of a loop that left its files."""
     files = {"models/base/policy.onnx": f"hash of seed {seed}", "models/base/card.json": "b"}
     return {"seed": seed, "stages": ["base", "filter"], "files": files, "runs": [run("base"), run("filter")]}
 

@@ -65,7 +65,7 @@ class Served:
         raise TimeoutError(state)
 
     def resume(self, run: str, **given: str) -> dict[str, Any]:
-        """What Prefect says to an answer; it calls a run suspended a moment before the question is there."""
+        """Answer of Prefect to an answer; it calls a run suspended a moment before the question is there."""
         end = time.monotonic() + LIMIT
         while time.monotonic() < end:
             told = self.ask(f"flow_runs/{run}/resume", run_input=given)

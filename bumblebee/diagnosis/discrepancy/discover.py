@@ -58,7 +58,7 @@ class _State:
     activity: JointActivity
 
     def around(self, fit: Fit) -> "_State":
-        """The same of another fit."""
+        """The state with another fit."""
         moved = self.problem.relinearised(fit.effects)
         new = resolved(moved, fit, window_weights(fit.clean(moved)))
         validation = self.holdout.relinearised(new.effects)
@@ -68,7 +68,7 @@ class _State:
 
 @dataclass(frozen=True, eq=False)
 class _Means:
-    """What the look for discrepancy models may use."""
+    """Means of the search for discrepancy models."""
 
     offers: Offers
     budget: Budget

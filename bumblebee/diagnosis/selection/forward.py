@@ -53,7 +53,7 @@ class Search:
     columns: Columns
     """Screening columns of all candidates."""
     tests: Scores
-    """Of every candidate of `columns`, given the chosen ones."""
+    """Score tests of every candidate of `columns`, given the chosen ones."""
     bound: float
     """z that a candidate had to reach."""
     count: int

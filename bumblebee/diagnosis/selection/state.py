@@ -153,7 +153,7 @@ class SearchState:
 
     @property
     def now(self) -> Now:
-        """What a move starts from and is judged by."""
+        """State that a move starts from and is judged by."""
         return self.problem, self.holdout, self.fit
 
     def accept(self, candidate: Candidate, values: np.ndarray) -> bool:
@@ -248,7 +248,7 @@ class Loss:
     gain: float
     """Log-likelihood on the fitted windows, of this share against none."""
     paid: float
-    """The same on the held-out windows; infinite where there are none."""
+    """Loss on the validation windows; infinite where there are none."""
     explains: float
     """Share of the held-out excess of chi-square that goes with the commands that arrived."""
 

@@ -7,4 +7,4 @@ FOLDER = Path(__file__).parent
 RANDOMISED = FOLDER / "randomised"
 """Another one: it learnt on robots that differ, with delays, and follows less closely."""
 NAMES = {FOLDER: "pretrained", RANDOMISED: "pretrained-randomised"}
-"""What a policy's card calls the parent that it began from."""
+"""Names of the parents that a policy began from, on its card."""

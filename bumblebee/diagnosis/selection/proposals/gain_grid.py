@@ -39,7 +39,7 @@ Servo = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class _Course:
-    """What servos are compared by."""
+    """Comparison of servos: what they are compared by."""
 
     problem: Problem
     windows: Windows
@@ -51,7 +51,7 @@ class _Course:
 
     @property
     def rule(self) -> GainGrid:
-        """What is tried, and how servos are compared."""
+        """Thresholds: which servos are tried, and how they are compared."""
         return self.problem.thresholds.selection.proposals.gain_grid
 
     def scores(self, several: Sequence[Sequence[Servo]]) -> np.ndarray:
