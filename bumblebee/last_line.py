@@ -101,8 +101,8 @@ def unforeseen(error: BaseException, argv: Sequence[str] | None = None) -> str:
         with os.fdopen(handle, "w", encoding="utf-8", errors="replace") as stream:
             stream.write(head + text)
     except OSError:
-        return f"an error that should not happen: {said}. No log could be written"
-    return f"an error that should not happen: {said}. Please report it with {name}"
+        return f"internal error: {said}; no traceback could be written"
+    return f"internal error: {said}; the traceback is in {name}, please report it"
 
 
 @contextlib.contextmanager

@@ -33,7 +33,7 @@ def add(name: Name, group: Groups = [], workspace: Workspace = Path()) -> None: 
 def remove(name: Name, workspace: Workspace = Path()) -> None:
     """Let somebody in no more, from now on."""
     people.remove(_folder(workspace), name)
-    print(f"{name} is out")
+    print(f"{name} can no longer log in")
 
 
 @user.command("list")

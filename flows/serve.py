@@ -49,7 +49,7 @@ def started(options: argparse.Namespace) -> int:
                 try:
                     gate_answer.resume_answered(folder, addresses.prefect)
                 except (BadInput, OSError) as error:  # a gate's file, or the server: the pages are open all the same
-                    print(f"runs that were answered meanwhile wait on: {error}", file=sys.stderr)
+                    print(f"runs that were answered meanwhile still wait: {error}", file=sys.stderr)
                 return serve(folder, addresses)
         except KeyboardInterrupt:
             print("servers stopped", file=sys.stderr)
@@ -67,7 +67,7 @@ def parser() -> argparse.ArgumentParser:
 def serve(folder: Path, addresses: Addresses) -> int:
     """Wait for runs to start or resume, each in a process of its own; ends with Ctrl-C."""
     if addresses.keeper != os.getpid():
-        print(f"the servers run already, kept by process {addresses.keeper}, and end with it", flush=True)
+        print(f"the servers already run; they end with process {addresses.keeper}", flush=True)
     print("start a run on Prefect's page Deployments; Ctrl-C ends this", flush=True)
     return attend(folder, addresses, "--deployment", DEPLOYMENT, until_lost=True)
 

@@ -85,7 +85,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         found, missing = candidates(Path(scratch), config.untrained)
         for name in missing:
-            print(f"not evaluated, not there: {name}", flush=True)
+            print(f"not evaluated, no such policy: {name}", flush=True)
         planned = plan(found, clips, cluster_of, config.seeds)
         tables = [
             run(engine, found, planned, clips, contract, cluster_of, config, Path(scratch)) for engine in config.engines

@@ -118,7 +118,7 @@ def found(config: SealConfig, motions: Sequence[Clip]) -> dict[str, Any]:
         policy = export_shipped(Path(scratch) / "shipped")
         clips = followed(policy, motions, config.trial_seed, config.threads)
         if not clips:
-            print("the shipped policy follows none of the trial's motions on the declared model: nothing to lose")
+            print("the shipped policy follows none of the trial's motions on the declared model: no loss to measure")
             return sealed_robot(config, 0)
         tried: list[tuple[Trial, dict[str, Any]]] = []
         for attempt in range(config.draws):

@@ -256,4 +256,4 @@ def _tell(job: Job, card: dict[str, Any]) -> None:
     print(f"{job.name}: success {families}; key error {card['after_key_error'] * 100:.1f} cm")
     if card["kept"] == "parent":
         rate = card["trained"]["success"]["all"]
-        print(f"{job.name}: training made it no better here ({rate:.0%}): the parent's policy is kept")
+        print(f"{job.name}: training did not improve it ({rate:.0%}): the parent's policy is kept")

@@ -7,7 +7,7 @@ TELLS = re.compile(
     r"could not|ending|gone|not started|hung|denied|unavailable|retry",
     re.IGNORECASE,
 )
-UNFORESEEN = "an error that should not happen"
+UNFORESEEN = "internal error"
 TRACEBACK = "Traceback (most recent call last)"
 LINES, LENGTH = 200, 400
 

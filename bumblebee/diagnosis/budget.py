@@ -1,4 +1,4 @@
-"""Time that a search may take: what is begun is ended, what would be begun after it is left out and said."""
+"""Soft time limit of a search: running steps finish, later ones are skipped and listed."""
 
 import time
 from collections.abc import Callable

@@ -251,7 +251,7 @@ class TrackingEnv(VecEnv):
         return fallen(step.state, step.ref)
 
     def _push(self) -> None:
-        """Push whom it hits now."""
+        """Apply this step's random pushes."""
         config = self.cfg.randomisation
         self._push_clock += 1
         if config.push and config.push_regular:

@@ -132,7 +132,7 @@ def _with_models(
         if is_swap:
             tried.remove(worst.joint)  # an effect of the catalogue may leave something that it has no effect for
             new = [c for c in after.fit.chosen if c not in state.fit.chosen]
-            means.say(f"in a form's place on {worst.joint}: {', '.join(_with_places(new))}")
+            means.say(f"in place of a discrepancy model of {worst.joint}: {', '.join(_with_places(new))}")
         else:
             kinds[worst.joint] = model.kind
             means.say(f"discovered on {worst.joint}: {model}")
@@ -168,7 +168,7 @@ def _validated(
     if swapped is not None:
         gains = compare(problem, holdout, fit, swapped).passes(problem.thresholds.comparison.validation)
         return (state.around(swapped), True) if gains else (None, False)
-    means.say(f"discrepancy model of {worst.joint}: what it leaves")
+    means.say(f"discrepancy model of {worst.joint}: residual")
     new = state.around(model.fit)
     redundant = problem.thresholds.comparison.elimination.redundant_z
     excess = new.left.joints[problem.plant.joints.index(worst.joint)].excess

@@ -99,10 +99,10 @@ def _make_plan(
     known = None if session is None else _measured(stage.machine, session, findings, config)
     if known is not None:
         stage = _with_rivals(stage, session, known, findings, config)
-    say(f"{config.pool} candidate motions")
+    say(f"simulating {config.pool} candidate motions")
     safe = safe_pool(surest(stage), config)
     refuse_none(safe, say)
-    say(f"{len(safe.motions)} of them are safe; what they would tell")
+    say(f"{len(safe.motions)} of them are safe; computing their information")
     ask = _Asking(stage, findings.effects if findings else (), _windows(stage.machine, config))
     logs = ask.logs(safe.motions)
     if known is None:
@@ -223,7 +223,7 @@ def _chosen(
         new = [r for r in picked if r not in tried]
         if not new:
             break
-        say(f"{len(new)} runs on each of {len(stage.cases)} robots")
+        say(f"rehearsing {len(new)} runs on each of {len(stage.cases)} robots")
         proof = proven(stage, [motions[r] for r in new])
         refused += proof.refused
         found = {m.number: (m, reached) for m, reached in zip(proof.motions, proof.reached, strict=True)}

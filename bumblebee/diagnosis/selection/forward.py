@@ -83,7 +83,7 @@ def search(
     for _ in range(problem.thresholds.selection.forward.swaps):
         if not budget.has_time_for("swap steps"):
             break
-        say("each effect against its rivals")
+        say("comparing each effect with its rivals")
         better = partial(_any_of, run, (swap, add_stribeck_friction, complete_frictions))
         if not attempt("swap steps", better, _no):
             break

@@ -232,7 +232,7 @@ class SearchState:
             self.fit = refit(self.fit.chosen, self.fit.values, by_slopes=False)
         for c in [c for c in reversed(self.fit.chosen) if c.effect in JUDGED_ALONE]:
             if not is_still_confirmed(self.problem, self.fit, c, wide):
-                self.say(f"needless: {c.effect} on {c.where}")
+                self.say(f"removed as redundant: {c.effect} on {c.where}")
                 rest = self.fit.without([c])
                 self.fit = refit(rest.chosen, rest.values)
 

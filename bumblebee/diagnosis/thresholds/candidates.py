@@ -132,7 +132,7 @@ class SurfaceSteps:
     """First steps of a surface that a body of a robot on a fixed base touches."""
 
     ticks: int = 25
-    """Every so manieth tick of the logs says how low a body comes."""
+    """Every n-th tick of the logs shows how low a body comes."""
     travel: float = 0.02
     """Height through which a body must move [m]."""
     below: float = 0.01

@@ -60,7 +60,7 @@ class Split:
     """Thresholds for the division into fitted and held-out rollouts."""
 
     every: int = 4
-    """Every so manieth motion of a cluster is held out."""
+    """Every n-th motion of a cluster is held out."""
     enough: int = 4
     """Rollouts to fit from which on some are put aside to decide which effects are accepted."""
     same: float = 0.1

@@ -79,7 +79,7 @@ class ExampleWindows:
     ticks: int = 120
     """Points at most that are drawn of one."""
     typical: float = 0.9
-    """Quantile of the gain among a joint's windows that is shown: telling, and no freak."""
+    """Quantile of the gain among a joint's windows that is shown: typical, not extreme."""
 
 
 @dataclass(frozen=True)

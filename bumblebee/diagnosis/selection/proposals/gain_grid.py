@@ -180,7 +180,7 @@ def start_with_gain_grid(run: SearchState) -> bool:
         return True
     for c, z in zip(fit.chosen, walds(run.problem, fit, weights, fit.chosen), strict=True):
         run.steps.append(evidence(c, float(z), len(run.candidates)))
-        run.say(f"found {c.effect} on {c.where}, far from the declared: {fit.of(c).round(5)}")
+        run.say(f"found {c.effect} on {c.where}, far from the declared value: {fit.of(c).round(5)}")
     run.screened_cost = 0.0
     run.renew(fit)
     run.given = len(fit.chosen)

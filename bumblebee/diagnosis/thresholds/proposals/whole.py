@@ -8,7 +8,7 @@ class AllJoints:
     """Thresholds for the usual effects of all joints, fitted together."""
 
     windows: int = 60
-    """Windows that the way from the declared values is gone on."""
+    """Number of windows used for the coarse fit."""
     steps: int = 9
     """Steps of Levenberg's and Marquardt's way at most."""
     steps_of_small: int = 20
