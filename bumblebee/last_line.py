@@ -102,7 +102,7 @@ def unforeseen(error: BaseException, argv: Sequence[str] | None = None) -> str:
             stream.write(head + text)
     except OSError:
         return f"internal error: {said}; no traceback could be written"
-    return f"internal error: {said}; the traceback is in {name}, please report it"
+    return f"internal error: {said}; the traceback is kept, please report it with {name}"
 
 
 @contextlib.contextmanager

@@ -20,7 +20,7 @@ app.add_typer(user, name="user")
 
 Workspace = Annotated[Path, typer.Option("--workspace", help="Folder whose servers are meant; by default this one.")]
 Name = Annotated[str, typer.Argument(help="Small letters; the person's unix login, where there is one.")]
-Groups = Annotated[list[str], typer.Option("--group", help="As gate.group, serve.write and serve.promote name it.")]
+Groups = Annotated[list[str], typer.Option("--group", help="A group of gate.group, serve.write or serve.promote.")]
 
 
 @user.command()

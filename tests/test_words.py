@@ -1,15 +1,15 @@
-"""Docstrings begin with their subject, so that each can be read alone."""
+"""Docstrings and options' help begin with their subject, so that each can be read alone."""
 
 import re
 from pathlib import Path
 
 HOME = Path(__file__).parent.parent
 FOLDERS = ("bumblebee", "tasks", "flows", "benchmarks", "tests")
-BEGINNING = re.compile(r'^ *"""\s*(Of|The same|What)\b.*', re.MULTILINE)
+BEGINNING = re.compile(r'(^ *"""\s*|\bhelp=")(Of|The same|What)\b.*', re.MULTILINE)
 MOST = 40
 
 
-def test_docstrings_begin_with_their_subject():
+def test_docstrings_and_help_begin_with_their_subject():
     found = [
         f"{path.relative_to(HOME)}: {match[0].strip()}"
         for folder in FOLDERS
