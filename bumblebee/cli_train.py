@@ -9,7 +9,7 @@ from bumblebee.errors import BadInput, plain
 
 CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
 Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Facts that files leave unsaid: docs/data.md.")
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Facts that files lack: docs/data.md.")
 ]
 _PIECE = 10.0  # s: the longest episode of a training
 

@@ -33,7 +33,7 @@ def view(
     effects: Annotated[Path | None, typer.Option("--effects", help="effects.yaml of a diagnosis of them.")] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Facts that files leave unsaid: docs/data.md."),
+        typer.Option("--set", metavar="KEY=VALUE", help="Facts that files lack: docs/data.md."),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write replay.html, for no server, instead.")] = None,
     name: Annotated[str, typer.Option("--name", help="Which of several the replay shows: its name.")] = "",
