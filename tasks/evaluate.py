@@ -230,10 +230,14 @@ def stand_in(
     return (read_rollout(scratch / "rollouts" / f"{e.rollout_id}.parquet") for e in planned)
 
 
-def headline(summary: dict) -> dict[str, float]:
-    """Success rates over all motions, by policy and engine, for MLflow."""
-    whole = [r for r in summary["results"] if r["split"] == r["group"] == "all"]
-    return {f"{r['engine']}/{r['policy']}/success": r["success"]["value"] for r in whole}
+def headline(summary: dict) -> dict[str, dict[int, float]]:
+    """Success rates over all motions, by engine and policy, over the rounds, for MLflow."""
+    rates: dict[str, dict[int, float]] = {}
+    for r in summary["results"]:
+        if r["split"] == r["group"] == "all":
+            name = r["policy"].replace(f"-r{r['round']}", "")
+            rates.setdefault(f"{r['engine']}/{name}/success", {})[r["round"] or 0] = r["success"]["value"]
+    return rates
 
 
 def tell(summary: dict) -> None:
