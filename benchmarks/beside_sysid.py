@@ -40,7 +40,7 @@ class Kind:
     """A number that every joint has."""
 
     name: str
-    """Of the effect's parameter."""
+    """Name of the effect's parameter."""
     start: float
     most: float
 
@@ -92,7 +92,7 @@ def effects_of(table: mujoco.sysid.ParameterDict) -> list[Effect]:
 
 
 def identified(session: Session, kinds: Sequence[str], windows: int, horizon: float) -> list[Effect]:
-    """What `mujoco.sysid` makes of a session's rollouts, all of them."""
+    """Effects that `mujoco.sysid` makes of a session's rollouts, all of them."""
     plant, layout, step = session.plant, session.layout, session.steps[0]
     starts = choose_starts(session.rollouts, list(range(len(session.rollouts))), horizon, windows)
     cuts = cut(plant, layout, session.rollouts, starts)

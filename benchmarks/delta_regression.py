@@ -1,4 +1,4 @@
-"""What a delta action by regression takes out, on stand-in robots that differ by one thing each.
+"""Errors that a delta action by regression takes out, on stand-in robots that differ by one thing each.
 
     python -m benchmarks.delta_regression --motions study/motions --out delta.jsonl
 
@@ -73,7 +73,7 @@ def row(policy: Path, effects: Sequence[tuple[str, str, float]], clips: Sequence
 
 
 def fitted(rollouts: Sequence[Rollout], config: DeltaConfig | None = None) -> dict[str, Any]:
-    """What a fit to every other motion changes on the rest."""
+    """Changes on the other motions by a fit to every other motion."""
     config, model = config or DeltaConfig(), load_model()
     names = sorted({str(rollout.meta["motion"]) for rollout in rollouts})
     learnt, judges = (
@@ -132,7 +132,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def read_rows(file: Path) -> list[dict[str, Any]]:
-    """What was run before.
+    """Rows of earlier runs.
 
     Raises:
         BadInput: for another kind of file.

@@ -1,4 +1,4 @@
-"""What a diagnosis costs: wall time, processor time and peak memory on generated rollouts of a standing G1.
+"""Cost of a diagnosis: wall time, processor time and peak memory on generated rollouts of a standing G1.
 
     python -m benchmarks.diagnosis_cost                        6 rollouts of 8 s, and 20 motions x 8 rollouts of 8 s
     python -m benchmarks.diagnosis_cost --rows small --kinds   the first with nothing to find

@@ -93,7 +93,7 @@ def declared() -> mujoco.MjModel:
 
 
 def judge(rollout: Rollout, model: mujoco.MjModel, rng: np.random.Generator, seed: int) -> dict[str, object]:
-    """What the checks say of it as it is, and with one joint's commands reversed about its rest."""
+    """Findings of the checks on it as it is, and with one joint's commands reversed about its rest."""
     fatal = [finding for finding in check_rollout(rollout, model) if finding.fatal]
     row = {"seed": seed, "rollout": rollout.rollout_id, "seconds": rollout.duration}
     row |= {"false_sign": any(each.rule == "response-sign" for each in fatal), "set_aside": bool(fatal)}

@@ -1,4 +1,4 @@
-"""What a jump asks of the robot: take-off speed, rise, and the torques of its push-off by inverse dynamics.
+"""Demands of a jump on the robot: take-off speed, rise, and the torques of its push-off by inverse dynamics.
 
 The floor's forces on the soles that are near it are those that explain the root's motion with small joint torques
 (non-negative least squares over the edges of friction pyramids); what the joints must add is what the reference needs.

@@ -85,7 +85,7 @@ def write_single(folder: Path, clips: Iterator[Clip]) -> None:
 
 
 def add_single(folder: Path, clips: Iterator[Clip]) -> None:
-    """The same library with more motions: their files, and the index anew."""
+    """Add motions to the library: their files, and the index anew."""
     facts = Library(folder).index.to_dict("records")
     for clip in clips:
         write_clip(folder / "clips" / f"{clip.name}.parquet", clip)

@@ -42,7 +42,7 @@ def sample() -> Iterator[Case]:
 
 
 def name_of(job: Case | Path) -> str:
-    """Of a result's file."""
+    """Name of a result's file."""
     return job.name if isinstance(job, Path) else f"{job.number:03d}-{job.robot}-{job.group}"
 
 

@@ -1,4 +1,4 @@
-"""What the paper's task costs beside the demo's: control steps a second of the environment, part by part.
+"""Cost of the paper's task beside the demo's: control steps a second of the environment, part by part.
 
     python -m benchmarks.task_cost --engine mujoco --worlds 64 --seconds 2
     python -m benchmarks.task_cost --engine mujoco_warp --worlds 4096 8192        # on a GPU

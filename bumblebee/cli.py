@@ -55,7 +55,7 @@ def diagnose(
     max_windows: Annotated[
         int | None, typer.Option(min=8, help="Windows that take part in the fit; 120, and 40 with --quick.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the perturbed starts.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the perturbed starts.")] = 0,
 ) -> None:
     """Find which effect the model lacks, add it, and report the error before and after."""
     from bumblebee.diagnosis.config import DiagnosisConfig
@@ -165,7 +165,7 @@ def import_(
 
 
 def compensate(
-    effects: Annotated[Path, typer.Argument(metavar="EFFECTS.yaml", help="What the diagnosis found.")],
+    effects: Annotated[Path, typer.Argument(metavar="EFFECTS.yaml", help="Effects that a diagnosis found.")],
     out: Annotated[Path, typer.Option("--out", help="File for the compensation, JSON.")],
     model: Annotated[
         Path | None,
@@ -177,7 +177,7 @@ def compensate(
     ] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """What a policy's runner can undo at the joints of the G1, without training; no other robot has such a runner."""
+    """List what a policy's runner can undo at the joints of the G1, without training; no other robot has a runner."""
     from bumblebee.deploy.compensation_evidence import require_proven
     from bumblebee.deploy.compensation_file import claim_compensation, table_of, write_compensation
     from bumblebee.deploy.compensation_plan import compensate_file

@@ -24,7 +24,7 @@ Where = Annotated[Path, typer.Argument(metavar="PATH", help="A motion file, a fo
 CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="What files leave unsaid: docs/data.md."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Facts that files lack: docs/data.md."),
 ]
 Skeleton = Annotated[
     str, typer.Option("--skeleton", metavar="FILE", help="Which joint of BVH files is which: `inspect` prints it.")

@@ -35,10 +35,10 @@ def plan(
         list[str] | None, typer.Option(metavar="[JOINT=]VALUE", help="Travel to either side of the start in rad or m.")
     ] = None,
     start: Annotated[str | None, typer.Option(help="Keyframe that runs start and end in.")] = None,
-    kp: Annotated[float | None, typer.Option(help="Of the servo that tracks targets on torque drives.")] = None,
-    kd: Annotated[float | None, typer.Option(help="The same on the velocity.")] = None,
+    kp: Annotated[float | None, typer.Option(help="kp of the servo that tracks targets on torque drives.")] = None,
+    kd: Annotated[float | None, typer.Option(help="kd of that servo.")] = None,
     pool: Annotated[int, typer.Option(min=4, max=1000, help="Candidate motions to choose from.")] = 48,
-    seed: Annotated[int, typer.Option(min=0, help="Of the candidate motions.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the candidate motions.")] = 0,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier plan.")] = False,
 ) -> None:
     """Runs for the robot that tell apart what a diagnosis could not, within all limits, with a run sheet."""

@@ -9,7 +9,7 @@ from bumblebee.errors import BadInput, plain
 
 CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
 Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="What files leave unsaid: docs/data.md.")
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Facts that files lack: docs/data.md.")
 ]
 _PIECE = 10.0  # s: the longest episode of a training
 
@@ -36,6 +36,7 @@ def train(
     from bumblebee.api.training import TrainConfig
     from bumblebee.api.training import train as fit
     from bumblebee.io.write import refuse_overlap
+    from bumblebee.motion.cache import user_cache
     from bumblebee.motion.few_lines import few_lines
     from bumblebee.motion.folder import ReadConfig, read_folder
     from bumblebee.motion.one_file import stated
@@ -46,7 +47,7 @@ def train(
     config = TrainConfig(**chosen, worlds=worlds, threads=threads, seed=seed)  # type: ignore[arg-type]
     refuse_overlap(out, [folder])
     files = ReadConfig(**vars(stated(settings or [], csv_fps=csv_fps)), max_seconds=_PIECE)
-    reading = read_folder(folder, files)
+    reading = read_folder(folder, files, cache=user_cache())
     for told in few_lines(zip(reading.skipped["file"], reading.skipped["reason"], strict=True)):
         print(plain(f"skipped: {told.line}: {told.whose}"))
     counts = f"{len(reading.clips)} motions of at most {_PIECE:g} s read, {len(reading.skipped)} files skipped"

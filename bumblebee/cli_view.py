@@ -26,13 +26,14 @@ Ticks = Annotated[int | None, typer.Option("--ticks", hidden=True, help="Rounds 
 
 def view(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="Motions, a policy's folder, or measured rollouts.")],
-    motions: Annotated[Path | None, typer.Option("--motions", help="What a policy follows; without, ours.")] = None,
+    motions: Annotated[Path | None, typer.Option("--motions", help="Motions for a policy; without, ours.")] = None,
     model: Annotated[
         Path | None, typer.Option("--model", help="Declared MJCF that measured rollouts belong to.")
     ] = None,
     effects: Annotated[Path | None, typer.Option("--effects", help="effects.yaml of a diagnosis of them.")] = None,
     settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="What files leave unsaid: docs/data.md.")
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Facts that files lack: docs/data.md."),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write replay.html, for no server, instead.")] = None,
     name: Annotated[str, typer.Option("--name", help="Which of several the replay shows: its name.")] = "",

@@ -26,5 +26,5 @@ class BadInput(Exception):
         super().__init__(plain(words))
 
     def __reduce__(self) -> tuple[type["BadInput"], tuple[str, ...]]:
-        """What another process makes it from again: an exception is otherwise rebuilt from its text alone."""
+        """Arguments that another process makes it from again: an exception is otherwise rebuilt from its text alone."""
         return type(self), (self.where, self.expected, self.came, self.do)

@@ -84,7 +84,7 @@ def disk_line(error: OSError) -> str | None:
 
 
 def sqlite_line(error: Exception) -> str | None:
-    """The same for a database of SQLite's that could not be written, such as DVC's; None for any other error."""
+    """Line for a database of SQLite's that could not be written, such as DVC's; None for any other error."""
     if not isinstance(error, sqlite3.OperationalError) or str(error) not in _SQLITE:
         return None
     return str(BadInput(_here(), "a disk that takes the output", str(error), _DO))
@@ -101,8 +101,8 @@ def unforeseen(error: BaseException, argv: Sequence[str] | None = None) -> str:
         with os.fdopen(handle, "w", encoding="utf-8", errors="replace") as stream:
             stream.write(head + text)
     except OSError:
-        return f"an error that should not happen: {said}. No log could be written"
-    return f"an error that should not happen: {said}. Please report it with {name}"
+        return f"internal error: {said}; no traceback could be written"
+    return f"internal error: {said}; the traceback is kept, please report it with {name}"
 
 
 @contextlib.contextmanager

@@ -59,7 +59,7 @@ class Progress:
 
 
 class _Bar(Progress):
-    """The same on a terminal, by rich."""
+    """Progress bar on a terminal, by rich."""
 
     def __init__(self, total: float, what: str, unit: str, start: float) -> None:
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn

@@ -22,7 +22,7 @@ def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
 
 
 def multiply_by_cross(left: FloatArray, right: FloatArray) -> FloatArray:
-    """The same product (..., 4) from scalar and vector parts."""
+    """Quaternion product (..., 4) from scalar and vector parts."""
     scalar = left[..., :1] * right[..., :1] - (left[..., 1:] * right[..., 1:]).sum(axis=-1, keepdims=True)
     crossed = np.cross(left[..., 1:], right[..., 1:])
     vector = left[..., :1] * right[..., 1:] + right[..., :1] * left[..., 1:] + crossed
@@ -43,7 +43,7 @@ def rotate(quat: ArrayLike, vector: ArrayLike) -> FloatArray:
 
 
 def rotate_by_cross(quat: FloatArray, vector: FloatArray) -> FloatArray:
-    """The same rotation of vectors (..., 3) by numpy's cross products."""
+    """Rotation of vectors (..., 3) by numpy's cross products."""
     twice = 2.0 * np.cross(quat[..., 1:], vector)
     return vector + quat[..., :1] * twice + np.cross(quat[..., 1:], twice)
 

@@ -79,15 +79,15 @@ class Text:
 Count = Annotated[int, Range(least=1, most=1_000_000)]
 """So many, at least one."""
 Few = Annotated[int, Range(least=1, most=1000)]
-"""The same of what is costly: passes, repeats, threads, GPUs."""
+"""Number of something costly: passes, repeats, threads, GPUs."""
 Seed = Annotated[int, Range(least=0, most=2**31 - 1)]
-"""What torch, NumPy and scikit-learn all take."""
+"""Seed that torch, NumPy and scikit-learn all take."""
 Share = Annotated[float, Range(least=0, most=1)]
 """A part of the whole, from none to all."""
 PartOf = Annotated[float, Range(least=0, below=1)]
 """A part of the whole that leaves some of it."""
 Factor = Annotated[float, Range(least=0, most=1000)]
-"""What something is multiplied by; 0 switches it off."""
+"""Factor that something is multiplied by; 0 switches it off."""
 Positive = Annotated[float, Range(above=0, most=1000)]
 """More than nothing."""
 Seconds = Annotated[float, Range(above=0, most=3600)]
@@ -95,7 +95,7 @@ Seconds = Annotated[float, Range(above=0, most=3600)]
 Rate = Annotated[float, Range(above=0, most=1)]
 """A learning rate."""
 Weight = Annotated[float, Range(least=-1e6, most=1e6)]
-"""What a term counts in a sum; negative where it punishes."""
+"""Weight of a term in a sum; negative where it punishes."""
 Widths = Annotated[tuple[Annotated[int, Range(least=1, most=65_536)], ...], Size(most=32)]
 """Units of a network's hidden layers."""
 Name = Annotated[str, Text()]
@@ -215,7 +215,7 @@ def element_kinds(origin: Any, args: tuple[Any, ...], length: int) -> list[Any] 
 
 
 def describe(kind: Any) -> str:
-    """What an annotation allows, in words."""
+    """Range of an annotation, in words."""
     origin, args = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return " ".join([describe(args[0]), *map(str, args[1:])])

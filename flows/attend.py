@@ -1,4 +1,4 @@
-"""What a keeper does while the loop runs in a process of its own: wait, pass on what ends it, notice a lost server."""
+"""Work of a keeper while the loop runs in a process of its own: wait, pass on what ends it, notice a lost server."""
 
 import os
 import signal
@@ -17,7 +17,7 @@ from flows.servers import HOME, Addresses
 LOOK_EVERY = 0.2  # [s]
 WALK = [sys.executable, "-m", "flows.walk"]
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-SEEN = {"mlflow": "MLflow's server went away: its page is closed, the stages go on and write its history all the same"}
+SEEN = {"mlflow": "MLflow's server ended: its page is closed; the stages continue and still record their runs"}
 
 
 @contextmanager

@@ -31,7 +31,7 @@ OUT_OF_MEMORY = "its machine ran out of memory; say in lab.yaml what it needs: r
 
 @dataclass(frozen=True)
 class Errand:
-    """What is known of a stage before it goes anywhere."""
+    """Facts of a stage before it goes anywhere."""
 
     name: str
     """As DVC calls it."""
@@ -40,7 +40,7 @@ class Errand:
     inputs: tuple[str, ...]
     """Paths that no stage makes and that travel with it."""
     sections: tuple[str, ...]
-    """Of params.yaml."""
+    """Sections of params.yaml that it reads."""
     stays: str
     """Why it runs on the head; "" for a stage that may go anywhere."""
 
@@ -58,7 +58,7 @@ def ancestors(stages: Iterable[Stage], name: str) -> tuple[str, ...]:
 
 
 def errand(workspace: Path, name: str) -> Errand:
-    """What DVC says of the stage.
+    """Facts of the stage, by DVC.
 
     Raises:
         BadInput: for dvc.yaml that DVC cannot read.
@@ -147,7 +147,7 @@ def send(ray: Any, what: Errand, lab: Lab, wanted: ray_cluster.Need) -> int | No
 
 
 def of_the_machine(error: Exception) -> Exception:
-    """What the other machine's disk said, which the last line knows by its number; any other error as Ray tells it."""
+    """Error of the other machine's disk, which the last line knows by its number; any other error as Ray tells it."""
     cause = getattr(error, "cause", None)
     return cause if isinstance(cause, OSError) else error
 

@@ -14,6 +14,7 @@ from flows import login
 from flows import workspace as workspaces
 from flows.attend import attend, ended_in_order
 from flows.environment import SERVERS, environment
+from flows.first_look import MODELS
 from flows.owned import require_own
 from flows.servers import Addresses, require_port, servers
 from flows.stages import changed_stages, read_stages, to_run
@@ -32,7 +33,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def started(options: argparse.Namespace) -> int:
-    """What the options ask for, until it is done or a signal ends it."""
+    """Do what the options ask for, until it is done or a signal ends it."""
     with ended_in_order():
         try:
             require_port("--prefect-port", options.prefect_port)
@@ -143,7 +144,7 @@ def announce(folder: Path, addresses: Addresses) -> None:
     """Where to look while it runs."""
     print(f"workspace  {shown(folder)}")
     print(f"Prefect    {addresses.prefect}   the stages as they run, and the gates")
-    print(f"MLflow     {addresses.mlflow}   every run's numbers, and the registered policies")
+    print(f"MLflow     {addresses.mlflow}/{MODELS}   the registered policies, and every run's numbers")
     print(f"login      user {login.USER}, password in {shown(folder / SERVERS / login.NAME)} (only you can read it);")
     print("           Prefect's page wants the whole line of that file")
     print(f"open them again with: {serve_command(folder)}", flush=True)
@@ -161,7 +162,7 @@ def shown(folder: Path) -> str:
 
 
 def summarise(folder: Path) -> None:
-    """What there is now: registered models and the report."""
+    """Print what there is now: registered models and the report."""
     published = folder / paths.PUBLISHED
     if published.exists():
         models = json.loads(published.read_text())["models"]

@@ -24,7 +24,7 @@ CONNECTIONS = 1000  # at the door at once
 def with_door(
     server: str, app: Any, workspace: Path, password: str, listener: socket.socket
 ) -> "Callable[[uvicorn.Config], uvicorn.Server]":
-    """What makes a server with a door, from the settings of the one without.
+    """Function that makes a server with a door, from the settings of the one without.
 
     Args:
         server: "prefect" or "mlflow".

@@ -68,7 +68,7 @@ def remember(workspace: Path, name: str, seconds: float) -> None:
 
 
 def expect(stages: Iterable[Stage], earlier: Mapping[str, list[float]], seen: Mapping[str, float]) -> Expectation:
-    """What each stage will take.
+    """Expected time of each stage.
 
     Args:
         stages: the run's stages.

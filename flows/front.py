@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from flows import login
 from flows.environment import SERVERS
+from flows.first_look import first_look
 from flows.guard import Guard
 from tasks import registry
 from tasks.lab import read_lab
@@ -102,7 +103,10 @@ MLFLOW = {
 
 
 def mlflow_app(workspace: Path) -> Any:
-    """MLflow's server on the database of the workspace or its lab; by name, since flows import nothing of MLflow."""
+    """MLflow's server on the database of the workspace or its lab; by name, since flows import nothing of MLflow.
+
+    Its start page is sent with `first_look`.
+    """
     folder, lab = workspace / SERVERS, read_lab(workspace)
     database, artifacts = f"sqlite:///{folder}/{registry.DATABASE}", f"{folder}/artifacts"
     if lab is None:
@@ -115,6 +119,9 @@ def mlflow_app(workspace: Path) -> Any:
         os.environ["_MLFLOW_SERVER_REGISTRY_STORE"],
         os.environ["_MLFLOW_SERVER_ARTIFACT_ROOT"],
     )
+    pages = import_module("mlflow.server").app
+    index = first_look((Path(pages.static_folder) / "index.html").read_text())
+    pages.view_functions["serve"] = lambda: index
     return import_module("mlflow.server.fastapi_app").app
 
 

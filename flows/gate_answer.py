@@ -108,7 +108,7 @@ async def _resume(table: dict[str, Any]) -> list[str]:
 
 
 def filled(table: dict[str, Any]) -> dict[str, str]:
-    """What the form of a run's question holds when this answer stands."""
+    """Content of a run's form when this answer stands."""
     answer = next(verb for verb, status in gate.ANSWERS.items() if status == table["status"])
     return {"answer": answer, "by": table["by"], "seen": words.short(table), "note": table["note"]}
 

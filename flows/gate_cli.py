@@ -51,7 +51,7 @@ def list_gates(workspace: Workspace = Path()) -> None:
 
 @app.command()
 def show(what: What, workspace: Workspace = Path()) -> None:
-    """What came in a round, or what a version can; where its plots are, and the commands that answer."""
+    """Print what came in a round, or what a version can; where its plots are, and the commands that answer."""
     from bumblebee.measured import gate
     from tasks import gate as rounds
     from tasks import promotion_answer

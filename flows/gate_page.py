@@ -1,4 +1,4 @@
-"""What Prefect's page shows of a gate, as Markdown: everything needed to judge, and which button answers.
+"""Page of a gate on Prefect, as Markdown: everything needed to judge, and which button answers.
 
 Prefect renders tables, links and pictures that lie in the text itself (data URIs); nothing is loaded from elsewhere.
 """
@@ -29,7 +29,7 @@ def where_to_answer(round: int, url: str | None) -> str:
 
 
 def question(request: dict[str, Any], artifact: str) -> str:
-    """What the dialog says above its fields: short, with a link to the page."""
+    """Text of the dialog above its fields: short, with a link to the page."""
     seen = request["seen"]
     rules = ", ".join(f"{cell(rule)} ({counts['files']})" for rule, counts in list(seen["findings"].items())[:8])
     return (
@@ -97,7 +97,7 @@ def wanted(request: dict[str, Any]) -> list[str]:
 
 
 def findings(place: gate.Gate) -> list[str]:
-    """What was found, in words, the fatal ones first."""
+    """Findings in words, the fatal ones first."""
     rows = list(csv.DictReader(io.StringIO(read_text(place.summary.with_name("findings.csv"), 1 << 30))))
     rows.sort(key=lambda row: row["fatal"] != "True")
     if not rows:

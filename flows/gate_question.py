@@ -23,7 +23,7 @@ PAGE = {"how": "Prefect's page: whoever holds the login of this workspace"}  # m
 
 
 class GateAnswer(RunInput):
-    """What a person answers on Prefect's page; nothing is chosen beforehand."""
+    """Answer of a person on Prefect's page; nothing is chosen beforehand."""
 
     answer: Literal["approve", "reject", "more"] = Field(description=CHOICE)
     by: str = Field(description="Your name.", min_length=1, max_length=gate.LONGEST)
@@ -114,7 +114,7 @@ def pause_key(request: dict[str, Any], attempt: int) -> str:
 
 
 def answered(key: str) -> dict[str, Any] | None:
-    """What was answered on Prefect's page to the question of this name, if anything."""
+    """Answer on Prefect's page to the question of this name, if anything."""
     found = read_flow_run_input(f"suspended-{key}-response")
     return found if isinstance(found, dict) else None
 

@@ -1,4 +1,4 @@
-"""What stands before both servers' applications: own pages only, with a login, and a page that calls nobody else.
+"""Guard before both servers' applications: own pages only, with a login, and a page that calls nobody else.
 
 A request must name this machine as its host (a foreign name that resolves to it is DNS rebinding), and where a browser
 says which page it comes from, that must be a page of the same server.
@@ -111,7 +111,7 @@ def allowed(headers: list[tuple[bytes, str]], password: str) -> bool:
 
 
 def proof(password: str, nonce: str) -> str:
-    """What only somebody who knows the password can answer to `nonce`; it does not tell the password."""
+    """Proof that only somebody who knows the password can give to `nonce`; it does not tell the password."""
     return hmac.new(password.encode(), f"alive {nonce}".encode(), hashlib.sha256).hexdigest()
 
 
@@ -135,7 +135,7 @@ async def reply(send: Send, status: int, text: str) -> None:
 
 
 def with_headers(send: Send) -> Send:
-    """What the application answers, with the headers that every page gets."""
+    """Send the application's answer with the headers that every page gets."""
 
     async def wrapped(message: Message) -> None:
         if message["type"] == "http.response.start":

@@ -20,7 +20,7 @@ app.add_typer(user, name="user")
 
 Workspace = Annotated[Path, typer.Option("--workspace", help="Folder whose servers are meant; by default this one.")]
 Name = Annotated[str, typer.Argument(help="Small letters; the person's unix login, where there is one.")]
-Groups = Annotated[list[str], typer.Option("--group", help="As gate.group, serve.write and serve.promote name it.")]
+Groups = Annotated[list[str], typer.Option("--group", help="A group of gate.group, serve.write or serve.promote.")]
 
 
 @user.command()
@@ -33,7 +33,7 @@ def add(name: Name, group: Groups = [], workspace: Workspace = Path()) -> None: 
 def remove(name: Name, workspace: Workspace = Path()) -> None:
     """Let somebody in no more, from now on."""
     people.remove(_folder(workspace), name)
-    print(f"{name} is out")
+    print(f"{name} can no longer log in")
 
 
 @user.command("list")

@@ -1,4 +1,4 @@
-"""What Ray runs on a machine of the cluster. It is sent by value: nothing of ours need be installed there.
+"""Code that Ray runs on a machine of the cluster. It is sent by value: nothing of ours need be installed there.
 
 So this module imports the standard library alone. The stage's code comes with its parcel (flows/parcel.py).
 """
@@ -22,7 +22,7 @@ PLACE = "BUMBLEBEE_NODE"  # variable of `ray start`: the machine's own folder fo
 
 
 def facts(packages: tuple[str, ...], folder: str, module: str) -> dict[str, str]:
-    """What must be equal on all machines, and what is wrong with the way to the shared remote ("" for nothing).
+    """Facts that must be equal on all machines, and what is wrong with the way to the shared remote ("" for nothing).
 
     Args:
         packages: names whose versions are asked for; "" in the answer where one is not installed.

@@ -34,7 +34,7 @@ class PageAnswers:
     async def take(
         self, run: str, values: Any, who: Person, scope: Message, app: App, body: bytes
     ) -> dict[str, Any] | None:
-        """What to tell the page instead of resuming the run; None where it shall be resumed.
+        """Text for the page instead of resuming the run; None where it shall be resumed.
 
         Args:
             run: its number.
@@ -85,7 +85,7 @@ def answer(place: gate.Gate, values: dict[str, Any], who: Person) -> tuple[str |
 
 
 async def call(app: App, scope: Message, body: bytes = b"") -> bytes | None:
-    """What an application answers to a request of ours; None where that is not what was wanted."""
+    """Answer of an application to a request of ours; None where that is not what was wanted."""
     status, parts = 0, []
 
     async def send(message: Message) -> None:
@@ -100,7 +100,7 @@ async def call(app: App, scope: Message, body: bytes = b"") -> bytes | None:
 
 
 def once(body: bytes) -> Receive:
-    """What an application receives where the body has been read already; then nothing."""
+    """Receiver for an application where the body has been read already; then nothing."""
     left = [body]
 
     async def receive() -> Message:

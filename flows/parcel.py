@@ -1,4 +1,4 @@
-"""What travels with a stage to another machine: the code as it is here, settings, dvc.lock, files that no stage makes.
+"""Parcel of a stage for another machine: the code as it is here, settings, dvc.lock, files that no stage makes.
 
 Everything else the machine pulls from DVC's shared remote.
 """

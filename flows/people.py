@@ -40,11 +40,11 @@ class Person:
     """Somebody who may use the servers."""
 
     name: str
-    """Of the login; where the person has a unix login here, the same one, since both count as one person at a gate."""
+    """Name of the login; that of the person's unix login here, where there is one: both are one person at a gate."""
     groups: tuple[str, ...]
-    """What `gate.group`, `serve.write` and `serve.promote` are compared with."""
+    """Groups that `gate.group`, `serve.write` and `serve.promote` are compared with."""
     salt: str
-    """Of the hash, in hex."""
+    """Salt of the hash, in hex."""
     hash: str
     """scrypt of the password, in hex."""
 

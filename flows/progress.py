@@ -30,7 +30,7 @@ _running: dict[str, "Progress"] = {}
 
 
 class Progress:
-    """What has ended, what runs and what is to come; safe to be told by several threads."""
+    """Progress of the stages: ended, running and to come; safe to be told by several threads."""
 
     def __init__(
         self,

@@ -31,7 +31,7 @@ ANSWER = 10  # [s] within which the cluster's head must
 JOIN, LOOK_EVERY = 180.0, 2.0  # [s] within which the machines of an allocation must, and between two looks
 LOOK = 120  # [s] within which every machine must; the first process on one takes some
 PACKAGES = ("dvc", "mlflow", "mujoco", "numpy", "rsl-rl-lib", "scikit-learn", "scipy", "torch", DISTRIBUTION)
-"""What decides results. The code of bumblebee travels: a machine may do without it, but have no other version."""
+"""Packages that decide results. The code of bumblebee travels: a machine may lack it, but have no other version."""
 GIB = 2**30  # [bytes]
 MODULES = {"s3": "dvc_s3", "ssh": "dvc_ssh"}  # of DVC, by the scheme of the remote
 
@@ -101,7 +101,7 @@ def _refused(own: RayLab, where: str, text: str) -> BadInput:
 
 @dataclass(frozen=True)
 class Need:
-    """What a stage asks of one machine beside a CPU slot."""
+    """Demand of a stage on one machine beside a CPU slot."""
 
     gpus: int = 0
     memory: float = 0.0
@@ -115,7 +115,7 @@ class Need:
 
 
 def need(own: RayLab, content: Mapping[str, Any], kind: str, sections: Iterable[str]) -> Need:
-    """What a stage needs, by its name without cluster and round and the sections of `content` that it reads."""
+    """Demand of a stage, by its name without cluster and round and the sections of `content` that it reads."""
     return Need(gpus.wanted(content, sections), own.memory.get(kind, 0.0))
 
 
@@ -167,7 +167,7 @@ def check(workspace: Path) -> None:
 
 
 def _facts(ray: Any, own: RayLab) -> list[dict[str, str]]:
-    """What the machines with a CPU slot say, and first this one."""
+    """Facts of the machines with a CPU slot, and first of this one."""
     at = importlib.import_module("ray.util.scheduling_strategies").NodeAffinitySchedulingStrategy
     importlib.import_module("ray.cloudpickle").register_pickle_by_value(node)
     scheme, _, _ = own.remote.partition("://")

@@ -75,7 +75,7 @@ class Rights:
     """May also move aliases, change models and delete; "" for nobody."""
 
     def ranks(self, groups: tuple[str, ...]) -> set[str]:
-        """What a member of these groups is."""
+        """Ranks of a member of these groups."""
         promotes = bool(self.promote) and self.promote in groups
         writes = promotes or (bool(self.write) and self.write in groups)
         return {"all"} | ({"write"} if writes else set()) | ({"promote"} if promotes else set())

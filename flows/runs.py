@@ -71,7 +71,7 @@ def _crash(server: str, password: str, which: str) -> None:
 
 
 def ask(server: str, password: str, what: str, body: dict[str, Any]) -> Any:
-    """What Prefect's interface answers; by hand, since Prefect itself reads its settings at its first import."""
+    """Answer of Prefect's interface; by hand, since Prefect itself reads its settings at its first import."""
     headers = {"Authorization": login.header(password), "Content-Type": "application/json"}
     asked = urllib.request.Request(f"{server}/api/{what}", json.dumps(body).encode(), headers)
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))

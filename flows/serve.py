@@ -15,6 +15,7 @@ from flows import workspace as workspaces
 from flows.attend import attend, ended_in_order
 from flows.demo import add_ports, announce
 from flows.environment import environment
+from flows.first_look import MODELS
 from flows.owned import require_own
 from flows.servers import Addresses, require_port, servers
 from tasks.lab_serve import read_serve
@@ -43,11 +44,12 @@ def started(options: argparse.Namespace) -> int:
             with servers(folder, options.prefect_port, options.mlflow_port, door) as addresses:
                 announce(folder, addresses)
                 if door is not None:
-                    print(f"people     {door.prefect} and {door.mlflow}, each with a login of their own", flush=True)
+                    pages = f"{door.prefect} and {door.mlflow}/{MODELS}"
+                    print(f"people     {pages}, each with a login of their own", flush=True)
                 try:
                     gate_answer.resume_answered(folder, addresses.prefect)
                 except (BadInput, OSError) as error:  # a gate's file, or the server: the pages are open all the same
-                    print(f"runs that were answered meanwhile wait on: {error}", file=sys.stderr)
+                    print(f"runs that were answered meanwhile still wait: {error}", file=sys.stderr)
                 return serve(folder, addresses)
         except KeyboardInterrupt:
             print("servers stopped", file=sys.stderr)
@@ -65,7 +67,7 @@ def parser() -> argparse.ArgumentParser:
 def serve(folder: Path, addresses: Addresses) -> int:
     """Wait for runs to start or resume, each in a process of its own; ends with Ctrl-C."""
     if addresses.keeper != os.getpid():
-        print(f"the servers run already, kept by process {addresses.keeper}, and end with it", flush=True)
+        print(f"the servers already run; they end with process {addresses.keeper}", flush=True)
     print("start a run on Prefect's page Deployments; Ctrl-C ends this", flush=True)
     return attend(folder, addresses, "--deployment", DEPLOYMENT, until_lost=True)
 

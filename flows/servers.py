@@ -44,9 +44,9 @@ class Addresses:
     """Where the two servers answer."""
 
     prefect: str
-    """Of Prefect's pages; its interface is below `/api`."""
+    """Address of Prefect's pages; its interface is below `/api`."""
     mlflow: str
-    """Of MLflow's pages and interface."""
+    """Address of MLflow's pages and interface."""
     keeper: int
     """The process that started them and ends them."""
     pids: tuple[int, ...]
@@ -54,7 +54,7 @@ class Addresses:
     born: tuple[float, ...] = ()
     """When these started, and at the end the keeper: seconds since 1970."""
     door: tuple[str, ...] = ()
-    """Of both for people from elsewhere, where `lab.yaml` has a section `serve`."""
+    """Addresses of both for people from elsewhere, where `lab.yaml` has a section `serve`."""
 
     def lost(self) -> list[str]:
         """The servers whose process is gone."""
@@ -100,7 +100,7 @@ def running(workspace: Path) -> Addresses | None:
 
 
 def written(workspace: Path) -> Addresses | None:
-    """What the last keeper wrote down."""
+    """Addresses that the last keeper wrote down."""
     try:
         table = json.loads((workspace / SERVERS / "addresses.json").read_text())
         return Addresses(**{**table, **{name: tuple(table.get(name, ())) for name in ("pids", "born", "door")}})

@@ -30,7 +30,7 @@ class Stage:
     name: str
     """As DVC calls it, such as `experts@c0`."""
     command: str
-    """What it runs."""
+    """Command that it runs."""
     needs: frozenset[str]
     """Names of the stages whose files it reads."""
     lacks: frozenset[str]
@@ -136,7 +136,7 @@ def downstream(stages: list[Stage], name: str) -> set[str]:
 
 
 def state_of(stage: Stage, changed: set[str], busy: set[str]) -> str:
-    """What a stage is about to do: nothing, run, run after another, or wait for a file that no stage makes."""
+    """State of a stage: nothing, run, run after another, or wait for a file that no stage makes."""
     if stage.lacks:
         return f"{LACKS} {', '.join(sorted(stage.lacks))}"
     if stage.name in changed:
@@ -166,7 +166,7 @@ def table(stages: list[Stage], changed: set[str]) -> Table:
 
 
 def _indirect(stages: list[Stage], stage: Stage) -> set[str]:
-    """What a stage would read through another of those that it needs: left out of the picture."""
+    """Stages that a stage would read through another of those that it needs: left out of the picture."""
     return {name for name in stage.needs if stage.needs & downstream(stages, name)}
 
 

@@ -81,7 +81,7 @@ def create(folder: Path, profile: str | None = None, motions: Path | None = None
 
 
 def settings_of(folder: Path, profile: str | None) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """What params.yaml starts from: (settings, the edited ones in `folder` if somebody edited them there)."""
+    """Settings that params.yaml starts from: (settings, the edited ones in `folder` if somebody edited them there)."""
     here, generated = folder / "params.yaml", folder / GENERATED
     made = here.is_file() and generated.is_file() and here.read_bytes() == generated.read_bytes()
     if here.exists() and not made:

@@ -1,4 +1,4 @@
-"""What: one module a stage of the loop. Each loads artefacts, calls the library, and saves artefacts."""
+"""Stages of the loop, one module each: it loads artefacts, calls the library, and saves artefacts."""
 
 import os
 import signal

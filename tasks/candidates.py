@@ -34,7 +34,7 @@ class Candidate:
     cluster: str | None = None
     """An expert's cluster: it is run on that cluster's motions only."""
     compensation: Path | None = None
-    """What its runner undoes at the joints: compensation.json."""
+    """Compensation that its runner undoes at the joints: compensation.json."""
 
     @property
     def for_robot_only(self) -> bool:
@@ -80,7 +80,7 @@ def expert(cluster: str, number: int) -> Candidate:
 
 
 def beside(cluster: str, number: int, parent: int, kinds: Sequence[str]) -> list[Candidate]:
-    """What a round's refinement is held against, as far as it is there.
+    """Candidates that a round's refinement is held against, as far as they are there.
 
     The policy that it began from, compensated, and the same training without the diagnosis, of these `kinds`: what
     earlier settings left in the folder is not taken.
@@ -105,7 +105,7 @@ def came_along(base: Path) -> bool:
 
 
 def same(candidate: Candidate) -> tuple[str, str]:
-    """What decides an episode beside motion and seed: the policy's file, and what its runner undoes."""
+    """Key of an episode beside motion and seed: the policy's file, and what its runner undoes."""
     return file_hash(candidate), str(candidate.compensation or "")
 
 
@@ -115,7 +115,7 @@ def file_hash(candidate: Candidate) -> str:
 
 
 def chain(found: list[Candidate]) -> list[tuple[str, str]]:
-    """What is compared with what: each step of the loop, the generalist with all before it, each round's controls."""
+    """Pairs to compare: each step of the loop, the generalist with all before it, each round's controls."""
     rounds = sorted({c.round for c in found if c.kind == "expert" and c.round is not None})
     steps = ["untrained", "shipped", "base", *(f"experts-r{number}" for number in rounds), "generalist"]
     pairs = list(pairwise(steps))

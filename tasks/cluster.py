@@ -111,7 +111,7 @@ def tell(result: Clustering) -> None:
 
 
 def elbow_line(summary: dict[str, Any]) -> str:
-    """What to do about another K than the elbow's; "" where both are the same."""
+    """Line on another K than the elbow's and what to do; "" where both are the same."""
     bend, k = summary["elbow"], summary["k"]
     over = f"K from {bend['from']} to {bend['to']}"
     if bend["suggested_k"] is None:

@@ -43,7 +43,7 @@ def main(round: int) -> None:
 
 
 def undone_after(parent: int, found: Path, limits: CompensationLimits) -> Compensation:
-    """What undoes the effects `found` for experts of the round `parent`.
+    """Compensation of the effects `found` for experts of the round `parent`.
 
     What that round's own diagnosis found they were trained with, and to undo it again would be to do it twice. It is
     left out also where a cluster's expert stayed what it was. Nothing is undone where held-out rollouts show no
@@ -65,7 +65,7 @@ def undone_after(parent: int, found: Path, limits: CompensationLimits) -> Compen
 
 
 def _key(effect: Effect) -> tuple[str, frozenset[str]]:
-    """What makes it the same effect as another round's."""
+    """Key by which it is one effect with another round's."""
     return effect.effect, frozenset(effect.where)
 
 

@@ -33,6 +33,7 @@ from bumblebee.sim.engine_choice import make_engine
 from bumblebee.sim.sensors import load_model
 from tasks import paths
 from tasks.diagnosis_split import split
+from tasks.run_form import milliseconds
 from tasks.stage import load, log_run, output_folder, run_stage
 
 _WORLDS_TO_JUDGE = 64
@@ -40,7 +41,7 @@ _WORLDS_TO_JUDGE = 64
 
 @dataclass(frozen=True)
 class Simulator:
-    """What a delta action corrects."""
+    """Simulator that a delta action corrects."""
 
     model: mujoco.MjModel
     """With foot sensors."""
@@ -75,7 +76,11 @@ def main(round: int, cluster: str) -> None:
         trained.curve.to_csv(folder / "curve.csv", index=False)
     gain = trained.gain
     print(verdict(round, cluster, gain))
-    numbers = {f"held_out/{h}/{k}": v for h, values in gain.change.items() for k, v in values.items() if v == v}
+    numbers: dict[str, dict[int, float]] = {}
+    for horizon, values in gain.change.items():
+        for name, value in values.items():
+            if value == value:
+                numbers.setdefault(f"held_out/{name}", {})[milliseconds(horizon)] = value
     tags = {"promoted": str(gain.promoted).lower()}
     curve = target / "curve.csv"
     log_run("delta", cluster=cluster, round=round, params=config, metrics=numbers, curve=curve, tags=tags)
@@ -112,7 +117,7 @@ def train(simulator: Simulator, round: int, cluster: str, config: DeltaConfig) -
 
 
 def card(trained: Trained, round: int, cluster: str, config: DeltaConfig) -> dict[str, object]:
-    """What is told about a delta action."""
+    """Card of a delta action."""
     return {
         "round": round,
         "cluster": cluster,

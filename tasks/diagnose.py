@@ -12,6 +12,7 @@ from bumblebee.diagnosis.output import fill
 from bumblebee.diagnosis.report import summary
 from bumblebee.ranges import Range, Ranged, Seed
 from tasks import paths
+from tasks.run_form import Metric, milliseconds
 from tasks.stage import load, log_run, output_folder, run_stage
 
 Windows = Annotated[int, Range(least=8, most=100_000)]
@@ -31,9 +32,9 @@ class DiagnoseConfig(Ranged):
     """Time after which the search for effects begins nothing new [s], for up to 12 degrees of freedom and in proportion
     longer for more; what was found by then is fitted and reported, and a note says that time ran out."""
     beyond_seconds: Annotated[float, Range(above=0, most=1e6)] = 100.0
-    """The same for the search for what is in no catalogue [s]."""
+    """Time limit of the search for what is in no catalogue [s]."""
     seed: Seed = 0
-    """Of the perturbed starts."""
+    """Seed of the perturbed starts."""
 
 
 def main(round: int) -> None:
@@ -50,14 +51,12 @@ def main(round: int) -> None:
     log_run("diagnose", round=round, params=config, metrics=_metrics(result.document))
 
 
-def _metrics(document: dict) -> dict[str, float]:
-    """Headline numbers: effects found and joint error by horizon."""
-    metrics = {"effects": float(len(document["effects"]))}
+def _metrics(document: dict) -> dict[str, Metric]:
+    """Number of effects found, and the joint error [rad] over the horizon [ms]."""
+    metrics: dict[str, Metric] = {"effects": float(len(document["effects"]))}
     for part in ("before", "after", "floor"):
-        for horizon, measures in document["error"][part].items():
-            value = measures["joint_pos_rmse"]["value"]
-            if value is not None:
-                metrics[f"joint_pos_rmse_{horizon}s_{part}"] = value
+        errors = {h: measures["joint_pos_rmse"]["value"] for h, measures in document["error"][part].items()}
+        metrics[f"joint_pos_rmse/{part}"] = {milliseconds(h): e for h, e in errors.items() if e is not None}
     return metrics
 
 

@@ -1,4 +1,4 @@
-"""What later stages read of a round's diagnosis."""
+"""Parts of a round's diagnosis that later stages read."""
 
 import json
 

@@ -48,7 +48,7 @@ ENGINES = ("nominal", "stand_in")
 
 @dataclass(frozen=True)
 class EvaluateConfig(Ranged):
-    """What is evaluated."""
+    """Settings of the evaluation."""
 
     seeds: Annotated[tuple[Seed, ...], Size()] = (0,)
     """One episode for each seed, motion and policy."""
@@ -85,7 +85,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         found, missing = candidates(Path(scratch), config.untrained)
         for name in missing:
-            print(f"not evaluated, not there: {name}", flush=True)
+            print(f"not evaluated, no such policy: {name}", flush=True)
         planned = plan(found, clips, cluster_of, config.seeds)
         tables = [
             run(engine, found, planned, clips, contract, cluster_of, config, Path(scratch)) for engine in config.engines
@@ -138,7 +138,7 @@ def frozen(clips: list[Clip], config: EvaluateConfig) -> Contract:
 
 
 def settings(engine: str) -> dict[str, Any]:
-    """What the contract says about an engine, from the model that it runs; of the sealed robot only the file's hash."""
+    """Settings of an engine in the contract, from the model that it runs; of the sealed robot only the file's hash."""
     if engine == "nominal":
         return {**engine_settings(NominalRobots(1, 1).model), "sensor_noise": None}
     if not paths.SEALED_ROBOT.exists():
@@ -230,14 +230,18 @@ def stand_in(
     return (read_rollout(scratch / "rollouts" / f"{e.rollout_id}.parquet") for e in planned)
 
 
-def headline(summary: dict) -> dict[str, float]:
-    """Success rates over all motions, by policy and engine, for MLflow."""
-    whole = [r for r in summary["results"] if r["split"] == r["group"] == "all"]
-    return {f"{r['engine']}/{r['policy']}/success": r["success"]["value"] for r in whole}
+def headline(summary: dict) -> dict[str, dict[int, float]]:
+    """Success rates over all motions, by engine and policy, over the rounds, for MLflow."""
+    rates: dict[str, dict[int, float]] = {}
+    for r in summary["results"]:
+        if r["split"] == r["group"] == "all":
+            name = r["policy"].replace(f"-r{r['round']}", "")
+            rates.setdefault(f"{r['engine']}/{name}/success", {})[r["round"] or 0] = r["success"]["value"]
+    return rates
 
 
 def tell(summary: dict) -> None:
-    """The same as a table on the terminal."""
+    """Print the summary as a table on the terminal."""
     print(f"{'policy':<28}{'engine':<10}{'success [95 %]':<24}{'MPJPE rad':>10}{'MPKPE mm':>10}")
     for r in summary["results"]:
         if r["split"] == r["group"] == "all":

@@ -107,7 +107,7 @@ def policy_contracts(folders: list[Path], round: int) -> dict[str, dict[str, Any
 
 
 def read_contract(path: Path) -> dict[str, Any]:
-    """What the checks ask of a policy's contract: joints, and gains for each."""
+    """Contract of a policy as the checks need it: joints, and gains for each."""
     table = read_json(path)
     if not isinstance(table, dict):
         raise BadInput(path, "a JSON object", type(table).__name__)

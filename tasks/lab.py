@@ -89,10 +89,10 @@ class RayLab:
     address: str
     """`HOST:PORT` of its head, or `auto`: what the variable RAY_ADDRESS says."""
     remote: str
-    """Of DVC: a folder that every machine sees, `s3://BUCKET/FOLDER` or `ssh://HOST/FOLDER`."""
+    """Remote of DVC: a folder that every machine sees, `s3://BUCKET/FOLDER` or `ssh://HOST/FOLDER`."""
     memory: Mapping[str, float] = field(default_factory=dict)
-    """What a stage needs, by its name without cluster and round [GiB]; here and not in params.yaml, whose change would
-    make the stage stale. Of a machine Ray gives as much as was stated at `ray start --memory`, most of it without."""
+    """Memory that a stage needs, by its name without cluster and round [GiB]; here and not in params.yaml, whose change
+    would make the stage stale. Ray gives of a machine what `ray start --memory` stated, most of it without."""
     checkpoint_seconds: float = 60.0
     """At least so long between two checkpoints of a running stage that go to the remote [s]."""
 
@@ -108,7 +108,7 @@ class Lab:
 
     @property
     def variables(self) -> dict[str, str]:
-        """What processes of the servers and stages get beside their environment; nothing secret."""
+        """Variables that processes of the servers and stages get beside their environment; nothing secret."""
         found = {"PREFECT_API_DATABASE_CONNECTION_URL": self.prefect.connection}
         if self.mlflow.s3_endpoint:
             found["MLFLOW_S3_ENDPOINT_URL"] = self.mlflow.s3_endpoint
@@ -185,7 +185,7 @@ def _strings(content: Any, section: str, names: list[str], path: Path) -> dict[s
 
 
 def _take_numbers(section: Any, where: str) -> dict[str, Any]:
-    """What the section says in numbers, taken out of it."""
+    """Numbers of the section, taken out of it."""
     found: dict[str, Any] = {}
     if not isinstance(section, dict):
         return found

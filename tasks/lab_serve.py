@@ -37,9 +37,9 @@ class ServeLab:
     """Where people reach both servers, and which groups of people may change what."""
 
     prefect: str
-    """Of Prefect's pages, `https://HOST[:PORT]`."""
+    """Address of Prefect's pages, `https://HOST[:PORT]`."""
     mlflow: str
-    """Of MLflow's pages, `https://HOST[:PORT]`."""
+    """Address of MLflow's pages, `https://HOST[:PORT]`."""
     prefect_listen: str
     """Where Prefect's server listens for it, `ADDRESS:PORT` of this machine."""
     mlflow_listen: str
@@ -55,7 +55,7 @@ class ServeLab:
 
     @property
     def addresses(self) -> dict[str, str]:
-        """Of both servers, by name."""
+        """Addresses of both servers, by name."""
         return {"prefect": self.prefect, "mlflow": self.mlflow}
 
     @property

@@ -1,4 +1,4 @@
-"""What a stage was made from: the MD5 of each of its inputs as DVC counts it, the git commit, the versions."""
+"""Lineage of a stage: the MD5 of each of its inputs as DVC counts it, the git commit, the versions."""
 
 import hashlib
 import importlib.metadata
@@ -96,7 +96,7 @@ def upstream(output: Path, lock: Path = lock_file.FILE) -> dict[str, str]:
 
 
 def history(output: Path, lock: Path = lock_file.FILE) -> list[dict[str, str]]:
-    """The same as a list of `path`, `md5` and, where a stage made it, `stage`."""
+    """History as a list of `path`, `md5` and, where a stage made it, `stage`."""
     stages = lock_file.locked_stages(lock)
     makers = {out["path"]: name for name, stage in stages.items() for out in stage.get("outs", [])}
     found: dict[str, dict[str, str]] = {}
@@ -156,7 +156,7 @@ def inputs_of_stage() -> list[dict[str, str]]:
 
 
 def versions() -> dict[str, str]:
-    """Of Python and of what decides a result."""
+    """Versions of Python and of what decides a result."""
     found = {"python": platform.python_version()}
     for name in ("torch", "mujoco", "rsl-rl-lib", "numpy", DISTRIBUTION):
         try:

@@ -116,7 +116,7 @@ def metrics(index: pd.DataFrame, reading: Reading) -> dict[str, float]:
 
 
 def tell(index: pd.DataFrame, reading: Reading) -> None:
-    """What came: counts, sets with their licences, texts, why files were skipped, what was detected in others."""
+    """Print what came: counts, sets with their licences, texts, why files were skipped, what was detected in others."""
     counts = metrics(index, reading)
     print(f"{counts['clips']} clips, {counts['minutes']:.1f} minutes, {counts['held_out']} held out -> {paths.MOTIONS}")
     sets = [f"  {row.set}: {row.clips} clips, {row.minutes:.1f} minutes, licence {row.licence}"
@@ -140,7 +140,7 @@ def _print(lines: list[str], more: str) -> None:
 
 
 def by_set(index: pd.DataFrame) -> pd.DataFrame:
-    """What each folder of the source gave, be it in an archive: set, clips, minutes, licence."""
+    """Table of the source's folders, archives included: set, clips, minutes, licence."""
     table = pd.DataFrame({
         "set": [source.split("/")[0] for source in index["source"]],
         "minutes": index["duration"] / 60,

@@ -81,7 +81,7 @@ def check_names(content: Iterable[str], path: Path) -> None:
 
 
 def section_of(content: dict[str, Any], section: str, kind: type[Config], path: Path) -> Config:
-    """The same from the content of the file."""
+    """Section from the content of the file."""
     if section not in content:
         raise BadInput(f"{path}: {section}", "this section", "none", nearest(section, content))
     return build(kind, content[section], path, section)

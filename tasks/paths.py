@@ -3,7 +3,7 @@
 from pathlib import Path
 
 DATA = Path("data")
-"""What the loop itself fills."""
+"""Folders that the loop itself fills."""
 RAW = Path("data/raw")
 """Where a user's motions and texts lie, a folder a set, kept by DVC."""
 RETARGETS = Path("data/retargets")
@@ -18,7 +18,7 @@ LABELS = CLUSTERS / "labels.parquet"
 CLUSTERING = Path("models/clustering")
 """The autoencoder that clusters."""
 SEALED_ROBOT = Path("data/sealed/robot.json")
-"""What the stand-in robot has and nobody is told."""
+"""File of what the stand-in robot has and nobody is told."""
 BASE = Path("models/base")
 """The policy for all clusters that the experts begin from."""
 GENERALIST = Path("models/generalist")
@@ -55,7 +55,7 @@ def measured(round: int) -> Path:
 
 
 def rejected(round: int) -> Path:
-    """What was found wrong with a round of which nothing can be used."""
+    """File of what was found wrong with a round of which nothing can be used."""
     return Path(f"data/rejected/r{round}")
 
 
@@ -65,7 +65,7 @@ def gate(round: int) -> Path:
 
 
 def diagnosis(round: int) -> Path:
-    """What the declared model lacks, as a round showed it; the folder of the three files below and of a page."""
+    """Folder of a round's diagnosis: what the declared model lacks, the three files below and a page."""
     return Path(f"data/diagnosis/r{round}")
 
 
@@ -90,7 +90,7 @@ def compensation(round: int) -> Path:
 
 
 def compensation_plan(round: int) -> Path:
-    """The same as the file that the runner reads."""
+    """File of the compensation, as the runner reads it."""
     return compensation(round) / "compensation.json"
 
 
@@ -110,5 +110,5 @@ def experts(round: int) -> Path:
 
 
 def control(round: int, cluster: str, kind: str) -> Path:
-    """The same training without the diagnosis."""
+    """Folder of the control: the training without the diagnosis."""
     return Path(f"models/control/r{round}/{cluster}/{kind}")

@@ -46,11 +46,11 @@ class Promotion:
 
     @property
     def subject(self) -> dict[str, Any]:
-        """What tells its answers from others in the record."""
+        """Keys that tell its answers from others in the record."""
         return {"model": self.model}
 
     def seen(self) -> dict[str, Any]:
-        """What is proposed, for the policy as its file is now; with the hash of all that.
+        """Proposal for the policy as its file is now; with the hash of all that.
 
         Raises:
             BadInput: where nothing is proposed.
@@ -73,7 +73,7 @@ class Promotion:
 
 
 def proposals(workspace: Path) -> dict[str, dict[str, Any]]:
-    """What stage publish proposes, by model."""
+    """Proposals of stage publish, by model."""
     path = workspace / paths.PUBLISHED
     if not path.exists():
         return {}

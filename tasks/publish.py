@@ -56,7 +56,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Standard:
-    """What a version is measured by."""
+    """Standard that a version is measured by."""
 
     contract: str
     """sha256 of the frozen evaluation."""

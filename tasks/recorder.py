@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ AWAY = re.compile(
     r"Could not connect to the endpoint|Connection refused|server closed the connection|"
     r"the database system is (starting up|shutting down)"
 )
+_BEGUN = time.time()  # the stage's modules are the first that its process imports
 _started: list[subprocess.Popen[str]] = []
 
 
@@ -41,6 +43,7 @@ def record(run: dict[str, Any]) -> None:
         OSError: where a file could not be read or written, as it came up there.
         RuntimeError: with MLflow's words, where the run could not be written for another reason.
     """
+    run = {**run, "begun": _BEGUN}
     if not _started:
         registry.log_run(**run)
         return
@@ -83,7 +86,7 @@ def away(text: str) -> BadInput | None:
 
 
 def _plain(run: dict[str, Any]) -> dict[str, Any]:
-    """The same in what JSON knows."""
+    """The run in what JSON knows."""
     curve = None if run["curve"] is None else str(run["curve"])
     return {**run, "params": registry.flatten(run["params"]), "curve": curve}
 

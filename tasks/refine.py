@@ -39,7 +39,7 @@ def main(round: int, cluster: str) -> None:
     parent, out = paths.expert(parent_of(round), cluster), paths.expert(round, cluster)
     if not learned(round, cluster):
         keep(parent, out, round)
-        print(f"round {round}, {cluster}: nothing was found that the model lacks: the expert stays what it is")
+        print(f"round {round}, {cluster}: no effect was found: the expert is kept unchanged")
         log_run("refine", cluster=cluster, round=round, params=config, tags={"kept": "parent"})
         return
     clips, share, tried = cluster_clips(cluster, config.others)

@@ -11,6 +11,7 @@ import json
 import logging
 import os
 import tempfile
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import cache
@@ -25,10 +26,13 @@ from tasks.lab_serve import read_tracking
 from tasks.lineage import current_stage, git_sha, history, inputs_of_stage, lineage, place
 from tasks.outputs import MANIFEST, copied, manifest
 from tasks.private import private
-from tasks.run_form import card_settings, fitted, flatten, metric_name, read_curve
+from tasks.run_form import Metric, by_step, card_settings, fitted, flatten, metric_name, read_curve
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
+
+# Before anything of MLflow is imported: it reads this once, and would otherwise tell its maker of every use.
+os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
 
 SERVERS, DATABASE = Path(".servers"), "mlflow.db"
 SCHEME = "mlflow-artifacts"
@@ -47,7 +51,6 @@ def prepare() -> "MlflowClient":
 @cache
 def _prepared(workspace: Path) -> "MlflowClient":
     lab, server = read_lab(workspace), read_tracking(workspace)
-    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     os.environ.setdefault("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT", "1")
     _quiet()
@@ -175,10 +178,11 @@ def log_run(
     cluster: str | None,
     round: int | None,
     params: object,
-    metrics: dict[str, float],
+    metrics: Mapping[str, Metric],
     curve: Path | None,
     tags: dict[str, str],
     outputs: Sequence[Path] | None = None,
+    begun: float | None = None,
 ) -> str:
     """Write one finished run with its outputs (`tasks/outputs.py`); returns its id.
 
@@ -187,14 +191,16 @@ def log_run(
         cluster: the cluster, where the stage has one.
         round: the round, where the stage has one.
         params: the configuration (dataclass or mapping).
-        metrics: final numbers.
+        metrics: numbers, each alone or by step.
         curve: a CSV file whose first column is the step.
         tags: anything else worth searching for.
         outputs: files and folders, relative to the workspace; None: those of the stage that DVC runs.
+        begun: when the stage began, in seconds since 1970; None: now.
 
     A stage that DVC runs again with equal inputs, as after a kill, takes the place of what it has written before.
     """
-    from mlflow.entities import Metric, Param, RunTag
+    from mlflow.entities import Metric as Point
+    from mlflow.entities import Param, RunTag
 
     client = prepare()
     experiment = client.get_experiment_by_name(experiment_name())
@@ -206,12 +212,14 @@ def log_run(
     if "DVC_STAGE" in os.environ:
         for earlier in client.search_runs([experiment.experiment_id], f"tags.record = '{record}'"):
             client.delete_run(earlier.info.run_id)
-    run = client.create_run(experiment.experiment_id, run_name=title, tags={"record": record})
-    run_id, now = run.info.run_id, run.info.start_time
+    now = time.time()
+    start, end = (int(1000 * moment) for moment in (now if begun is None else begun, now))
+    run = client.create_run(experiment.experiment_id, start, run_name=title, tags={"record": record})
+    run_id = run.info.run_id
     labels = {"stage": stage, **_origin_tags(origin), **tags}
     labels |= {key: str(value) for key, value in (("cluster", cluster), ("round", round)) if value is not None}
-    points = [Metric(metric_name(name), float(value), now, 0) for name, value in metrics.items()]
-    points += [Metric(metric_name(name), value, now, step) for name, step, value in read_curve(curve)] if curve else []
+    numbers = [*by_step(metrics), *(read_curve(curve) if curve else [])]
+    points = [Point(metric_name(name), value, end, step) for name, step, value in numbers]
     settings = [Param(key, fitted(value, LONGEST_PARAM, LINEAGE)) for key, value in settings_of.items()]
     written = [RunTag(key, value) for key, value in _fitted_tags(labels).items()]
     for start in range(0, max(len(points), 1), 1000):
@@ -225,12 +233,12 @@ def log_run(
     client.log_text(run_id, _text(made), MANIFEST)
     for file in copied(made):
         client.log_artifact(run_id, str(file), os.path.dirname(file))
-    client.set_terminated(run_id)
+    client.set_terminated(run_id, end_time=end)
     return str(run_id)
 
 
 def _origin_tags(origin: str) -> dict[str, str]:
-    """What to filter runs by: commit, DVC's stage, and the hash of all inputs, which are in lineage.json."""
+    """Tags to filter runs by: commit, DVC's stage, and the hash of all inputs, which are in lineage.json."""
     digest = hashlib.sha256(origin.encode()).hexdigest()
     return {"git_sha": git_sha(), "dvc_stage": os.environ.get("DVC_STAGE", ""), "lineage": digest}
 
@@ -316,7 +324,7 @@ def _signature(model: Any) -> Any:
 
 
 def describe(name: str, text: str) -> None:
-    """What the page of the registered model says."""
+    """Set the text on the page of the registered model."""
     prepare().update_registered_model(name, fitted(text, LONGEST_DESCRIPTION, CARD))
 
 
@@ -389,7 +397,7 @@ def version_tags(name: str, version: str) -> dict[str, str] | None:
 
 
 def version_card(name: str, version: str) -> str:
-    """What the page of a version says."""
+    """Text on the page of a version."""
     found = _version(name, version)
     return "" if found is None else str(found.description or "")
 

@@ -33,7 +33,7 @@ from tasks.stage import load, log_run, output_file, run_stage
 
 @dataclass(frozen=True)
 class ReportConfig(Ranged):
-    """What the page shows beside the numbers."""
+    """Settings of what the page shows beside the numbers."""
 
     title: Line = ""
     """The page's heading; empty: what the loop found."""
@@ -42,7 +42,7 @@ class ReportConfig(Ranged):
     film_motion: Line = ""
     """Motion of the film; empty: the liveliest that was won back, else the liveliest that the generalist follows."""
     seed: Seed = 3
-    """Of the start state and the sensor noise where no motion was won back and one run is shown alone."""
+    """Seed of the start state and the sensor noise where no motion was won back and one run is shown alone."""
 
 
 def main() -> None:
@@ -102,7 +102,7 @@ def with_reference(evaluation: dict[str, Any]) -> dict[str, Any]:
 
 
 def sealed_truth() -> dict[str, Any] | None:
-    """What was sealed in the stand-in; None where the measured rollouts are of the user's robot."""
+    """Sealed effects of the stand-in; None where the measured rollouts are of the user's robot."""
     return _json(paths.SEALED_ROBOT) if load("rollouts", RolloutsConfig).source is None else None
 
 

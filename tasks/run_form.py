@@ -7,6 +7,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 
+Metric = float | Mapping[int, float]
+"""A number, or numbers by their step, which MLflow draws as a curve."""
+
 
 def metric_name(name: str) -> str:
     """A name that MLflow accepts: no empty part between slashes, no sign it does not know."""
@@ -34,6 +37,17 @@ def flatten(params: object, prefix: str = "") -> dict[str, str]:
         nested = isinstance(value, Mapping) or is_dataclass(value)
         flat |= flatten(value, f"{prefix}{key}.") if nested else {f"{prefix}{key}": str(value)}
     return flat
+
+
+def by_step(metrics: Mapping[str, Metric]) -> list[tuple[str, int, float]]:
+    """(name, step, value) of each number; one that stands alone has the step 0."""
+    series = {name: value if isinstance(value, Mapping) else {0: value} for name, value in metrics.items()}
+    return [(name, int(step), float(value)) for name, values in series.items() for step, value in values.items()]
+
+
+def milliseconds(horizon: str) -> int:
+    """The step of a number that belongs to a horizon, which is given in seconds."""
+    return round(1000 * float(horizon))
 
 
 def read_curve(path: Path) -> list[tuple[str, int, float]]:

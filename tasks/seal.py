@@ -38,10 +38,10 @@ BODIES = tuple(name for name, body in g1_bodies().items() if float(body["mass"])
 
 @dataclass(frozen=True)
 class SealConfig(Ranged):
-    """What may be sealed."""
+    """Settings of what may be sealed."""
 
     seed: Seed = 7
-    """Of the draw."""
+    """Seed of the draw."""
     n_effects: Annotated[int, Range(least=0, most=1000)] = 4
     """Number of effects, each of another kind at another place; 0: the diagnosis' null test."""
     kinds: tuple[Name, ...] = OF_G1
@@ -61,7 +61,7 @@ class SealConfig(Ranged):
     max_seconds: Annotated[float, Range(least=0.1, most=3600)] = 6.0
     """Longer motions are cut to their beginning [s]."""
     trial_seed: Seed = 977
-    """Of the trial's start states and sensor noise; no other stage uses it."""
+    """Seed of the trial's start states and sensor noise; no other stage uses it."""
     threads: Few = 2
     """CPU threads of the trial."""
     joints: tuple[Name, ...] = joint_names()
@@ -118,7 +118,7 @@ def found(config: SealConfig, motions: Sequence[Clip]) -> dict[str, Any]:
         policy = export_shipped(Path(scratch) / "shipped")
         clips = followed(policy, motions, config.trial_seed, config.threads)
         if not clips:
-            print("the shipped policy follows none of the trial's motions on the declared model: nothing to lose")
+            print("the shipped policy follows none of the trial's motions on the declared model: no loss to measure")
             return sealed_robot(config, 0)
         tried: list[tuple[Trial, dict[str, Any]]] = []
         for attempt in range(config.draws):
@@ -144,7 +144,7 @@ def trial_clips(config: SealConfig) -> list[Clip]:
 
 
 def sealed_robot(config: SealConfig, attempt: int) -> dict[str, Any]:
-    """What stands in the file after so many draws that were drawn again."""
+    """Content of the file after so many draws that were drawn again."""
     effects = draw(config, attempt)
     return {
         "schema": SCHEMA,

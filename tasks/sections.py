@@ -48,7 +48,7 @@ def loop(path: Path = params.FILE) -> Loop:
 
 
 def shape_of(content: dict[str, Any], path: Path) -> Loop:
-    """The same from the content of the file."""
+    """Shape of the loop from the content of the file."""
     shape = params.build(Loop, {key: content[key] for key in params.LOOP if key in content}, path, "")
     if not shape.clusters or len({name.casefold() for name in shape.clusters}) < len(shape.clusters):
         raise BadInput(f"{path}: clusters", "distinct names, at least one", shown(list(shape.clusters)))
@@ -84,7 +84,7 @@ def check(path: Path = params.FILE) -> dict[str, Any]:
 
 
 def check_content(content: dict[str, Any], path: Path) -> dict[str, Any]:
-    """The same from the content of the file."""
+    """Check the content of the file."""
     params.check_names(content, path)
     found: dict[str, Any] = {"": shape_of(content, path)}
     for section, place in params.SECTIONS.items():

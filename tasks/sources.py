@@ -70,7 +70,7 @@ def _at_home(name: str, key: str, wanted: str) -> Path:
 
 
 def _before_round(incoming: str) -> Path:
-    """What stands before the part of the path that is another in each round."""
+    """Path before the part that is another in each round."""
     parts = Path(incoming).parts
     changing = [index for index, part in enumerate(parts) if "{" in part]
     return Path(*parts[: changing[0]]) if changing else Path(incoming)

@@ -1,4 +1,4 @@
-"""What every stage shares: its command line, its parameters, outputs that appear whole or not at all.
+"""Services that every stage shares: its command line, its parameters, outputs that appear whole or not at all.
 
 A stage's module reads:
 
@@ -19,7 +19,7 @@ import inspect
 import os
 import shutil
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -31,6 +31,7 @@ from tasks.lab_serve import read_tracking
 from tasks.params import load
 from tasks.parent import end_with_parent
 from tasks.private import private_index
+from tasks.run_form import Metric
 from tasks.sections import check_once
 
 __all__ = ["disk_line", "load", "log_run", "output_file", "output_folder", "run_stage", "scratch"]
@@ -120,7 +121,7 @@ def output_folder(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def output_file(path: str | Path) -> Iterator[Path]:
-    """The same for a single file; the name to write to keeps the suffix."""
+    """A file to write a stage's output into, whole or never; the name to write to keeps the suffix."""
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     fresh = target.parent / f".writing-{target.name}"
@@ -168,7 +169,7 @@ def log_run(
     cluster: str | None = None,
     round: int | None = None,
     params: object = None,
-    metrics: dict[str, float] | None = None,
+    metrics: Mapping[str, Metric] | None = None,
     curve: Path | None = None,
     tags: dict[str, str] | None = None,
 ) -> None:
@@ -181,7 +182,7 @@ def log_run(
         cluster: the cluster, where the stage has one.
         round: the round, where the stage has one.
         params: the configuration (dataclass or mapping); nested fields are flattened with dots.
-        metrics: final numbers.
+        metrics: numbers, each alone or by step.
         curve: a CSV file whose first column is the step and each other one a metric.
         tags: anything else worth searching for.
     """

@@ -1,4 +1,4 @@
-"""What base, experts and refine share: train a policy, try it before and after, write its folder."""
+"""Training of base, experts and refine: train a policy, try it before and after, write its folder."""
 
 import json
 import os
@@ -41,7 +41,7 @@ class TrainingConfig(Ranged):
     """One training of a tracking policy."""
 
     seed: Seed = 0
-    """Of the network, the draws of clips and frames, and the differences between the worlds."""
+    """Seed of the network, the draws of clips and frames, and the differences between the worlds."""
     env: EnvConfig = field(default_factory=EnvConfig)
     """The task."""
     learner: LearnerName = "ppo"
@@ -71,7 +71,7 @@ class TrainingConfig(Ranged):
 
 @dataclass(frozen=True)
 class Job:
-    """What is trained where, on what, from what."""
+    """Job of a training: what is trained where, on what, from what."""
 
     stage: str
     name: str
@@ -178,9 +178,8 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
         (out / "card.json").write_text(json.dumps(card, indent=1) + "\n")
         after.assign(before=before["success"], key_error_before=before["key_error"]).to_csv(out / "trials.csv")
     _tell(job, card)
-    metrics = {f"{when}/{family}": rate for when in ("before", "after") for family, rate in card[when].items()}
-    rate = trainer.frames / max(float(curve["seconds"].iloc[-1]), 1e-9)
-    metrics |= {"frames_per_second": round(rate), "unstable_worlds": card["unstable_worlds"]}
+    before_rates, last = card["before"], int(curve.iloc[-1, 0])
+    metrics = {f"success/{family}": {0: before_rates[family], last: rate} for family, rate in card["after"].items()}
     log_run(
         job.stage,
         cluster=job.cluster,
@@ -258,4 +257,4 @@ def _tell(job: Job, card: dict[str, Any]) -> None:
     print(f"{job.name}: success {families}; key error {card['after_key_error'] * 100:.1f} cm")
     if card["kept"] == "parent":
         rate = card["trained"]["success"]["all"]
-        print(f"{job.name}: training made it no better here ({rate:.0%}): the parent's policy is kept")
+        print(f"{job.name}: training did not improve it ({rate:.0%}): the parent's policy is kept")

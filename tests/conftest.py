@@ -1,4 +1,4 @@
-"""What all tests share: no network, no telemetry, one thread, nothing of the user's own settings."""
+"""Surroundings of all tests: no network, no telemetry, one thread, nothing of the user's own settings."""
 
 import os
 
@@ -9,6 +9,7 @@ for name, value in {
     "PREFECT_SERVER_ALLOW_EPHEMERAL_MODE": "false",
     "DVC_NO_ANALYTICS": "1",
     "HF_HUB_OFFLINE": "1",
+    "BUMBLEBEE_CACHE": "",
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
 }.items():

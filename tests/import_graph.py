@@ -29,7 +29,7 @@ class Import:
 
 @dataclass(frozen=True)
 class Source:
-    """What the tests ask of a file of code."""
+    """Facts that the tests ask of a file of code."""
 
     imports: tuple[Import, ...]
     started: tuple[str, ...]
@@ -37,7 +37,7 @@ class Source:
 
 
 def source(path: Path, home: Path) -> Source:
-    """What a file below `home` imports and starts; each state of a file is parsed once."""
+    """Facts of a file below `home`: what it imports and starts; each state of a file is parsed once."""
     return _parsed(path, home, path.stat().st_mtime_ns)
 
 

@@ -44,7 +44,7 @@ def normal(name: str) -> str:
 
 
 def environments() -> Iterator[dict[str, str]]:
-    """What markers are asked about: each Python on each system."""
+    """Environments that markers are asked about: each Python on each system."""
     for python, (system, platform, machine) in product(PYTHONS, SYSTEMS):
         versions = {"python_version": python.rpartition(".")[0], "python_full_version": python, "os_name": "posix"}
         yield versions | {"sys_platform": system, "platform_system": platform, "platform_machine": machine}
@@ -124,7 +124,7 @@ def fits(tag: Tag) -> bool:
 
 
 def pages(names: Iterable[str]) -> dict[str, Page]:
-    """What pip finds for each name, on the indices and in the folders that it is configured for."""
+    """Pages that pip finds for each name, on the indices and in the folders that it is configured for."""
     from pip._internal.commands import create_command
     from pip._internal.index.collector import LinkCollector, parse_links
 

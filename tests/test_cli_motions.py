@@ -140,7 +140,7 @@ def test_play_asks_for_what_it_needs(folder, tmp_path, capsys, monkeypatch):
         ((folder / "walk.pkl", "--out", tmp_path / "a.gif", "--seconds", "nan", 10), "of the motion's 0 to 1.2 s"),
         ((folder / "walk.pkl", "--out", tmp_path / "a.gif", "--seconds", 0, 900), "expected at most 120 s, came 900"),
         ((folder / "walk.pkl", "--out", tmp_path / "mine.gif"), "expected a new name"),
-        ((folder / "walk.pkl", "--out", folder / "walk.pkl"), "a place apart from what is read"),
+        ((folder / "walk.pkl", "--out", folder / "walk.pkl"), "an output that does not contain the input"),
     ]
     for arguments, line in cases:
         assert run("play", *arguments) == 2, arguments

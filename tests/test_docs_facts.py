@@ -1,4 +1,4 @@
-"""What pages say of the code's settings and counts is so."""
+"""Pages say true things of the code's settings and counts."""
 
 import re
 from pathlib import Path
@@ -38,3 +38,10 @@ def test_every_test_that_a_promise_names_is_there():
         if file is None or not file.exists() or (word and f"def {word}" not in file.read_text()):
             missing.append(name)
     assert missing == []
+
+
+def test_the_glossary_explains_each_word_once_in_three_columns():
+    rows = [line for line in (DOCS / "glossary.md").read_text().splitlines() if re.match(r"\| (?!word|---)", line)]
+    words = [row.split(" | ")[0] for row in rows]
+    assert len(set(words)) == len(words)
+    assert [row for row in rows if row.count("|") != 4] == []

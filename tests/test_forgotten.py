@@ -1,4 +1,4 @@
-"""What is forgotten when a stage or a reward term is added says so, and names the file and what to add.
+"""A stage or a reward term that lacks a part says so, and names the file and what to add.
 
 docs/adding-a-stage.md and docs/adding-a-reward.md are the worked examples.
 """
@@ -48,7 +48,7 @@ def test_a_stage_depends_on_the_sections_that_its_module_loads(stage: str):
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_stage_names_the_paths_that_its_module_uses(stage: str):
-    """Of paths that are constants in tasks/paths.py; those of rounds and clusters are spelled in dvc.yaml alone."""
+    """Paths that are constants in tasks/paths.py; those of rounds and clusters are spelled in dvc.yaml alone."""
     entry = STAGES[stage]
     named = [path if isinstance(path, str) else next(iter(path)) for path in (*entry["deps"], *entry["outs"])]
     for name in sorted(set(re.findall(r"\bpaths\.([A-Z][A-Z_]*)\b", source(stage)))):

@@ -1,4 +1,4 @@
-"""What `make test` leaves to `make test-all` is only what is listed here, and both halves together are all tests."""
+"""Tests that `make test` leaves to `make test-all` are listed here, and both halves together are all tests."""
 
 import ast
 import sys

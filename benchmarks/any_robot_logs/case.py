@@ -55,7 +55,7 @@ QUICK = Budgets(
 
 @dataclass(frozen=True)
 class Drawn:
-    """What a seed stands for."""
+    """Robot, logs and truth that a seed stands for."""
 
     robot: Robot
     rollouts: list[Rollout]

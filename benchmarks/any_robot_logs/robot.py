@@ -21,7 +21,7 @@ class Size:
     joints: int = 30
     seconds: float = 60.0
     rows: int = 60_000
-    """Of all rollouts together, times the joints a tenth."""
+    """Rows of all rollouts together, times the joints a tenth."""
     rollouts: int = 6
 
 
@@ -35,7 +35,7 @@ class Robot:
     xml: str
     joints: tuple[str, ...]
     drive: str
-    """Of all driven joints."""
+    """Drive of all driven joints."""
     driven: tuple[bool, ...]
     floating: bool
     motor_gains: tuple[float, float] | None

@@ -42,7 +42,7 @@ class Log:
     quantum: float = 0.0
     """Step of the encoders [rad]."""
     noise: tuple[float, float] = (1e-4, 1e-2)
-    """Of positions [rad] and velocities [rad/s]."""
+    """Noise of positions [rad] and velocities [rad/s]."""
     loud: float = 1.0
     """Times the usual size of the commands."""
     resting: bool = False
@@ -225,7 +225,7 @@ class _Recorder:
             data.qfrc_applied[self.dof[j]] = (self.strength[j] - 1) * gear * data.actuator_force[a] * (gain != 0)
 
     def _within(self, a: int, force: float, data: mujoco.MjData) -> float:
-        """What a drive adds to its own damping for a force beside it: their sum keeps to the drive's limits."""
+        """Damping that a drive adds for a force beside it: their sum keeps to the drive's limits."""
         if not self.model.actuator_forcelimited[a]:
             return force
         low, high = self.model.actuator_forcerange[a]

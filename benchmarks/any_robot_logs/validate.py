@@ -20,7 +20,7 @@ _HORIZONS = ("0.02", "0.2", "1.0")
 
 
 def problems(document: Any) -> list[str]:
-    """What is wrong with a document, one line each; empty where it keeps the contract."""
+    """Faults of a document, one line each; empty where it keeps the contract."""
     found = [*_keys(document, _TOP, "document")]
     if found:
         return found

@@ -50,7 +50,7 @@ _SAVE_EVERY, _TELL_EVERY = 120.0, 20.0  # s
 
 
 def training_clips(rows: list[Packed]) -> list[Packed]:
-    """What is learned from: whole motions, and the kept pieces of those with a gap; none that is held out."""
+    """Clips to learn from: whole motions, and the kept pieces of those with a gap; none that is held out."""
     whole = whole_motions(rows)
     complete = {(row.group, row.clip.name) for row in whole}
     rest = [row for row in rows if row.kept and (row.group, motion_of(row.clip.name)) not in complete]

@@ -1,4 +1,4 @@
-"""What `benchmarks.baselines` can train: each method with its own settings, and single settings changed by path."""
+"""Methods that `benchmarks.baselines` can train: each with its own settings, and single settings changed by path."""
 
 import json
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -28,7 +28,7 @@ KEPT = ("method", "variety", "seed", "embedded")
 
 @dataclass(frozen=True)
 class Method:
-    """What is trained: the task, the algorithm, and the student, if there is one."""
+    """Method of training: the task, the algorithm, and the student, if there is one."""
 
     name: str
     env: EnvConfig

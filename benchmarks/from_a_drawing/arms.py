@@ -37,7 +37,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Arm:
-    """What was drawn."""
+    """Arm that was drawn."""
 
     joints: tuple[Joint, ...]
     servo: bool
@@ -115,7 +115,7 @@ def xml(joints: Sequence[Joint], servo: bool, rotors: bool = False, gain: float 
 
 
 def rollouts(arm: Arm, seed: int, count: int = 8, seconds: float = 8.0) -> list[Rollout]:
-    """What the true arm's logger writes."""
+    """Rollouts that the true arm's logger writes."""
     rng, joints = np.random.default_rng([20, seed]), len(arm.joints)
     model = mujoco.MjModel.from_xml_string(xml(arm.joints, arm.servo, True, arm.gain, arm.load))
     kp, kd = np.array([j.kp for j in arm.joints]), np.array([j.kd for j in arm.joints])

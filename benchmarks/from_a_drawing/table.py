@@ -16,7 +16,7 @@ _CLOSE = 2.0
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Of each kind of robot medians with their intervals, shares with their counts."""
+    """Medians of each kind of robot with their intervals, shares with their counts."""
     kinds = dict.fromkeys(row.get("robot", "arm") for row in rows)
     return "\n\n".join(_of_one([row for row in rows if row.get("robot", "arm") == kind], kind) for kind in kinds)
 

@@ -1,1 +1,1 @@
-"""What a kill costs: each process of the loop and each command, hit in every way, then started again."""
+"""Cost of a kill: each process of the loop and each command, hit in every way, then started again."""

@@ -8,7 +8,7 @@ SIGNALS = {"-9": signal.SIGKILL, "INT": signal.SIGINT, "TERM": signal.SIGTERM, "
 
 @dataclass(frozen=True)
 class Cell:
-    """What is done."""
+    """One cell of the matrix: what is done."""
 
     target: str
     """A process of the loop (keeper, flow, dvc, stage, recorder, prefect, mlflow), or a command of the library."""
@@ -25,7 +25,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of it; the cell holds where `broken` is empty."""
+    """Outcome of a cell; the cell holds where `broken` is empty."""
 
     cell: str
     seconds: float
@@ -47,7 +47,7 @@ class Outcome:
 
     @property
     def broken(self) -> list[str]:
-        """What does not hold."""
+        """Conditions that do not hold."""
         found = [f"lost {', '.join(self.lost)}"] if self.lost else []
         found += [f"orphans: {', '.join(self.orphans)}"] if self.orphans else []
         found += [f"half written: {', '.join(self.left)}"] if self.left else []

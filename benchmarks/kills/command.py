@@ -87,7 +87,7 @@ def command_line(command: str, inputs: Path, place: Path) -> list[str]:
 
 
 def output_name(command: str) -> str:
-    """What a command leaves in its place."""
+    """Name of what a command leaves in its place."""
     return "out.json" if command == "replay" else "out"
 
 

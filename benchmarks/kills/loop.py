@@ -89,7 +89,7 @@ def blow(cell: Cell, name: str, folder: Path, log: Path, fill: "Fill") -> tuple[
 
 
 def goes_on(cell: Cell, name: str, folder: Path, log: Path) -> int | None:
-    """The same command once more, until the stage is done; what comes after it is not waited for.
+    """Run the command once more, until the stage is done; what comes after it is not waited for.
 
     Returns 0 when it is, else the command's exit status, None where it does neither.
     """

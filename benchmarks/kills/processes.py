@@ -86,7 +86,7 @@ def wait_end(running: subprocess.Popen[bytes]) -> tuple[int | None, float]:
 
 
 def orphans(mark: str) -> list[str]:
-    """What still lives after the grace; it is killed then."""
+    """Processes that still live after the grace; they are killed then."""
     end = time.monotonic() + GRACE
     while marked(mark) and time.monotonic() < end:
         time.sleep(0.2)

@@ -74,7 +74,7 @@ async def prefect(arm: Arm, loops: int, stages: int) -> None:
 
 
 def stage(run: str, number: int) -> dict[str, Any]:
-    """What Prefect is told of a stage."""
+    """Record of a stage for Prefect."""
     kind = STAGES[number % len(STAGES)]
     return {
         "flow_run_id": run,

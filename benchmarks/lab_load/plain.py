@@ -35,7 +35,7 @@ def mlflow(workspace: Path, workers: int) -> Iterator[str]:
 
 @contextmanager
 def prefect(workspace: Path) -> Iterator[str]:
-    """The same of Prefect's."""
+    """Serve Prefect plainly."""
     port = free_port()
     command = ["prefect", "server", "start", "--host", HOST, "--port", str(port)]
     with served(command, workspace, f"http://{HOST}:{port}", "api/health", "prefect"):

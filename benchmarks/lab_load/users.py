@@ -16,7 +16,7 @@ API = "api/2.0/mlflow"
 
 @dataclass(frozen=True)
 class Known:
-    """What may be looked up."""
+    """Objects that may be looked up."""
 
     experiment: str
     runs: Sequence[str]
@@ -59,7 +59,7 @@ class Request:
 
 
 def look_ups(known: Known, draw: random.Random) -> dict[str, list[Request]]:
-    """What a page of each kind asks its server."""
+    """Requests of a page of each kind to its server."""
     run, model, flow_run = draw.choice(known.runs), draw.choice(known.models), draw.choice(known.flow_runs)
     page = {"experiment_ids": [known.experiment], "max_results": 100, "order_by": ["attributes.start_time DESC"]}
     of_run = {"flow_runs": {"id": {"any_": [flow_run]}}, "limit": 200, "sort": "EXPECTED_START_TIME_DESC"}
@@ -85,7 +85,7 @@ def look_ups(known: Known, draw: random.Random) -> dict[str, list[Request]]:
 
 
 async def seen(arm: Arm, experiment: str, file: str) -> Known:
-    """What there is, as the servers themselves say it: runs with files are those that became versions of a model.
+    """Objects that the servers themselves list: runs with files are those that became versions of a model.
 
     Args:
         arm: the servers.

@@ -1,4 +1,4 @@
-"""What a finished loop has left: the hashes of its files without wall times, and its runs in MLflow's database."""
+"""Facts of a finished loop: the hashes of its files without wall times, and its runs in MLflow's database."""
 
 import csv
 import hashlib

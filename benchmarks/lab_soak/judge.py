@@ -13,7 +13,7 @@ FINISHED = "FINISHED"
 
 @dataclass
 class Verdict:
-    """What was found; the soak holds where `broken` is empty."""
+    """Verdict on a soak; it holds where `broken` is empty."""
 
     broken: list[str] = field(default_factory=list)
     faults: list[list[str]] = field(default_factory=list)
@@ -104,7 +104,7 @@ def runs(loop: Event, against: Event, sha: str | None, known: set[str]) -> list[
 
 
 def partial(run: Event, wanted: Event, sha: str | None) -> list[str]:
-    """What a finished run has otherwise than its reference."""
+    """Differences of a finished run from its reference."""
     keys = ("params", "points", "stage", "versions")
     found = [f"{key} {run[key]}, expected {wanted[key]}" for key in keys if run[key] != wanted[key]]
     if files_of(run) != files_of(wanted):

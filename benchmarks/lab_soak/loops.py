@@ -33,12 +33,12 @@ TINY: dict[str, Any] = {
     "distill": {"iterations": 1, "env": {"num_worlds": 8}},
     "evaluate": {"max_motions": 2, "max_seconds": 0.5, "engines": ["stand_in"]},
 }
-"""Of params.yaml, over the smoke profile: the lab is soaked, and a stage should be little more than its start."""
+"""Changes of params.yaml over the smoke profile: the lab is soaked, and a stage should be little but its start."""
 
 
 @dataclass
 class Running:
-    """What the faults may hit: the loop that is at work."""
+    """Loop that is at work, which the faults may hit."""
 
     process: subprocess.Popen[bytes] | None = None
 
@@ -76,7 +76,7 @@ def create(folder: Path, seed: int, salt: str, lab: dict[str, Any] | None) -> Pa
 
 
 def reference(folder: Path, seed: int, record: Record) -> None:
-    """The same seed on this machine alone, without servers and faults."""
+    """Run the seed on this machine alone, without servers and faults."""
     made = create(folder, seed, "reference", None)
     command = [sys.executable, "-m", "dvc", "repro", "-q"]
     began = time.monotonic()
@@ -117,7 +117,7 @@ def loop(job: Job, record: Record, now: Running) -> bool:
 
 
 def log_name(number: int, attempt: int) -> str:
-    """Of the file with what a start says."""
+    """Name of the file with what a start says."""
     return f"loop-{number:03d}-{attempt:02d}.log"
 
 

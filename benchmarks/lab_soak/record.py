@@ -1,4 +1,4 @@
-"""What happened, a line of JSON each, written as it happens: a soak that is cut short can still be judged."""
+"""Record of what happened, a line of JSON each, written as it happens: a soak that is cut short can still be judged."""
 
 import json
 import threading

@@ -7,7 +7,7 @@ TELLS = re.compile(
     r"could not|ending|gone|not started|hung|denied|unavailable|retry",
     re.IGNORECASE,
 )
-UNFORESEEN = "an error that should not happen"
+UNFORESEEN = "internal error"
 TRACEBACK = "Traceback (most recent call last)"
 LINES, LENGTH = 200, 400
 
@@ -76,7 +76,7 @@ def telling(text: str) -> list[str]:
 
 
 def name_of(line: str) -> str | None:
-    """What the line is called; None for one that nobody has named, and for what the code itself did not foresee."""
+    """Name of the line; None for one that nobody has named, and for what the code itself did not foresee."""
     if UNFORESEEN in line:
         return None
     return next((name for name, (pattern, _) in NAMED.items() if pattern.search(line)), None)

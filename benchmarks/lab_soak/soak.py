@@ -17,12 +17,12 @@ LATE = 600.0  # [s] after the last fault that the loop at work has to end
 
 @dataclass(frozen=True)
 class Plan:
-    """What is soaked."""
+    """Plan of a soak."""
 
     minutes: float
     """Length, without the references and the end of the last loop."""
     seed: int
-    """Of the faults' schedule."""
+    """Seed of the faults' schedule."""
     seeds: int
     """Different loops, each with a reference."""
     workers_every: float

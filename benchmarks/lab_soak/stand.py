@@ -24,14 +24,14 @@ DISK = "700m"  # of each worker and of the workspaces
 
 @dataclass
 class Stand:
-    """What runs, and how to hit it."""
+    """Processes that run, and how to hit them."""
 
     folder: Path
     postgres: machines.Postgres
     store: machines.Store
     seaweed: "Server"
     address: str
-    """Of Ray's head."""
+    """Address of Ray's head."""
     workers: list[clusters.Node]
 
     @property
@@ -40,7 +40,7 @@ class Stand:
         return self.folder / "loops"
 
     def content(self, remote: Path) -> dict[str, Any]:
-        """Of lab.yaml."""
+        """Content of lab.yaml."""
         mlflow = {"database": self.postgres.url("mlflow"), "artifacts": f"s3://{self.store.bucket}/mlflow"}
         return {
             "prefect": {"database": self.postgres.url("prefect")},
@@ -53,7 +53,7 @@ class Stand:
         self.workers[number].kill()
 
     def start_worker(self, number: int) -> None:
-        """The same machine again, with its folder as it was left."""
+        """Start the machine again, with its folder as it was left."""
         self.workers[number] = worker(self.folder / f"worker{number}", self.address)
 
 

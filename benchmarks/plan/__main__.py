@@ -1,4 +1,4 @@
-"""What planned runs are worth on sealed robots, with random motions of equal length beside them.
+"""Worth of planned runs on sealed robots, with random motions of equal length beside them.
 
     python -m benchmarks.plan --out results.jsonl --workers 32 --limit 120
     python -m benchmarks.plan --table results.jsonl

@@ -44,7 +44,7 @@ def judged(
 
 
 def against(motion: HumanMotion, raw: RawMotion, reference: Clip | None = None, fps: float = FPS) -> dict[str, float]:
-    """What a retargeted motion is worth, however it was made (another's result, too).
+    """Measures of a retargeted motion, however it was made (another's result, too).
 
     `landmark_mm` is the mean distance of the robot's landmarks from those of the person scaled to its size, both
     relative to the pelvis; `joint_rad`, `keypoint_mm`, `keypoint_local_mm` are those against the reference.
@@ -101,7 +101,7 @@ def main() -> None:
     parser.add_argument("path", type=Path, help="motions of people, in any format; of the robot: their landmarks")
     parser.add_argument("--retargeters", nargs="+", default=[OURS], help="package.module:name")
     parser.add_argument("--reference", type=Path, help="somebody's result on the robot, under the same names")
-    parser.add_argument("--every", type=int, default=1, help="take every so manieth motion")
+    parser.add_argument("--every", type=int, default=1, help="take every n-th motion")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     raws = (

@@ -1,4 +1,4 @@
-"""What a robot is taken to be, beside what its model declares: what a diagnosis found, a delta action, or both."""
+"""Correction of the declared model: what a diagnosis found, a delta action, or both."""
 
 from dataclasses import dataclass
 from pathlib import Path

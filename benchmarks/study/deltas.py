@@ -34,14 +34,14 @@ WORK = "benchmarks.study.delta_work"
 
 @dataclass(frozen=True)
 class DeltasConfig:
-    """What is fixed beforehand."""
+    """Settings that are fixed beforehand."""
 
     delta: DeltaConfig = field(
         default_factory=lambda: DeltaConfig(
             method="ppo", limit=0.2, num_envs=1024, ppo=replace(DELTA_PPO, iterations=1000)
         )
     )
-    """The same for a cluster's own and the general one, which thus sees a cluster a fifth as often."""
+    """Settings of a cluster's own and the general one, which thus sees a cluster a fifth as often."""
     steps: float = 5e6
     """Control steps by which the base policy trains on on a cluster's motions."""
     tries: int = 2

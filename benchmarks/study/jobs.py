@@ -1,4 +1,4 @@
-"""What is trained in the study: each policy as a job, from which parent, on which motions, for how many steps."""
+"""Jobs of the study: each policy, from which parent, on which motions, for how many steps."""
 
 import json
 from collections.abc import Sequence

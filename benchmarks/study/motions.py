@@ -19,7 +19,7 @@ from bumblebee.motion.pieces import hold_out, motion_of
 
 MOTIONS, LABELS = "motions.npz", "labels.csv"
 SHARE = 0.22
-"""Of each family's motions that is held out, by a hash of their names."""
+"""Share of each family's motions that is held out, by a hash of their names."""
 CLUSTERING = ClusterConfig()
 
 
@@ -102,7 +102,7 @@ def prepare(sources: Sequence[Path], out: Path, texts: Path | None = None, clust
 
 
 def read_motions(folder: Path) -> Motions:
-    """What `prepare` wrote.
+    """Motions that `prepare` wrote.
 
     Raises:
         BadInput: if it is not there, or pieces and labels do not belong together.

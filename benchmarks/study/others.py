@@ -36,13 +36,13 @@ def other(study: Study, name: str) -> Baseline:
 
 
 def teachers_task(study: Study, name: str) -> Baseline:
-    """What its teacher learns in: what only the student sees is not computed."""
+    """Task that its teacher learns in: what only the student sees is not computed."""
     own = other(study, name)
     return replace(own, env=replace(own.env, student=ObservationConfig(terms=())))
 
 
 def students_task(study: Study, name: str) -> Baseline:
-    """What its student learns in: the teacher answers what it sees without noise."""
+    """Task that its student learns in: the teacher answers what it sees without noise."""
     own = other(study, name)
     exact = replace(own.env.observation, noise=0.0)
     return replace(own, env=replace(own.env, observation=exact, num_worlds=study.distil.worlds))

@@ -1,4 +1,4 @@
-"""What a step is worth under the paper's printed rewards: to the reference itself, and to a policy that follows it.
+"""Reward of a step under the paper's printed terms: to the reference itself, and to a policy that follows it.
 
     python -m benchmarks.study.printed_rewards study/run/s0-base --motions study/motions --out rewards.md
 
@@ -94,7 +94,7 @@ def on_reference(engine: Engine, frame: int, ref: ReferenceFrame) -> Tensor:
 
 
 def by_policy(policy: Policy, how: Manner, worlds: int, library: MotionLibrary) -> Mover:
-    """What a policy does without noise."""
+    """Motion under a policy without noise."""
     group = Group(how.seen, (worlds, library.num_joints, len(library.ahead)), 0.0, torch.device("cpu"))
     scale = action_scale() if how.scale is None else torch.full((library.num_joints,), how.scale)
     middle, act = action_middle(policy.shape.action), policy.follower()

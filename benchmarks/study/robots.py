@@ -48,10 +48,10 @@ GROUND = ("ground_compliance", "ground_friction")
 
 @dataclass(frozen=True)
 class RobotsConfig:
-    """What is drawn, and when a robot is taken."""
+    """Settings of the draw, and when a robot is taken."""
 
     name: str = "robot"
-    """Of each robot, with its number."""
+    """Name of each robot, with its number."""
     seeds: tuple[int, ...] = (1801, 1802, 1803)
     """One for each robot."""
     fixed: tuple[tuple[tuple[str, str, str], ...], ...] = ()
@@ -78,9 +78,9 @@ class RobotsConfig:
     max_seconds: float = 8.0
     """Longer motions are cut to their beginning [s]."""
     base: str = BASES[1]
-    """What the robot knows of its base's place."""
+    """Source of the base's place for the robot."""
     trial_seed: int = 1899
-    """Of start states and sensor noise; the rounds use others."""
+    """Seed of start states and sensor noise; the rounds use others."""
 
 
 _PITCH, _KNEE = "{}_ankle_pitch_joint", "{}_knee_joint"

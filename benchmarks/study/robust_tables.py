@@ -1,4 +1,4 @@
-"""What keeps a policy up on robots that nobody declared: single changes of the base policy's task, at equal steps."""
+"""Changes that keep a policy up on robots that nobody declared: single ones of the base policy's task."""
 
 from pathlib import Path
 

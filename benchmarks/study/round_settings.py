@@ -1,4 +1,4 @@
-"""What the rounds fix beforehand, and which of it the command line chooses."""
+"""Settings that the rounds fix beforehand, and which of them the command line chooses."""
 
 import argparse
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ from bumblebee.learning.delta import DELTA_PPO, DeltaConfig
 
 @dataclass(frozen=True)
 class RoundsConfig:
-    """What the rounds fix beforehand."""
+    """Settings that the rounds fix beforehand."""
 
     rounds: int = 2
     motions: int = 20
@@ -27,11 +27,11 @@ class RoundsConfig:
     steps: float = 10e6
     """Control steps by which each arm trains on in a round."""
     record_base: str = BASES[2]
-    """What a recording says of the base's place."""
+    """Source of the base's place in a recording."""
     tried_base: str = BASES[1]
-    """What the robot knows of its base's place while it is tried and recorded."""
+    """Source of the base's place for the robot while it is tried and recorded."""
     record_seed: int = 18_100
-    """Of start states and sensor noise; a round has seeds of its own, and so have trials."""
+    """Seed of start states and sensor noise; a round has seeds of its own, and so have trials."""
     try_seed: int = 18_900
     delta: DeltaConfig = field(
         default_factory=lambda: DeltaConfig(
@@ -39,9 +39,9 @@ class RoundsConfig:
         )
     )
     diagnosis: DiagnosisConfig = field(default_factory=DiagnosisConfig)
-    """Of the first round, before a GPU is there."""
+    """Settings of the first round's diagnosis, before a GPU is there."""
     later: DiagnosisConfig = field(default_factory=lambda: DiagnosisConfig(search_seconds=150.0, beyond_seconds=30.0))
-    """Of later rounds, which GPUs wait for: less time, on all cores."""
+    """Settings of later rounds' diagnoses, which GPUs wait for: less time, on all cores."""
     judge_worlds: int = 64
     """Robots that replay held-out recordings at once."""
 
@@ -68,7 +68,7 @@ SMALL_CONFIG = RoundsConfig(
 
 
 def settings(options: argparse.Namespace) -> tuple[Study, RoundsConfig]:
-    """Of the study and of its rounds, by the command line."""
+    """Settings of the study and of its rounds, by the command line."""
     if options.small:
         return SMALL, SMALL_CONFIG
     return Study(), REGRESSION if options.regression else RoundsConfig()

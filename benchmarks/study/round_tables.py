@@ -1,4 +1,4 @@
-"""What rounds did: success on each robot, error on held-out recordings, what was found; intervals are over motions."""
+"""Results of rounds: success on each robot, error on held-out recordings, what was found; intervals over motions."""
 
 import json
 from collections.abc import Sequence

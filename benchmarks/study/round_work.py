@@ -37,7 +37,7 @@ from bumblebee.sim.sensors import load_model
 from tasks.stand_in import cut
 
 CORRECTIONS = {"declared": (), "physics": ("diagnosis",), "delta": ("delta",), "both": ("diagnosis", "delta")}
-"""What held-out recordings of round 1 are replayed in."""
+"""Corrections that held-out recordings of round 1 are replayed in."""
 
 
 class Work:
@@ -64,7 +64,7 @@ class Work:
         return [cut(by_name[name], self.config.max_seconds) for name in names]
 
     def correction(self, parts: Sequence[str], deltas: str) -> Correction:
-        """What this round's recordings led to; `deltas` is the arm whose delta action it is."""
+        """Correction that this round's recordings led to; `deltas` is the arm whose delta action it is."""
         place = self.place
         return Correction(
             self.out / place.recorded.name / "diagnosis" if "diagnosis" in parts else None,
@@ -101,7 +101,7 @@ def record(work: Work) -> None:
 
 
 def diagnosis(work: Work) -> None:
-    """What the declared model lacks, from the recordings to learn from."""
+    """Diagnose what the declared model lacks, from the recordings to learn from."""
     mujoco.set_mju_user_warning(lambda text: None)
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as scratch:

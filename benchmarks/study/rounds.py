@@ -30,7 +30,7 @@ from bumblebee.learning.policy import FILE
 BASE = "base"
 """The arm of what all arms share: the base policy, the recordings of round 1 and their diagnosis."""
 ARMS = {"none": (), "physics": ("diagnosis",), "delta": ("delta",), "both": ("diagnosis", "delta")}
-"""What each arm corrects the simulator by. The longest way is the last and goes first."""
+"""Corrections of the simulator in each arm. The longest way is the last and goes first."""
 KINDS = ("tried", "record", "diagnosis", "delta", "errors", "policy")
 WORK = "benchmarks.study.round_work"
 

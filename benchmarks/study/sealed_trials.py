@@ -48,7 +48,7 @@ from bumblebee.tracking.rows import Rows
 from tasks.stand_in import cut
 
 SEED = 1897
-"""Of starts and sensor noise; neither the search of the robots nor the rounds use it."""
+"""Seed of starts and sensor noise; neither the search of the robots nor the rounds use it."""
 TRAINED = 40
 """Training motions, shared among the clusters."""
 
@@ -102,7 +102,7 @@ def follow_sealed(
 
 
 def chosen_clips(motions: Motions, config: RobotsConfig) -> list[Clip]:
-    """What is followed: a piece of every held-out motion, and training motions of all clusters, cut."""
+    """Clips to follow: a piece of every held-out motion, and training motions of all clusters, cut."""
     labels = motions.labels
     held = labels[labels["split"] == "test"].drop_duplicates("motion")["name"]
     names = [*held, *thin(labels[labels["split"] == "train"], TRAINED)]

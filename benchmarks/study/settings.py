@@ -1,4 +1,4 @@
-"""What the study fixes beforehand, and the file that holds a run to it."""
+"""Settings that the study fixes beforehand, and the file that holds a run to it."""
 
 import hashlib
 import json
@@ -33,7 +33,7 @@ TASK = EnvConfig(
 
 @dataclass(frozen=True)
 class Distilling:
-    """What the arms of the part `generalist` share."""
+    """Settings that the arms of the part `generalist` share."""
 
     iterations: int = 4000
     worlds: int = 4096
@@ -57,7 +57,7 @@ class Study:
     """Seeds, budgets and settings, the same for every arm."""
 
     seeds: tuple[int, ...] = (0, 1, 2)
-    """Of the base policy, of everything trained on from it, and of its random clusters."""
+    """Seeds of the base policy, of everything trained on from it, and of its random clusters."""
     base_steps: float = 80e6
     """Control steps of a base policy, which learns from all training motions."""
     expert_steps: float = 16e6
@@ -113,7 +113,7 @@ PAPER_CHANGES: dict[str, tuple[str, ...]] = {
     "ours-wide": ("adaptive", "ours", "wide"),
     "actions-seen": ("actions", "algorithm", "seen"),
 }
-"""What each arm of the part `paper-task` changes of the printed task; rewards are in `benchmarks/reward_arms.py`."""
+"""Changes of the printed task by each arm of the part `paper-task`; rewards are in `benchmarks/reward_arms.py`."""
 
 
 TASK_PARTS: dict[str, tuple[str, ...]] = {
@@ -126,7 +126,7 @@ TASK_PARTS: dict[str, tuple[str, ...]] = {
 
 
 PROPRIOCEPTION = ("gravity_b", "root_ang_vel_b", "joint_pos", "joint_vel", "last_action")
-"""What the arms with a history see over ten steps."""
+"""Terms that the arms with a history see over ten steps."""
 WIDE: dict[str, Any] = {
     "friction": (0.3, 1.5),
     "gains": 0.35,
@@ -136,7 +136,7 @@ WIDE: dict[str, Any] = {
     "push": 1.0,
     "delay": (0.0, 0.06),
 }
-"""What the arm `wide` draws instead of the paper's ranges."""
+"""Ranges that the arm `wide` draws from instead of the paper's."""
 ROBUST_CHANGES: dict[str, tuple[str, ...]] = {
     "judged": ("own",),
     "place": ("own", "blind"),
@@ -221,7 +221,7 @@ SMALL = Study(
     paper_ppo=replace(PAPER, steps=16, epochs=1, hidden=(32, 32)),
     distil=Distilling(iterations=3, worlds=8, steps=4, capacity=4000),
 )
-"""The same study in seconds on two cores: it shows that every part runs, and nothing else."""
+"""Study in seconds on two cores: it shows that every part runs, and nothing else."""
 
 
 def freeze(out: Path, study: Study, **inputs: Any) -> str:
@@ -253,7 +253,7 @@ def freeze(out: Path, study: Study, **inputs: Any) -> str:
 
 
 def frozen(out: Path) -> dict[str, Any]:
-    """What `freeze` wrote.
+    """Content that `freeze` wrote.
 
     Raises:
         BadInput: if nothing was begun there.

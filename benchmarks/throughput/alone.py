@@ -67,7 +67,7 @@ def command(env: TrackingEnv, targets: torch.Tensor) -> None:
 
 @contextmanager
 def without_overflow(env: TrackingEnv) -> Iterator[None]:
-    """What physics alone does meanwhile leaves no trace in the engine's count of dropped contacts.
+    """Keep physics alone from leaving a trace in the engine's count of dropped contacts.
 
     Robots that nobody restarts may lie in a heap, for which an environment's buffers need not be large enough.
     """

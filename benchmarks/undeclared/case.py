@@ -117,6 +117,6 @@ def _smallest(truth: dict[str, Any], document: dict[str, Any]) -> float | None:
 
 
 def _brief(entry: dict[str, Any]) -> dict[str, Any]:
-    """What of an entry is kept."""
+    """Part of an entry that is kept."""
     keep = ("effect", "where", "parameters", "equivalent", "explains", "evidence")
     return {k: entry[k] for k in keep if k in entry}

@@ -31,9 +31,9 @@ class Drawn:
     truth: list[dict[str, Any]]
     """The contract's entries (effect, where, parameters), with nominal values, size, minimal size and ratio."""
     shown: list[Rollout]
-    """What every method gets."""
+    """Rollouts that every method gets."""
     judge: list[Rollout]
-    """What only the judge gets."""
+    """Rollouts that only the judge gets."""
 
 
 def draw(case: Case, seed: int, policy: Path | None = None) -> Drawn:

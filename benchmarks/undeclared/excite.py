@@ -1,4 +1,4 @@
-"""What the robots do: an arm follows sums of sines and rests, a G1 stands, shifts its weight and moves its arms.
+"""Excitation of the robots: an arm follows sums of sines and rests, a G1 stands, shifts its weight and moves its arms.
 
 A plan gives the target of every tick from the robot's true state, so that a standing robot can balance.
 """

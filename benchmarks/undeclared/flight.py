@@ -19,7 +19,7 @@ _BEFORE_FALL = 10  # ticks that are cut off before a fall
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """What R robots did in T ticks, without noise."""
+    """Motion of R robots in T ticks, without noise."""
 
     qpos: np.ndarray
     """(T, R, nq) as faultless sensors behind this robot's own faults say."""

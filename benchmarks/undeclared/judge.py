@@ -1,4 +1,4 @@
-"""What a diagnosis is worth: names, places, sizes and intervals against the truth, and the error that is left."""
+"""Score of a diagnosis: names, places, sizes and intervals against the truth, and the error that is left."""
 
 import re
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ def _named(truth: Entry, effect: str, where: Sequence[str]) -> bool:
 
 
 def _where(truth: Entry, where: Sequence[str]) -> bool:
-    """The same joint or body; for what has no place of its own any place is right."""
+    """Whether joint or body are the true ones; for what has no place of its own any place is right."""
     return not truth["where"] or set(truth["where"]) == set(where)
 
 
@@ -85,7 +85,7 @@ def _size(truth: Entry, found: Entry) -> dict[str, Any] | None:
 
 
 def _outside(truth: Sequence[Entry], document: dict[str, Any]) -> dict[str, bool] | None:
-    """Of a strange effect: was it flagged, its joint named, what it depends on named."""
+    """Verdict on a strange effect: was it flagged, its joint named, what it depends on named."""
     strange = [t for t in truth if KINDS[t["effect"]].outside]
     structure = document.get("unexplained", {})
     discovered = [f for f in document["effects"] if f["effect"] == "discovered"]

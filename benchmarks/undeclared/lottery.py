@@ -138,7 +138,7 @@ def _later() -> list[dict[str, Any]]:
 
 
 def draw_signs(kind: str, robot_joints: tuple[str, ...], rng: np.random.Generator) -> dict[str, Any]:
-    """What a size leaves open."""
+    """Properties that a size leaves open."""
     assert kind in KINDS
     return {
         "sign": int(rng.choice([-1, 1])),

@@ -93,7 +93,7 @@ class Windows:
         return self._errors(robots, self.target)
 
     def known(self, off: np.ndarray, rng: np.random.Generator, guess: bool) -> np.ndarray:
-        """The same with the flight's effects; what no reading shows is as it was, or guessed from noisy readings."""
+        """Starts with the flight's effects; what no reading shows is as it was, or guessed from noisy readings."""
         robot, model, nv, joints = self.robot, self.model, self.model.nv, len(self.robot.joints)
         r, k = self.picks.T
         around = k + np.array([[-1], [0], [1]])

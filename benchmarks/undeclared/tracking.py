@@ -44,7 +44,7 @@ class TrackPlan:
         self._hold = self._runner.hold()
 
     def target(self, tick: int, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
-        """What the policy wants; it sees the state without noise."""
+        """Target that the policy wants; it sees the state without noise."""
         joints = self._hold.shape[1]
         quat = qpos[:, 3:7] / np.linalg.norm(qpos[:, 3:7], axis=1, keepdims=True)
         sensors = Sensors(

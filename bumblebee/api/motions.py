@@ -16,7 +16,7 @@ EMBEDDED = "embedded"
 
 
 def read_motions(path: str | Path = EMBEDDED, *, max_seconds: float = 0.0, **settings: Any) -> list[Clip]:
-    """Read all motions at a path as motions of the G1 at 50 Hz; people's are retargeted.
+    """Read all motions at a path as motions of the G1 at 50 Hz; people's are retargeted, once for each file.
 
     Args:
         path: a file, a folder or an archive in any format that docs/data.md lists, a motion library, or
@@ -38,6 +38,7 @@ def read_motions(path: str | Path = EMBEDDED, *, max_seconds: float = 0.0, **set
         >>> len(motions), motions[0].joint_pos.shape[1]
         (2, 23)
     """
+    from bumblebee.motion.cache import user_cache
     from bumblebee.motion.embedded import EmbeddedConfig, make_library
     from bumblebee.motion.folder import read_folder
     from bumblebee.motion.settings import ReadConfig
@@ -45,7 +46,7 @@ def read_motions(path: str | Path = EMBEDDED, *, max_seconds: float = 0.0, **set
     if str(path) == EMBEDDED:
         return make_library(_settings(EmbeddedConfig, settings))
     config = _settings(ReadConfig, {"max_seconds": max_seconds, **settings})
-    return read_folder(Path(path).expanduser(), config).clips
+    return read_folder(Path(path).expanduser(), config, cache=user_cache()).clips
 
 
 def _settings(kind: Callable[..., Any], given: Mapping[str, Any]) -> Any:

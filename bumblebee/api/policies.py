@@ -1,13 +1,12 @@
 """Load a policy, try it on motions, and let it follow one."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bumblebee.api import checks
-from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 
 if TYPE_CHECKING:
@@ -52,21 +51,14 @@ def load_policy(folder: str | Path = "shipped") -> "Policy | Deployed":
 class Deployed:
     """An exported policy (`policy.onnx`), as a function of observations.
 
-    Args:
-        exported: the policy; one that sees one control step and remembers nothing.
+    `evaluate` and `follow` run it as a robot does, with its history and memory. Called as a function, a policy with a
+    memory acts as at an episode's first step.
 
-    Raises:
-        BadInput: a policy with a history or a memory, which the runner of `bumblebee.deploy` feeds.
+    Args:
+        exported: the policy.
     """
 
     def __init__(self, exported: "ExportedPolicy") -> None:
-        from bumblebee.tracking.config import ObservationConfig
-
-        plain = exported.seen == ObservationConfig() and exported.memory is None
-        if not plain or exported.contract["action"]["base"] != "reference":
-            raise BadInput(
-                exported.folder, "a policy with the default observation", f"{exported.seen}", "Give its policy.pt."
-            )
         self.exported = exported
 
     def __call__(self, observation: "torch.Tensor") -> "torch.Tensor":
@@ -74,13 +66,6 @@ class Deployed:
         import torch
 
         return torch.from_numpy(self.exported.act(observation.numpy()))
-
-
-def ahead_of(policy: "Policy | Deployed") -> tuple[float, ...]:
-    """Look-ahead times [s] of the reference that a policy sees."""
-    if isinstance(policy, Deployed):
-        return tuple(policy.exported.contract.get("ahead", ()))
-    return policy.shape.ahead
 
 
 def evaluate(
@@ -98,7 +83,8 @@ def evaluate(
         policy: the policy, or its folder.
         motions: one motion or several, at 50 Hz.
         repeats: rollouts of each motion.
-        noise: factor on the noise of start and sensors; 0 is none, 1 that of training.
+        noise: factor on the noise of start and sensors; 0 is none, 1 that of training (of the stand-in robot for a
+            folder with `policy.onnx` alone).
         seed: seed of that noise.
         threads: CPU threads of the physics.
 
@@ -116,12 +102,15 @@ def evaluate(
         >>> table["success"].tolist()
         [True, True]
     """
+    from bumblebee.deploy.trial import try_exported
     from bumblebee.learning.trial import Trials, World, try_policy
     from bumblebee.sim.sensors import load_model
 
-    clips, own = checks.motions(motions), _loaded(policy)
+    clips, own, trials = checks.motions(motions), _loaded(policy), Trials(repeats, noise, seed)
+    if isinstance(own, Deployed):
+        return try_exported(own.exported, clips, repeats, noise, seed, threads)
     world = World(load_model(physics_hz=PHYSICS_HZ), threads=threads)
-    return try_policy(cast(Callable[..., Any], own), clips, world, ahead_of(own), Trials(repeats, noise, seed))
+    return try_policy(own, clips, world, own.shape.ahead, trials)
 
 
 def follow(policy: "Policy | Deployed | str | Path", motion: Clip) -> Clip:
@@ -146,21 +135,22 @@ def follow(policy: "Policy | Deployed | str | Path", motion: Clip) -> Clip:
     """
     import torch
 
-    from bumblebee.learning.policy import Policy
+    from bumblebee.deploy.trial import follow_exported
     from bumblebee.learning.rollout import Manner, roll_out
     from bumblebee.motion.kinematics import make_clip
     from bumblebee.sim.engine_choice import make_engine
     from bumblebee.sim.sensors import load_model
-    from bumblebee.tracking.config import ObservationConfig
     from bumblebee.tracking.library import MotionLibrary
 
     clip, own = checks.motions(motion, "motion")[0], _loaded(policy)
+    if isinstance(own, Deployed):
+        return follow_exported(own.exported, clip)
     engine = make_engine("mujoco", load_model(physics_hz=PHYSICS_HZ), 1, 1)
-    manner = Manner(own.shape.seen if isinstance(own, Policy) else ObservationConfig())
-    library = MotionLibrary([clip], ahead_of(own))
+    manner = Manner(own.shape.seen)
+    library = MotionLibrary([clip], own.shape.ahead)
     rows = [(clip.root_pos[0], clip.root_quat[0], clip.joint_pos[0])]
     with torch.inference_mode():
-        for tick in roll_out(cast(Callable[..., Any], own), manner, library, engine):
+        for tick in roll_out(own, manner, library, engine):
             state = tick.state
             rows.append((state.root_pos_w[0].numpy(), state.root_quat_w[0].numpy(), state.joint_pos[0].numpy()))
     root, quat, joints = (np.stack(part) for part in zip(*rows, strict=True))

@@ -210,7 +210,7 @@ def _kept(
     after = evaluate(policy, clips, threads=config.threads)
     before = None if parent is None else evaluate(parent, clips, threads=config.threads)
     if before is not None and _score(after) < _score(before):
-        say("training made it no better on the training motions: the policy that it began from is kept")
+        say("training did not improve success on the training motions: the initial policy is kept")
         policy, kept = load_policy(str(parent)), before  # type: ignore[assignment]
     else:
         kept = after

@@ -26,11 +26,11 @@ from bumblebee.tracking.terminations import fallen
 
 NAME = "exbody2"
 PROPRIOCEPTION = ("root_ang_vel_b", "ex_roll_pitch", "ex_yaw_error", "joint_pos", "ex_joint_vel", "last_action")
-"""What both see of the robot, now and over the history."""
+"""Observation terms of the robot that teacher and student see, now and over the history."""
 GOAL = ("ex_target_joint_pos", "ex_target_lin_vel", "target_ang_vel", "ex_target_attitude", "ex_target_keys")
-"""What both see of the reference, now."""
+"""Observation terms of the reference that teacher and student see, now."""
 PRIVILEGED = ("ex_key_errors", "key_pos_b", "root_lin_vel_b")
-"""What the teacher sees beside it, now."""
+"""Observation terms that the teacher alone sees, now."""
 
 AIR_TIME = 0.5  # s
 FORCE = 500.0  # N

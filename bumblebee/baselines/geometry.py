@@ -1,4 +1,4 @@
-"""What the other groups' observations need beside our own: heading, roll-pitch-yaw, a point in the head."""
+"""Geometry that the other groups' observations need beside our own: heading, roll-pitch-yaw, a point in the head."""
 
 import math
 

@@ -18,9 +18,9 @@ from bumblebee.tracking.rewards import RewardConfig
 
 NAME = "hover"
 COMMAND = ("hover_command", "hover_mask")
-"""What the student is told while it is trained: a masked command and its mask."""
+"""Terms that tell the student its command in training: a masked command and its mask."""
 COMMAND_TRIED = ("hover_command_all", "hover_mask_all")
-"""What it is told when it is tried: all of the command, as the paper compares it."""
+"""Terms that tell the student its command in trials: all of the command, as the paper compares it."""
 WEIGHTS = {name: weight for name, weight in OMNIH2O_WEIGHTS.items() if name != "body_rotation"} | {"stumble": -1000.0}
 
 

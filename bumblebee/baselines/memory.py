@@ -1,4 +1,4 @@
-"""What an episode's steps so far leave for the rewards of feet and of moving bodies."""
+"""State that an episode's steps so far leave for the rewards of feet and of moving bodies."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ _CONTACT = 1.0  # N, as in legged_gym
 
 @dataclass(frozen=True)
 class Now:
-    """What a step adds to the state.
+    """Additions of one step to the state.
 
     `key_vel_w` (B, K, 3) [m/s] of the key bodies by differences; of the feet (B, 2): `contact` bool (now, unfiltered),
     `landed` bool (down after a flight), `air_time` [s] and `height` [m, the highest] of the flight that goes on or has

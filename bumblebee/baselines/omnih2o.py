@@ -32,9 +32,9 @@ TEACHER = (
 )
 """The privileged teacher's terms."""
 PROPRIOCEPTION = ("joint_pos", "joint_vel", "root_ang_vel_b", "gravity_b", "last_action")
-"""What the student sees of itself, now and over 25 control steps."""
+"""Observation terms of the student's own body, now and over 25 control steps."""
 GOAL = ("h2o_three_errors_h", "h2o_three_targets_h", "h2o_three_speeds_h")
-"""What the student sees of the reference: hands and head, now."""
+"""Observation terms of the reference for the student: hands and head, now."""
 
 ROWS: dict[str, Row] = {
     "joint_position": rows.joint_position(0.5),

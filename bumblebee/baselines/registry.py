@@ -9,7 +9,7 @@ from bumblebee.baselines.spec import Baseline
 from bumblebee.errors import BadInput
 
 BASELINES: dict[str, Callable[[], Baseline]] = {"omnih2o": omnih2o, "exbody2": exbody2, "hover": hover}
-"""What makes each."""
+"""Function that makes each baseline, by name."""
 
 
 def baseline(name: str) -> Baseline:

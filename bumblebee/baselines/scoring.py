@@ -16,7 +16,7 @@ _MEAN_OF = 10_000  # ended episodes that the mean length remembers
 
 @dataclass(frozen=True)
 class Judged:
-    """What a row may use: the step, what the steps before it left, and which worlds (B,) bool it loses."""
+    """Inputs of a row: the step, what the steps before it left, and which worlds (B,) bool it loses."""
 
     step: Step
     now: Now

@@ -1,4 +1,4 @@
-"""What makes a baseline: the task, the algorithm, the student, the reward, and when an episode is lost."""
+"""Parts of a baseline: the task, the algorithm, the student, the reward, and when an episode is lost."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class Baseline:
     scale: float = 0.25
     """Factor [rad] on the actions of all joints, around the relaxed stand."""
     tried: ObservationConfig | None = None
-    """What the student sees when it is tried, if that is not what it saw in training."""
+    """Observation of the student in trials, if that is not what it saw in training."""
 
 
 def tilted(state: RobotState, ref: ReferenceFrame) -> Tensor:

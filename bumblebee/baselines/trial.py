@@ -25,7 +25,7 @@ from bumblebee.tracking.randomisation import randomise_worlds
 from bumblebee.tracking.terminations import fallen
 
 ROBOTS_SEED = 11
-"""Of robots that differ, the same for all policies."""
+"""Seed of robots that differ, the same for all policies."""
 UPRIGHT_HEIGHT, UPRIGHT_TILT = 0.25, 0.8
 """The rule of BeyondMimic and what follows it: lost where the pelvis is so many metres too high or low, or gravity's
 part along the base's z is off by so much."""

@@ -1,4 +1,4 @@
-"""What a clip does by rules on its numbers alone: labels that were made from neither names nor captions.
+"""Kinds of a clip by rules on its numbers alone: labels that were made from neither names nor captions.
 
 They share their inputs with the features of the autoencoder (root, feet, joints), so agreement with them says that the
 latents kept such differences, and not that the clusters mean anything.

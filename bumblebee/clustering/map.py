@@ -1,4 +1,4 @@
-"""What the report's map shows of each motion: where it lies, what it is, and a few poses in few signs."""
+"""Rows of the report's map of motions: where each lies, what it is, and a few poses in few signs."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from bumblebee.clustering.material import Material
 from bumblebee.clustering.poses import BONES
 
 SIGNS = "".join(chr(code) for code in range(35, 126) if chr(code) not in "&'<>\\")
-"""What a number of a pose is written with: printable, and without what HTML or JSON would have to escape."""
+"""Signs that a number of a pose is written with: printable, and without what HTML or JSON would have to escape."""
 STEP = 1.8 / (len(SIGNS) - 1)
 """Between one sign and the next [m]: 2.1 cm; a picture is 1.8 m wide and high, the pelvis in its middle."""
 _LONGEST = 160  # letters of a caption

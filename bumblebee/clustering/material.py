@@ -1,4 +1,4 @@
-"""What the clustering keeps of a clip once its frames are read: some 15 kB, so that thousands fit into memory."""
+"""Features that the clustering keeps of a clip once its frames are read: some 15 kB, so that thousands fit."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

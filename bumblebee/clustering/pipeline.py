@@ -26,7 +26,7 @@ Report = Callable[[int, str], None]
 
 @dataclass(frozen=True)
 class Clustering:
-    """What the stage keeps.
+    """Result that the stage keeps.
 
     `labels`: name, cluster, x, y, split, family, one row a clip. `statistics`: the clip's numbers of table 2, by name.
     `elbow`: k, within_ss, silhouette and the stability over K. `curve`: the loss terms by epoch. `points`: what the

@@ -1,4 +1,4 @@
-"""What a clip does, in the columns of the paper's table 2, and what a cluster is called after them."""
+"""Statistics of a clip, in the columns of the paper's table 2, and the name of a cluster after them."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ LOWER = tuple(i for i, name in enumerate(joint_names()) if any(part in name for 
 UPPER = tuple(i for i in range(len(joint_names())) if i not in LOWER)
 COLUMNS = ("displacement", "z_move", "speed", "joint", "lower_joint", "upper_joint", "airborne")
 MORE = ("turn", "lowest")
-"""Of a clip, and not in the table: what `kinds.kinds` goes by beside it."""
+"""Columns of a clip that are not in the table: `kinds.kinds` goes by them beside it."""
 
 _WORDS = {
     "speed": ("slow", "fast"),
@@ -28,7 +28,7 @@ _WORDS = {
     "lower_joint": ("quiet-legs", "lively-legs"),
     "upper_joint": ("quiet-arms", "lively-arms"),
 }
-"""What a cluster is called whose mean of a statistic is less than that of others, and more."""
+"""Words for a cluster whose mean of a statistic is less than that of others, and more."""
 _NEARLY_ALL = 0.8  # of the clips with a text: a word that so many have is the captions' form, not their meaning
 
 

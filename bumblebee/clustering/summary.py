@@ -1,4 +1,4 @@
-"""What the stage says about a clustering: counts, the paper's table 2, the elbow, the audit."""
+"""Summary of a clustering: counts, the paper's table 2, the elbow, the audit."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -71,7 +71,7 @@ def clusters(
 
 
 def elbow(curve: pd.DataFrame, k: int) -> Json:
-    """What the elbow suggests, by which rule, over which K; and the K with the largest silhouette."""
+    """Suggestion of the elbow, by which rule, over which K; and the K with the largest silhouette."""
     best = curve.dropna(subset=["silhouette"])
     return {
         "suggested_k": elbows.knee(curve),

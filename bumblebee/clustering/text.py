@@ -67,7 +67,7 @@ def plain_text(caption: str) -> str:
 
 
 TEXT_SOURCES = ("file", "humanml3d", "csv", "made")
-"""Of `Clip.caption_source`: what somebody wrote about the motion, the user, HumanML3D or the embedded library."""
+"""Values of `Clip.caption_source` for texts that somebody wrote: the user, HumanML3D or the embedded library."""
 _FILLERS = (
     "person man woman someone somebody human humanoid figure robot character subject actor "
     "perform performs performing performed execute executes executing do does doing make makes making "

@@ -1,4 +1,4 @@
-"""What a runner undoes at the joints of a robot whose effects are known: numbers by joint, bounded, and the plan.
+"""Compensation at the joints of a robot whose effects are known: numbers by joint, bounded, and the plan.
 
 The estimates are used as they are, not the ends of their intervals: too much friction compensation shakes a robot and
 too little costs a little accuracy, but that margin is `CompensationLimits.friction_share`, which is wider than any
@@ -18,7 +18,7 @@ from bumblebee.robot.facts import ROBOT
 
 @dataclass(frozen=True)
 class PlannedEffect:
-    """What becomes of one effect."""
+    """Fate of one effect in the plan."""
 
     effect: str
     """Its id in the catalogue."""
@@ -90,7 +90,7 @@ class Compensation:
     """Whose gravity is carried."""
     limits: CompensationLimits
     effects_sha256: str
-    """Of the effects.yaml that it was made from."""
+    """Hash of the effects.yaml that it was made from."""
     plan: tuple[PlannedEffect, ...]
 
     @property
@@ -104,7 +104,7 @@ JOINT_ARRAYS = tuple(f.name for f in fields(Compensation) if f.type in (np.ndarr
 
 
 def as_table(compensation: Compensation) -> dict[str, Any]:
-    """The same as plain data."""
+    """The compensation as plain data."""
     lists: dict[str, Any] = {name: getattr(compensation, name).tolist() for name in (*JOINT_ARRAYS, "imu")}
     for name in ("cogging", "hysteresis", "terms"):
         lists[name] = [list(row) for row in getattr(compensation, name)]

@@ -20,7 +20,7 @@ ONLY_G1 = (
 
 @dataclass(frozen=True, eq=False)
 class DeclaredRobot:
-    """What effects are measured against; J joints."""
+    """Declared robot that effects are measured against; J joints."""
 
     model: mujoco.MjModel
     dofs: np.ndarray

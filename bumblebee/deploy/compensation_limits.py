@@ -15,7 +15,7 @@ class CompensationLimits(Ranged):
     gain_least: Annotated[float, Range(least=0.2, most=1)] = 0.4
     """Gain sent over the declared one: a softer drive no longer carries the robot if the diagnosis was wrong."""
     gain_most: Annotated[float, Range(least=1, most=4)] = 2.5
-    """The same upwards: a stiffer drive rings with delays that nobody measured."""
+    """Gain sent over the declared one, at most: a stiffer drive rings with delays that nobody measured."""
     damping_left: Annotated[float, Range(least=0.1, most=1)] = 0.2
     """Share of the drive's kd that is kept where the joint's own friction damps instead: friction warms up and fades,
     and the drive must then still damp."""
@@ -27,7 +27,7 @@ class CompensationLimits(Ranged):
     """[s] by which the reference is sent earlier or later, and a reading carried on: three control steps; a policy that
     is later than that has lost more than its reference."""
     correction_share: Annotated[float, Range(least=0, most=1)] = 0.5
-    """Of a command's delay over which the policy's own correction is carried on at its present rate: at 40 ms on
+    """Share of a command's delay over which the policy's own correction is carried on at its present rate: at 40 ms on
     eight joints half of it gained most of what there was to gain, and all of it brought the robot down."""
     friction_share: Annotated[float, Range(least=0, most=0.95)] = 0.8
     """Share of friction that is fed forward: less than all, so that it never moves a joint by itself, even where the

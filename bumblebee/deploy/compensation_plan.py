@@ -27,7 +27,7 @@ def compensate(
     where: object = "effects",
     effects_sha256: str = "",
 ) -> Compensation:
-    """What undoes `effects` at the joints of the G1.
+    """Plan what undoes `effects` at the joints of the G1.
 
     Args:
         effects: what the robot has and the model has not.
@@ -70,7 +70,7 @@ def compensate(
 def compensate_file(
     path: Path, model: Path | None = None, limits: CompensationLimits | None = None, leave_out: bool = False
 ) -> Compensation:
-    """The same from `effects.yaml`, and the MJCF of the model that the policy was trained on."""
+    """Plan what undoes the effects of an `effects.yaml`; `model` is the MJCF that the policy was trained on."""
     effects = read_effects(path)
     digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
     declared = load_model(model) if model else build_model()

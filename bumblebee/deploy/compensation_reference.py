@@ -1,4 +1,4 @@
-"""What a compensation needs to know of the reference motions: targets, velocities, accelerations, holding torques."""
+"""Reference motions as a compensation needs them: targets, velocities, accelerations, holding torques."""
 
 from collections.abc import Sequence
 

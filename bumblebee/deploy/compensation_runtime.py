@@ -47,7 +47,7 @@ class Compensator:
         self._gains = (None, None) if same else (c.kp, c.kd)
 
     def hold(self, targets: np.ndarray) -> np.ndarray:
-        """What the drives must be told (B, J) to stand at targets (B, J) [rad] before the start."""
+        """Targets (B, J) [rad] that the drives must be told to stand at targets (B, J) [rad] before the start."""
         return targets + self.compensation.encoder_offset
 
     def seen(self, sensors: Sensors) -> Sensors:
@@ -55,7 +55,7 @@ class Compensator:
         return put_right(self.compensation, sensors)
 
     def command(self, robots: np.ndarray, tick: int, seen: Sensors, target: np.ndarray) -> ServoCommand:
-        """What the drives of `robots` (n,) get in place of the policy's target (n, J) [rad].
+        """Command to the drives of `robots` (n,) in place of the policy's target (n, J) [rad].
 
         Args:
             robots: which.

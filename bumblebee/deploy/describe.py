@@ -50,7 +50,7 @@ _AHEAD = {
 
 
 def meaning(name: str, ahead: list[float]) -> tuple[str, str, str]:
-    """What a part of the observation is, its unit and its frame; a term of a baseline says it in its own words."""
+    """Meaning of a part of the observation, its unit and its frame; a term of a baseline says it in its own words."""
     if name in MEANINGS:
         return MEANINGS[name]
     further = re.fullmatch(r"ahead(\d+)_(\w+)", name)
@@ -98,7 +98,7 @@ def _row(begin: int, part: dict[str, Any], ahead: list[float]) -> str:
 
 
 def action_sentence(contract: dict[str, Any]) -> str:
-    """What becomes of an action."""
+    """Sentence on what becomes of an action."""
     action = contract["action"]
     if action.get("base", "reference") == "default":
         middle = "the stand pose (`default_pos` of contract.json)"

@@ -43,7 +43,7 @@ class Episode:
     motion: str
     """Name of the clip."""
     seed: int
-    """Of the start state and the sensor noise; the same seed and motion give the same draws whatever runs beside."""
+    """Seed of the start state and the sensor noise; one seed and motion give equal draws whatever runs beside."""
     meta: dict[str, Any] = field(default_factory=dict)
     """Further fields of the rollout's metadata (cluster, operator, ...)."""
 

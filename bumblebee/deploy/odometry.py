@@ -1,4 +1,4 @@
-"""What a walking robot without motion capture knows of its base's place: its own velocity, summed up.
+"""Odometry of a walking robot without motion capture: the base's place as its own velocity, summed up.
 
 The velocity is the logged one with its noise (20 mm/s a tick make a walk of 3 mm in a second, growing with the root of
 time), a scale that is off by about 1 % and a heading that wanders by about 1 degree in 10 s: an error of 1 to 2 % of
@@ -30,7 +30,7 @@ class OdometryErrors:
 
 
 class Odometry:
-    """Of B robots side by side, each with errors of its own.
+    """Odometry of B robots side by side, each with errors of its own.
 
     Args:
         start: (B, 3) true places at the start [m], which a robot takes for known.
@@ -80,5 +80,5 @@ class Odometry:
 def placed(
     noise: SensorNoise, start: np.ndarray, rngs: Sequence[np.random.Generator], period: float
 ) -> Callable[[np.ndarray, Sensors], Sensors]:
-    """What puts the base's place into noisy readings of some robots, tick by tick: nothing to do for motion capture."""
+    """Function that puts the base's place into noisy readings, tick by tick: nothing to do for motion capture."""
     return Odometry(start, rngs, period).seen if noise.base == "odometry" else lambda robots, sensors: sensors

@@ -77,7 +77,7 @@ class ExportedPolicy:
 
     @property
     def seen(self) -> ObservationConfig:
-        """What it sees: terms and control steps."""
+        """Observation of the policy: terms and control steps."""
         return observed(self.contract)
 
     @property

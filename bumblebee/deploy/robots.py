@@ -31,7 +31,7 @@ class Robots(Protocol):
         """True readings of all B robots."""
 
     def truth(self) -> Sensors:
-        """What sensors without noise or faults would say, as motion capture would: for judging, never for acting."""
+        """Readings of sensors without noise or faults, as motion capture would give: for judging, never for acting."""
 
     def step(self, robots: np.ndarray, command: ServoCommand) -> None:
         """Hold a command for one control period on `robots` (n,); the others stand still in time."""

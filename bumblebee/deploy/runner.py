@@ -106,7 +106,7 @@ class PolicyRunner:
         return sensors if self._undo is None else self._undo.seen(sensors)
 
     def _look(self, robots: np.ndarray, tick: int, sensors: Sensors) -> tuple[Tensor, Tensor]:
-        """What `robots` (n,) see over time (n, H, D) and of the newest step alone (n, N).
+        """Observation of `robots` (n,) over time (n, H, D) and of the newest step alone (n, N).
 
         Before its first step a robot saw the same; tick 0 is a clip's first step, whatever was before it.
         """
@@ -125,7 +125,7 @@ class PolicyRunner:
 
 
 def reference_key(policy: ExportedPolicy) -> tuple[tuple[float, ...], bool]:
-    """What of the references depends on the policy: look-ahead times [s], and whether gravity is fed forward."""
+    """Key of the references that the policy needs: look-ahead times [s], and whether gravity is fed forward."""
     stated = policy.contract.get("ahead")
     ahead = tuple(map(float, stated)) if stated is not None else AHEAD[: policy.ahead]
     return ahead, policy.contract["action"].get("feed_forward") is not None

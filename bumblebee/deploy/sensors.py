@@ -1,4 +1,4 @@
-"""What the robot's sensors say at one control tick, and the noise that is in it."""
+"""Readings of the robot's sensors at one control tick, and the noise that is in them."""
 
 from dataclasses import dataclass, fields
 

@@ -1,4 +1,4 @@
-"""What the drives are told for one control period: the low-level command of a robot with PD drives."""
+"""Command to the drives for one control period: the low-level command of a robot with PD drives."""
 
 from dataclasses import dataclass
 

@@ -45,7 +45,7 @@ BASES = ("mocap", "odometry", "none")
 
 @dataclass(frozen=True)
 class Work:
-    """What is run."""
+    """Work of the stand-in robot: what is run."""
 
     policies: dict[str, Path]
     """Key -> folder."""

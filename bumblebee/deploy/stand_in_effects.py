@@ -20,6 +20,7 @@ from bumblebee.errors import BadInput
 from bumblebee.robot.model import build_spec
 
 SCHEMA = 2
+_AGAIN = "Run the stage seal again."
 UNITS = {
     "coulomb_friction": "N m", "viscous_friction": "N m s/rad", "stribeck_friction": "N m, rad/s",
     "asymmetric_friction": "N m", "armature": "kg m^2", "torque_limit": "N m", "torque_speed_limit": "rad/s",
@@ -57,10 +58,13 @@ def read_sealed(path: Path) -> list[Json]:
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise BadInput(path, "a sealed robot with effects and sha256", f"{type(error).__name__}: {error}") from None
     if schema != SCHEMA:
-        raise BadInput(f"{path}: field schema", str(SCHEMA), str(schema)[:12], "Seal it anew.")
+        raise BadInput(f"{path}: field schema", str(SCHEMA), str(schema)[:12], _AGAIN)
     if seal(effects) != claimed:
         raise BadInput(
-            f"{path}: field sha256", seal(effects)[:12], str(claimed)[:12], "The seal is broken: seal it anew."
+            f"{path}: field sha256",
+            seal(effects)[:12],
+            str(claimed)[:12],
+            f"The file was changed. {_AGAIN}",
         )
     to_laws(effects, path)
     return effects
@@ -106,7 +110,10 @@ def _law(effect: Json, where: str) -> Law:
     told = effect.get("parameters")
     if not _same(told, parameters):
         raise BadInput(
-            f"{where}: {name}: parameters", f"those of its size, {parameters}", str(told)[:60], "Seal it anew."
+            f"{where}: {name}: parameters",
+            f"those of its size, {parameters}",
+            str(told)[:60],
+            "Run the stage seal again.",
         )
     return law
 

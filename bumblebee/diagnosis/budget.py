@@ -1,4 +1,4 @@
-"""Time that a search may take: what is begun is ended, what would be begun after it is left out and said."""
+"""Soft time limit of a search: running steps finish, later ones are skipped and listed."""
 
 import time
 from collections.abc import Callable
@@ -11,12 +11,12 @@ class Budget:
 
     seconds: float = float("inf")
     search: str = "beyond the catalogue"
-    """What is sought."""
+    """Name of what is sought."""
     setting: str = "beyond_seconds"
     """Where the seconds are set."""
     clock: Callable[[], float] = time.monotonic
     left_out: list[str] = field(default_factory=list)
-    """What was not begun, in words, each once."""
+    """Work that was not begun, in words, each once."""
     began: float = field(init=False)
 
     def __post_init__(self) -> None:

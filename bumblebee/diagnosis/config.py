@@ -57,7 +57,7 @@ class DiagnosisConfig:
     For up to 12 degrees of freedom; in proportion longer for more, where every trial is.
     """
     search_seconds: float = 600.0
-    """The same for the search among the catalogue's effects; what was found by then is fitted and reported."""
+    """Time limit of the search among the catalogue's effects [s]; what was found by then is fitted and reported."""
     search: SearchConfig = field(default_factory=SearchConfig)
     """How strict the search is."""
     thresholds: Thresholds = field(default_factory=Thresholds)

@@ -58,7 +58,7 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What search, last fit and the look beyond the catalogue gave."""
+    """Outcome of search, last fit and the look beyond the catalogue."""
 
     search: Search
     last: Refined
@@ -66,7 +66,7 @@ class _Found:
     """Around the last fit."""
     beyond: Discovery | None
     budgets: tuple[Budget, ...]
-    """Of the search and of the look beyond the catalogue, with what they left out."""
+    """Budgets of the search and of the look beyond the catalogue, with what they left out."""
 
     @property
     def judging(self) -> Problem:
@@ -87,11 +87,11 @@ def diagnose(
 
 
 def _diagnose(session: Session, config: DiagnosisConfig, say: Callable[[str], None]) -> Diagnosis:
-    """The same on the threads that there are."""
+    """Diagnose on the threads that there are."""
     rng = np.random.default_rng(config.seed)
     material = gather(session, config, rng, say)
     found = _found(material, config, rng, say)
-    say(f"{len(found.last.fit.chosen)} effects; error before and after")
+    say(f"prediction error before and after {len(found.last.fit.chosen)} effects")
     entries = effect_entries(found.search, found.last, found.holdout, found.beyond)
     rounded, steps = _steps_of_encoders(material.session, found)
     lost, losses = loss_entries(found.search.loss)
@@ -124,14 +124,14 @@ def _found(material: Material, config: DiagnosisConfig, rng: np.random.Generator
     larger = max(1.0, material.session.plant.model.nv / max(1, material.session.thresholds.time_steps.small_model))
     time = Budget(larger * config.search_seconds, "among the catalogue's effects", "search_seconds")
     found = search(material.problem, material.holdout, material.remade, config.search, say, time)
-    say(f"the last fit, of {len(found.fit.chosen)} effects")
+    say(f"final fit of {len(found.fit.chosen)} effects")
     holdout = material.holdout.finely()
     last = refine(found.problem, found.fit, rng, holdout)
     if last.fit.chosen:
         holdout = holdout.relinearised(last.fit.effects)
     if not config.beyond:
         return _Found(found, _finished(last, holdout, found), holdout, None, (time,))
-    say("what is left")
+    say("testing the residual")
     offers, budget = offers_of(found, material.candidates), Budget(larger * config.beyond_seconds)
     activity = JointActivity(material.typical, material.still)
 

@@ -41,7 +41,7 @@ GAP = Result(
 
 
 def inputs_of(model: Path, dataset: Path, *more: Path | None) -> list[Path]:
-    """What a command reads: the model with all files that it names, the dataset, and `more`."""
+    """Inputs of a command: the model with all files that it names, the dataset, and `more`."""
     return [Path(dataset) / "rollouts", Path(dataset), *model_files(model), *(path for path in more if path)]
 
 
@@ -53,7 +53,7 @@ def claim_folder(out: Path, result: Result, overwrite: bool, inputs: Sequence[Pa
 
 
 def claim_file(out: Path, overwrite: bool, inputs: Sequence[Path]) -> None:
-    """The same for the file of errors that `replay` writes."""
+    """Claim the file of errors that `replay` writes."""
     refuse_entering(out, inputs)
     try_output(out)
     refuse_file(out, overwrite)
@@ -103,7 +103,7 @@ def model_files(model: Path) -> list[Path]:
 
 
 def _foreign(out: Path, result: Result, names: Sequence[str]) -> str | None:
-    """What in a folder is not of our making, if anything."""
+    """First entry of a folder that is not of our making, if any."""
     for name in names:
         path = out / name
         if name not in result.files or path.is_symlink() or not path.is_file():

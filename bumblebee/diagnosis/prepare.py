@@ -1,4 +1,4 @@
-"""What a diagnosis works on: windows to fit, windows to accept by, candidates."""
+"""Material of a diagnosis: windows to fit, windows to accept by, candidates."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -58,7 +58,7 @@ def gather(session: Session, config: DiagnosisConfig, rng: np.random.Generator, 
         if config.grow
         else 1.0
     )
-    say("what noise in the starts becomes, by simulation")
+    say("propagating the initial-state noise")
     problem = _problem(session, fitted, round(more * config.max_windows), config, rng)
     holdout = _holdout(session, fitted, config, more, rng)
     say(f"{len(problem.windows)} windows of {config.horizon:g} s")

@@ -36,7 +36,7 @@ class QuickConfig:
 
 @dataclass(frozen=True, eq=False)
 class FirstLook:
-    """What it found."""
+    """Outcome of a first look."""
 
     horizon: float
     """[s] of the windows."""
@@ -51,9 +51,9 @@ class FirstLook:
     units: dict[tuple[str, str, str], str]
     """(effect, place, parameter) -> unit."""
     notes: list[str]
-    """Of the dataset (what was set aside), and models and steps of the search that failed."""
+    """Notes on the dataset (what was set aside), and on models and steps of the search that failed."""
     warnings: tuple[str, ...] = ()
-    """What must not be overlooked in the dataset."""
+    """Warnings about the dataset that must not be overlooked."""
 
 
 def first_look(

@@ -1,4 +1,4 @@
-"""What a model contributes to the frozen evaluation: its solver's settings, and a hash of the robot in it."""
+"""Facts of a model for the frozen evaluation: its solver's settings, and a hash of the robot in it."""
 
 import hashlib
 from typing import Any

@@ -18,7 +18,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class EpisodeMetrics:
-    """What one episode is worth."""
+    """Metrics of one episode."""
 
     success: bool
     """The clip was followed to its end: no fall, no key body beyond the threshold."""

@@ -1,4 +1,4 @@
-"""What runs that were killed leave beside their output: named after it and the process, and cleared by the next run.
+"""Left-overs of runs that were killed, beside their output: named after it and the process, cleared by the next run.
 
 `.<name>.<process>.<random>.part` is an output that was not finished, `.<name>.<process>.old` the result that was to be
 replaced: it comes back where nothing took its place.

@@ -8,9 +8,9 @@ class Limits:
     """Bounds of one input; a real log or motion stays a hundred times below most of them."""
 
     file_bytes: int = 1 << 30
-    """Of one file as it lies on disk."""
+    """Largest size of one file as it lies on disk."""
     unpacked_bytes: int = 1 << 30
-    """Of everything that one archive or compressed file unpacks to, together."""
+    """Largest size of everything that one archive or compressed file unpacks to, together."""
     ratio: float = 2000.0
     """Unpacked over packed bytes of one member beyond `free_bytes`; deflate itself cannot exceed 1032."""
     free_bytes: int = 64 << 20
@@ -20,7 +20,7 @@ class Limits:
     rows: int = 20_000_000
     """Rows of one table: 11 hours at 500 Hz."""
     text_bytes: int = 16 << 20
-    """Of a file of settings (YAML, JSON)."""
+    """Largest size of a file of settings (YAML, JSON)."""
     depth: int = 40
     """Nesting of a file of settings."""
     nodes: int = 200_000

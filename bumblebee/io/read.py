@@ -36,7 +36,7 @@ def read_bytes(path: Path, most: int = LIMITS.file_bytes) -> bytes:
 
 
 def open_file(path: Path, most: int = LIMITS.file_bytes) -> BinaryIO:
-    """The same file, opened, for what reads parts of it."""
+    """Open a file within the same limits, for what reads parts of it."""
     try:
         # Opening a pipe would wait for a writer; O_NONBLOCK does not.
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -96,7 +96,7 @@ def read_yaml(path: Path, limits: Limits = LIMITS) -> Any:
 
 
 def parse_yaml(where: object, text: str, limits: Limits = LIMITS) -> Any:
-    """The same from text; `where` names its place in a message."""
+    """Parse YAML from text; `where` names its place in a message."""
     try:
         _measure_yaml(where, text, limits)
         content = yaml.load(text, Loader=_DistinctKeys)
@@ -146,7 +146,7 @@ def read_json(path: Path, limits: Limits = LIMITS) -> Any:
 
 
 def parse_json(where: object, text: str, limits: Limits = LIMITS) -> Any:
-    """The same from text."""
+    """Parse JSON from text; `where` names its place in a message."""
 
     def refuse(word: str) -> Any:
         raise BadInput(where, "JSON of finite numbers", word)

@@ -11,6 +11,7 @@ from bumblebee.errors import BadInput
 from bumblebee.io import left_overs
 
 TRIED_BYTES = 1 << 20  # written and removed again to see whether a disk takes a result
+_OTHER = "Name another output folder or file."
 
 
 def refuse_overlap(out: Path, inputs: Sequence[Path]) -> None:
@@ -19,7 +20,7 @@ def refuse_overlap(out: Path, inputs: Sequence[Path]) -> None:
     for given in inputs:
         source = Path(os.path.realpath(given))
         if target == source or target in source.parents or _same(out, given):
-            raise BadInput(out, "a place apart from what is read", f"one that is or holds {given}", "Choose another.")
+            raise BadInput(out, f"an output that does not contain the input {given}", "one that does", _OTHER)
 
 
 def refuse_entering(out: Path, inputs: Sequence[Path]) -> None:
@@ -28,7 +29,7 @@ def refuse_entering(out: Path, inputs: Sequence[Path]) -> None:
     above = Path(os.path.realpath(out)).parents
     for given in inputs:
         if Path(os.path.realpath(given)) in above:
-            raise BadInput(out, "a place apart from what is read", f"one in {given}", "Choose another.")
+            raise BadInput(out, f"an output outside the input {given}", "one inside", _OTHER)
 
 
 def refuse_foreign(out: Path, is_ours: Callable[[Path], bool], what: str) -> None:
@@ -174,7 +175,7 @@ def swap(fresh: Path, out: Path) -> None:
 
 
 def _copied(fresh: Path, out: Path) -> Path:
-    """The same folder on the disk of `out`, from which a rename is enough."""
+    """Copy of the folder on the disk of `out`, from which a rename is enough."""
     near = Path(tempfile.mkdtemp(dir=out.parent, prefix=left_overs.prefix(out), suffix=".part"))
     try:
         shutil.copytree(fresh, near, dirs_exist_ok=True)

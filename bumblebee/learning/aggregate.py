@@ -116,7 +116,7 @@ class Aggregate:
         return Samples(self._observed(time, world, age, back), known, *answer, weight)
 
     def _observed(self, time: Tensor, world: Tensor, age: Tensor, back: Tensor) -> Tensor:
-        """What `world` (n,) saw `back` (M + 1,) steps before `time` (n,), (n, M + 1, H * D + A).
+        """Observations and actions of `world` (n,) `back` (M + 1,) steps before `time` (n,), (n, M + 1, H * D + A).
 
         As the environment's history has it, what was before an episode's first step is that step.
         """

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 
 class GruGate(nn.Module):
-    """What a sub-layer made, y, let into what went past it, x: g(x, y), a GRU's step.
+    """Gate that lets a sub-layer's output y into what went past it, x: g(x, y), a GRU's step.
 
     r = s(W_r y + U_r x), z = s(W_z y + U_z x - b), h = tanh(W_g y + U_g (r x)), g = (1 - z) x + z h, with s the
     logistic function. With b above 0 the gate lets x through at first, and the block begins near the identity.
@@ -60,7 +60,7 @@ class WindowAttention(nn.Module):
         self.register_buffer("distances", sinusoids(range(memory, -1, -1), size), persistent=False)
 
     def forward(self, steps: Tensor, known: Tensor) -> Tensor:
-        """What the last S steps see, (N, S, E).
+        """Attend from the last S steps, (N, S, E).
 
         Args:
             steps: (N, M + S, E), the oldest first.

@@ -21,7 +21,7 @@ def save_checkpoint(path: Path, content: dict[str, Any]) -> None:
 
 
 def load_checkpoint(path: Path) -> dict[str, Any]:
-    """What `save_checkpoint` wrote, on the CPU; nothing in the file is executed.
+    """Content that `save_checkpoint` wrote, on the CPU; nothing in the file is executed.
 
     Raises:
         BadInput: if it is no checkpoint, or holds anything else than tensors and plain values.

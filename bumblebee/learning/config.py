@@ -42,7 +42,7 @@ class PpoConfig(Ranged):
     desired_kl: Positive = 0.05
     """KL divergence of an update that the rate is adapted to, at first."""
     desired_kl_end: Positive = 0.05
-    """The same at the end."""
+    """KL divergence that the rate is adapted to at the end."""
     hidden: Widths = (256, 256, 128)
     """Widths of the actor's and the critic's layers, ELU."""
     initial_std: Positive = 0.8

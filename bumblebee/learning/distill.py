@@ -174,7 +174,7 @@ class Distiller:
         self.iteration, self._rows = content["iteration"], content["rows"]
 
     def _settings(self) -> dict[str, Any]:
-        """What a checkpoint must have been made with, as plain values."""
+        """Settings that a checkpoint must have been made with, as plain values."""
         free = ("iterations", "checkpoint_every", "env", "transformer", "hidden")
         own = {name: value for name, value in asdict(self.config).items() if name not in free}
         return own | {f"student's {name}": value for name, value in asdict(self.shape).items()}
@@ -194,7 +194,7 @@ class Distiller:
             student.reset(dones)
 
     def _answers(self, known: Tensor, now: Tensor) -> tuple[Tensor, Tensor]:
-        """What the expert of each world's cluster `now` (B,) does with `known` (B, D): mean and deviation (B, J)."""
+        """Answers of the expert of each world's cluster `now` (B,) to `known` (B, D): mean and deviation (B, J)."""
         wanted = torch.zeros(self.env.num_envs, self.env.num_actions, device=known.device)
         spread = torch.ones_like(wanted)
         for index, expert in self._experts.items():

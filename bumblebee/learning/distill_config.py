@@ -31,7 +31,7 @@ class DistillConfig(Ranged):
     init: Literal["base", "scratch"] = "base"
     """Start from the base policy or from nothing; a student with an observation of its own starts from nothing."""
     model: Literal["mlp", "transformer"] = "mlp"
-    """What the generalist is; a transformer starts from scratch."""
+    """Network of the generalist; a transformer starts from scratch."""
     hidden: Widths = (256, 256, 128)
     """Layers of an MLP from scratch; from base they are base's."""
     transformer: TransformerConfig = field(default_factory=TransformerConfig)

@@ -60,7 +60,7 @@ def contract(
     action: str,
     memory: tuple[int, int] | None = None,
 ) -> dict[str, Any]:
-    """What a runner must know to feed the policy and to use its output.
+    """Contract that a runner needs to feed the policy and to use its output.
 
     "observation" lists the parts of one control step; the input has "history" of them, the oldest first, and then the
     parts "observation_now" of the newest step alone. "sensors" names the readings that it takes

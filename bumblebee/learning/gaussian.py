@@ -1,4 +1,4 @@
-"""What actors would do as Gaussians, and how far two of them are apart."""
+"""Actions as Gaussians, and how far two of them are apart."""
 
 from rsl_rl.models import MLPModel
 from torch import Tensor
@@ -27,7 +27,7 @@ def gaussian(actor: MLPModel, observation: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def believed(student: MLPModel, observation: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
-    """What a student with or without a memory would do: mean (N, J) and deviation (N, J).
+    """Action of a student with or without a memory: mean (N, J) and deviation (N, J).
 
     Args:
         student: who learns.

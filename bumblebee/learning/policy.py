@@ -22,7 +22,7 @@ FILE = "policy.pt"
 
 @dataclass(frozen=True)
 class Shape:
-    """What fixes an actor and its critic."""
+    """Sizes and inputs that fix an actor and its critic."""
 
     observation: int
     """Entries of the actor's observation, of all control steps that it sees."""
@@ -38,7 +38,7 @@ class Shape:
     now: tuple[str, ...] = ()
     """Terms of which the newest step alone is seen, after the others."""
     action: Literal["reference", "default"] = "reference"
-    """What an action of zero commands, see `EnvConfig.action`."""
+    """Command of an action of zero, see `EnvConfig.action`."""
     transformer: TransformerConfig | None = None
     """The transformer that `hidden` stands behind; None for an MLP."""
 
@@ -49,7 +49,7 @@ class Shape:
 
     @property
     def seen(self) -> ObservationConfig:
-        """What the actor sees, as the environment's configuration has it."""
+        """Observation of the actor, as the environment's configuration has it."""
         return ObservationConfig(self.terms, self.history, self.now)
 
 

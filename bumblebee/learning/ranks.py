@@ -41,7 +41,7 @@ class Ranks:
 
     @property
     def settings(self) -> dict[str, int] | None:
-        """What rsl_rl calls `multi_gpu_cfg`; None for one process."""
+        """Settings that rsl_rl calls `multi_gpu_cfg`; None for one process."""
         if self.count == 1:
             return None
         return {"global_rank": self.rank, "local_rank": self.rank, "world_size": self.count}

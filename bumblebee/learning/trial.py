@@ -30,12 +30,12 @@ class Trials(Ranged):
     noise: Factor = 0.0
     """Factor on the noise of the start and of the sensors."""
     seed: Seed = 0
-    """Of that noise."""
+    """Seed of that noise."""
 
 
 @dataclass(frozen=True)
 class World:
-    """What the policy is tried on: a model with foot sensors, and what is no part of the model."""
+    """World that the policy is tried on: a model with foot sensors, and what is no part of the model."""
 
     model: mujoco.MjModel
     hooks: RuntimeHooks | None = None

@@ -22,7 +22,7 @@ TOLD = ("value", "surrogate", "entropy", "symmetry")
 
 
 def cannot(algorithm: PPO) -> str | None:
-    """What of this algorithm's settings this update has not got, or None."""
+    """Setting of this algorithm that this update has not got, or None."""
     symmetry = algorithm.symmetry
     lacking = {
         "a recurrent network": algorithm.actor.is_recurrent or algorithm.critic.is_recurrent,
@@ -140,7 +140,7 @@ class DeviceUpdate:
                 norm._std = kept
 
     def _uses(self) -> Iterator[Tensor | None]:
-        """What a recording depends on and others could replace."""
+        """Tensors that a recording depends on and others could replace."""
         algorithm, storage = self._algorithm, self._algorithm.storage
         yield from storage.observations.values()
         yield from (storage.actions, storage.values, storage.returns, storage.actions_log_prob)

@@ -17,10 +17,10 @@ LEAST, MOST = 1e-5, 1e-2  # rsl_rl's own bounds of an adapted rate
 
 @dataclass(frozen=True)
 class Losses:
-    """Of one mini-batch, scalars on the device."""
+    """Losses of one mini-batch, scalars on the device."""
 
     total: Tensor
-    """What is differentiated."""
+    """Loss that is differentiated."""
     told: tuple[Tensor, ...]
     """Value, surrogate, entropy and, with symmetry, how far the actor is from being symmetric."""
     kl: Tensor | None

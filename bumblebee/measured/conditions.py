@@ -1,4 +1,4 @@
-"""What was different while a rollout was recorded: the metadata's `conditions`, and the gains beside them.
+"""Conditions of a rollout's recording: the metadata's `conditions`, and the gains beside them.
 
 Known names have a meaning and a unit; any other name is a label of the user's, a text or a number. Labels group
 rollouts and change no model.
@@ -57,7 +57,7 @@ def check_conditions(table: object, refuse: Refuse) -> None:
 
 
 def _expected(name: str, value: object) -> str:
-    """What should have come instead of `value`; "" where it is right."""
+    """Expected form of `value`; "" where it is right."""
     ranges = {
         "supply_voltage": (1e-6, VOLTS, "a number of volts above 0"),
         "temperature": (COLDEST, HOTTEST, f"degrees C from {COLDEST} to {HOTTEST:g}"),

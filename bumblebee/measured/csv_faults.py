@@ -1,4 +1,4 @@
-"""What is wrong with a CSV file that pandas cannot read, or reads with its columns shifted: a line, and the remedy."""
+"""Faults of a CSV file that pandas cannot read, or reads with its columns shifted: a line, and the remedy."""
 
 import re
 

@@ -69,7 +69,7 @@ __all__ = [
 ]
 
 ANSWERS = {"approve": "approved", "reject": "rejected", "more": "more"}
-"""What a person says, and the status that it gives the request."""
+"""Status of the request for each answer of a person."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class GateConfig(Ranged):
 
 
 class Question(Protocol):
-    """What people are asked about."""
+    """Question that people are asked."""
 
     @property
     def workspace(self) -> Path:
@@ -105,10 +105,10 @@ class Question(Protocol):
 
     @property
     def subject(self) -> dict[str, Any]:
-        """What tells this gate's answers from others in the record."""
+        """Keys that tell this gate's answers from others in the record."""
 
     def seen(self) -> dict[str, Any]:
-        """What a person sees of what lies there now, with its hash."""
+        """Summary that a person sees of what lies there now, with its hash."""
 
     def sha256(self) -> str:
         """The hash of it."""
@@ -130,16 +130,16 @@ class Gate:
 
     @property
     def summary(self) -> Path:
-        """What the ingest stage showed."""
+        """Summary that the ingest stage showed."""
         return self.workspace / "data" / "measured" / f"r{self.round}" / "summary.json"
 
     @property
     def subject(self) -> dict[str, Any]:
-        """What tells this gate's answers from others in the record."""
+        """Keys that tell this gate's answers from others in the record."""
         return {"round": self.round}
 
     def seen(self) -> dict[str, Any]:
-        """What a person sees of what lies there now."""
+        """Summary that a person sees of what lies there now."""
         return seen_of(self.summary)
 
     def sha256(self) -> str:
@@ -148,7 +148,7 @@ class Gate:
 
 
 def seen_of(summary: Path) -> dict[str, Any]:
-    """What a person sees of an intake, with the hash that binds an answer to it."""
+    """Summary that a person sees of an intake, with the hash that binds an answer to it."""
     table = read_object(summary)
     keys = ("accepted", "quarantined", "seconds")
     counts = {key: table.get(key) for key in keys}

@@ -1,4 +1,4 @@
-"""What the gate says to people: whole commands that work from any folder, and one line for each refusal."""
+"""Words of the gate for people: whole commands that work from any folder, and one line for each refusal."""
 
 import os
 import shlex
@@ -41,12 +41,12 @@ def _python(module: str, workspace: Path, *more: str) -> str:
 
 
 def title(table: dict[str, Any]) -> str:
-    """What is asked about, as a sentence begins."""
+    """Subject of the question, as a sentence begins."""
     return f"promotion of {table['model']}" if "model" in table else f"round {table['round']}"
 
 
 def go_on(table: dict[str, Any]) -> str:
-    """What to do where somebody asked for more."""
+    """Next command where somebody asked for more."""
     if "model" in table:
         return "publish again with what is wanted: other figures are asked about anew"
     return "add rollouts and start again: changed data are asked about anew"
@@ -74,7 +74,7 @@ def so_far(table: dict[str, Any]) -> str:
 
 
 def what(table: dict[str, Any]) -> str:
-    """What an answer is about, in a few words."""
+    """Subject of an answer, in a few words."""
     seen = table["seen"]
     if "model" in table:
         success = "?" if seen.get("success") is None else f"{seen['success']:.3f}"

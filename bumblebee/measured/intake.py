@@ -44,7 +44,7 @@ class Item:
 
 @dataclass(frozen=True)
 class IntakeSummary:
-    """What came of a batch."""
+    """Outcome of a batch."""
 
     items: tuple[Item, ...]
     findings: pd.DataFrame
@@ -187,7 +187,7 @@ def _set_aside(source: Path, digest: str, quarantine: Path, findings: list[Findi
 
 
 def _note(place: Path, file: str, digest: str, findings: list[Finding]) -> None:
-    """What was found, as JSON beside the file that was set aside."""
+    """Write the findings as JSON beside the file that was set aside."""
     notes = place.with_name(f"{place.name}.findings.json")
     table = {"file": file, "sha256": digest, "findings": [finding.as_dict() for finding in findings]}
     if not notes.exists():

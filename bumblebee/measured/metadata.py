@@ -24,7 +24,7 @@ OPTIONAL_KEYS += ("conditions",)  # what was different meanwhile, see `measured.
 
 @dataclass(frozen=True)
 class Metadata:
-    """What a rollout file says about itself."""
+    """Metadata of a rollout file."""
 
     rollout_id: str
     joints: tuple[str, ...]

@@ -72,7 +72,7 @@ def write_overview(path: Path, summary: dict[str, Any], findings: pd.DataFrame, 
 
 
 def _asked(summary: dict[str, Any], sha256: str) -> str:
-    """What is asked, and how to answer exactly this."""
+    """Question, and how to answer exactly this."""
     if not summary["accepted"]:
         return "<div class=ask><p><b>No file can be used: there is nothing to approve.</b></p></div>"
     text = (

@@ -48,7 +48,7 @@ class BadRollout(BadInput):
         super().__init__(where, expected, came, do)
 
     def __reduce__(self) -> tuple[type["BadRollout"], tuple[str, ...]]:
-        """What another process makes it from again."""
+        """Arguments that another process makes it from again."""
         return type(self), (self.file, self.column, self.rule, self.expected, self.came, self.do)
 
 

@@ -115,7 +115,7 @@ def _within(where: object, rows: int, columns: int, limits: Limits) -> None:
 
 
 def separator(where: object, head: str) -> str:
-    """What separates the names of a header: comma, semicolon or tab, whichever is there most often."""
+    """Separator of the names of a header: comma, semicolon or tab, whichever is there most often."""
     try:
         row = next(csv.reader([head]), [head])
     except csv.Error as error:

@@ -11,7 +11,7 @@ from bumblebee.measured.rollout import Rollout
 
 @dataclass(frozen=True)
 class Review:
-    """What the checks say of one rollout."""
+    """Review of one rollout by the checks."""
 
     findings: tuple[Finding, ...]
 
@@ -27,12 +27,12 @@ class Review:
 
     @property
     def warnings(self) -> list[str]:
-        """What a person should know of it, one line each."""
+        """Warnings that a person should know, one line each."""
         return [finding.message for finding in self.findings if not finding.fatal]
 
 
 def review(rollout: Rollout, model: mujoco.MjModel, file: str = "") -> Review:
-    """What the checks say of a rollout.
+    """Review a rollout by the checks.
 
     Args:
         rollout: as read.

@@ -25,7 +25,7 @@ from bumblebee.motion.texts import shown
 
 SUFFIXES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2")  # AMASS comes as .tar.bz2
 ARCHIVE = replace(LIMITS, unpacked_bytes=64 << 30, members=250_000)
-"""Of an archive: its members are read one by one, so that together they may be more than memory holds."""
+"""Limits of an archive: its members are read one by one, so that together they may be more than memory holds."""
 _MAX_DIRECTORY = 64 << 20  # bytes of a zip's list of members
 _END = 22 + (1 << 16) + 76  # bytes at a zip's end: the record with the longest comment, and that of zip64
 _CHUNK = 1 << 20
@@ -91,7 +91,7 @@ def _bad(name: str, where: object, expected: str, came: str, do: str = "") -> Me
 
 
 def _refuse(where: str, expected: str, came: str, do: str, most: int) -> NoReturn:
-    """What reading a bad member does."""
+    """Refuse a bad member."""
     raise BadInput(where, expected, came, do)
 
 

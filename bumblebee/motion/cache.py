@@ -27,6 +27,8 @@ Arrays = dict[str, np.ndarray]
 
 MOST_BYTES = 20 << 30
 """Size of a cache: 200,000 motions of 8 s."""
+VARIABLE = "BUMBLEBEE_CACHE"
+"""Environment variable that names another folder for the user's cache; empty: nothing is kept."""
 _LIMITS = Limits(file_bytes=1 << 28, unpacked_bytes=1 << 28, members=64)  # of one entry
 _KEY = re.compile(r"[0-9a-f]{64}")
 _KINDS = "biuf"  # of arrays: truth, whole numbers, real numbers
@@ -36,6 +38,14 @@ _LEEWAY = 0.9  # of the size is left after a clearing, so that not every new ent
 _DAY = 86_400.0  # s: how exactly "used longest ago" is known
 _counting = threading.Lock()
 _grown: dict[Path, int] = {}  # bytes in each folder, as this process knows them
+
+
+def user_cache() -> Path | None:
+    """The user's own cache, shared by all folders that they work in; None where `VARIABLE` is empty."""
+    named = os.environ.get(VARIABLE)
+    if named is None:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "bumblebee" / "retargets"
+    return Path(named) if named else None
 
 
 def key_of(parts: Mapping[str, object]) -> str:
@@ -53,7 +63,7 @@ def key_of(parts: Mapping[str, object]) -> str:
 
 
 def cached(folder: Path, key: str, make: Callable[[], Arrays], most_bytes: int = MOST_BYTES) -> Arrays:
-    """What `make` returns, from the cache where it is there.
+    """Arrays that `make` returns, from the cache where they are there.
 
     Args:
         folder: the cache; made if it is not there.

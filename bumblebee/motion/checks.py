@@ -1,4 +1,4 @@
-"""What a motion file must satisfy before anything is made of it; each check names file, frame and remedy."""
+"""Checks of a motion file before anything is made of it; each names file, frame and remedy."""
 
 from collections.abc import Callable, Sequence
 
@@ -103,7 +103,7 @@ CHECKS: tuple[Callable[[RawMotion], None], ...] = (
 
 
 def check_clip(where: object, clip: Clip) -> None:
-    """What every clip must satisfy that is read or written.
+    """Check a clip that is read or written.
 
     Raises:
         BadInput: unequal lengths, a rate or a length that no motion has, NaN or infinity, values beyond all sense,
@@ -113,7 +113,7 @@ def check_clip(where: object, clip: Clip) -> None:
 
 
 def check_clips(clips: Sequence[tuple[object, Clip]]) -> None:
-    """The same for (where, clip) of many at once, which is faster: the first that fails is named."""
+    """Check (where, clip) of many at once, which is faster: the first that fails is named."""
     for where, clip in clips:
         _check_arrays(where, clip)
     if not clips:

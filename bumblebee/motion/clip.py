@@ -31,7 +31,7 @@ class Clip:
     licence: str = ""
     """Licence of the source, "unknown" where none was found."""
     sha256: str = ""
-    """Of the source file; of the arrays if the clip was made."""
+    """Hash of the source file; of the arrays if the clip was made."""
     family: str = ""
     """Kind of motion: stand, squat, walk, jump ...; "" if unknown."""
     split: str = "train"

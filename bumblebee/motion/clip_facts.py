@@ -1,4 +1,4 @@
-"""What a clip's file says about the clip beside its arrays: name, rate, captions, source ..., each of its type."""
+"""Facts of a clip's file beside its arrays: name, rate, captions, source ..., each of its type."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ def read_facts(where: object, data: bytes) -> dict[str, Any]:
 
 
 def require_facts(where: object, facts: Any) -> dict[str, Any]:
-    """The same from plain data."""
+    """Require the facts of a clip from plain data."""
     if not isinstance(facts, dict):
         raise BadInput(where, "a table of facts about a clip", f"a {type(facts).__name__}")
     missing = [key for key in _KEYS if key not in facts]

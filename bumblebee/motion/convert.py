@@ -36,14 +36,14 @@ _OWN = {INDEX, "clips", "skipped.csv"}  # names in a library
 
 @dataclass(frozen=True)
 class ConvertConfig:
-    """What is written."""
+    """Settings of a conversion: what is written."""
 
     to: str
     """One of `KINDS`."""
     fps: float | None = None
     """Rate of what is written [Hz]; None: each motion's own, 50 for mjlab and libraries."""
     files: FileConfig = field(default_factory=FileConfig)
-    """What the files may leave unsaid."""
+    """Settings that the files may leave unsaid."""
 
     @property
     def rate(self) -> float | None:
@@ -54,7 +54,7 @@ class ConvertConfig:
 
 @dataclass
 class Converted:
-    """What came of it."""
+    """Outcome of a conversion."""
 
     written: int = 0
     files: int = 0

@@ -1,4 +1,4 @@
-"""What is said of many files in few lines: what differs in numbers only is one line, with the range of each."""
+"""Many files in few lines: reasons that differ in numbers only are one line, with the range of each."""
 
 import re
 from collections.abc import Iterable

@@ -36,7 +36,7 @@ class File:
     clips: tuple[Clip, ...] = ()
     reason: str = ""
     place: Path | None = None
-    """Of a library's clip that gave none."""
+    """Place of a library's clip that gave none."""
 
 
 def each_file(path: Path, config: ReadConfig, cache: Path | None) -> Iterator[File]:
@@ -75,7 +75,7 @@ def _loaded(source: Source, config: ReadConfig) -> _Loaded:
 
 
 def _worked(loaded: _Loaded, config: ReadConfig, cache: Path | None) -> File:
-    """What a file holds; never raises."""
+    """File with its motions; never raises."""
     source = Source(loaded.path, _gone, loaded.archive)
     if loaded.reason or (loaded.path.name == INDEX and loaded.archive is None):
         return File(source, reason=loaded.reason)
@@ -118,7 +118,7 @@ def _csv_fps(source: Source, config: ReadConfig) -> float | None:
 
 
 def tried(read: Callable[[], Result], file: Path) -> Result | str:
-    """What `read` returns, or why it does not."""
+    """Result of `read`, or why there is none."""
     try:
         return read()
     except BadInput as error:

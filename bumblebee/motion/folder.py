@@ -31,7 +31,7 @@ __all__ = ["ReadConfig", "Reading", "read_each", "read_file", "read_folder", "sk
 
 @dataclass(frozen=True)
 class Reading:
-    """What a folder gave: the clips, the files without any, and what was detected rather than stated."""
+    """Clips of a folder, the files without any, and what was detected rather than stated."""
 
     clips: list[Clip]
     skipped: pd.DataFrame
@@ -67,7 +67,7 @@ def read_each(
     tell: Callable[[], None] | None = None,
     cache: Path | None = None,
 ) -> Reading:
-    """The same for more motions than memory holds: `take` gets one clip after the other, and the reading has none."""
+    """Read more motions than memory holds: `take` gets one clip after the other, and the reading has none."""
     path, config = Path(path), config or ReadConfig()
     if not os.path.lexists(path):
         raise BadInput(path, "a folder with motion files, or a motion file", "no such folder or file")
@@ -89,7 +89,7 @@ def read_file(path: Path, config: ReadConfig | None = None) -> list[Clip]:
 
 @dataclass
 class _Heard:
-    """What is said of the files while they are read."""
+    """Notes on the files while they are read."""
 
     files: int = 0
     skipped: list[tuple[str, str]] = field(default_factory=list)
@@ -168,5 +168,5 @@ def skipped_table(rows: list[tuple[str, str]]) -> pd.DataFrame:
 
 
 def noted_table(rows: list[tuple[str, str]]) -> pd.DataFrame:
-    """What was detected, columns `file` and `note`."""
+    """Table of what was detected, columns `file` and `note`."""
     return pd.DataFrame(rows, columns=["file", "note"])

@@ -29,7 +29,7 @@ class Inspected:
     rate_from: str = ""
     """Who says the rate: file, setting or library."""
     height: tuple[float, float] = (0.0, 0.0)
-    """Of the root, lowest and highest [m]."""
+    """Height of the root, lowest and highest [m]."""
     joints: int = 0
     """Joints of the robot; 0 for a person."""
     captions: int = 0
@@ -57,7 +57,7 @@ class Counts:
     faulty: int = 0
     """Motions that were read and failed a check."""
     seconds: float = 0.0
-    """Of the motions that are usable."""
+    """Duration of the motions that are usable [s]."""
 
     def add(self, rows: list[Inspected]) -> None:
         """Count the rows of one file."""

@@ -19,12 +19,12 @@ _LONGEST = 300  # characters of a source or a licence
 
 @dataclass(frozen=True)
 class Stated:
-    """What the table says of one file."""
+    """Row of the table on one file."""
 
     file: str
     motion: str
     fps: float
-    """Of the motion in the file [Hz]."""
+    """Rate of the motion in the file [Hz]."""
     source: str
     licence: str
 
@@ -50,7 +50,7 @@ def read_table(folder: Path) -> dict[str, Stated]:
 
 
 def stated_of(file: Path) -> Stated | None:
-    """What the table beside a file says of it."""
+    """Row about a file in the table beside it."""
     return read_table(file.parent).get(file.name)
 
 

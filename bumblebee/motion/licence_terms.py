@@ -1,4 +1,4 @@
-"""What the licences of motions say about commercial use, and what must be said of whatever is made from them."""
+"""Terms of the licences of motions: commercial use, and what must be said of whatever is made from them."""
 
 import re
 from collections.abc import Iterable, Mapping

@@ -70,19 +70,19 @@ def _from_table(file: Path) -> str:
 
 @cache
 def _from_folder(folder: Path) -> str:
-    """What the licence file of a folder is the text of."""
+    """Licence whose text the licence file of a folder is."""
     return next((found for name in _FILES if (found := _named(name, _text(folder / name)))), "")
 
 
 def _beside(archive: Path) -> str:
-    """The same of a file that is named after an archive."""
+    """Licence in a file that is named after an archive."""
     stem = archive.name[: len(archive.name) - len(next(end for end in SUFFIXES if archive.name.lower().endswith(end)))]
     names = [f"{stem}.{word}{end}" for word in ("LICENCE", "LICENSE") for end in (".txt", ".md", "")]
     return next((found for name in names if (found := _named(name, _text(archive.parent / name)))), "")
 
 
 def _inside(source: Source) -> str:
-    """The same of a licence file in a member's folder or one above it in the archive."""
+    """Licence in a file in a member's folder or one above it in the archive."""
     archive = source.archive
     texts = _archived(archive) if archive else {}
     folders = source.path.relative_to(archive).parents if archive and texts else []

@@ -1,4 +1,4 @@
-"""What lies at a path, file by file: motions of the robot, of people, clips of a library, or why a file gives none."""
+"""List of a path, file by file: motions of the robot, of people, clips of a library, or why a file gives none."""
 
 import os
 from collections.abc import Iterator

@@ -23,7 +23,7 @@ READ = tuple(dict.fromkeys((*ROBOT, *HUMAN)))
 
 @dataclass(frozen=True)
 class FileConfig(Ranged):
-    """What files may leave unsaid; "", None and 0: the file must say it, or the motion tell it, or it is refused."""
+    """Settings that files may leave unsaid; "", None and 0: the file or its motion tells it, or it is refused."""
 
     csv_fps: Annotated[float, Range(least=1, most=1000)] | None = None
     """Frame rate of CSV files, which do not hold one: g1_moves 60, LAFAN1's retargets 30 [Hz]. Without it, that which
@@ -61,12 +61,12 @@ class FileConfig(Ranged):
 
     @property
     def robot(self) -> RobotConfig:
-        """What concerns motions of the robot."""
+        """Settings of motions of the robot."""
         return RobotConfig(**{field.name: getattr(self, field.name) for field in fields(RobotConfig)})
 
     @property
     def human(self) -> HumanConfig:
-        """What concerns motions of people."""
+        """Settings of motions of people."""
         return HumanConfig(self.unit, self.up, self.smpl_fps, read_stated(self.skeleton) if self.skeleton else None)
 
 

@@ -39,7 +39,7 @@ def motion_of(name: str) -> str:
 
 
 def origin(name: str, source: str) -> str:
-    """What a motion is called in its own file, which several forms of it in several folders have in common.
+    """Name of a motion in its own file, which several forms of it in several folders have in common.
 
     Args:
         name: of the clip, where equal names of several files are told apart by the folder's, and then by a number.

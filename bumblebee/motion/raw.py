@@ -19,7 +19,7 @@ def as_wxyz(values: np.ndarray, order: str) -> np.ndarray:
 
 @dataclass(frozen=True)
 class RawMotion:
-    """What a reader returns: arrays at the file's own rate, float64.
+    """Motion of the robot from a file: arrays at the file's own rate, float64.
 
     `root_pos` (T, 3) [m, world], `root_quat` (T, 4) [wxyz as read, of any length or sign], `joint_pos` (T, 23) [rad].
     """
@@ -35,7 +35,7 @@ class RawMotion:
     part: str = ""
     """Which motion of the file, where it holds several."""
     notes: tuple[str, ...] = ()
-    """What was detected and not stated by the file: units, an order of joints; for the summary."""
+    """Notes on what was detected and not stated by the file: units, an order of joints; for the summary."""
     rate_from: str = "file"
     """Who states the frame rate: the file itself, or a setting."""
 

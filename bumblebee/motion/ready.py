@@ -34,7 +34,7 @@ class Job:
     data: bytes
     sha256: str
     csv_fps: float | None
-    """Of this file, if it is a CSV file [Hz]."""
+    """Rate of this file, if it is a CSV file [Hz]."""
     cache: Path | None
     """Folder of what was retargeted before."""
 
@@ -95,7 +95,7 @@ def _on_floor(even: RawMotion, config: ReadConfig) -> RawMotion:
 
 
 def _key(job: Job, config: ReadConfig) -> str:
-    """Of everything that decides the result: the file's name and bytes, the settings, the bodies, the code."""
+    """Key of everything that decides the result: the file's name and bytes, the settings, the bodies, the code."""
     parts = {
         "file": job.sha256,
         "name": job.path.name,

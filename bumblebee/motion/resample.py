@@ -10,7 +10,7 @@ from bumblebee.motion.raw import RawMotion
 
 
 def resample(raw: RawMotion, fps: float) -> RawMotion:
-    """The same motion at `fps`; the first frame stays, the last falls on the last sample within the motion.
+    """Motion at `fps`; the first frame stays, the last falls on the last sample within the motion.
 
     Where a new sample coincides with an old one it keeps its value, so resampling to the present rate changes nothing.
     """

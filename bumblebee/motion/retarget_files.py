@@ -39,7 +39,7 @@ class RobotFiles(Ranged):
     to: Literal["npz", "csv"] = "npz"
     """`.npz` with named arrays, or CSV with a header."""
     files: FileConfig = field(default_factory=FileConfig)
-    """What the people's files may leave unsaid."""
+    """Settings that the people's files may leave unsaid."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class _Job:
     motion: HumanMotion | None = None
     reason: str = ""
     first: bool = True
-    """Of its file."""
+    """Whether it is the first of its file."""
 
 
 @dataclass(frozen=True)

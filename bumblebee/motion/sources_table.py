@@ -74,7 +74,7 @@ def _rows(table: Path, changed: int) -> tuple[Row, ...]:
 
 
 def _names(cell: str) -> tuple[PurePosixPath, ...]:
-    """What a first cell names: what stands between backticks, or its words."""
+    """Names in a first cell: what stands between backticks, or its words."""
     found = re.findall(r"`([^`]+)`", cell) or cell.split()
     return tuple(PurePosixPath(name.strip("()/")) for name in found if name.strip("()/"))
 

@@ -18,7 +18,7 @@ def motion_files(path: Path) -> list[Path]:
 
 
 def motion_sources(path: Path) -> Iterator[Source]:
-    """What is to be read below a folder, or of a file: files, and the members of archives, in the order of names.
+    """Sources to be read below a folder, or of a file: files, and the members of archives, in the order of names.
 
     An archive, or a member of one, that cannot be used is a source whose `read` says why.
     """

@@ -66,7 +66,7 @@ def agreement(summary: Json) -> str:
 
 
 def without_texts(summary: Json) -> str:
-    """What the texts changed."""
+    """Sentence on what the texts changed."""
     bare = summary["audit"].get("motion_only")
     if not bare:
         return ""

@@ -15,7 +15,7 @@ _COLUMNS = (
     ("lower_joint", "lower", 3),
     ("upper_joint", "upper", 3),
 )
-"""Of the paper's table 2: key, heading, digits."""
+"""Columns of the paper's table 2: key, heading, digits."""
 
 
 def clusters_section(results: LoopResults) -> Section:

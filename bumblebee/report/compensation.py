@@ -1,4 +1,4 @@
-"""What was undone at the joint, without training: the plan beside each round's diagnosis."""
+"""Compensation at the joint, without training: the plan beside each round's diagnosis."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ class Planned:
     done: bool
     """Whether the runner undoes it."""
     what: str
-    """What it does, or why it does nothing."""
+    """Action, or why there is none."""
 
     @property
     def named(self) -> str:
@@ -51,6 +51,6 @@ def compensation_line(document: Json | None) -> str:
 
 
 def compensation_table(document: Json | None) -> list[Block]:
-    """What is undone and how, effect by effect; nothing where there is no plan."""
+    """Table of what is undone and how, effect by effect; nothing where there is no plan."""
     rows = [(e.named, Cell("undone", "found") if e.done else "left", e.what) for e in planned(document)]
     return [table(("effect", "at the joint", "how, or why not"), rows, "", "compensation")] if rows else []

@@ -9,7 +9,7 @@ _MOST_ROWS = 12
 
 
 def motions_section(results: LoopResults) -> Section:
-    """What was read, what the filter dropped and why."""
+    """Section on what was read, what the filter dropped and why."""
     library, drops = results.library, results.drops
     dropped = drops["motion"].nunique() if len(drops) else 0
     held_out = int((library["split"] == "test").sum())

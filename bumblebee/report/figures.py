@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 INK, QUIET, GRID = "#22262b", "#59626d", "#e3e7ec"
 PALETTE = ("#d9880f", "#2f6db5", "#3a8f5c", "#a4478f", "#7a6a52", "#c2423b", "#4aa3a8", "#85858f", "#8a6fd1")
 WIDTH = 3.35
-"""Of a figure [inch]: 322 CSS pixels."""
+"""Width of a figure [inch]: 322 CSS pixels."""
 SMALLEST = 9.7
 """Size of letters [pt]: 12.9 CSS pixels."""
 

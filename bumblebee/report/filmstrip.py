@@ -39,9 +39,9 @@ class Sheet:
     rows: int
     fps: float
     width: int
-    """Of a frame [pixels]."""
+    """Width of a frame [pixels]."""
     height: int
-    """Of a frame [pixels]."""
+    """Height of a frame [pixels]."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from bumblebee.report.page import Block, image
 from bumblebee.report.results import Json
 
 CHOICES = (("cluster", "cluster"), ("split", "split"), ("family", "family"), ("licence", "licence of the source"))
-"""What the points can be coloured by: a column, and what the page calls it."""
+"""Columns that the points can be coloured by, and the page's names of them."""
 _FULL = 1000  # of each axis, in the page
 
 

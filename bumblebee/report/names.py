@@ -1,4 +1,4 @@
-"""What policies are called on the page, and in which order: what came along apart from what this loop made."""
+"""Names of policies on the page, and their order: what came along apart from what this loop made."""
 
 import re
 

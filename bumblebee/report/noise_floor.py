@@ -1,4 +1,4 @@
-"""What the noise floor is, and what an error at or below it means.
+"""Meaning of the noise floor, and of an error at or below it.
 
 The floor is no bound: it is the error that a perfect model would show, drawn from simulated sensor noise. It has an
 interval of its own, and a measured error may come out below it by chance, or because the sensors are better than said.
@@ -18,7 +18,7 @@ WHAT = (
 
 
 def meaning(after: Json | None, floor: Json | None) -> str:
-    """What an error says beside its floor, as the end of a sentence; "" above the floor's interval or without a floor.
+    """Meaning of an error beside its floor, as the end of a sentence; "" above the floor's interval or without a floor.
 
     Args:
         after: `{"value", "ci95"}` of the corrected model's error.

@@ -40,7 +40,7 @@ def opening(results: LoopResults, film: Sequence[Block] = ()) -> Section:
 
 
 def opening_lines(results: LoopResults) -> list[str]:
-    """The same for a terminal."""
+    """First lines of the report for a terminal."""
     lines, turn = [headline(results)], _last(results)
     if turn is None:
         return lines
@@ -65,7 +65,7 @@ def headline(results: LoopResults) -> str:
 
 
 def _headlines(results: LoopResults) -> list[str]:
-    """What was undeclared and found, and how far the robot was won back; without what there is nothing to say of."""
+    """Sentences on what was undeclared and found, and how far the robot was won back; nothing without any of these."""
     turn = _last(results)
     if turn is None:
         return ["No round with the robot.", _lone_success(results)]

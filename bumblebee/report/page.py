@@ -75,9 +75,9 @@ class Block:
     panels: tuple[str, ...] = ()
     """Headings over the parts of a film that stand side by side in it."""
     facts: dict[str, str] = field(default_factory=dict)
-    """What the script of a map goes by."""
+    """Facts for the script of a map."""
     choices: tuple[tuple[str, str], ...] = ()
-    """What a map's points can be coloured by: a column, and what it is called."""
+    """Columns that a map's points can be coloured by, each with its name on the page."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a finished loop left, as plain values: everything that the report's sections read."""
+"""Results of a finished loop, as plain values: everything that the report's sections read."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -62,7 +62,7 @@ class LoopResults:
     """Whether the base stage kept a policy of its own training, and not the one that it went on from."""
 
     points: pd.DataFrame | None = None
-    """What the map shows of each motion; None where the clustering kept none."""
+    """Points of the map, a row a motion; None where the clustering kept none."""
 
     @property
     def real_robot(self) -> bool:

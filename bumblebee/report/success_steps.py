@@ -24,7 +24,7 @@ class Step:
 
 
 def success_steps(summary: Json, turn: RoundResults, base: str = "base") -> tuple[Step, ...]:
-    """What was evaluated of: what the loop began with, before, compensated, refined, the generalist, the two controls.
+    """Steps that were evaluated: the loop's beginning, before, compensated, refined, the generalist, the two controls.
 
     Args:
         summary: data/evaluation/summary.json.

@@ -80,7 +80,7 @@ def changes(entry: dict[str, Any]) -> str:
 
 
 def shown(low: float, high: float, p: float, better: int = 1) -> str:
-    """What a difference's interval and the paired test over motions show together; few motions can fool either.
+    """Verdict of a difference's interval and the paired test over motions together; few motions can fool either.
 
     Args:
         low: end of the 95 % interval.

@@ -112,7 +112,7 @@ def constant(values: Any, device: torch.device) -> Tensor:
 
 
 def _operand(value: Any, like: Tensor, as_tensor: bool) -> Any:
-    """What torch takes in place of `value`: a tensor on the device of `like`, or, unless `as_tensor`, a number."""
+    """Operand for torch in place of `value`: a tensor on the device of `like`, or, unless `as_tensor`, a number."""
     if isinstance(value, DeviceArray):
         return value.tensor
     if isinstance(value, np.ndarray) and value.ndim:

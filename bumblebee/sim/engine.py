@@ -16,7 +16,7 @@ from torch import Tensor
 
 @dataclass(frozen=True)
 class RobotState:
-    """What B robots' sensors and forward kinematics say at one control tick.
+    """State of B robots at one control tick, by their sensors and forward kinematics.
 
     `root_pos_w` (B, 3) m and `root_quat_w` (B, 4) wxyz are the pelvis in the world; `root_lin_vel_b` (B, 3) m/s and
     `root_ang_vel_b` (B, 3) rad/s its velocity in its own frame; `joint_pos` (B, J) rad and `joint_vel` (B, J) rad/s;

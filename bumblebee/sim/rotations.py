@@ -62,7 +62,7 @@ def turned(vectors: Tensor, matrices: Tensor) -> Tensor:
 
 
 def turned_in_full(vectors: Tensor, matrices: Tensor) -> Tensor:
-    """The same by sums of products: a GPU's own product may round its factors to ten bits (TF32)."""
+    """Rotation by sums of products: a GPU's own product may round its factors to ten bits (TF32)."""
     return (vectors[:, :, None] * matrices[:, None]).sum(-1)
 
 

@@ -42,7 +42,7 @@ class Servos:
         return np.clip(raw, -bound, bound)
 
     def given(self, control: np.ndarray) -> np.ndarray:
-        """What was asked for (..., J), from the servos' controls: a position [rad], or a torque [N m] of a motor."""
+        """Request (..., J) from the servos' controls: a position [rad], or a torque [N m] of a motor."""
         follows = self.bias[..., 1] != 0
         return np.where(follows, control / np.where(self.gear != 0, self.gear, 1.0), self.gain * control)
 

@@ -1,4 +1,4 @@
-"""What stops MuJoCo Warp: missing packages, device or memory, and buffers that are too small; a clear line for each."""
+"""Limits of MuJoCo Warp: missing packages, device or memory, and buffers that are too small; a clear line for each."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

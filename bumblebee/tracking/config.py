@@ -57,7 +57,7 @@ class Terrain(Ranged):
     half_side: Annotated[float, Range(least=2, most=1000)] = 20.0
     """Half the side of the terrain [m]; an episode that comes within 1 m of the edge ends, which is no failure."""
     seed: Seed = 0
-    """Of the heights."""
+    """Seed of the heights."""
 
     def __post_init__(self) -> None:
         """Refuse ground of too few knots to stand on, or too many to hold."""
@@ -68,7 +68,7 @@ class Terrain(Ranged):
 
 @dataclass(frozen=True)
 class ObservationConfig(Ranged):
-    """What a network sees: terms of `tracking.terms.TERMS`, or names of sets of them, over some control steps."""
+    """Observation of a network: terms of `tracking.terms.TERMS`, or names of sets of them, over some control steps."""
 
     terms: tuple[Name, ...] = ("demo",)
     """Names of terms in order; `teacher` and `student` stand for sets of them. Without any: no such group."""
@@ -111,7 +111,7 @@ class EnvConfig(Ranged):
     threshold_start: Annotated[float, Range(above=0, most=100)] = 0.8
     """Distance of a key body from the reference that ends an episode, at first [m]."""
     threshold_end: Annotated[float, Range(above=0, most=100)] = 0.3
-    """The same at the end of the curriculum [m]."""
+    """Threshold at the end of the curriculum [m]."""
     threshold_share: Share = 0.5
     """Share of the training over which the threshold shrinks."""
     sampler_floor: Annotated[float, Range(above=0, most=1000)] = 0.3
@@ -121,13 +121,13 @@ class EnvConfig(Ranged):
     sampler_stretch: Annotated[float, Range(least=0, most=3600)] = 0.0
     """Length of the stretches of a clip whose own failure rates are followed [s]; 0: whole clips' rates."""
     observation: ObservationConfig = field(default_factory=ObservationConfig)
-    """What the policy sees; the critic sees the same without noise, forces, torques and the time left."""
+    """Observation of the policy; the critic sees the same without noise, forces, torques and the time left."""
     critic: tuple[Name, ...] = ()
     """Terms that the critic sees beside that, exact: `demo` for a policy of `imu`, which sees less than the state."""
     student: ObservationConfig = field(default_factory=lambda: ObservationConfig(terms=()))
-    """What a student of the policy sees, as a group of its own; nothing where nobody is distilled."""
+    """Observation of a student of the policy, as a group of its own; nothing where nobody is distilled."""
     action: Literal["reference", "default"] = "reference"
-    """What an action of zero commands: the reference one step ahead with its gravity lead (ours), or the relaxed stand
+    """Command of an action of zero: the reference one step ahead with its gravity lead (ours), or the relaxed stand
     (the paper: actions are joint targets)."""
     place: Literal["world", "own"] = "world"
     """Where reward and ends of episodes compare robot and reference: in the world, or in the robot's own place, the

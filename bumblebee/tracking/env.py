@@ -191,7 +191,7 @@ class TrackingEnv(VecEnv):
         self._generator.set_state(saved["generator"].cpu())
 
     def _kept(self) -> dict[str, Tensor]:
-        """What a step leaves for the next, beside state and reference, which follow from it."""
+        """Tensors that a step leaves for the next, beside state and reference, which follow from it."""
         kept = {name: getattr(self, f"_{name}") for name in ("clip", "frame", "action", "action_before", "push_clock")}
         for group, own in self.groups.items():
             kept |= {f"{group}_{name}": tensor for name, tensor in own.kept().items()}
@@ -200,7 +200,7 @@ class TrackingEnv(VecEnv):
         return kept | {"episode_length": self.episode_length_buf, "failure": self.sampler.failure}
 
     def _shown(self) -> dict[str, Tensor]:
-        """What was seen last."""
+        """Observations that were seen last."""
         shown = {"privileged": self._privileged}
         for name, own in self.groups.items():
             shown |= {f"{name}_exact": own.exact, f"{name}_noisy": own.noisy}
@@ -212,7 +212,7 @@ class TrackingEnv(VecEnv):
         return state if self.ground is None else self.ground.in_clip_frame(state)
 
     def _judge(self) -> None:
-        """What the step earned, who has failed or come to an end, and new starts for these."""
+        """Judge the step: its reward, who has failed or come to an end, and new starts for these."""
         state = self._read()
         self._frame += 1
         self.episode_length_buf += 1
@@ -251,7 +251,7 @@ class TrackingEnv(VecEnv):
         return fallen(step.state, step.ref)
 
     def _push(self) -> None:
-        """Push whom it hits now."""
+        """Apply this step's random pushes."""
         config = self.cfg.randomisation
         self._push_clock += 1
         if config.push and config.push_regular:
@@ -308,7 +308,7 @@ class TrackingEnv(VecEnv):
         return self.library.frames(self._clip, (self._frame + 1) * self.dt)
 
     def _extended(self, exact: Tensor) -> Tensor:
-        """What the critic sees (B, D + extras), from the exact observation (B, D)."""
+        """Observation of the critic (B, D + extras), from the exact observation (B, D)."""
         left = (self.library.length[self._clip] - self._frame).float() * self.dt
         fresh = (self.episode_length_buf == 0)[:, None]  # its sensors still tell of the episode before
         extras = (

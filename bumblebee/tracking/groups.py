@@ -18,7 +18,7 @@ Look = Callable[[RobotState, ReferenceFrame, Tensor], Tensor]
 
 
 class Group:
-    """What one network sees of B robots; on a GPU in tensors that stay where they are, since looks are recorded there.
+    """Observation of B robots for one network; on a GPU in tensors that stay in place, since looks are recorded there.
 
     Args:
         config: its terms and history.

@@ -32,20 +32,20 @@ def other_side(name: str) -> str:
 
 
 def joint_reflection() -> Reflection:
-    """Of values of the joints: sides exchanged, turns about x and z (roll, yaw) with the other sign."""
+    """Reflection of values of the joints: sides exchanged, turns about x and z (roll, yaw) with the other sign."""
     table = joints()
     names = [joint.name for joint in table]
     return [names.index(other_side(name)) for name in names], [1.0 if joint.axis[1] else -1.0 for joint in table]
 
 
 def body_reflection(names: Sequence[str]) -> Reflection:
-    """Of places of bodies, three entries each."""
+    """Reflection of places of bodies, three entries each."""
     order = [list(names).index(other_side(name)) for name in names]
     return [3 * body + k for body in order for k in range(3)], [1.0, -1.0, 1.0] * len(order)
 
 
 def reflection(parts: Sequence[Part]) -> Reflection:
-    """Of an observation with these parts.
+    """Reflection of an observation with these parts.
 
     Raises:
         BadInput: for a part whose reflection nobody has written down.

@@ -1,4 +1,4 @@
-"""What the policy sees: the robot, the reference one control step ahead, and the difference, all in the base frame.
+"""Observation of the policy: the robot, the reference one control step ahead, and the difference, in the base frame.
 
 Everything here is computable on the robot from orientation, gyro, odometry (velocity, position), encoders and forward
 kinematics; nothing depends on the heading or the place in the world (paper, section 3.2: proprioception and goal).

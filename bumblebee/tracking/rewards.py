@@ -41,7 +41,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Step:
-    """What the reward of one control step depends on; actions (B, J) are the policy's outputs, newest first.
+    """Inputs of the reward of one control step; actions (B, J) are the policy's outputs, newest first.
 
     Errors that also end episodes or stand in the learning curve are worked out once: `key_errors` (B, K) [m] of the key
     bodies, `root_angle` (B,) [rad], `velocity_error` (B,) [m/s] of the root and `joint_error` (B,) [rad], a norm.
@@ -238,7 +238,7 @@ class RewardConfig(Ranged):
     ramp_share: Share = 0.0
     """Share of the training over which it grows; with 0 it is 1 throughout."""
     floor: Annotated[float, Range(least=-1000, most=0)] | None = None
-    """What a step earns at least, before the control period: with 0, to fall early is never worth more than to live.
+    """Least reward of a step, before the control period: with 0, to fall early is never worth more than to live.
     None: no limit."""
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Some of the worlds, as indices or as a mask: one code for a CPU, which saves work, and a GPU, which saves looks."""
+"""Some of the worlds, as indices or as a mask: one code for a CPU, which saves work, and a GPU, which avoids syncs."""
 
 import torch
 from torch import Tensor

@@ -23,12 +23,12 @@ class ClipShares:
 
     @classmethod
     def equal(cls, group: Sequence[int]) -> "ClipShares":
-        """The same share for each group; `group` is the index of each clip's."""
+        """Shares with one equal part for each group; `group` is the index of each clip's."""
         index = torch.as_tensor(group)
         return cls(index, torch.ones(int(index.max()) + 1))
 
     def of(self, clip: Tensor) -> "ClipShares":
-        """The same for what is drawn in place of clips: S parts, each of a clip (S,)."""
+        """Shares of what is drawn in place of clips: S parts, each of a clip (S,)."""
         return ClipShares(self.group.to(clip.device)[clip], self.share.to(clip.device))
 
 

@@ -1,4 +1,4 @@
-"""What happened in the environment since someone last asked: the columns of a learning curve."""
+"""Statistics of the environment since someone last asked: the columns of a learning curve."""
 
 import torch
 from torch import Tensor
@@ -30,7 +30,7 @@ class Statistics:
 
     @property
     def sums(self) -> Tensor:
-        """What `take` will read, to be added up over several environments first."""
+        """Sums that `take` will read, to be added up over several environments first."""
         return self._sums
 
     def take(self) -> dict[str, float]:

@@ -27,7 +27,7 @@ Part = tuple[str, int]
 
 @dataclass(frozen=True)
 class Seen:
-    """What a term may use.
+    """Inputs of a term.
 
     The state now, the reference at the end of the coming control period, the last action (B, J), the inverse of the
     base's orientation (B, 4), and `to_base` (B, 3, 3), which turns vectors of the world into the base frame.

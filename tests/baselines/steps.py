@@ -29,7 +29,7 @@ def state(n: int = 1, **changes: torch.Tensor) -> RobotState:
 
 
 def reference(n: int = 1, **changes: torch.Tensor) -> MovingFrame:
-    """The same place and pose as `state`, at rest, with one frame further ahead."""
+    """Reference at the place and pose of `state`, at rest, with one frame further ahead."""
     s = state(n)
     made = MovingFrame(
         root_pos_w=s.root_pos_w,

@@ -54,7 +54,7 @@ def test_the_same_seed_draws_the_same_case() -> None:
 
 
 def test_every_kind_of_robot_is_drawn() -> None:
-    """What the issue lists: joints, drives, bases, looks, what couples joints."""
+    """Kinds that a draw must reach: joints, drives, bases, looks, what couples joints."""
     robots = [make_robot(np.random.default_rng([19, seed]), Size()) for seed in range(300)]
     words = {word for robot in robots for word in robot.about}
     assert words >= {

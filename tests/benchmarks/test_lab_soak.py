@@ -32,7 +32,7 @@ def run(name: str) -> Event:
 
 
 def left(seed: int) -> Event:
-    """What a loop leaves."""
+    """Event of a loop that left its files."""
     files = {"models/base/policy.onnx": f"hash of seed {seed}", "models/base/card.json": "b"}
     return {"seed": seed, "stages": ["base", "filter"], "files": files, "runs": [run("base"), run("filter")]}
 
@@ -206,7 +206,7 @@ def test_lines_that_tell_are_kept_once_for_each_shape() -> None:
 def test_what_nobody_foresaw_has_no_name_wherever_it_is_said() -> None:
     line = "publish | Finished in state Failed('publish: this machine / {} OperationalError: connection refused')"
     assert said.name_of(line.format("expected the lab's")) is not None
-    assert said.name_of(line.format("an error that should not happen:")) is None
+    assert said.name_of(line.format("internal error:")) is None
     kept = "base | base: its machine was lost; another one goes on from its last checkpoint"
     assert said.name_of(kept) == said.name_of("base: its machine was lost; the stage starts again on another one")
 

@@ -1,4 +1,4 @@
-"""What following is worth under a table of rewards, without training."""
+"""Reward of following under a table of rewards, without training."""
 
 import pandas as pd
 import pytest

@@ -47,7 +47,7 @@ def test_every_method_has_the_same_steps_and_motions(motions: Motions) -> None:
     jobs = {job.name: job for job in table_1_jobs(SMALL, motions)}
 
     def all_steps(job: Job) -> float:
-        """Of the job and everything that it comes from."""
+        """Steps of the job and everything that it comes from."""
         needed, wanted = set(), [job.name]
         while wanted:
             name = wanted.pop()

@@ -42,7 +42,7 @@ def test_copies_are_found_where_their_motions_are() -> None:
 
 
 def test_the_rows_are_rates() -> None:
-    """Of the physics, which is the fastest, of the environment and of the loop; also with a hook at every step."""
+    """Rates of the physics, which is the fastest, of the environment and of the loop; also with a hook a step."""
     config = EnvConfig(num_worlds=4, threads=1, physics_hz=100.0)
     ppo = PpoConfig(steps=2, epochs=1, mini_batches=1, hidden=(8,))
     for effects in ((), (single("torque_lag", "left_knee_joint", 0.01),)):

@@ -24,7 +24,7 @@ def test_labels_that_have_nothing_in_common_lie_within_chance_and_equal_ones_far
 
 
 def test_the_interval_holds_the_index_of_other_libraries() -> None:
-    """Of 40 draws of one world nearly all have the world's own index in their interval."""
+    """In nearly all of 40 draws of one world the world's own index lies in their interval."""
     held = 0
     for seed in range(40):
         draw = np.random.default_rng(seed)

@@ -52,7 +52,7 @@ class Imperfect(NominalRobots):
         self._running.reset(np.arange(len(qpos)))
 
     def read(self) -> Sensors:
-        """What the sensors say."""
+        """Readings of the sensors."""
         true = super().read()
         angle = float(np.linalg.norm(self._hooks.imu))
         quat = true.base_quat

@@ -1,4 +1,4 @@
-"""What the diagnosis found and a drive can undo is undone: a hanging robot moves as the declared one does."""
+"""Effects that the diagnosis found and a drive can undo are undone: a hanging robot moves as the declared one does."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -115,7 +115,7 @@ DECLARED: dict[float, np.ndarray] = {}  # the declared robot's motion, by the cl
 def test_a_robot_with_the_effect_moves_as_the_declared_one_under_the_compensation(
     name: str, policy: ExportedPolicy
 ) -> None:
-    """What is left of the distance to the declared robot's motion, over what it is without the compensation."""
+    """Compare the distance to the declared robot's motion with the compensation and without."""
     effects, left = CASES[name]
     rate = 0.2 if name.startswith("link") else 1.2  # what carries a load's weight does not speed it up
     if rate not in DECLARED:

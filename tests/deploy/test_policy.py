@@ -1,4 +1,4 @@
-"""What is deployed is what the contract says, or nothing is."""
+"""A policy is deployed as its contract says, or not at all."""
 
 import json
 from collections.abc import Callable

@@ -33,7 +33,7 @@ from tests.deploy.conftest import nod
 def test_observation_and_motion_equal_the_engines_step_by_step(
     policy_folder: Callable[..., Path], ahead: tuple[float, ...]
 ) -> None:
-    """The same policy closed-loop in the training engine and through the runner: equal observations for ten ticks."""
+    """A policy closed-loop in the training engine and through the runner has equal observations for ten ticks."""
     clip, policy = nod(), ExportedPolicy.load(policy_folder(gain=0.02, ahead=ahead))
     assert policy.ahead == len(ahead)
     library, ids = reference_library(policy, [clip]), torch.zeros(1, dtype=torch.long)

@@ -168,7 +168,7 @@ def test_effects_it_cannot_have_are_named_in_one_line(change: dict, expected: st
 
 @pytest.mark.parametrize("schema", [1, None, 3])
 def test_a_robot_sealed_by_another_schema_is_refused(schema: int | None, tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"field schema: expected 2, came .*Seal it anew"):
+    with pytest.raises(BadInput, match=r"field schema: expected 2, came .*Run the stage seal again"):
         read_sealed(sealed(tmp_path / "robot.json", [OFFSET], schema))
 
 

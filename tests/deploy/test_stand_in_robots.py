@@ -64,7 +64,7 @@ def inverse_mass(joint: int, armature: float = 0.0) -> float:
 
 
 def speed_change(effects: list[dict], milliseconds: int, speed: float, joint: int = KNEE) -> float:
-    """What the effects add to a coasting joint's speed, servos off, [rad/s]."""
+    """Change of a coasting joint's speed by the effects, servos off, [rad/s]."""
     ends = []
     for these in (effects, []):
         robots = in_the_air(these, servo=False, joint=joint, speed=speed)

@@ -29,7 +29,7 @@ def xml(drive: str = SERVO, custom: str = "") -> str:
 
 @dataclass(frozen=True)
 class Truth:
-    """What the servo has that the model lacks."""
+    """Effects that the servo has and the model lacks."""
 
     viscous: float = 0.0
     """[N m s/rad]"""
@@ -44,21 +44,21 @@ class Truth:
 
 @dataclass(frozen=True)
 class Setting:
-    """Of one rollout."""
+    """Setting of one rollout."""
 
     kp: float = KP
     kd: float = KD
     load: float = 0.0
     """[kg]"""
     at: float = 2 * ARM
-    """Of the load below the axis [m]."""
+    """Place of the load below the axis [m]."""
     supply: float = 1.0
     """Share of the torque limit."""
     stated: bool = True
     """Whether the metadata say so."""
 
     def meta(self) -> dict:
-        """What the rollout's metadata state."""
+        """Metadata of the rollout."""
         if not self.stated:
             return {}
         loads = [{"body": "link", "kg": self.load, "position": [0.0, 0.0, -self.at]}] if self.load else []

@@ -1,4 +1,4 @@
-"""The same arm with any effect of the catalogue, by equations of its own: 1 ms steps, explicit servo.
+"""An arm with any effect of the catalogue, by equations of its own: 1 ms steps, explicit servo.
 
 Effects are {(id, place): parameters in the catalogue's order}; "" is the whole arm. `gravity` [m/s^2] is the arm's own.
 """
@@ -75,7 +75,7 @@ class _Drives:
         return out
 
     def reading(self) -> tuple[np.ndarray, np.ndarray]:
-        """What the encoders say now."""
+        """Readings of the encoders now."""
         back = np.round(self.get("encoder_delay") * 1000).astype(int)
         q, v = self.past[-1]
         if back.any():

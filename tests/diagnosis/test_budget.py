@@ -1,4 +1,4 @@
-"""A budget of time: what is begun is ended, what it leaves out is said, and what is left is flagged all the same."""
+"""A soft time limit: running steps finish, skipped ones are listed, and what is left is flagged all the same."""
 
 import pytest
 

@@ -35,7 +35,7 @@ ITERATIONS = 16  # of the base policy
 
 @dataclass(frozen=True)
 class Loop:
-    """What happened on the way."""
+    """Record of a loop: what happened on the way."""
 
     folder: Path
     killed: str

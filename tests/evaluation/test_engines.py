@@ -1,4 +1,4 @@
-"""What the contract says about an engine follows the model that runs."""
+"""The contract's settings of an engine follow the model that runs."""
 
 import pytest
 

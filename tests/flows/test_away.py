@@ -1,4 +1,4 @@
-"""What travels with a stage to another machine, and what it asks of that machine; no cluster."""
+"""Parcel of a stage for another machine, and what it asks of that machine; no cluster."""
 
 import io
 import os

@@ -66,7 +66,7 @@ class Asked:
         return sent[0]["status"], sent[1]["body"].decode()
 
     def socket(self, first: str, path: str = "/api/events/out") -> list[dict[str, Any]]:
-        """What a socket gets whose first message is this."""
+        """Messages to a socket whose first message is this."""
         sent: list[dict[str, Any]] = []
         messages = [{"type": "websocket.receive", "text": first}, {"type": "websocket.connect"}]
 

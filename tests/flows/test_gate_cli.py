@@ -23,7 +23,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> gate.Gate:
 
 
 def typed(place: gate.Gate, *words: str) -> str:
-    """What the command prints."""
+    """Text that the command prints."""
     result = CliRunner().invoke(app, [*words, "--workspace", str(place.workspace)])
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception

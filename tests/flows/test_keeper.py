@@ -93,7 +93,7 @@ class Keeper:
         self.all = [psutil.Process(pid) for pid in [*self.servers, *walk]]
 
     def left(self) -> list[psutil.Process]:
-        """What of it does not end within a few seconds."""
+        """Processes of it that do not end within a few seconds."""
         return [p for p in psutil.wait_procs(self.all, timeout=30)[1] if p.status() != psutil.STATUS_ZOMBIE]
 
 

@@ -18,7 +18,7 @@ def place(tmp_path: Path) -> gate.Gate:
 
 
 def given(place: gate.Gate, verb: str = "approve", **more: object) -> dict[str, object]:
-    """What the form holds."""
+    """Content of the form."""
     return {"answer": verb, "by": "", "seen": gate.seen_of(place.summary)["sha256"][:12], "note": "", **more}
 
 

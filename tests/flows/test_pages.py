@@ -65,7 +65,7 @@ class Served:
         raise TimeoutError(state)
 
     def resume(self, run: str, **given: str) -> dict[str, Any]:
-        """What Prefect says to an answer; it calls a run suspended a moment before the question is there."""
+        """Answer of Prefect to an answer; it calls a run suspended a moment before the question is there."""
         end = time.monotonic() + LIMIT
         while time.monotonic() < end:
             told = self.ask(f"flow_runs/{run}/resume", run_input=given)
@@ -307,11 +307,9 @@ def test_the_older_page_of_prefect_finds_its_server_too(served: Served, page: "P
 
 
 @pytest.mark.browser
-def test_the_champion_is_found_on_mlflows_page(served: Served, page: "Page"):
-    page.goto(f"{served.addresses.mlflow}/#/models")
-    page.get_by_text("expert-c0").first.wait_for()
-    for _ in range(2):  # what MLflow says to newcomers lies over the table
-        page.keyboard.press("Escape")
+def test_mlflows_page_opens_on_the_models_with_nothing_over_them(served: Served, page: "Page"):
+    page.goto(served.addresses.mlflow)
     page.get_by_role("link", name="expert-c0").first.wait_for()
+    assert page.get_by_role("dialog").count() == page.get_by_text("Ask questions about").count() == 0
     page.get_by_text("champion").first.wait_for()
     look(page, "mlflow-registry")

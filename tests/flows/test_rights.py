@@ -39,7 +39,7 @@ def of_mlflow() -> Iterator[tuple[str, str]]:
 
 
 def open_to(rank: str, server: str) -> set[str]:
-    """What changes something and is open to a rank, without the servers' prefixes."""
+    """Requests that change something and are open to a rank, without the servers' prefixes."""
     routes = of_prefect() if server == "prefect" else of_mlflow()
     changes = {(method, path) for method, path in routes if method not in READS and rank in may(server, method, path)}
     return {

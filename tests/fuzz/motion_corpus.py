@@ -21,7 +21,7 @@ Make = Callable[[Path], object]
 
 
 class Calls:
-    """What a hostile pickle asks for."""
+    """Call that a hostile pickle asks for."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return os.system, ("touch executed",)

@@ -43,7 +43,7 @@ def motion(frames: int = 24) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def table(frames: int = 24) -> np.ndarray:
-    """The same as the rows of a CSV file with 23 joints, (T, 30)."""
+    """Rows of a CSV file with 23 joints, (T, 30)."""
     root_pos, root_quat, joint_pos = motion(frames)
     return np.concatenate([root_pos, root_quat[:, [1, 2, 3, 0]], joint_pos], axis=1)
 

@@ -35,7 +35,7 @@ def damaged(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def outcome(config: DescribeConfig, root: Path, how: str) -> None:
-    """What is given must be captions within the motion, what is not must be one line, and all must add up."""
+    """Captions given must be within the motion, what is not must be one line, and all must add up."""
     try:
         say = describer(config, root)
         told = say.captions(root / "cmu" / "01_01.bvh", "01_01", DURATION)

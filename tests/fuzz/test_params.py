@@ -56,7 +56,7 @@ def refused(text: str) -> str | None:
 
 
 def judged(content: dict[Any, Any]) -> None:
-    """The same for settings that are no text."""
+    """Judge settings that are no text."""
     try:
         sections.check_content(content, FILE)
     except BadInput as error:

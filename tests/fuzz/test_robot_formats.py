@@ -25,7 +25,7 @@ WORDS = (b"nan", b"inf", b"-1e200", b"0", b"", b",", b"\n", b'"', b"Frame", b"_d
 
 
 def outcome(read: Callable[[], list], how: str) -> None:
-    """What a reader returns may fail the checks in one line; nothing else may come of it."""
+    """A reader's result may fail the checks in one line; nothing else may come of it."""
     try:
         for raw in read():
             assert np.isfinite(raw.fps) and raw.joint_pos.shape == (len(raw.root_pos), len(joint_names())), how

@@ -1,4 +1,4 @@
-"""What another user of this machine can do to a workspace's open servers.
+"""Attempts of another user of this machine on a workspace's open servers.
 
 By hand, as root, with `make serve` open for that workspace: `python tests/hostile/as_nobody.py WORKSPACE`. Prints what
 was tried as `nobody` and what came; status 1 if anything worked.
@@ -130,7 +130,7 @@ def main() -> int:
 
 
 def known(addresses: dict, secret: str) -> dict[str, str]:
-    """What an attacker who had guessed every number would name: a deployment, a suspended run, a model."""
+    """Names that an attacker who had guessed every number would use: a deployment, a suspended run, a model."""
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
     from flows.runs import ask
 

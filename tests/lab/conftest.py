@@ -25,7 +25,7 @@ class LabOnThisMachine:
     secret: str
 
     def content(self, **over: str) -> dict[str, dict[str, str]]:
-        """What lab.yaml says; `over` replaces keys of the section mlflow, `prefect_database` the other's."""
+        """Content of lab.yaml; `over` replaces keys of the section mlflow, `prefect_database` the other's."""
         prefect = over.pop("prefect_database", self.postgres.url("prefect"))
         own = {"database": self.postgres.url("mlflow"), "artifacts": f"s3://{self.store.bucket}/mlflow"}
         return {"prefect": {"database": prefect}, "mlflow": {**own, "s3_endpoint": self.store.endpoint, **over}}
@@ -72,7 +72,7 @@ class Stand:
 
     cluster: clusters.Cluster
     content: dict[str, Any]
-    """Of lab.yaml."""
+    """Content of lab.yaml."""
 
 
 @pytest.fixture(scope="session")

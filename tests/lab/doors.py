@@ -95,7 +95,7 @@ class Doors(Served):
             return error.code, error.read()
 
     def variables(self, who: str) -> dict[str, str]:
-        """What a program of somebody's gets, as docs/lab.md says."""
+        """Variables of a person's program, as docs/lab.md says."""
         known = {"PATH": os.environ["PATH"], "PYTHONPATH": str(servers.HOME), "NO_PROXY": "localhost,127.0.0.1"}
         name, _, password = self.pair(who).partition(":")
         known |= {"PREFECT_API_URL": f"{self.prefect}/api", "PREFECT_API_AUTH_STRING": self.pair(who)}
@@ -118,7 +118,7 @@ class Doors(Served):
 
 
 async def first_answer(served: Doors, token: str, path: str) -> str:
-    """What Prefect's server says to a socket that logs in; "" where it closes it."""
+    """First answer of Prefect's server to a socket that logs in; "" where it closes it."""
     from websockets.asyncio.client import connect
     from websockets.exceptions import ConnectionClosed
 

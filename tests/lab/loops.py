@@ -59,7 +59,7 @@ def locked(folder: Path) -> dict[str, Any]:
 
 
 def untimed(lock: dict[str, Any]) -> dict[str, Any]:
-    """The same without the hashes of `TIMED`."""
+    """The lock without the hashes of `TIMED`."""
     return {
         name: {**stage, **{part: _untimed(stage[part]) for part in ("deps", "outs")}} for name, stage in lock.items()
     }
@@ -70,7 +70,7 @@ def _untimed(entries: list[dict[str, Any]]) -> list[Any]:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """What stages made."""
+    """Files that stages made."""
     outs = [folder / out["path"] for stage in locked(folder).values() for out in stage["outs"]]
     found = [file for out in outs for file in ([out] if out.is_file() else out.rglob("*")) if file.is_file()]
     return {str(file.relative_to(folder)): file.read_bytes() for file in found}

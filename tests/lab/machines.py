@@ -37,16 +37,16 @@ class Postgres:
     bin: Path
 
     def url(self, name: str) -> str:
-        """Of a database, without a password."""
+        """Address of a database, without a password."""
         return f"postgresql://{USER}@{HOST}:{self.port}/{name}"
 
     def admin(self, program: str, *words: str, text: str | None = None) -> str:
-        """What a program of PostgreSQL's prints, run as the server's administrator."""
+        """Output of a program of PostgreSQL's, run as the server's administrator."""
         command = [str(self.bin / program), "-h", str(self.folder), "-p", str(self.port), *words]
         return _as_postgres(command, text).stdout
 
     def sql(self, text: str, database: str = "postgres") -> str:
-        """What a statement gives."""
+        """Result of a statement."""
         return self.admin("psql", "-v", "ON_ERROR_STOP=1", "-qAt", "-d", database, text=text)
 
     def kill(self) -> None:
@@ -183,7 +183,7 @@ def _until(done: Callable[[], bool], what: str, log: Path | None = None) -> None
 
 
 def missing() -> str:
-    """What this machine lacks for a lab's servers; "" for nothing."""
+    """Programs that this machine lacks for a lab's servers; "" for nothing."""
     from importlib.util import find_spec
 
     lacks = [name for name in ("psycopg2", "boto3") if find_spec(name) is None]

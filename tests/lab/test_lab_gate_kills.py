@@ -47,7 +47,7 @@ def answer_in_a_terminal(folder: Path) -> None:
 
 
 def of_page(folder: Path) -> dict[str, str]:
-    """What the page sends as an answer."""
+    """Fields that the page sends as an answer."""
     seen = gate.request(gate.Gate(folder, 1))["seen"]["sha256"][:12]
     return {"answer": "approve", "by": "Ada", "seen": seen, "note": ""}
 

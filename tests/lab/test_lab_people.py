@@ -163,7 +163,7 @@ def came_in(served: Doors, accepted: int) -> gate.Gate:
 
 
 def resumed(served: Doors, run: str, who: str, place: gate.Gate, verb: str = "approve", **more: str) -> dict[str, Any]:
-    """What the page is told, by the call that it makes."""
+    """Answer to the page, by the call that it makes."""
     seen = gate.seen_of(place.summary)["sha256"][:12]
     given = {"answer": verb, "by": "whoever", "seen": seen, "note": "", **more}
     while True:

@@ -136,7 +136,7 @@ def logged_on_one(folder: Path) -> list[str]:
 
 
 def logged_in_lab(lab: LabOnThisMachine) -> list[str]:
-    """The same of the lab's database, whichever machine logged them."""
+    """Stages logged in the lab's database, whichever machine logged them."""
     query = "SELECT runs.name FROM runs JOIN experiments USING (experiment_id)"
     query += " WHERE experiments.name = 'demo' AND runs.lifecycle_stage = 'active'"
     return sorted(lab.postgres.sql(query, "mlflow").split("\n")[:-1])

@@ -51,7 +51,7 @@ def logged(process: subprocess.Popen[str]) -> str:
 
 
 def mlflow(address: str, folder: Path, what: str, body: dict[str, Any] | None = None) -> bytes:
-    """What MLflow's interface answers."""
+    """Answer of MLflow's interface."""
     headers = {"Authorization": login.header(login.read(folder / SERVERS) or ""), "Content-Type": "application/json"}
     asked = urllib.request.Request(f"{address}/{what}", json.dumps(body).encode() if body else None, headers)
     with urllib.request.build_opener(urllib.request.ProxyHandler({})).open(asked, timeout=60) as reply:
@@ -151,7 +151,7 @@ def test_runs_of_other_machines_are_not_called_crashed(lab: LabOnThisMachine, wo
 
 
 def faults(lab: LabOnThisMachine, folder: Path) -> dict[str, tuple[dict[str, str], str]]:
-    """What lab.yaml says otherwise -> what the one line must say."""
+    """Faulty entries of lab.yaml -> what the one line must say."""
     nobody = lab.postgres.url("mlflow").replace(machines.USER, "nobody")
     return {
         "user": ({"database": nobody}, "mlflow.database: expected"),

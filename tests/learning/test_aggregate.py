@@ -1,4 +1,4 @@
-"""What DAgger gathers: the newest samples, their past put together as the environment showed it, within bounds."""
+"""Samples of DAgger: the newest ones, their past put together as the environment showed it, within bounds."""
 
 import pytest
 import torch

@@ -21,7 +21,7 @@ CONFIG = DeltaConfig(num_envs=60, regression=RegressionConfig(windows=300, passe
 
 
 def recordings(share: float, seed: int = 0, noise: float = 0.0) -> Recordings:
-    """Of a robot whose ankle pitch motors have that share of their gains; `noise` [rad, rad/s] of encoders."""
+    """Recordings of a robot whose ankle pitch motors have that share of their gains; `noise` [rad, rad/s]."""
     rollouts = record(24, 30, weakened(share, ANKLES), ANKLES, seed)
     rng = np.random.default_rng(seed)
     for rollout in rollouts:

@@ -37,7 +37,7 @@ def policy(shape: Shape = SHAPE) -> Policy:
 
 
 def windows(seen: Tensor, begun: int, memory: int) -> tuple[Tensor, Tensor]:
-    """Of one robot's observations (T, D) from step `begun` on: those of the last M + 1 steps, and which there are."""
+    """Windows of one robot's observations (T, D) from step `begun` on: the last M + 1 steps, and which there are."""
     steps = torch.arange(len(seen))[:, None] - torch.arange(memory, -1, -1)
     return seen[steps.clamp(min=0)], steps >= begun
 
@@ -98,7 +98,7 @@ def test_a_gate_is_the_formula_and_begins_near_the_identity() -> None:
 
 @torch.no_grad()
 def test_nothing_from_before_a_reset_reaches_the_actions() -> None:
-    """Of two robots one is reset: it acts as one that begins, whatever it had seen, NaN included; the other goes on."""
+    """One of two robots is reset: it acts as one that begins, whatever it had seen, NaN included; the other goes on."""
     own = policy()
     before, after = torch.randn(7, 2, 6), torch.randn(6, 2, 6)
     before[2, 1] = torch.nan
@@ -206,7 +206,7 @@ def test_the_defaults_are_the_papers() -> None:
 
 
 def test_an_untrained_one_of_the_same_shape_can_be_exported(tmp_path: Path) -> None:
-    """What success before training is measured with: other weights, finite actions, the same memory."""
+    """Success before training is measured with other weights, finite actions, and a memory of the same shape."""
     (tmp_path / "trained").mkdir()
     export_policy(tmp_path / "trained", policy())
     export_untrained(tmp_path / "trained", tmp_path / "fresh")

@@ -15,7 +15,7 @@ GPU = pytest.mark.skipif(not torch.cuda.is_available(), reason="no NVIDIA GPU")
 
 
 class Graph:
-    """What a recording is without a GPU."""
+    """Recording without a GPU."""
 
     def __init__(self, work: Callable[[], None]) -> None:
         self.replay = work

@@ -165,7 +165,7 @@ def one_answer(place: gate.Gate, number: int, seen: str, change: bool, start: An
 
 
 def at_once(place: gate.Gate, people: int, change: bool) -> list[int]:
-    """What processes of their own got for an answer at the same time: the number of the person, -1 where refused."""
+    """Answers to processes of their own at one time: the number of the person, -1 where refused."""
     fork = multiprocessing.get_context("fork")  # a fresh interpreter for each would take minutes to import
     seen, start, accepted = ask(place), fork.Barrier(people), fork.Queue()
     started = [fork.Process(target=one_answer, args=(place, n, seen, change, start, accepted)) for n in range(people)]

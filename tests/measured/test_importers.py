@@ -211,7 +211,7 @@ def sensed_arm() -> mujoco.MjModel:
 
 
 def write_sysid(folder: Path, rollout: Rollout, model: mujoco.MjModel, layout: str) -> None:
-    """What mujoco.sysid itself writes: a trajectory with states or with sensors, or two time series."""
+    """Write files as mujoco.sysid itself does: a trajectory with states or with sensors, or two time series."""
     control = sysid.TimeSeries.from_control_names(rollout.time, rollout.joint_target, model, list(rollout.joints))
     both = np.concatenate([rollout.joint_pos, rollout.joint_vel], axis=1)
     kinds = {"pos": sysid.SignalType.MjStateQPos, "vel": sysid.SignalType.MjStateQVel}

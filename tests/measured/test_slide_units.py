@@ -1,4 +1,4 @@
-"""What the rule `degrees` says of a slide: metres, and millimetres where these would fit."""
+"""Units of a slide by the rule `degrees`: metres, and millimetres where these would fit."""
 
 import mujoco
 import numpy as np

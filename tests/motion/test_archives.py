@@ -49,7 +49,7 @@ MAKERS = pytest.mark.parametrize(
 
 
 def outcome(path: Path) -> tuple[dict[str, bytes], list[str]]:
-    """What can be read below a path, and the lines about what cannot."""
+    """Readable members below a path, and the lines about what cannot be read."""
     read, lines = {}, []
     for source in motion_sources(path):
         try:

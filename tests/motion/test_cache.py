@@ -1,4 +1,4 @@
-"""What was made once is not made again, unless it is damaged, was cleared, or would come out another way."""
+"""An entry is not made again, unless it is damaged, was cleared, or would come out another way."""
 
 import multiprocessing
 import os

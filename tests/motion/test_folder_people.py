@@ -2,12 +2,17 @@
 
 import zipfile
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import bumblebee as bb
+from bumblebee import cli_train
+from bumblebee.api import training as api_training
 from bumblebee.motion import ready
+from bumblebee.motion.cache import VARIABLE
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.describe.describer import DescribeConfig
 from bumblebee.motion.folder import Reading, read_each, read_folder
@@ -123,6 +128,27 @@ def test_a_second_read_makes_nothing_anew_and_gives_the_same(mixed, tmp_path, ma
     assert made == []
     assert_same(first, second)
     assert_same(first, without)
+
+
+def test_a_second_training_on_a_folder_retargets_nothing(mixed, tmp_path, made, monkeypatch):
+    """Nor does a call from Python on the same files; without the user's cache both would."""
+    trained = []
+    monkeypatch.setattr(api_training, "train", lambda clips, *_, **__: trained.append(clips) or stop())
+    monkeypatch.setattr("bumblebee.motion.folder.ReadConfig", partial(ReadConfig, processes=1))
+    for cache, again in ((str(tmp_path / "cache"), 0), ("", 2)):
+        monkeypatch.setenv(VARIABLE, cache)
+        for _ in range(2):
+            made.clear()
+            with pytest.raises(KeyboardInterrupt):
+                cli_train.train(mixed / "cmu", tmp_path / "policy")
+        assert len(made) == again
+        bb.read_motions(mixed / "cmu", processes=1, max_seconds=10.0)
+        assert len(made) == 2 * again
+    assert all(len(clips) == 2 for clips in trained)
+
+
+def stop():
+    raise KeyboardInterrupt
 
 
 def test_a_changed_neighbour_is_made_anew_alone(mixed, tmp_path, made):

@@ -1,4 +1,4 @@
-"""What lies at a path, file by file, of the robot and of people; counts add up."""
+"""List of a path, file by file, of the robot and of people; counts add up."""
 
 import zipfile
 

@@ -176,7 +176,7 @@ def test_a_library_is_read_lazily_by_name_and_in_order(motions, tmp_path, small_
 
 
 def test_no_more_than_some_clips_are_in_memory(motions, tmp_path):
-    """Of a library of 44 MB, while it is written from a stream and while it is gone through."""
+    """A library of 44 MB, while it is written from a stream and while it is gone through."""
     one = motions.clip("m", 400)
 
     def stream():

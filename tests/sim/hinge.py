@@ -53,7 +53,7 @@ def path(
 def reference(
     torque: Callable[[float, float, float], float], seconds: float = 0.4, speed: float = 0.0, inertia: float = TOTAL
 ) -> np.ndarray:
-    """The same by semi-implicit Euler in fine steps; `torque(t, q, v)` is all that acts."""
+    """Integrate by semi-implicit Euler in fine steps; `torque(t, q, v)` is all that acts."""
     q, v, out = 0.0, speed, []
     every = round(0.001 / FINE)
     for k in range(round(seconds / FINE)):

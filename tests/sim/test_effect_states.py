@@ -1,4 +1,4 @@
-"""What discovered terms remember: by the engine's steps, by the log, and by an independent integration."""
+"""States of discovered terms: by the engine's steps, by the log, and by an independent integration."""
 
 import numpy as np
 import pytest

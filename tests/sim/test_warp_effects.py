@@ -140,7 +140,7 @@ def test_lost_commands_are_held(device: str) -> None:
 
 
 def test_without_hooks_it_is_the_plain_engine(device: str) -> None:
-    """The same numbers, but for a GPU's order of sums, on a model that needs none of this."""
+    """Numbers are equal, but for a GPU's order of sums, on a model that needs none of this."""
     spec = build_spec()
     add_foot_sensors(spec)
     robot = converged(spec.compile())

@@ -1,4 +1,4 @@
-"""What the GPU engine refuses: contacts that do not fit, models, drivers, too little memory. One line each."""
+"""Refusals of the GPU engine: contacts that do not fit, models, drivers, too little memory. One line each."""
 
 import mujoco
 import pytest

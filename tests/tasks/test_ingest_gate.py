@@ -202,7 +202,7 @@ def test_an_answer_with_the_hash_of_other_data_is_refused(workspace: Setup, caps
 
 
 def test_another_model_needs_another_answer(workspace: Setup) -> None:
-    """The same rollouts beside a declared model that passes them too are not what was approved."""
+    """Rollouts beside another declared model that passes them too are not what was approved."""
     workspace()
     ingest.main(1)
     assert answer("approve", "Ann") == 0

@@ -53,7 +53,7 @@ def lockfile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lockfi
 
 
 def written_meanwhile(path: Path, beginning: str, read: Callable[[], object]) -> object:
-    """What `read` finds while another writes: the beginning stands there, the rest comes 0.2 s later."""
+    """Content that `read` finds while another writes: the beginning stands there, the rest comes 0.2 s later."""
     path.write_text(beginning)
 
     def finish() -> None:

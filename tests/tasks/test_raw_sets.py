@@ -109,7 +109,7 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def small(lab: Path) -> Path:
-    """The same with small commands."""
+    """A lab with small commands."""
     stages = yaml.safe_load((lab / "dvc.yaml").read_text())
     stages["stages"]["motions"]["cmd"] = f"PYTHONPATH={HOME} {sys.executable} read.py"
     stages["stages"]["filter"]["cmd"] = "mkdir -p data/filtered && cp data/motions/* data/filtered && echo x >> looked"

@@ -27,12 +27,15 @@ def test_the_run_is_written_with_everything_in_it(workspace: Path) -> None:
     curve = workspace / "curve.csv"
     curve.write_text("frames,reward\n10,0.5\n20,0.75\n")
     recorder.start()
-    recorder.record(run(cluster="c0", round=1, params={"a": {"b": 2}}, metrics={"x": 0.5}, curve=curve))
+    numbers = {"x": 0.5, "error": {200: 2.0, 1000: 3.0}}
+    recorder.record(run(cluster="c0", round=1, params={"a": {"b": 2}}, metrics=numbers, curve=curve))
     client = registry.prepare()
     experiment = client.get_experiment_by_name(workspace.name)
     (found,) = client.search_runs([experiment.experiment_id])
     assert found.data.params == {"a.b": "2"}
-    assert found.data.metrics == {"x": 0.5, "reward": 0.75}
+    assert found.data.metrics == {"x": 0.5, "error": 3.0, "reward": 0.75}
+    points = client.get_metric_history(found.info.run_id, "error")
+    assert [(point.step, point.value) for point in points] == [(200, 2.0), (1000, 3.0)]
     assert (found.data.tags["cluster"], found.data.tags["round"]) == ("c0", "1")
     assert [item.path for item in client.list_artifacts(found.info.run_id)] == ["lineage.json", "outputs.json"]
 
@@ -73,3 +76,10 @@ def test_a_stage_that_ends_without_a_run_leaves_none(workspace: Path) -> None:
     assert process.returncode == 0
     client = registry.prepare()
     assert client.search_runs([client.get_experiment_by_name(workspace.name).experiment_id]) == []
+
+
+def test_a_stages_run_lasts_from_the_stages_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: dict[str, object] = {}
+    monkeypatch.setattr(registry, "log_run", lambda **given: told.update(given))
+    recorder.record(run())
+    assert told["begun"] == recorder._BEGUN

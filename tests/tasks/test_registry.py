@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -75,7 +76,8 @@ def test_runs_and_models_can_be_found_again_even_when_the_workspace_has_moved(
     """One run of a stage and two versions of a model; then the folder gets another name and all is still there."""
     curve = Path("curve.csv")
     curve.write_text("step,loss\n0,2.0\n1,1.0\n")
-    run_id = registry.log_run("base", None, 0, Config(), {"success": 0.5}, curve, {"note": "x"}, [curve])
+    begun = time.time() - 90
+    run_id = registry.log_run("base", None, 0, Config(), {"success": 0.5}, curve, {"note": "x"}, [curve], begun)
     first = registry.register(
         "generalist", policy_folder(workspace / "p1", 2.0), {"onnx_sha256": "1"}, {"success": 0.5}
     )
@@ -96,6 +98,7 @@ def test_runs_and_models_can_be_found_again_even_when_the_workspace_has_moved(
     monkeypatch.chdir(moved)
     client = registry.prepare()
     run = client.get_run(run_id)
+    assert (run.info.start_time, run.info.end_time >= int(1000 * begun) + 90_000) == (int(1000 * begun), True)
     assert run.data.params["ppo.clip"] == "0.2"
     assert [point.value for point in client.get_metric_history(run_id, "loss")] == [2.0, 1.0]
     own = {name for name in run.data.tags if not name.startswith("mlflow.")}

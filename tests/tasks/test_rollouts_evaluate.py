@@ -221,3 +221,16 @@ def test_an_unknown_engine_is_named(workspace: Path) -> None:
     (workspace / "params.yaml").write_text(PARAMS.replace("{threads: 1}", "{engines: [gazebo]}"))
     with pytest.raises(BadInput, match="gazebo"):
         evaluate.main()
+
+
+def test_an_experts_success_is_one_curve_over_the_rounds() -> None:
+    def row(policy: str, round: int | None, value: float, split: str = "all") -> dict:
+        about = {"policy": policy, "round": round, "engine": "nominal", "split": split, "group": "all"}
+        return {**about, "success": {"value": value}}
+
+    experts = [row("expert-c0-r0", 0, 0.2), row("expert-c0-r1", 1, 0.6)]
+    rows = [*experts, row("base", None, 0.1), row("base", None, 0.0, "test")]
+    assert evaluate.headline({"results": rows}) == {
+        "nominal/expert-c0/success": {0: 0.2, 1: 0.6},
+        "nominal/base/success": {0: 0.1},
+    }

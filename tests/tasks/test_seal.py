@@ -117,7 +117,7 @@ def test_motions_that_the_policy_does_not_follow_at_all_are_no_reason_to_stop(
     monkeypatch.setattr(seal, "followed", lambda *_: [])
     seal.main()
     assert json.loads(paths.SEALED_ROBOT.read_text())["attempt"] == 0
-    assert "nothing to lose" in capsys.readouterr().out
+    assert "no loss to measure" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("line", ["seal: {n_effects: 0}\nrollouts: {}", "seal: {}\nrollouts: {source: mine}"])

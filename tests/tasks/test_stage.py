@@ -1,4 +1,4 @@
-"""What stages share: whole outputs or none, one line and status 2 for bad input, scratch that follows its inputs."""
+"""Services that stages share: whole outputs or none, one line and status 2 for bad input, scratch by inputs."""
 
 import errno
 from pathlib import Path

@@ -49,7 +49,7 @@ def test_the_newest_rows_stand_last_and_a_fresh_world_has_no_other_past(by_mask:
 
 
 def test_an_environments_history_is_what_was_seen_before(model: mujoco.MjModel) -> None:
-    """Of teacher and student alike; the newest step's own terms come last."""
+    """Teacher and student alike; the newest step's own terms come last."""
     env = make(model)
     past = [steps(env, "policy", 3)[:, -1].clone()]
     first = steps(env, "policy", 3)

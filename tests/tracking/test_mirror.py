@@ -68,7 +68,7 @@ def situation() -> tuple[tuple, tuple]:
 
 @pytest.mark.parametrize("name", OWN)
 def test_the_mirrored_robot_sees_the_reflected_observation(name: str) -> None:
-    """Of every term: seen in the mirrored world, or reflected after it was seen, is the same."""
+    """Each term, seen in the mirrored world or reflected after it was seen, is equal."""
     plain, mirrored = situation()
     index, sign = reflection(parts([name], J, A))
     seen = see((name,), *plain)[:, index] * torch.tensor(sign)
@@ -89,7 +89,7 @@ def test_mirrored_joints_put_mirrored_bodies_in_mirrored_places() -> None:
 
 
 def test_twice_reflected_is_as_before() -> None:
-    """Of joints, bodies and the whole observations."""
+    """Joints, bodies and whole observations."""
     for index, sign in (joint_reflection(), body_reflection(FEET), reflection(parts(["teacher", "student"]))):
         back = [index[i] for i in index]
         assert back == list(range(len(index)))

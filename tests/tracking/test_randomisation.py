@@ -90,7 +90,7 @@ def test_a_shifted_centre_of_mass_is_felt(model: mujoco.MjModel) -> None:
 
 @pytest.mark.parametrize(("delay", "late"), [(0.0, [0, 0]), (0.020, [4, 0]), (0.030, [4, 2]), (0.040, [4, 4])])
 def test_a_command_arrives_after_its_delay(delay: float, late: list[int]) -> None:
-    """Of the 4 physics steps of each of two control periods, the first `late` ones still hold the old command."""
+    """In the 4 physics steps of each of two control periods, the first `late` ones still hold the old command."""
     spread = replace(OFF, delay=(delay, delay))
     robot = task_model(EnvConfig(physics_hz=200.0, randomisation=spread))
     engine = MujocoCpu(robot, 1, threads=1)

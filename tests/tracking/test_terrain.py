@@ -113,7 +113,7 @@ def _height(x: float, y: float) -> float:
 
 
 def test_the_share_of_rough_starts_is_kept(model: mujoco.MjModel) -> None:
-    """Of 4,000 starts a quarter is rough where that is asked for, and none lies near the edge."""
+    """A quarter of 4,000 starts is rough where that is asked for, and none lies near the edge."""
     from bumblebee.tracking.rows import Rows
 
     ground = Ground(replace(ROUGH, rough=0.25), 4000, "cpu")

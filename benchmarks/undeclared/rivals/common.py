@@ -1,4 +1,4 @@
-"""What the rivals share: the usual parameters of a robot, a linear view of them, and how a fit names effects.
+"""Parts that the rivals share: the usual parameters of a robot, a linear view of them, and how a fit names effects.
 
 A method that moves every parameter names none by itself. Here an effect is named if taking it out alone gives back at
 least a twentieth of what the whole fit gained, and nothing is named if the whole fit gained less than 1 %.
@@ -36,7 +36,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a method says."""
+    """Answer of a method."""
 
     named: list[dict]
     """Entries with effect and where, the most important first."""

@@ -63,7 +63,7 @@ class GroundCompliance(Law):
     constant: float
 
     def model(self, model: mujoco.MjModel) -> None:
-        """Of all geoms, for MuJoCo mixes the two."""
+        """Set the contact constant of all geoms, for MuJoCo mixes the two."""
         model.geom_solref[:, 0] = self.constant
 
 

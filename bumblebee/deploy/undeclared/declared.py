@@ -1,4 +1,4 @@
-"""What is declared of a robot: its model, and the figures that the truth starts from."""
+"""Declaration of a robot: its model, and the figures that the truth starts from."""
 
 from dataclasses import dataclass
 
@@ -34,7 +34,7 @@ class Declared:
 
 
 def describe(name: str, spec: mujoco.MjSpec) -> Declared:
-    """What a model of position servos declares; a base that moves freely is told by its joint."""
+    """Read what a model of position servos declares; a base that moves freely is told by its joint."""
     model = spec.compile()
     hinges = [j for j in range(model.njnt) if model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_HINGE)]
     dofs = model.jnt_dofadr[hinges]

@@ -35,7 +35,7 @@ class Strength(Law):
         kd[..., self.joint] *= self.factor
 
     def feed_forward(self, world: World, torque: np.ndarray) -> np.ndarray:
-        """The same."""
+        """Feed-forward torque (R, J) [N m] after the loss of strength."""
         torque = torque.copy()
         torque[:, self.joint] *= self.factor
         return torque
@@ -57,7 +57,7 @@ class TorqueLimit(Law):
 
 @dataclass
 class TorqueSpeed(Law):
-    """What the drive can give along the motion falls linearly to 0 at `speed` [rad/s]; `limit` is that at rest."""
+    """Torque limit along the motion that falls linearly to 0 at `speed` [rad/s]; `limit` is that at rest."""
 
     joint: str
     limit: float

@@ -81,7 +81,7 @@ class Backlash(Law):
         return q, v
 
     def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same."""
+        """Encoders' positions and velocities for the log."""
         return self.sense(world, q, v)
 
     def inertia(self, world: World, armature: np.ndarray) -> None:
@@ -160,5 +160,5 @@ class Elastic(Law):
         return q, v
 
     def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same."""
+        """Encoders' positions and velocities for the log."""
         return self.sense(world, q, v)

@@ -82,7 +82,7 @@ def _scaled(field_name: str, share: float) -> Callable[[Place], float]:
 
 
 def _read(p: Place) -> float:
-    """What the encoder of play and shafts reads, as the contract has it: 0 the motor, 1 the joint."""
+    """Place of the encoder of play and shafts, as the contract has it: 0 the motor, 1 the joint."""
     return float(p.draw["sign"] < 0)
 
 

@@ -11,7 +11,7 @@ from bumblebee.deploy.servo_command import ServoCommand
 
 @dataclass
 class World:
-    """What laws see; R robots, J joints. Arrays are those of the millisecond that begins."""
+    """State that laws see; R robots, J joints. Arrays are those of the millisecond that begins."""
 
     joints: tuple[str, ...]
     count: int
@@ -19,7 +19,7 @@ class World:
     dt: float
     """[s]."""
     rng: np.random.Generator | Sequence[np.random.Generator]
-    """Of what is random in the truth itself, such as which commands are lost; or one of each robot."""
+    """Generator for what is random in the truth itself, such as which commands are lost; or one of each robot."""
     time: np.ndarray = field(default_factory=lambda: np.zeros(1))
     """(R,) since the start [s]."""
     q: np.ndarray = field(default_factory=lambda: np.zeros((1, 0)))
@@ -46,7 +46,7 @@ class World:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What sensors say of W robots at one tick; J joints. What is read is exact, what is inferred has their noise."""
+    """Readings of W robots at one tick; J joints. What is read is exact, what is inferred has their noise."""
 
     joints: tuple[str, ...]
     q: np.ndarray
@@ -106,27 +106,27 @@ class Law:
         """Guess what no reading determines, here and in the states (W, nq), (W, nv) of `model`, in place."""
 
     def tick(self, world: World, command: ServoCommand) -> ServoCommand:
-        """What becomes of a command of R robots when it is issued, once a control period."""
+        """Change a command of R robots when it is issued, once a control period."""
         return command
 
     def command(self, world: World, command: ServoCommand) -> ServoCommand:
-        """What becomes of a command on its way to the servo, every millisecond."""
+        """Change a command on its way to the servo, every millisecond."""
         return command
 
     def feed_forward(self, world: World, torque: np.ndarray) -> np.ndarray:
-        """What the drive makes of a feed-forward torque (R, J) [N m]; the servo's own is in `gains`."""
+        """Feed-forward torque (R, J) [N m] that the drive makes of the commanded one; the servo's own is in `gains`."""
         return torque
 
     def sense(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the encoders say; called once a millisecond and may keep memory."""
+        """Encoders' positions and velocities for the servo; called once a millisecond and may keep memory."""
         return q, v
 
     def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same for the log, without changing the memory; by default as the servo senses."""
+        """Encoders' positions and velocities for the log; the memory stays. By default as the servo senses."""
         return q, v
 
     def base(self, quat: np.ndarray) -> np.ndarray:
-        """What the IMU says of the base's orientation, (R, 4) wxyz."""
+        """Orientation of the base that the IMU reads, (R, 4) wxyz."""
         return quat
 
     def drive(self, world: World, torque: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What laws remember, row by row: taken out for the robots that move, put back when they have moved."""
+"""Memory of laws, row by row: taken out for the robots that move, put back when they have moved."""
 
 from collections.abc import Iterator, Sequence
 from copy import copy

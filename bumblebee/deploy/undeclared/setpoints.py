@@ -33,7 +33,7 @@ class CommandFilter(Law):
 
 @dataclass
 class CommandRateLimit(Law):
-    """What the servo follows moves by at most `rate` [rad/s], every millisecond a thousandth of it."""
+    """Set-point that moves by at most `rate` [rad/s], every millisecond a thousandth of it."""
 
     joint: str
     rate: float
@@ -53,7 +53,7 @@ class CommandRateLimit(Law):
 
 @dataclass
 class CommandProfile(Law):
-    """What the servo follows speeds up and slows down by `acceleration` [rad/s^2], as a drive's firmware does it.
+    """Set-point that speeds up and slows down by `acceleration` [rad/s^2], as a drive's firmware does it.
 
     Every fifth of a millisecond it takes the speed from which it can just stop at the target.
     """

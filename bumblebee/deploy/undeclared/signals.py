@@ -22,12 +22,12 @@ class Line:
         return self.peek()
 
     def ahead(self, value: np.ndarray) -> np.ndarray:
-        """What would come out if `value` were put in now."""
+        """Value that would come out if `value` were put in now."""
         past = [value, *self.past]
         return (1 - self._share) * past[self._whole] + self._share * past[self._whole + 1]
 
     def peek(self) -> np.ndarray:
-        """What came out last."""
+        """Value that came out last."""
         return (1 - self._share) * self.past[self._whole] + self._share * self.past[self._whole + 1]
 
 
@@ -60,7 +60,7 @@ class DroppedCommands(Law):
 
     @property
     def chance(self) -> float:
-        """Of each tick."""
+        """Probability of a lost command, each tick."""
         return self.share
 
     def start(self, world: World, target: np.ndarray) -> None:
@@ -117,7 +117,7 @@ class EncoderOffset(Law):
         return q, v
 
     def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same."""
+        """Encoders' positions and velocities for the log."""
         return self.sense(world, q, v)
 
 
@@ -130,7 +130,7 @@ class EncoderQuantisation(Law):
 
     @property
     def grid(self) -> float:
-        """Of one joint."""
+        """Step of one joint's encoder."""
         return self.step
 
     def settle(self, model: mujoco.MjModel, seen: Seen, qpos: np.ndarray, qvel: np.ndarray) -> None:
@@ -145,7 +145,7 @@ class EncoderQuantisation(Law):
         return q, v
 
     def read(self, world: World, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same."""
+        """Encoders' positions and velocities for the log."""
         return self.sense(world, q, v)
 
 

@@ -30,7 +30,7 @@ class Moving:
     rows: np.ndarray | slice
     """Which."""
     world: World
-    """Of these n alone."""
+    """State of these n robots alone."""
     laws: Sequence[Law]
     """With the memory of these n alone."""
     acting: dict[str, tuple[int, ...]]
@@ -43,7 +43,7 @@ class Moving:
 
 @dataclass(frozen=True)
 class Gains:
-    """Of the servos, (J,) or (n, J) each: kp [N m/rad], kd [N m s/rad], and those that the drives reckon with."""
+    """Gains of the servos, (J,) or (n, J) each: kp [N m/rad], kd [N m s/rad], and those that the drives reckon with."""
 
     kp: np.ndarray
     kd: np.ndarray
@@ -121,21 +121,21 @@ class TrueRobots:
         return self._qpos.copy(), self._qvel.copy()
 
     def readings(self) -> tuple[np.ndarray, np.ndarray]:
-        """What the encoders say, positions and velocities (R, J)."""
+        """Readings of the encoders, positions and velocities (R, J)."""
         q, v = self._qpos[:, self._q].copy(), self._qvel[:, self._v].copy()
         for i in self._acting["read"]:
             q, v = self.laws[i].read(self.world, q, v)
         return q, v
 
     def orientation(self) -> np.ndarray:
-        """What the IMU says of the base's orientation, (R, 4) wxyz."""
+        """Orientation of the base that the IMU reads, (R, 4) wxyz."""
         quat = self._qpos[:, 3:7] / np.linalg.norm(self._qpos[:, 3:7], axis=1, keepdims=True)
         for law in self.laws:
             quat = law.base(quat)
         return quat
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
-        """What perfect sensors with this robot's faults would say, as (R, nq), (R, nv) of the declared model."""
+        """State that perfect sensors with this robot's faults would read, as (R, nq), (R, nv) of the declared model."""
         q, v = self.readings()
         if not self.robot.floating:
             return q, v
@@ -155,7 +155,7 @@ class TrueRobots:
         self._hold(now, command, cycles)
 
     def arrived(self, target: np.ndarray) -> np.ndarray:
-        """What becomes of targets (R, J) [rad] when they are issued."""
+        """Targets (R, J) [rad] as they arrive at the servos when they are issued."""
         command = ServoCommand(target)
         for i in self._acting["tick"]:
             command = self.laws[i].tick(self.world, command)
@@ -229,7 +229,7 @@ class TrueRobots:
         return believed
 
     def _drive(self, now: Moving, command: ServoCommand, gains: Gains) -> tuple[np.ndarray, np.ndarray]:
-        """What the drives were asked for, as they believe, and the torque that they give, (n, J)."""
+        """Torque that the drives were asked for, as they believe, and the torque that they give, (n, J)."""
         world = now.world
         self._see(now)
         q, v = world.q, world.v
@@ -253,7 +253,7 @@ class TrueRobots:
         return believed, torque
 
     def _apply(self, now: Moving, torque: np.ndarray) -> None:
-        """What acts on the mechanics while the drives give a torque (n, J)."""
+        """Let a torque (n, J) of the drives act on the mechanics."""
         world = now.world
         for law in now.of("transmit"):
             torque = law.transmit(world, torque)

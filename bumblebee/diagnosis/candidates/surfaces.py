@@ -45,7 +45,7 @@ def outermost(model: mujoco.MjModel, bodies: Sequence[str]) -> list[str]:
 
 
 def centre_heights(plant: Plant, rollouts: Sequence[Rollout], bodies: Sequence[str], every: int) -> np.ndarray:
-    """Heights (T, B) [m] of the bodies' centres of mass at every so manieth tick of all rollouts."""
+    """Heights (T, B) [m] of the bodies' centres of mass at every n-th tick of all rollouts."""
     ids, data = [int(plant.model.body(name).id) for name in bodies], mujoco.MjData(plant.model)
     heights = []
     for rollout in rollouts:

@@ -1,4 +1,4 @@
-"""What the diagnosis must know of each effect of the catalogue beside its equation: one row an effect.
+"""Facts that the diagnosis must know of each effect of the catalogue beside its equation: one row an effect.
 
 A new effect of the catalogue needs a row here; without one nothing is imported. The rest: docs/adding-an-effect.md.
 """
@@ -12,12 +12,12 @@ from bumblebee.sim.effects import CATALOGUE
 
 @dataclass(frozen=True)
 class Traits:
-    """Of one kind of effect."""
+    """Facts about one kind of effect."""
 
     experiment: str = ""
-    """What a person would do to tell it from effects that look the same."""
+    """Experiment that a person would do to tell it from effects that look the same."""
     on_fixed_base: str = ""
-    """The same where the robot's base is bolted down, if it is another."""
+    """Experiment where the robot's base is bolted down, if it is another."""
     column: Literal["torque", "late", "simulated"] = "torque"
     """Where its sensitivity comes from: from a torque on the robot; from one to first order, which is poor for light
     joints of stiff servos; or from simulation alone, for no torque stands for it."""
@@ -46,7 +46,7 @@ class Traits:
     not_beside: tuple[str, ...] = ()
     """Effects that a joint cannot have as well: MJCF has one spring a joint, and one second hinge. Said on one side."""
     named_first: int = 0
-    """Of effects that fit the same the one that is met most often is named: its place in that order; 0: after these."""
+    """Place in the order in which effects that fit equally are named, the most often met first; 0: after these."""
 
 
 TRAITS: dict[str, Traits] = {
@@ -155,7 +155,7 @@ def exclude(one: str, other: str) -> bool:
 
 
 def experiment(kind: str, floating: bool) -> str:
-    """What a person would do to tell a kind from what looks the same, on a robot whose base is free or not."""
+    """Experiment that tells a kind from what looks the same, on a robot whose base is free or not."""
     return (not floating and TRAITS[kind].on_fixed_base) or TRAITS[kind].experiment
 
 

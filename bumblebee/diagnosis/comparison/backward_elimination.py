@@ -84,7 +84,7 @@ def drop_insignificant(
     def stays(fit: Fit, less: Fit) -> bool:
         return costs_more_than(problem, fit, less, bound) or (holdout is not None and holdout.worse_later(fit, less))
 
-    return eliminate(fit, worst, without, stays, lambda c: say(f"needless: {c.effect} on {c.where}"))
+    return eliminate(fit, worst, without, stays, lambda c: say(f"removed as insignificant: {c.effect} on {c.where}"))
 
 
 def drop_unsure(problem: Problem, fit: Fit, weights: np.ndarray, simulated: bool = False) -> Fit:

@@ -22,7 +22,7 @@ from bumblebee.sim.effects import Effect
 
 @dataclass(frozen=True, eq=False)
 class Holdout:
-    """What acceptance is decided on; without windows everything is accepted."""
+    """Validation windows that acceptance is decided on; without windows everything is accepted."""
 
     problem: Problem | None = None
     long: Windows | None = None
@@ -32,22 +32,22 @@ class Holdout:
     recall: Recall = field(default_factory=Recall, repr=False)
 
     def relinearised(self, effects: Sequence[Effect]) -> "Holdout":
-        """The same around a model with `effects`."""
+        """Validation windows around a model with `effects`."""
         return self if self.problem is None else self._with(self.problem.relinearised(effects))
 
     def finely(self) -> "Holdout":
-        """The same in the steps of the last fit, and judged by the windows that there are for it."""
+        """Validation windows in the steps of the last fit, judged by all windows that there are for it."""
         if self.problem is None:
             return self
         wide = self.widely()
         return wide._with(self.problem.finely())
 
     def widely(self) -> "Holdout":
-        """The same, and after 1 s judged by all windows that there are for the last fit."""
+        """Validation windows that are also after 1 s all windows that there are for the last fit."""
         return self if self.last is None or self.last is self.long else Holdout(self.problem, self.last, self.last)
 
     def _with(self, problem: Problem) -> "Holdout":
-        """The same on another problem; what is known of the declared model after 1 s stays known."""
+        """Validation windows of another problem; what is known of the declared model after 1 s stays known."""
         other = replace(self, problem=problem)
         if "late" in self.__dict__:
             other.__dict__["late"] = self.late

@@ -54,7 +54,7 @@ def walds(problem: Problem, fit: Fit, weights: np.ndarray, asked: Collection[Can
 
 
 def _lost(problem: Problem, fit: Fit, weights: np.ndarray, index: int) -> float:
-    """The same for an effect of which slopes say nothing: by what the fit loses without it, the others as they are."""
+    """Wald statistic of an effect whose slopes say nothing: the fit's loss without it, the others as they are."""
     others = [e for k, e in enumerate(fit.effects) if k != index]
     rise = cost_of(problem, problem.residual([others])[0], weights)[0] - fit.cost
     return z_value(max(rise, 0.0) / max(fit.power(problem), 1.0), 1, len(weights))
@@ -71,7 +71,7 @@ def z_value(wald: float, count: int, windows: int) -> float:
 
 
 def z_values(wald: np.ndarray, count: int, windows: int) -> np.ndarray:
-    """The same of several statistics (C,)."""
+    """Standard normal values of several statistics (C,)."""
     if count == 1:
         return np.sqrt(wald)
     share = windows - count

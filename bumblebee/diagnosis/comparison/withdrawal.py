@@ -31,7 +31,7 @@ def is_worse(problem: Problem, before: Sequence[Effect], after: Sequence[Effect]
 def standing(
     problem: Problem, fitted: Sequence[Effect], read: Sequence[Effect]
 ) -> tuple[list[Effect], list[Effect], list[str]]:
-    """What may stand of the effects that were fitted and of those that were read off the logs; and notes on the rest.
+    """Effects that may stand of those fitted and of those read off the logs; and notes on the rest.
 
     `problem` has windows that took no part in the fit, where there are any.
     """

@@ -19,7 +19,7 @@ from bumblebee.measured.usable import Review
 
 @dataclass(frozen=True)
 class _Convention:
-    """What a rule of the checks says about a whole logger."""
+    """Verdict of a rule of the checks on a whole logger."""
 
     remedy: str = ""
     """Setting in the map of an import; empty where the finding says what to do."""
@@ -51,7 +51,7 @@ _DEGREES = {
     "joint_target": "set scale of joint_target to 0.01745 on all joints, of mm to 0.001 (positions are in rad, m)",
     "base_ang_vel": "set gyro_unit to deg",
 }
-"""What to set where the rule `degrees` is broken in such a column and not in joint_pos."""
+"""Setting where the rule `degrees` is broken in such a column and not in joint_pos."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class _Common:
 
     @property
     def remedy(self) -> str:
-        """What to set in the map of an import."""
+        """Setting for the map of an import."""
         usual = _CONVENTIONS[self.rule].remedy
         return _DEGREES.get(self.first.column.split("[")[0], usual) if self.rule == "degrees" else usual
 

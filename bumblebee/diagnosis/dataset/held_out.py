@@ -31,7 +31,7 @@ class HeldOut:
         return {"by": "condition", "condition": self.name, "values": list(self.values)}
 
     def note(self) -> str:
-        """The same in words."""
+        """The held-out rollouts in words."""
         listed = ", ".join(map(_said, self.values))
         return f"held out are rollouts with {self.name} = {listed}: they took no part in the fit or in acceptance"
 

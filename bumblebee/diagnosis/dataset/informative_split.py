@@ -101,7 +101,7 @@ def _exchanged(session: Session, one: int, other: int, why: str) -> Session:
 
 
 def window_errors(session: Session, effects: Sequence[Effect], horizon: float, step: float) -> dict[int, np.ndarray]:
-    """Of each rollout its windows' squared errors with `effects`, in steps of `step` [s]; largest first, 1 is usual.
+    """Squared errors of each rollout's windows with `effects`, in steps of `step` [s]; largest first, 1 is usual.
 
     Every signal is compared with its usual error at the same time after the start; a window that diverged is left out.
     """

@@ -1,4 +1,4 @@
-"""What diagnose, replay and gap share: the data matched with the model, noise, the split, the steps."""
+"""Session that diagnose, replay and gap share: the data matched with the model, noise, the split, the steps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -58,9 +58,9 @@ class Session:
     set_aside: list[dict[str, str]]
     """Rollouts that could not be used, with the reason."""
     warnings: tuple[str, ...] = ()
-    """What must not be overlooked in any report of this model and these rollouts."""
+    """Warnings that every report of this model and these rollouts must show."""
     thresholds: DatasetThresholds = field(default_factory=DatasetThresholds)
-    """What the use of its rollouts goes by."""
+    """Thresholds for the use of its rollouts."""
     held_out: HeldOut | None = None
     """The condition by which rollouts are held out; None: by motion."""
 
@@ -114,7 +114,7 @@ def make_session(
     warnings: Sequence[str] = (),
     thresholds: DatasetThresholds | None = None,
 ) -> Session:
-    """The same from memory; `model` and `dataset` are names for messages.
+    """Make a session from memory; `model` and `dataset` are names for messages.
 
     A rollout that cannot be used is set aside with its reason, as are those in `errors` (id, error), which could not be
     read; where none is left the first reason ends it.
@@ -185,7 +185,7 @@ def _sorted_out(
 
 
 def _check_notes(warnings: Sequence[str], most: int) -> list[str]:
-    """What the checks found that does not stop a file; of more than `most` findings the number."""
+    """Notes of the checks that do not stop a file; of more than `most` findings the number."""
     notes = [f"check: {text}" for text in warnings[:most]]
     return [*notes, f"{len(warnings) - most} more findings that do not stop a file"] if len(warnings) > most else notes
 

@@ -11,7 +11,7 @@ def step_for(windows_period: float, longest: float, rule: TimeSteps) -> float:
 
 
 def longest_step(windows_period: float, longest: float, rule: TimeSteps) -> float:
-    """The same for sensitivities, of several control periods where these are shorter [s]."""
+    """Longest step [s] for sensitivities: several control periods where these are shorter."""
     return max(1, int(longest / windows_period + rule.uneven)) * step_for(windows_period, longest, rule)
 
 

@@ -46,7 +46,7 @@ def in_step(rollout: Rollout, ages: np.ndarray) -> Rollout:
 
 
 def age_note(joints: Sequence[str], ages: np.ndarray) -> str:
-    """What a person should know of ages (J,) that were found; empty where there are none."""
+    """Note for a person on ages (J,) that were found; empty where there are none."""
     late = [f"{name} {1e3 * age:.1f} ms" for name, age in zip(joints, ages, strict=True) if age]
     return f"logged velocities lag the positions; their timestamps were aligned: {', '.join(late)}" if late else ""
 
@@ -71,7 +71,7 @@ def _solved(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _products(rollout: Rollout, rule: VelocityLatency) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Of each part of a rollout what the instruments make of regressors (J, 2, 2) and of what lacks (J, 2)."""
+    """Products of the instruments with regressors (J, 2, 2) and with what lacks (J, 2), for each part of a rollout."""
     time, place, speed = rollout.time, rollout.joint_pos, rollout.joint_vel
     period = float(np.median(np.diff(time)))
     near, span = max(1, round(rule.near / period)), max(2, round(rule.span / period))

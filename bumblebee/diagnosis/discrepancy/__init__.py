@@ -1,4 +1,4 @@
-"""What no effect of the catalogue explains: whether it is there, on which joint, and with which discrepancy model."""
+"""Model discrepancy beyond the catalogue: whether it is there, on which joint, and with which discrepancy model."""
 
 from bumblebee.diagnosis.discrepancy.catalogue_alternative import offers_of, with_catalogue_effects
 from bumblebee.diagnosis.discrepancy.catalogue_terms import quantities_of

@@ -128,12 +128,12 @@ def _one_more(problem: Problem, fit: Fit, joint: str, offers: Offers, say: Calla
     order = [k for k in np.argsort(-tests.gain) if tests.gain[k] > 0][: rule.trials]
     trials = []
     for k in order:
-        say(f"instead of a discrepancy model of {joint}: {_with_place(looked[k])} tried")
+        say(f"trying {_with_place(looked[k])} in place of a discrepancy model of {joint}")
         trials.append(try_one(problem, fit, looked[k], tests.steps[k], weights))
     tried = sorted((t for t in trials if t is not None), key=lambda t: t.cost + 2 * len(t.candidate.free))[: rule.fits]
     fits = []
     for t in tried:
-        say(f"instead of a discrepancy model of {joint}: refit with {_with_place(t.candidate)}")
+        say(f"refitting with {_with_place(t.candidate)} in place of a discrepancy model of {joint}")
         new = refitted(problem, (*fit.chosen, t.candidate), np.concatenate((fit.values, t.values)), fit)
         new = drop_beside(problem, new, t.candidate)
         if _is_sure(problem, fit, new, t.candidate):

@@ -12,7 +12,7 @@ from bumblebee.sim.effects import CATALOGUE
 QUANTITIES = ("position", "velocity", "target", "torque", "time", "history")
 _POSITION, _VELOCITY, _TARGET, _TORQUE, _TIME, _ = ((name,) for name in QUANTITIES)
 Rows = Iterator[tuple[Any, ...]]
-"""Of basis functions: texts, quantities, cost; of one with an inner number also that, its family and its reach."""
+"""Rows of basis functions: texts, quantities, cost; of one with an inner number also that, its family and its reach."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Law:
     """One effect in terms."""
 
     rows: Callable[[Quantities, int], Rows]
-    """What it looks like on a joint (an index)."""
+    """Rows of the law on a joint (an index)."""
     family: Literal["", "friction(", "q", "v"]
     """Terms of its constant part, linear part or first harmonic; "": it stays beside every discovered effect."""
     terms: Callable[[np.ndarray, np.ndarray], dict[str, float]] | None = None

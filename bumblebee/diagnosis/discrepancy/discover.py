@@ -58,7 +58,7 @@ class _State:
     activity: JointActivity
 
     def around(self, fit: Fit) -> "_State":
-        """The same of another fit."""
+        """The state with another fit."""
         moved = self.problem.relinearised(fit.effects)
         new = resolved(moved, fit, window_weights(fit.clean(moved)))
         validation = self.holdout.relinearised(new.effects)
@@ -68,7 +68,7 @@ class _State:
 
 @dataclass(frozen=True, eq=False)
 class _Means:
-    """What the look for discrepancy models may use."""
+    """Means of the search for discrepancy models."""
 
     offers: Offers
     budget: Budget
@@ -132,7 +132,7 @@ def _with_models(
         if is_swap:
             tried.remove(worst.joint)  # an effect of the catalogue may leave something that it has no effect for
             new = [c for c in after.fit.chosen if c not in state.fit.chosen]
-            means.say(f"in a form's place on {worst.joint}: {', '.join(_with_places(new))}")
+            means.say(f"in place of a discrepancy model of {worst.joint}: {', '.join(_with_places(new))}")
         else:
             kinds[worst.joint] = model.kind
             means.say(f"discovered on {worst.joint}: {model}")
@@ -168,7 +168,7 @@ def _validated(
     if swapped is not None:
         gains = compare(problem, holdout, fit, swapped).passes(problem.thresholds.comparison.validation)
         return (state.around(swapped), True) if gains else (None, False)
-    means.say(f"discrepancy model of {worst.joint}: what it leaves")
+    means.say(f"discrepancy model of {worst.joint}: residual")
     new = state.around(model.fit)
     redundant = problem.thresholds.comparison.elimination.redundant_z
     excess = new.left.joints[problem.plant.joints.index(worst.joint)].excess

@@ -34,7 +34,7 @@ class DiscrepancyModel:
 
 @dataclass(frozen=True, eq=False)
 class _Refits:
-    """What models of one joint are refitted on and within, and who is told of each."""
+    """Refits of models of one joint: on what, within what, and who is told of each."""
 
     problem: Problem
     joint: str

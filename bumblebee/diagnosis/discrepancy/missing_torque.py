@@ -58,7 +58,7 @@ class Scene:
 
     @property
     def data(self) -> Quantities:
-        """What a basis function may depend on."""
+        """Quantities that a basis function may depend on."""
         return self._seen[1]
 
     def excess(self, spared: int = 0) -> np.ndarray:
@@ -66,7 +66,7 @@ class Scene:
         return np.array([self.quiet_excess(j, spared) for j in range(self.evidence.joints)])
 
     def quiet_excess(self, joint: int, spared: int = 0, rollouts: Sequence[int] | None = None) -> float:
-        """The same of one joint on some rollouts, all by default, each less the `spared` windows that say most."""
+        """Excess of one joint on some rollouts, all by default, each less the `spared` windows that say most."""
         of = self.problem.windows.rollout
         ids = np.unique(of) if rollouts is None else rollouts
         each = self.evidence.chi_square

@@ -1,4 +1,4 @@
-"""What a joint's missing torque may depend on, along the simulated paths of windows.
+"""Quantities that a joint's missing torque may depend on, along the simulated paths of windows.
 
 Position, velocity, target and the servo's torque come from the simulation that starts at the measured state; what a
 joint has done before the window comes from the log: how long it has rested, where a target of limited rate would be,
@@ -38,7 +38,7 @@ class Quantities:
     plant: Plant
     windows: Windows
     thresholds: DiscrepancyThresholds
-    """What basis functions of the quantities are made and chosen by."""
+    """Thresholds by which basis functions of the quantities are made and chosen."""
     _known: dict[tuple, np.ndarray] = field(default_factory=dict, repr=False)
 
     @property

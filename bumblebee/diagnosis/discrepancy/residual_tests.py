@@ -1,4 +1,4 @@
-"""What a fit leaves unexplained, joint by joint: how much, on what it depends, by which basis function; or nothing.
+"""Residual of a fit, joint by joint: how much is unexplained, on what it depends, by which basis function; or nothing.
 
 Two tests, both on the fitted windows and again on the validation set. Basis functions: whether one of several thousand,
 each with its few coefficients, explains what is left (`stepwise_regression`). Lack of fit: whether the torques that a
@@ -23,7 +23,7 @@ from bumblebee.diagnosis.residuals import Problem
 
 @dataclass(frozen=True, eq=False)
 class JointActivity:
-    """What the logs say of J joints before anything is asked of them."""
+    """Activity of J joints in the logs, before any test."""
 
     typical: np.ndarray
     """(J,) RMS torques of their servos [N m]."""
@@ -33,11 +33,11 @@ class JointActivity:
 
 @dataclass(frozen=True)
 class JointLackOfFit:
-    """What is left in one joint."""
+    """Lack of fit of one joint."""
 
     joint: str
     p: float
-    """Of the surer test, shared among all basis functions or joints."""
+    """p-value of the surer test, shared among all basis functions or joints."""
     excess: float
     """Standard errors by which its torques are larger than noise makes them."""
     functions: tuple[tuple[BasisFunction, np.ndarray], ...]
@@ -53,7 +53,7 @@ class JointLackOfFit:
 
 @dataclass(frozen=True)
 class Whole:
-    """Of all joints and sensors together."""
+    """Lack of fit of all joints and sensors together."""
 
     reduced_chi_square: float
     """Mean square of what is left on the fitted windows, 1 for noise, each rollout's loudest windows not counted."""
@@ -64,7 +64,7 @@ class Whole:
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
-    """Of all joints."""
+    """Lack of fit of all joints."""
 
     joints: list[JointLackOfFit]
     scene: Scene
@@ -82,7 +82,7 @@ class LackOfFit:
 
 @dataclass(frozen=True, eq=False)
 class _Tested:
-    """What the tests of all joints gave, before it is said of each."""
+    """Outcome of the tests of all joints, before it is said of each."""
 
     scene: Scene
     excess: np.ndarray
@@ -125,7 +125,7 @@ def lack_of_fit(problem: Problem, validation: Problem | None, fit: Fit, activity
 
 
 def _of_joint(tested: _Tested, j: int) -> JointLackOfFit:
-    """What the tests say of the joint with index `j`."""
+    """Lack of fit of the joint with index `j`, from the tests."""
     scene, names, activity = tested.scene, tested.scene.problem.plant.joints, tested.activity
     rule = scene.problem.thresholds.discrepancy.residual_tests
     own = [(one, size) for one, size in tested.kept if one.joint == j]

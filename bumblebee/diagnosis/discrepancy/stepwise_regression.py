@@ -34,7 +34,7 @@ class Sought:
     bound: float
     """z that a basis function had to reach."""
     rivals: list[Found]
-    """Of the first basis function: others that explain much of what it does and depend on something else."""
+    """Rivals of the first basis function: they explain much of what it does and depend on something else."""
 
 
 @dataclass(frozen=True, eq=False)

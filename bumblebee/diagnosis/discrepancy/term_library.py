@@ -52,7 +52,7 @@ class BasisFunction:
         return np.stack([data.torque(term, joint) for term in self.terms])
 
     def moved(self, at: float) -> "BasisFunction":
-        """The same basis function with another inner number."""
+        """The basis function with another inner number."""
         assert self.family is not None
         return BasisFunction(self.family(at), self.on, self.cost, self.effect, at, self.family, self.reach)
 
@@ -70,7 +70,7 @@ def basis_functions(data: Quantities, joint: int) -> list[BasisFunction]:
 
 
 def _catalogue(data: Quantities, j: int) -> Iterator[BasisFunction]:
-    """What effects of the catalogue look like on one joint."""
+    """Basis functions that effects of the catalogue look like on one joint."""
     driven = bool(np.ptp(data.tau[..., j]) > 0)
     for kind, law in LAWS.items():
         if driven or not law.driven:

@@ -1,4 +1,4 @@
-"""What whitened windows say about torques that the model lacks on its joints, ready for any number of questions.
+"""Scores of torques that the model lacks on its joints, from whitened windows, ready for any number of questions.
 
 The answers of a window to impulses of torque turn its residual into scores: for each joint and fifth of the window, how
 much the cost would fall with a little torque there, and how fast that gain would end. Any formula or table for a torque
@@ -21,7 +21,7 @@ from bumblebee.diagnosis.thresholds.discrepancy import TorqueScores
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """Of one group of columns on one joint."""
+    """Verdict on one group of columns on one joint."""
 
     z: float
     """The test's p-value as a two-sided standard normal; the smaller one of two tests, see `Evidence.test`."""
@@ -63,13 +63,13 @@ class Evidence:
         return len(self.answers)
 
     def with_columns(self, problem: Problem, residual: np.ndarray, columns: np.ndarray) -> "Evidence":
-        """The same answers given other columns (F, W, M) and another residual (W, M), weighed as these leave it."""
+        """Evidence given other columns (F, W, M) and another residual (W, M), weighed as these leave it."""
         basis, inverse = project(problem, columns, self.weights)
         left = residual - np.tensordot(solve(basis, inverse, residual, self.weights), basis, axes=1)
         return make_evidence(problem, self.answers, residual, columns, window_weights(left))
 
     def unweighted(self, problem: Problem, residual: np.ndarray, columns: np.ndarray) -> "Evidence":
-        """The same with all windows alike."""
+        """Evidence with all windows weighed alike."""
         return make_evidence(problem, self.answers, residual, columns, np.ones_like(self.weights))
 
     def column(self, joint: int, torque: np.ndarray) -> np.ndarray:

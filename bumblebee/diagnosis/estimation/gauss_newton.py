@@ -13,7 +13,7 @@ from bumblebee.diagnosis.residuals import Problem
 
 
 def resolved(problem: Problem, fit: Fit, weights: np.ndarray) -> Fit:
-    """The same values with the nuisances and the cost of other nuisance columns or weights."""
+    """The fit with the nuisances and the cost of other nuisance columns or weights; its values stay."""
     cost, nuisance = cost_of(problem, fit.residual, weights)
     return replace(fit, nuisance=nuisance, cost=cost)
 

@@ -57,7 +57,7 @@ def beyond_numerics(problem: Problem, before: Fit, after: Fit, weights: np.ndarr
 
 
 def _differences(problem: Problem, fit: Fit) -> Iterator[np.ndarray]:
-    """What other integrators change in the whitened residual (W, M) of a fit; 0 in windows that diverge or shake."""
+    """Changes of the whitened residual (W, M) by other integrators; 0 in windows that diverge or shake."""
     tilted = problem.tilted(fit.effects)
     residual = fit.residual if tilted is None else fit.residual - tilted
     for other in _others(vary(problem.plant, problem.as_whitened(fit.effects))):

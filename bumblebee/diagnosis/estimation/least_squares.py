@@ -44,7 +44,7 @@ class LeftOver:
         self.weights = weights
 
     def left(self, residual: np.ndarray) -> np.ndarray:
-        """What is left of a residual (W, M)."""
+        """Part of a residual (W, M) that is left."""
         move = solve(self._basis, self._inverse, residual, self.weights)
         return residual - np.tensordot(move, self._basis, axes=1)
 

@@ -34,7 +34,7 @@ class Gap:
     torque: MissingTorque | None
     """None where no stretch of the logs was long enough to test."""
     thresholds: Thresholds = field(default_factory=Thresholds)
-    """What it was made with."""
+    """Thresholds that it was made with."""
 
 
 def gap(session: Session, budget: int = 120, config: DiagnosisConfig | None = None) -> Gap:
@@ -70,7 +70,7 @@ def gap(session: Session, budget: int = 120, config: DiagnosisConfig | None = No
 
 
 def _tested(session: Session, config: DiagnosisConfig) -> tuple[MissingTorque | None, list[str]]:
-    """What the declared model lacks; where no window can be cut, None and a note why."""
+    """Missing torque of the declared model; where no window can be cut, None and a note why."""
     try:
         return missing_torque(session, config), []
     except BadInput as error:
@@ -78,7 +78,7 @@ def _tested(session: Session, config: DiagnosisConfig) -> tuple[MissingTorque | 
 
 
 def _heading(session: Session, units: dict[str, dict[str, str]]) -> dict[str, Any]:
-    """What was compared."""
+    """Heading: what was compared."""
     return {
         "schema": 1,
         "rollouts": session.ids(range(len(session.rollouts))),

@@ -20,7 +20,7 @@ from bumblebee.diagnosis.thresholds.gap import Naming
 
 @dataclass(frozen=True, eq=False)
 class MissingTorque:
-    """What the tests say of the declared model, on J joints."""
+    """Missing torque of the declared model by the tests, on J joints."""
 
     left: LackOfFit
     still: tuple[str, ...]
@@ -55,7 +55,7 @@ class MissingTorque:
         }
 
     def quantities(self, joint: int, rule: Naming) -> list[str]:
-        """What the torque of a joint that lacks one depends on, the most important first.
+        """Quantities that the torque of a joint that lacks one depends on, the most important first.
 
         By the basis functions that were found beyond doubt on the fitted windows. That their sizes are the same on
         others, as a diagnosis asks, is too much where nothing was fitted and sensitivities are the declared model's.

@@ -18,7 +18,7 @@ class Basis:
 
     candidates: tuple[Candidate, ...]
     sizes: tuple[np.ndarray, ...]
-    """Of each candidate (F,): its size in the steps of its rows; ones where nothing is known."""
+    """Size of each candidate (F,) in the steps of its rows; ones where nothing is known."""
     found: dict[int, Finding]
     """Candidate -> what a diagnosis says of it."""
     usual: tuple[int, ...]

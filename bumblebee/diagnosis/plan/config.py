@@ -1,4 +1,4 @@
-"""What a plan is asked for."""
+"""Settings of a plan."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ class PlanConfig:
     pool: int = 48
     """Candidate motions that the runs are chosen from."""
     seed: int = 0
-    """Of the candidate motions."""
+    """Seed of the candidate motions."""
     start: str | None = None
     """Name of the keyframe that runs start and end in."""
     speed: Mapping[str, float] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class PlanConfig:
     kp: float | None = None
     """Gain of the servo that tracks the targets on drives that take torques [N m/rad, N/m]."""
     kd: float | None = None
-    """The same on the velocity [N m s/rad, N s/m]."""
+    """Gain on the velocity [N m s/rad, N s/m]."""
     thresholds: Thresholds = field(default_factory=Thresholds)
     """Every number that single decisions go by."""
 

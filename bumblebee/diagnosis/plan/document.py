@@ -100,7 +100,7 @@ def _run(plan: Plan, k: int) -> dict[str, Any]:
 
 
 def notes(plan: Plan) -> list[str]:
-    """What to know beside the numbers."""
+    """Notes beside the numbers."""
     out = [
         "chi-squares and widths are expected values for the noise given here, if all runs are logged whole and the "
         "robot is one of those it was rehearsed on"

@@ -69,7 +69,7 @@ def csv_of(plan: Plan, k: int) -> str:
 
 
 def parquet_of(plan: Plan, k: int) -> bytes:
-    """The same columns as float64; what the player must know besides is JSON under the key `bumblebee.plan`."""
+    """Parquet file of the same columns as float64; the player's further facts are JSON under `bumblebee.plan`."""
     names, values = _table(plan, k)
     motion, machine = plan.motions[k], plan.machine
     about = {"schema": 1, "run": run_names(plan)[k], "rate": machine.rate, "factors": motion.gain._asdict()}
@@ -96,7 +96,7 @@ def _quoted(name: str) -> str:
 
 
 def _foreign(out: Path) -> str | None:
-    """What in a folder is not of a plan's making, if anything."""
+    """First entry of a folder that is not of a plan's making, if any."""
     names = sorted(os.listdir(out))
     for name in names:
         path = out / name

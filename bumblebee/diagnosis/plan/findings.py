@@ -1,4 +1,4 @@
-"""What a diagnosis said: effects with intervals, and those that its data could not tell from them."""
+"""Findings of a diagnosis: effects with intervals, and those that its data could not tell from them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -70,7 +70,7 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """Of one diagnosis."""
+    """Findings of one diagnosis."""
 
     effects: tuple[Effect, ...]
     """All that the corrected model has."""

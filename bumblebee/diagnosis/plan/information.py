@@ -1,4 +1,4 @@
-"""What runs would say: Gram matrices of whitened sensitivities on windows of simulated runs.
+"""Expected information of runs: Gram matrices of whitened sensitivities on windows of simulated runs.
 
 Windows are cut, whitened and differentiated as those of a diagnosis are, around the declared model; information adds up
 over windows, so a plan's is the sum of its runs'. The first rows are the diagnosis's nuisances.
@@ -24,7 +24,7 @@ from bumblebee.measured.rollout import Rollout
 
 @dataclass(frozen=True, eq=False)
 class Lens:
-    """What information is computed with."""
+    """Settings and models that information is computed with."""
 
     basis: Basis
     typical: np.ndarray

@@ -1,4 +1,4 @@
-"""What the robot may be asked for, joint by joint, and who says so."""
+"""Limits on what the robot may be asked for, joint by joint, and who says so."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from bumblebee.sim.servo import servos_of
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Of J joints; infinite for a joint without a drive where nothing is known."""
+    """Limits of J joints; infinite for a joint without a drive where nothing is known."""
 
     low: np.ndarray
     """(J,) lowest position [rad, m], with its margin."""

@@ -24,19 +24,19 @@ class Machine:
     """A robot of J joints."""
 
     name: str
-    """Of the model's file."""
+    """Name of the model's file."""
     driven: dict[Gain, Plant]
     """Gains -> the robot whose servos follow position targets."""
     seen: dict[Gain, Plant]
     """Gains -> the robot as a diagnosis takes its logs: the same, or one that takes the logged torques."""
     layout: Layout
-    """Of what is simulated, with the base's position."""
+    """Layout of what is simulated, with the base's position."""
     seen_layout: Layout
-    """Of what is logged."""
+    """Layout of what is logged."""
     sigma: np.ndarray
     """(D,) noise of what is logged."""
     rate: float
-    """Of the targets [Hz]."""
+    """Rate of the targets [Hz]."""
     steps: tuple[float, float]
     """Simulation step [s] for residuals and for sensitivities."""
     qpos: np.ndarray

@@ -24,7 +24,7 @@ class Motion:
     number: int
     family: str
     text: str
-    """What it is, in words."""
+    """Description in words."""
     gain: Gain
     """Factors on the servos' gains."""
     home: np.ndarray

@@ -20,7 +20,7 @@ class Question:
     fitted: int
     """Candidate that is fitted."""
     rows: np.ndarray
-    """Of what is there."""
+    """Rows of the parameters that are there."""
     size: np.ndarray
     """(F,) steps of its rows."""
     others: np.ndarray
@@ -29,7 +29,7 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """Of total information (N, N): of the data there are and of the runs chosen."""
+    """Objective of total information (N, N): of the data there are and of the runs chosen."""
 
     basis: Basis
     first: int
@@ -104,7 +104,7 @@ class Objective:
         return seen * float(np.sqrt(share))
 
     def value(self, total: np.ndarray) -> float:
-        """What is maximised: halvings of widths and classes, weighed."""
+        """Value that is maximised: halvings of widths and classes, weighed."""
         classes = sum(self.resolved(total).values())
         widths = [np.log2(w).mean() for w in self.widths(total).values()]
         narrow = -float(np.mean(widths)) if widths else 0.0

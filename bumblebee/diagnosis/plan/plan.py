@@ -78,7 +78,7 @@ def make_plan(
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """What the data say already, and how more of it is valued."""
+    """Prior information of the data, and how more of it is valued."""
 
     lens: Lens
     objective: Objective
@@ -94,15 +94,15 @@ def _make_plan(
     findings: Findings | None,
     say: Callable[[str], None],
 ) -> Plan:
-    """The same on the threads that there are."""
+    """Make a plan on the threads that there are."""
     stage = set_stage(spec, name, config, session, findings)
     known = None if session is None else _measured(stage.machine, session, findings, config)
     if known is not None:
         stage = _with_rivals(stage, session, known, findings, config)
-    say(f"{config.pool} candidate motions")
+    say(f"simulating {config.pool} candidate motions")
     safe = safe_pool(surest(stage), config)
     refuse_none(safe, say)
-    say(f"{len(safe.motions)} of them are safe; what they would tell")
+    say(f"{len(safe.motions)} of them are safe; computing their information")
     ask = _Asking(stage, findings.effects if findings else (), _windows(stage.machine, config))
     logs = ask.logs(safe.motions)
     if known is None:
@@ -111,7 +111,7 @@ def _make_plan(
 
 
 def _measured(machine: Machine, session: Session, findings: Findings | None, config: PlanConfig) -> _Known:
-    """What a dataset says."""
+    """Prior information of a dataset."""
     seen = session.plant  # which knows the conditions that its rollouts were recorded under
     lens = _lens(machine, seen, session.rollouts, findings, config)
     budget = 2 * _windows(machine, config)
@@ -174,16 +174,16 @@ def _windows(machine: Machine, config: PlanConfig) -> int:
 
 @dataclass(frozen=True, eq=False)
 class _Asking:
-    """What motions would tell, by simulations of them."""
+    """Expected information of motions, by simulations of them."""
 
     stage: Stage
     effects: Sequence[Effect]
-    """Of the robot that is expected."""
+    """Effects of the robot that is expected."""
     windows: int
     """That stand for a run."""
 
     def logs(self, motions: Sequence[Motion]) -> list[Rollout]:
-        """What would be recorded."""
+        """Rollouts that would be recorded."""
         stage = self.stage
         runs = rehearse(stage.machine, motions, self.effects, stage.step, stage.rules.motions.settle)
         return logs_of(stage.machine, runs, motions)
@@ -223,7 +223,7 @@ def _chosen(
         new = [r for r in picked if r not in tried]
         if not new:
             break
-        say(f"{len(new)} runs on each of {len(stage.cases)} robots")
+        say(f"rehearsing {len(new)} runs on each of {len(stage.cases)} robots")
         proof = proven(stage, [motions[r] for r in new])
         refused += proof.refused
         found = {m.number: (m, reached) for m, reached in zip(proof.motions, proof.reached, strict=True)}

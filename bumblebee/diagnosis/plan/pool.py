@@ -86,7 +86,7 @@ def _refuse_config(config: PlanConfig) -> None:
 def refuse_none(safe: Safe, say: Callable[[str], None]) -> None:
     """`BadInput` where no motion is safe; says what others were given up for."""
     for reason, count in safe.refused.most_common(3):
-        say(f"{count} motions given up: {reason}")
+        say(f"{count} motions discarded: {reason}")
     if not safe.motions:
         reason, count = safe.refused.most_common(1)[0]
         raise BadInput("plan", "a motion within all limits", f"none; {count} of them: {reason}", "Widen that limit.")

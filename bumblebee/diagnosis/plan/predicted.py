@@ -1,4 +1,4 @@
-"""What a plan is expected to tell: chi-squares of pairs and half-widths of intervals, before and after."""
+"""Prediction of a plan's outcome: chi-squares of pairs and half-widths of intervals, before and after."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -40,7 +40,7 @@ def classes(plan: Plan) -> list[dict[str, Any]]:
 
 
 def pairs(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Of the rows of `classes` one for each two effects, the direction that is harder to tell, hardest first.
+    """One row of `classes` for each two effects, the direction that is harder to tell, hardest first.
 
     Two effects are told apart where they are in both directions: either one if it is there and the other is fitted.
     """
@@ -57,7 +57,7 @@ def pairs(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _cosine(left: float, alone: float) -> float | None:
-    """Of the angle between what is there and what the rival can do; None where the data feel neither."""
+    """Cosine of the angle between what is there and what the rival can do; None where the data feel neither."""
     return float(np.sqrt(max(0.0, 1.0 - left / alone))) if alone > 1e-6 else None
 
 
@@ -131,7 +131,7 @@ def separates(plan: Plan, k: int) -> list[dict[str, Any]]:
 
 
 def _each_once(rows: Sequence[tuple[float, float, Question]]) -> list[tuple[float, float, Question]]:
-    """Of both directions of a pair the first."""
+    """First of both directions of each pair."""
     seen: set[frozenset[int]] = set()
     out = []
     for share, whole, q in rows:

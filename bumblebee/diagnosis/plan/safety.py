@@ -15,7 +15,7 @@ from bumblebee.diagnosis.plan.stage import Stage
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """Of one run under one case."""
+    """Verdict on one run under one case."""
 
     reason: str
     """Empty: the run is safe."""

@@ -91,7 +91,7 @@ def _run_table(told: dict[str, Any]) -> str:
 
 
 def _expected(plan: Plan, told: dict[str, Any]) -> list[str]:
-    """What the plan is expected to tell, in tables."""
+    """Expected outcome of the plan, in tables."""
     parts = []
     asked = pairs(told["predicted"]["classes"])
     if asked:

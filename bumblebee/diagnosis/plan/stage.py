@@ -21,7 +21,7 @@ class Stage:
     cases: list[Case]
     scope: Scope
     step: float
-    """Of rehearsals [s]."""
+    """Time step of rehearsals [s]."""
     rules: PlanThresholds
     left_out: Mapping[str, str] = field(default_factory=dict)
     """Cases that a plan is not rehearsed on, and why."""

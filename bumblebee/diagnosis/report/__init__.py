@@ -1,4 +1,4 @@
-"""What a diagnosis found, as a document, a page and lines for the terminal."""
+"""Report of a diagnosis: a document, a page and lines for the terminal."""
 
 from bumblebee.diagnosis.report.document import Findings, document
 from bumblebee.diagnosis.report.effect_entries import effect_entries, law_notes, loss_entries

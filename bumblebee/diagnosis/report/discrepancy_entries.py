@@ -105,7 +105,7 @@ def _cut(names: Sequence[str], most: int) -> str:
 
 @dataclass(frozen=True)
 class ExplainedShare:
-    """Of what is left above the noise, in chi-square, on windows that took no part where there are any."""
+    """Explained share of what is left above the noise, in chi-square, on windows that took no part, if any."""
 
     whole: float
     """By the joint's laws together; without any, by a torque of its own in every fifth of every window, at most."""
@@ -114,7 +114,7 @@ class ExplainedShare:
 
 
 def explained_share(found: Discovery, joint: JointLackOfFit) -> ExplainedShare:
-    """What a joint's missing torque explains of what is left."""
+    """Share of what is left that a joint's missing torque explains."""
     scene = found.left.validation or found.left.scene
     excess = max(float((scene.left**2).sum() - scene.left.size), 1e-12)
     place = found.problem.plant.joints.index(joint.joint)

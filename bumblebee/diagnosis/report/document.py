@@ -30,11 +30,11 @@ _STILL = "the joint is not excited: it moves no more than its sensor's noise"
 
 @dataclass(frozen=True)
 class Findings:
-    """What stands in the document on effects."""
+    """Entries of the document on effects."""
 
     effects: Sequence[Effect]
     entries: Sequence[dict[str, Any]]
-    """Of the effects, as the contract has them."""
+    """Entries of the effects, as the contract has them."""
     notes: Sequence[str]
 
 
@@ -79,7 +79,7 @@ def _recorded_under(session: Session) -> dict[str, Any]:
 
 
 def _notes(session: Session, findings: Findings, rule: Verdicts) -> list[str]:
-    """What to know beside the effects."""
+    """Notes beside the effects."""
     driven = _driven(session)
     return [
         *session.notes,
@@ -93,7 +93,7 @@ def _notes(session: Session, findings: Findings, rule: Verdicts) -> list[str]:
 
 
 def _settings(material: Material, config: DiagnosisConfig, bound: float, last: Refined) -> dict[str, Any]:
-    """What the diagnosis was made with."""
+    """Settings that the diagnosis was made with."""
     session = material.session
     return {
         "timestep": session.steps[0],

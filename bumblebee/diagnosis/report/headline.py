@@ -47,7 +47,7 @@ def _removed(document: Mapping[str, Any], told: Mapping[str, Any], rules: Report
 
 
 def _gone(entry: Mapping[str, Any], corrected: bool, rules: ReportThresholds) -> str:
-    """What became of the error of one kind of joint."""
+    """Change of the error of one kind of joint, in words."""
     what, size = entry["what"], f"{sized(entry['before'], entry['unit'])} RMS"
     if entry["share"] is None and entry["floor"] is not None:
         larger = f", the corrected model's is larger ({sized(entry['after'], entry['unit'])})"
@@ -99,7 +99,7 @@ def _left(told: Mapping[str, Any], rule: Matters) -> str:
 
 
 def _structure(told: Mapping[str, Any], rule: Matters) -> str:
-    """What tests of what is left saw, as a share of its chi-square; what explains next to nothing is only listed."""
+    """Verdict of the tests of what is left, as a share of its chi-square; what explains hardly anything is listed."""
     said = [entry for entry in told["structure"] if entry["proclaimed"]]
     slight = [entry["where"] for entry in told["structure"] if not entry["proclaimed"]]
     parts = [
@@ -173,7 +173,7 @@ def effect_groups(document: Mapping[str, Any], rules: ReportThresholds) -> list[
 
 
 def experiments(effects: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What would tell effects from those that look alike, each once, with the effects that it is for."""
+    """Experiments that would tell effects from those that look alike, each once, with the effects that it is for."""
     wanted: dict[str, list[str]] = {}
     for effect in effects:
         for text in effect.get("separate_by", []):

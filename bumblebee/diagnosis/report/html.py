@@ -1,4 +1,4 @@
-"""What the two reports share: the page, tables and numbers with intervals; all text that came from files is escaped."""
+"""Building blocks of the two reports: the page, tables and numbers with intervals; all text from files is escaped."""
 
 from collections.abc import Sequence
 from html import escape

@@ -169,7 +169,7 @@ def what_is_left(document: Mapping[str, Any], rule: Verdicts) -> str:
 
 
 def nothing_seen(document: Mapping[str, Any], joint: str, rule: Verdicts) -> str:
-    """What to say of a joint whose missing torque is not significant: no comfort where it errs by much."""
+    """Sentence on a joint whose missing torque is not significant: no comfort where it errs by much."""
     quiet = "no significant structure"
     if document["missing_torque"][joint]["p"] < rule.trace:
         quiet = "significant structure, but too small or not confirmed on other rollouts"

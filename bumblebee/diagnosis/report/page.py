@@ -43,7 +43,7 @@ def render_report(
 
 
 def _opening(document: dict[str, Any], rules: ReportThresholds) -> list[str]:
-    """What is gone, what is left, what to trust; where nothing was found, first that."""
+    """First lines: what is gone, what is left, what to trust; where nothing was found, first that."""
     lines = headline(document, rules)
     if not document["effects"]:
         far = unexplained_error(document, rules.verdicts)
@@ -189,7 +189,7 @@ def _left(document: dict[str, Any], rules: ReportThresholds) -> str:
 
 
 def _curves(document: dict[str, Any], joints: Sequence[str]) -> list[str]:
-    """What is left over velocity, position and so on, a row of pictures a joint."""
+    """Pictures of what is left over velocity, position and so on, a row a joint."""
     parts = []
     for joint in joints:
         known = document.get("structure", {}).get(joint, {}).get("curves", {})

@@ -88,7 +88,7 @@ def error_block(
 
 
 def block_of(cuts: HorizonWindows, whiteners: Whiteners, ends: Residuals, seed: int = 0) -> dict[str, Any]:
-    """The same of residuals that are there already."""
+    """Error block of residuals that are there already."""
     rng = np.random.default_rng(seed)
     block = {}
     for name, part in cuts.windows.items():
@@ -103,7 +103,7 @@ def block_of(cuts: HorizonWindows, whiteners: Whiteners, ends: Residuals, seed: 
 
 
 def floor_block(cuts: HorizonWindows, whiteners: Whiteners, sigma: np.ndarray, seed: int = 0) -> dict[str, Any]:
-    """What sensor noise alone leaves of the errors, in the same form, from the starts that the whiteners simulated."""
+    """Error block that sensor noise alone would leave, from the starts that the whiteners simulated."""
     rng = np.random.default_rng(seed)
     block = {}
     for name, every in cuts.windows.items():
@@ -143,7 +143,7 @@ def _measures(
 
 
 def _by_kind(cuts: HorizonWindows, name: str, squares: np.ndarray, groups: np.ndarray) -> dict[str, Any]:
-    """Of squares (W, J): the unit of their root mean square; hinges and slides apart where the robot has both."""
+    """Root mean squares of squares (W, J) with their unit; hinges and slides apart where the robot has both."""
     hinge, kinds = {"joint_pos": "rad", "joint_vel": "rad/s"}[name], members(cuts.plant)
     units = {kind: joint_unit(hinge, KINDS[kind]) for kind in kinds}
     if len(kinds) == 1:

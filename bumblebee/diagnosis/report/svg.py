@@ -9,7 +9,7 @@ import numpy as np
 INK, GRID, FAINT = "#1d2430", "#e4e7ee", "#6b7385"
 COLOURS = {"measured": INK, "before": "#c8553d", "after": "#1b8a6b", "target": "#9aa3b5", "model": "#c8553d"}
 NAMES = {"before": "declared model", "after": "corrected model", "oracle": "true effects", "floor": "noise floor"}
-"""What keys of the document are called for people."""
+"""Names of the document's keys for people."""
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from bumblebee.diagnosis.thresholds.report import Matters
 CARRY, BESIDE, WIDE = "carry", "beside", "wide"
 """Groups of effects: what carries the gain; what costs little to remove alone, its size known; its size not known."""
 LEFT = "the remaining chi-square"
-"""What structure explains a share of. Every reading counts by its noise there, so that a joint that errs by little may
-be most of it; what is left in a joint's own units is another share."""
+"""Note on the share that structure explains. Every reading counts by its noise there, so that a joint that errs little
+may be most of it; what is left in a joint's own units is another share."""
 
 
 def what_matters(document: Mapping[str, Any], ends: Ends, rule: Matters, seed: int = 0) -> dict[str, Any]:
@@ -44,7 +44,7 @@ def what_matters(document: Mapping[str, Any], ends: Ends, rule: Matters, seed: i
 
 
 def left_over(error: Mapping[str, Any], horizon: str | None, units: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What is left after `horizon` at each joint and the base, as RMS error, largest share first.
+    """Errors left after `horizon` at each joint and the base, as RMS error, largest share first.
 
     `share`: of the squared error above the noise floor, over all joints of a kind, or over the base's.
     """
@@ -126,7 +126,7 @@ def trust(effects: Sequence[Mapping[str, Any]], rule: Matters) -> list[dict[str,
 
 
 def _narrowest(effect: Mapping[str, Any]) -> float | None:
-    """Of an effect's parameters the least ratio of upper to lower end; None where no interval says a size."""
+    """Least ratio of upper to lower end among an effect's parameters; None where no interval says a size."""
     parameters = effect["parameters"]
     if effect["effect"] == "discovered":
         sizes = [(t["ci95"], 0.0) for t in parameters.get("terms", [])]

@@ -83,7 +83,7 @@ def _late_model(declared: mujoco.MjModel, own: Plant, part: str, rule: Nuisances
 
 
 def _read_thrice(windows: Windows, after: float, before: float) -> Windows:
-    """The same windows (N ticks) compared at their ticks, `before` s before each, and `after` s from the start."""
+    """Windows (N ticks) compared at their ticks, `before` s before each, and `after` s from the start."""
     ticks = windows.out_time
     times = np.concatenate((ticks, ticks - before, np.full((len(windows), 1), after)), axis=1)
     measured, quat = (

@@ -42,7 +42,7 @@ class Problem:
     fine: float
     """Step [s] for residuals."""
     finest: float
-    """The same of the last fit, at most `fine`."""
+    """Step of the last fit [s], at most `fine`."""
     between: float
     """Step [s] for sensitivities that coarse ones do not do for."""
     coarse: float
@@ -55,10 +55,10 @@ class Problem:
     read: Windows = field(repr=False)
     """The windows with their starts as measured."""
     tilt: Effect | None = None
-    """Of the base's sensor, with which the windows were whitened; residuals are linear in it."""
+    """Tilt of the base's sensor with which the windows were whitened; residuals are linear in it."""
     recall: Recall = field(default_factory=Recall, repr=False)
     thresholds: Thresholds = field(default_factory=Thresholds, repr=False)
-    """What all that is asked of the problem is decided by."""
+    """Thresholds of everything that is asked of the problem."""
     prior: float = 1.0
     """Weight of the nuisances' prior; see `held_to`."""
 
@@ -178,7 +178,7 @@ class Problem:
         return change * np.sqrt(np.minimum(1.0, most / np.maximum(power, 1e-30)))[..., None]
 
     def relinearised(self, effects: Sequence[Effect]) -> "Problem":
-        """The same windows with nuisance columns around the model with `effects`.
+        """Windows with nuisance columns around the model with `effects`.
 
         What a servo loop a millisecond late does depends on the accelerations, and these on a delay that was found:
         with the declared model's columns a delay of 13 ms came out 0.1 ms short, five standard errors.
@@ -191,7 +191,7 @@ class Problem:
         return replace(self, nuisance=fresh)
 
     def finely(self) -> "Problem":
-        """The same windows, simulated in the steps of the last fit."""
+        """Windows simulated in the steps of the last fit."""
         return replace(self, fine=self.finest)
 
     def part(self, keep: np.ndarray) -> "Problem":

@@ -42,7 +42,7 @@ class NoisyWindows:
     sigma: np.ndarray
     """(D,) noise of every signal."""
     step: float
-    """Of the simulation [s]."""
+    """Step of the simulation [s]."""
     rule: Whitening = field(default_factory=Whitening)
 
     @property
@@ -129,7 +129,7 @@ def _balanced_signs(windows: int, count: int, rng: np.random.Generator) -> np.nd
 
 @dataclass(frozen=True, eq=False)
 class Stepped:
-    """What the length of its steps makes of W simulated windows; NaN where these diverge."""
+    """Effect of the length of its steps on W simulated windows; NaN where these diverge."""
 
     change: np.ndarray
     """(W, N, D) change of the prediction from steps twice as long."""
@@ -139,7 +139,7 @@ class Stepped:
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """What noise in the starts of W windows makes of their residuals."""
+    """Effect of noise in the starts of W windows on their residuals."""
 
     moved: np.ndarray
     """(K, W, M) change of the residual from K perturbed starts."""

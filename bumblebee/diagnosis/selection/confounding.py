@@ -113,7 +113,7 @@ def rivals(found: Search, holdout: Holdout, ranked: list[list[tuple[Candidate, f
 
 @dataclass(frozen=True, eq=False)
 class _Slopes:
-    """What the screened windows' sensitivities suggest of a rival in an effect's place."""
+    """Prediction for a rival in an effect's place, from the screened windows' sensitivities."""
 
     rival: Candidate
     steps: np.ndarray

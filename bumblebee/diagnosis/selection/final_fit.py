@@ -35,7 +35,7 @@ class Refined:
     half: np.ndarray
     """(P,) of 95 % intervals; 0 for parameters that were not fitted."""
     other_laws: Mapping[Candidate, OtherLaw] = field(default_factory=dict)
-    """What another law of an effect comes to, where these data refute neither."""
+    """Alternative law of an effect and what it comes to, where these data refute neither."""
 
 
 def _around(problem: Problem, fit: Fit, rng: np.random.Generator) -> Problem:

@@ -53,7 +53,7 @@ class Search:
     columns: Columns
     """Screening columns of all candidates."""
     tests: Scores
-    """Of every candidate of `columns`, given the chosen ones."""
+    """Score tests of every candidate of `columns`, given the chosen ones."""
     bound: float
     """z that a candidate had to reach."""
     count: int
@@ -83,7 +83,7 @@ def search(
     for _ in range(problem.thresholds.selection.forward.swaps):
         if not budget.has_time_for("swap steps"):
             break
-        say("each effect against its rivals")
+        say("comparing each effect with its rivals")
         better = partial(_any_of, run, (swap, add_stribeck_friction, complete_frictions))
         if not attempt("swap steps", better, _no):
             break

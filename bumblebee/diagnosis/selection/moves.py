@@ -32,7 +32,7 @@ def by_slopes(problem: Problem, rest: Fit, new: Fit, weights: np.ndarray) -> flo
 
 
 def by_loss(problem: Problem, rest: Fit, new: Fit, weights: np.ndarray) -> float:
-    """The same, or if more by what the fit loses without it: half of what swings is out of step with the slopes."""
+    """Wald statistic, or if more, the fit's loss without the candidate: slopes miss half of a swing."""
     fall = cost_of(problem, rest.residual, weights)[0] - new.cost
     numbers = int(np.count_nonzero(new.chosen[-1].scales))
     lost = z_value(max(fall, 0.0) / max(new.power(problem), 1.0), numbers, len(weights))
@@ -46,7 +46,7 @@ class Terms:
     bound: float
     """z that it must reach."""
     rules: tuple[Any, ...]
-    """Of `thresholds.comparison`; one that is met is enough."""
+    """Rules of `thresholds.comparison`; one that is met is enough."""
     iterations: int
     """Steps of the joint refit."""
     weights: np.ndarray | None = None
@@ -69,22 +69,22 @@ class Move:
     before: Fit
     """The model as it is."""
     rest: Fit
-    """What stays of it."""
+    """Fit that stays without it."""
     after: Fit
     weights: np.ndarray
     """(W,) that `z` was found with."""
     z: float
-    """Of the candidate."""
+    """Statistic of the candidate."""
     terms: Terms
 
     @property
     def new(self) -> Candidate:
-        """What comes in."""
+        """Candidate that comes in."""
         return self.after.chosen[-1]
 
     @property
     def gone(self) -> list[Candidate]:
-        """What it replaces."""
+        """Candidates that it replaces."""
         return [c for c in self.before.chosen if c not in self.after.chosen]
 
     def passes(self) -> bool:

@@ -23,7 +23,7 @@ from bumblebee.diagnosis.thresholds.selection import ScoreTests
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Of C candidates, given a fit."""
+    """Scores of C candidates, given a fit."""
 
     steps: list[np.ndarray]
     """Estimates (F,) in steps of the free parameters."""

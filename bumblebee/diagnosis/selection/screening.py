@@ -1,4 +1,4 @@
-"""What the screening promises, looked at again on as many other windows before it is simulated on all.
+"""Second look at what the screening promises, on as many other windows, before it is simulated on all.
 
 Of a thousand candidates tens promise something on the screening's windows by noise alone. On as many windows again most
 of them promise nothing, at a third of the cost of all windows. What was simulated there is not simulated again.

@@ -153,7 +153,7 @@ class SearchState:
 
     @property
     def now(self) -> Now:
-        """What a move starts from and is judged by."""
+        """State that a move starts from and is judged by."""
         return self.problem, self.holdout, self.fit
 
     def accept(self, candidate: Candidate, values: np.ndarray) -> bool:
@@ -232,7 +232,7 @@ class SearchState:
             self.fit = refit(self.fit.chosen, self.fit.values, by_slopes=False)
         for c in [c for c in reversed(self.fit.chosen) if c.effect in JUDGED_ALONE]:
             if not is_still_confirmed(self.problem, self.fit, c, wide):
-                self.say(f"needless: {c.effect} on {c.where}")
+                self.say(f"removed as redundant: {c.effect} on {c.where}")
                 rest = self.fit.without([c])
                 self.fit = refit(rest.chosen, rest.values)
 
@@ -248,7 +248,7 @@ class Loss:
     gain: float
     """Log-likelihood on the fitted windows, of this share against none."""
     paid: float
-    """The same on the held-out windows; infinite where there are none."""
+    """Loss on the validation windows; infinite where there are none."""
     explains: float
     """Share of the held-out excess of chi-square that goes with the commands that arrived."""
 

@@ -50,7 +50,7 @@ def _chi_square(old: np.ndarray, new: np.ndarray) -> float:
 
 
 def _held_out_share(problem: Problem, before: Fit, after: Fit) -> float:
-    """What other integrators would make of the change from `before` to `after` on the validation windows."""
+    """Share that other integrators would make of the change from `before` to `after` on the validation windows."""
     old, new = problem.residual([before.effects, after.effects])
     none = np.empty((0, *old.shape))
     sides = [replace(fit, residual=residual, columns=none) for fit, residual in ((before, old), (after, new))]

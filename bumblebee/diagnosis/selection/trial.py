@@ -19,7 +19,7 @@ class Trial:
     values: np.ndarray
     """(P,) parameters."""
     cost: float
-    """Of the fit with it, the chosen ones free to move linearly."""
+    """Cost of the fit with it, the chosen ones free to move linearly."""
     change: np.ndarray
     """(W, M) what it does to the prediction, beside what the chosen ones could."""
 
@@ -61,7 +61,7 @@ def try_one(problem: Problem, fit: Fit, candidate: Candidate, steps: np.ndarray,
 
 
 def simplest(tried: Sequence[Trial], before: float, rule: Trials) -> Trial:
-    """Of the trials that cost nearly the same as the best, the usual effect, or the one of fewest parameters.
+    """Simplest of the trials that cost nearly the same as the best: the usual effect, or the fewest parameters.
 
     Costs that differ by a few say nothing; those of changes that are nearly parallel differ by more than that only
     because their sizes were found in coarse steps. `before` is the cost without any of them.

@@ -1,4 +1,4 @@
-"""What a small change of each candidate does to the residuals."""
+"""Sensitivities: the change of the residuals by a small change of each candidate."""
 
 from bumblebee.diagnosis.sensitivities.columns import Answered, Columns, pulse_sizes, screen
 from bumblebee.diagnosis.sensitivities.impulse_responses import Answers, Path, answers_of

@@ -15,7 +15,7 @@ from bumblebee.sim.effects import SETPOINTS, Effect
 
 @dataclass(frozen=True, eq=False)
 class Answered:
-    """What pulses do to the W windows of a screening of a model with some effects."""
+    """Responses of the W windows of a screening to pulses, with a model of some effects."""
 
     effects: Sequence[Effect]
     white: np.ndarray

@@ -26,7 +26,7 @@ class Late:
         self._known: dict[tuple[str, float], np.ndarray] = {}
 
     def torque(self, kind: str, size: float, now: np.ndarray) -> np.ndarray:
-        """What lacks in the servos' torques `now` (W, K, J) [N m] where all drives lag or read late by `size` [s]."""
+        """Torque missing in the servos' `now` (W, K, J) [N m] where all drives lag or read late by `size` [s]."""
         if (kind, size) not in self._known:
             make = self._filtered if kind == "torque_lag" else self._old
             self._known[kind, size] = make(size, now) - now

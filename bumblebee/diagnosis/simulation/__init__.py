@@ -1,4 +1,4 @@
-"""What a robot with given effects would have shown: the declared model varied, simulated on windows of the logs."""
+"""Simulation of a robot with given effects: the declared model varied, on windows of the logs."""
 
 from bumblebee.diagnosis.simulation.activations import activations
 from bumblebee.diagnosis.simulation.actuator_history import (

@@ -1,4 +1,4 @@
-"""What the drives remember when a window starts, from the log before it: clocks, heat, filters, play.
+"""Memory of the drives at a window's start, from the log before it: clocks, heat, filters, play.
 
 A window restarts a simulation in the middle of a rollout. Position and velocity are read; what is not read follows from
 the readings and commands since the rollout began.
@@ -141,7 +141,7 @@ def bent_before(windows: Windows, column: int, width: float, rule: JointPath) ->
 
 
 def _together(windows: Windows, of: Callable[[Rollout], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """What the windows' rollouts `of` (T,) give, (R, T) up to the last start, a shorter one kept at its last value.
+    """Signals `of` (T,) of the windows' rollouts, (R, T) up to the last start, a shorter one kept at its last value.
 
     And which of the rows (W,) each window is of.
     """
@@ -152,7 +152,7 @@ def _together(windows: Windows, of: Callable[[Rollout], np.ndarray]) -> tuple[np
 
 
 def _states(plant: Plant, windows: Windows, hooks: RuntimeHooks, order: Sequence[int]) -> np.ndarray | None:
-    """What discovered terms remember (W, C)."""
+    """Memory of discovered terms (W, C)."""
     kept = states_of(hooks.terms)
     if not kept:
         return None
@@ -243,7 +243,7 @@ def read_at(
 def _read_at_each(
     windows: Windows, shifts: np.ndarray, delay: np.ndarray, order: Sequence[int], rule: JointPath
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same (W, S, J) for several shifts (S,) at once."""
+    """Readings (W, S, J) at several shifts (S,) at once."""
     place, speed = np.empty((2, len(windows), len(shifts), len(order)))
     for i in np.unique(windows.rollout):
         own, source = windows.rollout == i, windows.source[i]

@@ -1,4 +1,4 @@
-"""What drives a joint: the force law of any MuJoCo actuator by probing it, and drives made to take what was logged.
+"""Drives of a joint: the force law of any MuJoCo actuator by probing it, and drives made to take what was logged.
 
 `motor`, `position`, `general`, `pid` and `dcmotor` keep their gains in different places. A force for a small change of
 input, position and velocity is the same question for all of them.

@@ -24,7 +24,7 @@ class Recall:
     """The latest residuals of one set of windows, by model and step; the oldest go first."""
 
     of: tuple[object, ...] = ()
-    """What they depend on beside model and step: when it is another one, nothing is known."""
+    """Objects that they depend on beside model and step: when one is another, nothing is known."""
     kept: OrderedDict[Key, np.ndarray] = field(default_factory=OrderedDict)
 
     def get(
@@ -91,5 +91,5 @@ class Changes:
 
 
 def _rounded(effect: Effect) -> ChangeKey:
-    """What an effect is, its parameters to two digits."""
+    """Key of an effect, its parameters to two digits."""
     return (effect.effect, effect.where, *(f"{name} {value:.1e}" for name, value in effect.parameters.items()))

@@ -1,4 +1,4 @@
-"""What was different while a rollout was recorded, as far as it changes the declared model.
+"""Conditions of a rollout's recording, as far as they change the declared model.
 
 | condition | in the declared model |
 |---|---|
@@ -27,14 +27,14 @@ NOMINAL_VOLTAGE = "nominal_voltage"
 
 @dataclass(frozen=True)
 class Condition:
-    """What differs from the declared model; the empty one is the declared model."""
+    """Differences from the declared model; the empty one is the declared model."""
 
     kp: tuple[float, ...] = ()
     """(J,) [N m/rad] at the joints, or () for the declared ones."""
     kd: tuple[float, ...] = ()
     """(J,) [N m s/rad], or () for the declared ones."""
     loads: tuple[AddedMass, ...] = ()
-    """Of every body that carries an added mass in some rollout, which may be 0 kg in this one."""
+    """Added mass of every body that carries one in some rollout; it may be 0 kg in this one."""
     supply: float = 1.0
     """Supply voltage as a share of the nominal one."""
 
@@ -48,7 +48,7 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Declared:
-    """What a model declares of what conditions change."""
+    """Declared values that conditions change."""
 
     gains: tuple[np.ndarray, np.ndarray]
     """(J,) kp and kd of the joints; NaN where the model has none and the logs must state them."""
@@ -61,7 +61,7 @@ class Declared:
 
 
 def condition_of(rollout: Rollout, declared: Declared) -> Condition:
-    """What a rollout's metadata state that the model can have otherwise."""
+    """Conditions in a rollout's metadata that the model can have otherwise."""
     kp, kd = (_stated(rollout, key, gains, declared) for key, gains in zip(("kp", "kd"), declared.gains, strict=True))
     volts = (rollout.meta.get("conditions") or {}).get("supply_voltage")
     share = 1.0 if declared.volts is None or volts is None else float(volts) / declared.volts
@@ -77,7 +77,7 @@ def _stated(rollout: Rollout, key: str, gains: np.ndarray, declared: Declared) -
 
 
 def in_words(condition: Condition, joints: Sequence[str]) -> str:
-    """What a condition is: gains of the first joints, loads, voltage."""
+    """A condition in words: gains of the first joints, loads, voltage."""
     said = []
     for key, values in (("kp", condition.kp), ("kd", condition.kd)):
         listed = ", ".join(f"{joint} {value:.4g}" for joint, value in zip(joints[:2], values[:2], strict=False))

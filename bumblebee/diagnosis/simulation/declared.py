@@ -1,4 +1,4 @@
-"""What the declared model says of an effect's parameters in a place."""
+"""Declared values of an effect's parameters in a place."""
 
 from collections.abc import Callable, Sequence
 

@@ -18,7 +18,7 @@ from bumblebee.errors import BadInput
 from bumblebee.sim.effects import Effect
 
 REFUSALS = (mujoco.FatalError, mujoco.UnexpectedError, BadInput, ValueError, ArithmeticError, RuntimeError, LookupError)
-"""What making or simulating a model may raise because of the model; anything else (memory, a typing error) is none.
+"""Exceptions that making or simulating a model may raise because of the model; no others (memory, a typing error).
 
 numpy's LinAlgError is a ValueError, a place that the model lacks a LookupError.
 """
@@ -30,7 +30,7 @@ LEFT_OUT = "left out of the search, for it could not be computed"
 
 @dataclass(eq=False)
 class Failures:
-    """What failed in one diagnosis, each once."""
+    """Failures of one diagnosis, each once."""
 
     reasons: dict[tuple[str, str], int] = field(default_factory=dict)
     """(effects in words, reason) -> how often."""
@@ -42,7 +42,7 @@ class Failures:
         _count(self.reasons, effects_in_words(effects), error)
 
     def attempt(self, step: str, take: Callable[[], T], instead: Callable[[], T]) -> T:
-        """What `take` gives, or `instead` where that fails; the `step` in words is then written down."""
+        """Call `take`, or return `instead` where that fails; the `step` in words is then written down."""
         try:
             return take()
         except REFUSALS as error:

@@ -1,4 +1,4 @@
-"""What follows tick by tick from the tick before, linearly, found for all ticks of a log at once."""
+"""Linear recursions, from one tick to the next, solved for all ticks of a log at once."""
 
 import numpy as np
 

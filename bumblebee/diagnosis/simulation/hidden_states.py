@@ -24,7 +24,7 @@ Known = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def step_share(hidden: Sequence[tuple[str, str, tuple[float, ...]]], rule: HiddenStates) -> float:
-    """What of the step a model with these structural effects (kind, joint, parameters) needs."""
+    """Share of the step that a model with these structural effects (kind, joint, parameters) needs."""
     finer = any(kind == "backlash" or (kind in SUFFIX and values[1]) for kind, _, values in hidden)
     return rule.step_share if finer else 1.0
 

@@ -13,7 +13,7 @@ from bumblebee.sim.effects import ADDED, STICTION_SOLIMP, STICTION_SOLREF, nativ
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """What one effect on one place is written into."""
+    """Place in the model that one effect is written into."""
 
     plant: Plant
     model: mujoco.MjModel
@@ -23,7 +23,7 @@ class Target:
 
     @property
     def column(self) -> int:
-        """Of the joint."""
+        """Column of the joint."""
         return self.plant.joints.index(self.place)
 
     @property

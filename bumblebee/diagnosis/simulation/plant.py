@@ -67,17 +67,17 @@ class Plant:
     scalable: np.ndarray
     """(J,) bool: the drive's gains stand in gainprm and biasprm; not so for a dcmotor or a passive joint."""
     spec: mujoco.MjSpec
-    """What it was made of, to be compiled again with effects that change its structure."""
+    """Spec that it was made of, to be compiled again with effects that change its structure."""
     example: Rollout
     """A rollout whose columns it matches."""
     compiled: dict[tuple, "Plant"] = field(default_factory=dict, repr=False)
     """Plants of the same robot with play, flexible shafts or yielding springs, by their places."""
     thresholds: SimulationThresholds = field(default_factory=SimulationThresholds, repr=False)
-    """What it is simulated by."""
+    """Thresholds that it is simulated by."""
     condition: Condition = field(default_factory=Condition)
-    """What its model has otherwise than the declared one."""
+    """Condition of its model: what differs from the declared one."""
     others: tuple["Plant", ...] = field(default=(), repr=False)
-    """The same robot under the other conditions that rollouts were recorded under."""
+    """Plants of this robot under the other conditions that rollouts were recorded under."""
     under: Mapping[str, int] = field(default_factory=dict, repr=False)
     """Rollout -> number of its condition, 0 for this plant's own and where it is not listed."""
 

@@ -1,4 +1,4 @@
-"""What is compared: measured and simulated readings as vectors, and their difference.
+"""Readings that are compared: measured and simulated, as vectors, and their difference.
 
 The D signals of a tick are joint_pos (J), joint_vel (J) and, on a floating base, base_rot (3, rotation vector in the
 measured base frame), base_ang_vel (3), base_lin_vel (3) and, where it was logged, base_pos (3).

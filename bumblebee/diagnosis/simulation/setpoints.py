@@ -21,7 +21,7 @@ _BYTES = 48e6  # of paths at once
 
 @dataclass(frozen=True)
 class SetPoint:
-    """What one drive makes of its targets."""
+    """Set-point that one drive makes of its targets."""
 
     kind: str
     """One of `SETPOINTS`."""
@@ -29,7 +29,7 @@ class SetPoint:
     """The effect's parameters."""
     actuator: int
     column: int
-    """Of the joint in the log."""
+    """Column of the joint in the log."""
     scale: float
     """The actuator's input for a unit of what was logged."""
     torque: bool
@@ -115,7 +115,7 @@ def _at_first_command(windows: Windows, point: SetPoint) -> tuple[np.ndarray, np
 
 
 def _states_at_first_command(windows: Windows, points: Sequence[SetPoint]) -> np.ndarray:
-    """The same of P set-points of one kind, (P, W, 2)."""
+    """States of P set-points of one kind at the first command, (P, W, 2)."""
     some, rows = np.unique(windows.rollout, return_inverse=True)
     paths = _paths([windows.source[i] for i in some], points)
     issued = [windows.source[i].time[k] for i, k in zip(windows.rollout, windows.start, strict=True)]
@@ -162,7 +162,7 @@ def _followed(kind: str, values: Sequence[np.ndarray], command: np.ndarray, last
 
 
 def _filtered(constants: np.ndarray, command: np.ndarray, lasts: np.ndarray) -> np.ndarray:
-    """The same places (P, R, T) of filters with time constants (P, 1) [s]; one by one, for a cache holds one."""
+    """Outputs (P, R, T) of filters with time constants (P, 1) [s]; one by one, for a cache holds one."""
     out = np.empty_like(command)
     for p, told in enumerate(command):
         keep = np.exp(-lasts[:, :-1] / constants[p])

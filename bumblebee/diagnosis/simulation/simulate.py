@@ -156,7 +156,7 @@ class _Chunk:
     windows: Windows
     chosen: list[Variation]
     starts: Starts | None
-    """Of this chunk alone."""
+    """Starts of this chunk alone."""
     step: float
     """[s]"""
 
@@ -254,7 +254,7 @@ def _run(chunk: _Chunk, layout: Layout, inputs: list[np.ndarray]) -> np.ndarray:
 
 
 def _led_in(plant: Plant, windows: Windows, lead: Variation, step: float) -> Known | None:
-    """What a model with shafts has come to at the windows' starts."""
+    """State that a model with shafts has come to at the windows' starts."""
     if not any(kind == "series_elasticity" for kind, _, _ in lead.hidden):
         return None
     early, span, whole = earlier(plant, windows)

@@ -60,7 +60,7 @@ def members(plant: Plant) -> dict[str, list[int]]:
 
 
 def mixed_notes(plant: Plant) -> list[str]:
-    """What a reader must know of overall values where a robot has hinges and slides."""
+    """Notes on overall values where a robot has hinges and slides."""
     return [MIXED] if len(members(plant)) > 1 else []
 
 

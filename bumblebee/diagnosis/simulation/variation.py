@@ -34,9 +34,9 @@ class Variation:
     plant: Plant | None = None
     """The plant of `model` where its structure differs from the declared one's."""
     hooks: RuntimeHooks | None = None
-    """What must be done beside MuJoCo at every step."""
+    """Actions beside MuJoCo at every step."""
     setpoints: tuple[SetPoint, ...] = ()
-    """What drives make of their targets, on the way to the servos; as a delay it is in the controls."""
+    """Set-points that drives make of their targets, on the way to the servos; as a delay it is in the controls."""
     dropped: np.ndarray | None = None
     """(nu,) share of commands that never arrive."""
     tilt: np.ndarray | None = None
@@ -44,11 +44,11 @@ class Variation:
     hidden: tuple[tuple[str, str, tuple[float, ...]], ...] = field(default=())
     """(kind, joint, parameters) of the structural effects, for the state that no sensor reads."""
     effects: tuple[Effect, ...] = ()
-    """What the declared model was given."""
+    """Effects that the declared model was given."""
     impossible: bool = False
     """Whether the model with these effects could not be made: `model` is then the declared one, residuals are NaN."""
     others: tuple[mujoco.MjModel, ...] = field(default=(), repr=False)
-    """The same under the plant's other conditions; `model` is that of its own."""
+    """Models under the plant's other conditions; `model` is that of its own."""
 
     @property
     def models(self) -> tuple[mujoco.MjModel, ...]:
@@ -94,7 +94,7 @@ def _blamed(plant: Plant, effects: Sequence[Effect]) -> Sequence[Effect]:
 
 
 def vary_or_refuse(plant: Plant, effects: Sequence[Effect]) -> Variation:
-    """The same for effects that a user demands: `BadInput` where the model cannot be made."""
+    """Vary the plant by effects that a user demands: `BadInput` where the model cannot be made."""
     try:
         return _made(plant, effects)
     except REFUSALS as error:
@@ -112,7 +112,7 @@ def _made(plant: Plant, effects: Sequence[Effect]) -> Variation:
 
 
 def _alone(plant: Plant, effects: Sequence[Effect]) -> Variation:
-    """The same under the plant's own condition alone."""
+    """Vary the plant under its own condition alone."""
     if not effects:
         return Variation(plant.model, plant.delay, plant.offset)
     structural = [e for e in effects if _is_structural(e)]
@@ -198,7 +198,7 @@ def _structure(plant: Plant, effects: Sequence[Effect]) -> Plant:
 
 
 def _form(effect: Effect) -> tuple[bool, ...]:
-    """What of play and shafts decides on the structure: where the encoder is, whether the rotor is divided."""
+    """Structure of play and shafts: where the encoder is, whether the rotor is divided."""
     if effect.effect not in native.SUFFIX:
         return ()
     return tuple(bool(value) for value in (effect.values()[1], *effect.values()[3:]))

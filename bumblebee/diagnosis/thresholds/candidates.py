@@ -5,22 +5,22 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class StillJoints:
-    """Of joints of which nothing can be said."""
+    """Thresholds for joints of which nothing can be said."""
 
     place: float = 2.5
     """Times its noise that a position must vary to move."""
     speed: float = 1.5
-    """The same of a velocity."""
+    """Times its noise that a velocity must vary to move."""
 
 
 @dataclass(frozen=True)
 class SignalScales:
-    """Of the typical sizes that first steps follow from."""
+    """Typical sizes of signals that first steps follow from."""
 
     torque: float = 0.05
     """Share of the largest joint's torque that each has at least: a joint that rests has none of its own."""
     speed: float = 0.1
-    """The same of speeds."""
+    """Share of the largest joint's speed that each has at least."""
     peak: float = 0.995
     """Quantile that is the largest torque or speed: a single reading may be wrong."""
     rows: int = 50
@@ -29,7 +29,7 @@ class SignalScales:
 
 @dataclass(frozen=True)
 class JointSteps:
-    """Of first steps on a joint, from the sizes of its own signals."""
+    """First steps on a joint, from the sizes of its own signals."""
 
     torque: float = 0.1
     """Share of the typical torque: friction, springs."""
@@ -57,7 +57,7 @@ class JointSteps:
 
 @dataclass(frozen=True)
 class DriveSteps:
-    """Of first steps of what a drive does."""
+    """First steps of what a drive does."""
 
     load: float = 0.05
     """Load-dependent friction: share of the torque."""
@@ -83,7 +83,7 @@ class DriveSteps:
 
 @dataclass(frozen=True)
 class TransmissionSteps:
-    """Of first steps of backlash and flexible shafts."""
+    """First steps of backlash and flexible shafts."""
 
     backlash: float = 0.01
     """Share of the travel."""
@@ -103,7 +103,7 @@ class TransmissionSteps:
 
 @dataclass(frozen=True)
 class BodySteps:
-    """Of first steps of bodies, of the ground and of what the robot stands by."""
+    """First steps of bodies, of the ground and of what the robot stands by."""
 
     mass: float = 0.2
     """Share of the body's mass."""
@@ -112,7 +112,7 @@ class BodySteps:
     com: float = 0.1
     """Share of the body's size by which its centre of mass moves."""
     least_com: float = 0.01
-    """The same at least [m]."""
+    """Length [m] by which a centre of mass moves at least."""
     moments: float = 0.3
     """Share of the body's moments of inertia."""
     least_moment: float = 1e-5
@@ -124,15 +124,15 @@ class BodySteps:
     ground_friction: float = -0.1
     """Relative change of the ground's friction."""
     ground_compliance: float = 0.2
-    """The same of its compliance."""
+    """Relative change of the ground's compliance."""
 
 
 @dataclass(frozen=True)
 class SurfaceSteps:
-    """Of a surface that a body of a robot on a fixed base touches."""
+    """First steps of a surface that a body of a robot on a fixed base touches."""
 
     ticks: int = 25
-    """Every so manieth tick of the logs says how low a body comes."""
+    """Every n-th tick of the logs shows how low a body comes."""
     travel: float = 0.02
     """Height through which a body must move [m]."""
     below: float = 0.01
@@ -145,7 +145,7 @@ class SurfaceSteps:
 
 @dataclass(frozen=True)
 class CandidateLimits:
-    """Of one candidate: how it is simulated and how far it may go."""
+    """Limits of one candidate: how it is simulated and how far it may go."""
 
     few_joints: int = 8
     """Joints up to which lags and shafts are simulated on all; on more a lag is taken for a torque.

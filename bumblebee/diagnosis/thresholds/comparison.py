@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Validation:
-    """What a fit adds must be there on the validation windows, too, and be no trifle; nothing is worse later."""
+    """Thresholds of acceptance: a fit's gain is on the validation windows, too, and nothing is worse later."""
 
     z: float = 2.0
     """Standard errors that the gain must exceed."""
@@ -31,7 +31,7 @@ class Later:
     growth: float = 0.02
     """Growth of log(1 + error^2) that is none."""
     growth_of_square: float = 0.1
-    """The same of error^2, as a share of what it was: of a model that is right but for one window in a hundred, in
+    """Largest growth of error^2, as a share of what it was: of a model that is right but for one window in 100, in
     which a joint swings away, the logarithm sees nothing."""
     z: float = 2.0
     """Standard errors of Student's t beyond which it has grown."""
@@ -59,12 +59,12 @@ class WhereFelt:
 
 @dataclass(frozen=True)
 class WhereRare:
-    """The same for an effect that the validation windows cannot judge; several fitted windows decide."""
+    """Thresholds of an effect that the validation windows cannot judge; several fitted windows decide."""
 
     unfelt: float = 0.1
     """Share of what a fitted window feels on the mean, below which a validation window cannot judge."""
     felt: WhereFelt = field(default_factory=lambda: WhereFelt(least=4))
-    """What the fitted windows must meet."""
+    """Thresholds that the fitted windows must meet."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class Confirmed:
 
 @dataclass(frozen=True)
 class Withdrawn:
-    """What stands in the end must not be worse than the declared model."""
+    """Thresholds for the last check: what stands must not be worse than the declared model."""
 
     growth: float = 0.02
     """Growth of log(1 + chi-square) that is none."""
@@ -144,7 +144,7 @@ class Withdrawn:
 
 @dataclass(frozen=True)
 class Criterion:
-    """Of fits of different size."""
+    """Criterion that compares fits of different size."""
 
     parameter: float = 4.0
     """Log-likelihood that a parameter must bring."""
@@ -161,7 +161,7 @@ class Artefact:
     joint_gain: float = 0.1
     """Share of the chi-square of the joint's own signals that a late encoder must gain."""
     robot_gain: float = 0.05
-    """The same of all signals, for all encoders at once."""
+    """Share of the chi-square of all signals that late encoders must gain, all at once."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class Elimination:
     sure_z: float = 4.0
     """Standard errors that an effect fitted together with many must reach."""
     sure_z_of_body: float = 5.0
-    """The same of masses and centres of mass."""
+    """Standard errors that masses and centres of mass must reach."""
     unsure_cost: float = 0.2
     """Share by which the cost may grow without all that is not sure, where what goes is simulated."""
     trifle: float = 0.02

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Usable:
-    """Of rollouts that windows can be cut from."""
+    """Thresholds for rollouts that windows can be cut from."""
 
     seconds: float = 0.35
     """Length at least [s]: shorter ones hold no window of 0.2 s after the lead that delayed commands need."""
@@ -17,7 +17,7 @@ class Usable:
 
 @dataclass(frozen=True)
 class Conventions:
-    """Of a convention (sign, unit, order) that is wrong in all rollouts, told from faults of single recordings."""
+    """Thresholds for a convention (sign, unit, order) that is wrong in all rollouts, not in single recordings."""
 
     share: float = 0.5
     """Share of the rollouts that one rule sets aside on one joint, from which on it is a convention."""
@@ -33,12 +33,12 @@ class Conventions:
 
 @dataclass(frozen=True)
 class TimeSteps:
-    """Of the steps of the simulation."""
+    """Thresholds for the steps of the simulation."""
 
     fine: float = 0.001
     """Step for residuals at most [s]."""
     coarse: float = 0.005
-    """The same for sensitivities."""
+    """Step for sensitivities at most [s]."""
     small_model: int = 12
     """Degrees of freedom of the largest robot that is cheap to simulate. A larger one is searched in longer steps (the
     last fit and all that is reported is not) and has more time, in proportion; a smaller one has more windows."""
@@ -57,10 +57,10 @@ class TimeSteps:
 
 @dataclass(frozen=True)
 class Split:
-    """Of the division into fitted and held-out rollouts."""
+    """Thresholds for the division into fitted and held-out rollouts."""
 
     every: int = 4
-    """Every so manieth motion of a cluster is held out."""
+    """Every n-th motion of a cluster is held out."""
     enough: int = 4
     """Rollouts to fit from which on some are put aside to decide which effects are accepted."""
     same: float = 0.1
@@ -77,7 +77,7 @@ class Split:
 
 @dataclass(frozen=True)
 class Conditions:
-    """Of what was different when rollouts were recorded."""
+    """Thresholds for what was different when rollouts were recorded."""
 
     relative: float = 1e-3
     """Relative difference below which two numbers are one value of a condition: 0.205 says 0.204966."""
@@ -87,7 +87,7 @@ class Conditions:
 
 @dataclass(frozen=True)
 class InformativeSplit:
-    """Of the exchange of rollouts that show what no fitted one does."""
+    """Thresholds for the exchange of rollouts that show what no fitted one does."""
 
     windows: int = 300
     """Windows that are compared with the declared model."""
@@ -101,7 +101,7 @@ class InformativeSplit:
 
 @dataclass(frozen=True)
 class Noise:
-    """Of the sensors' noise, estimated from the logs."""
+    """Thresholds for the sensors' noise, estimated from the logs."""
 
     block: int = 24
     """Rows of a block that the mean square of the fourth difference is taken over."""
@@ -125,7 +125,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class Smoothing:
-    """Of the local fits that positions and velocities of fast logs are smoothed by."""
+    """Thresholds for the local fits that smooth positions and velocities of fast logs."""
 
     half_span: float = 0.01
     """Time to either side that a fit is over [s]."""
@@ -146,7 +146,7 @@ class Smoothing:
 
 @dataclass(frozen=True)
 class VelocityLatency:
-    """Of velocities that are older than the positions beside them."""
+    """Thresholds for velocities that are older than the positions beside them."""
 
     span: float = 0.15
     """Time over which velocities are integrated [s]."""
@@ -181,7 +181,7 @@ class DeclaredContacts:
 
 @dataclass(frozen=True)
 class Extent:
-    """Of how much of the logs and of time a diagnosis takes."""
+    """Extent of a diagnosis: how much of the logs and of time it takes."""
 
     more: float = 2.5
     """Times as many windows at most, for the smallest models."""

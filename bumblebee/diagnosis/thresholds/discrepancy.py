@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class TorqueScores:
-    """Of the windows' scores of a torque that a joint lacks."""
+    """Thresholds for the windows' scores of a torque that a joint lacks."""
 
     unexplained: float = 1e-3
     """Share of a column's power that must be left conditional on what is explained; with less it is no direction."""
@@ -21,7 +21,7 @@ class TorqueScores:
 
 @dataclass(frozen=True)
 class Regressors:
-    """Of the quantities that a missing torque may depend on."""
+    """Thresholds for the quantities that a missing torque may depend on."""
 
     creep: float = 0.02
     """[rad/s] Speeds below are no motion that dry friction could be told by."""
@@ -29,7 +29,7 @@ class Regressors:
 
 @dataclass(frozen=True)
 class TermLibrary:
-    """Of the basis functions that are tried: where their grids begin and end, and how fine these are."""
+    """Grids of the basis functions that are tried: where they begin and end, and how fine they are."""
 
     cogging_harmonics: tuple[int, ...] = (*range(1, 31), 32, 36, 40, 42, 48, 56, 60, 64, 72, 84, 96)
     """Periods a turn: all low ones, then those of usual numbers of poles, slots and teeth."""
@@ -72,7 +72,7 @@ class TermLibrary:
     least_target_steps: float = 2.0
     """Steps over its range at least of a target that arrives in steps."""
     most_target_steps: float = 250.0
-    """The same at most."""
+    """Steps over its range at most of a target that arrives in steps."""
     target_steps_apart: float = 0.4
     """Between the numbers of steps that are tried: a stair shifts by as much of a step at the end of the range."""
     least_target_step: float = 1e-3
@@ -101,10 +101,10 @@ class TermLibrary:
 
 @dataclass(frozen=True)
 class StepwiseRegression:
-    """Of the forward selection among all basis functions."""
+    """Thresholds for the forward selection among all basis functions."""
 
     level: float = 0.002
-    """Of a false basis function in a whole dataset, shared among all that are looked at."""
+    """Probability of a false basis function in a whole dataset, shared among all that are looked at."""
     least_share: float = 0.005
     """Share of the cost that a basis function must take away to be worth a word."""
     coefficient_price: float = 3.0
@@ -116,9 +116,9 @@ class StepwiseRegression:
     looked_at: int = 12
     """Best basis functions a step that are tested in full."""
     of_one_kind: int = 5
-    """Of them with one kind of dependence, so that others come up, too."""
+    """Number of them with one kind of dependence, so that others come up, too."""
     refined: int = 4
-    """Of these, basis functions whose inner numbers are refined."""
+    """Number of these whose inner numbers are refined."""
     rival: float = 0.6
     """Share of the best basis function's worth from which on another one is its rival."""
     rivals: int = 2
@@ -135,18 +135,18 @@ class StepwiseRegression:
 
 @dataclass(frozen=True)
 class ResidualTests:
-    """Of the tests of what a fit leaves unexplained."""
+    """Thresholds for the tests of what a fit leaves unexplained."""
 
     least_torque: float = 0.01
     """Share of a joint's typical torque below which a basis function's torque is not worth a word."""
     excess_fitted: float = 4.0
     """Standard errors by which a joint's chi-square must be too large on the fitted windows."""
     excess_validation: float = 1.5
-    """The same on the validation set: it has fewer windows, and confirms."""
+    """Standard errors of the excess on the validation set: it has fewer windows, and confirms."""
     excess_alone: float = 6.0
-    """The same on the fitted windows where there is no validation set."""
+    """Standard errors of the excess on the fitted windows where there is no validation set."""
     excess_one_rollout: float = 20.0
-    """The same in one rollout alone, its loudest windows not counted, from which on no second one is asked for."""
+    """Standard errors of the excess in one rollout, less its loudest windows, from which no second is asked for."""
     rollouts: int = 2
     """Rollouts that must show it where the validation set does not: what one shows may be an accident."""
     loudest: int = 2
@@ -154,9 +154,9 @@ class ResidualTests:
     whole_each: float = 2.0
     """Standard errors of all windows' chi-square on the fitted windows and on the validation set, each."""
     whole_both: float = 4.0
-    """The same of both together."""
+    """Standard errors of all windows' chi-square on both sets together."""
     whole_alone: float = 6.0
-    """The same on the fitted windows where there is no validation set."""
+    """Standard errors of all windows' chi-square on the fitted windows where there is no validation set."""
     met: float = 9.0
     """Chi-square of a basis function on the validation set, below which that does not meet it."""
     half_gain: float = 25.0
@@ -174,7 +174,7 @@ class ResidualTests:
 
 @dataclass(frozen=True)
 class Form:
-    """Of discrepancy models: basis functions that are refitted in the simulator."""
+    """Thresholds for discrepancy models: basis functions that are refitted in the simulator."""
 
     many_effects: int = 8
     """Effects in a fit beyond which every trial, that refits them all, is dear.
@@ -184,16 +184,16 @@ class Form:
     functions: int = 3
     """Basis functions in a discrepancy model at most."""
     worth: float = 12.0
-    """What a further one must bring in the criterion."""
+    """Gain in the criterion that a further one must bring."""
     worth_share: float = 0.03
-    """The same as a share of what the first ones bring."""
+    """Share of the first ones' gain that a further one must bring."""
     part: float = 0.2
     """Share of an effect of the catalogue that a basis function must be for the effect to be a part of it."""
 
 
 @dataclass(frozen=True)
 class CatalogueTerms:
-    """Of a discrepancy model that acts as an effect."""
+    """Thresholds for a discrepancy model that acts as an effect."""
 
     stiff: float = 2.0
     """Times the servo's own gain that a term which acts on the target asks for at most.
@@ -205,7 +205,7 @@ class CatalogueTerms:
 
 @dataclass(frozen=True)
 class SingleLaw:
-    """Of one basis function in a swap for several effects of the catalogue."""
+    """Thresholds for one basis function in a swap for several effects of the catalogue."""
 
     refined: int = 3
     """Best basis functions whose inner numbers are refined."""
@@ -217,24 +217,24 @@ class SingleLaw:
 
 @dataclass(frozen=True)
 class CatalogueAlternative:
-    """Of effects of the catalogue in a swap for a discrepancy model."""
+    """Thresholds for effects of the catalogue in a swap for a discrepancy model."""
 
     effects: int = 5
     """Effects whose sensitivities are simulated."""
     shapes: int = 2
     """Shapes of each."""
     anywhere: int = 2
-    """Of these the most promising that may be on other joints."""
+    """Number of the most promising of these that may be on other joints."""
     trials: int = 4
-    """Of these tried at their size."""
+    """Number of these that are tried at their size."""
     fits: int = 2
-    """Of these refitted jointly."""
+    """Number of these that are refitted jointly."""
     rounds: int = 2
     """Effects of the catalogue that together may take a discrepancy model's place."""
     hopeless: float = 0.5
     """Share of what a discrepancy model gains that one effect may lack; with more no second one is tried."""
     lacking: float = 0.1
-    """The same that the effects may lack and yet take its place.
+    """Share of a discrepancy model's gain that the effects may lack and yet take its place.
 
     Less is what basis functions differ by whose torques correlate by 0.95.
     """
@@ -242,7 +242,7 @@ class CatalogueAlternative:
 
 @dataclass(frozen=True)
 class Discover:
-    """Of keeping a discrepancy model."""
+    """Thresholds for keeping a discrepancy model."""
 
     joints: int = 3
     """Joints at most that get one."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Covariance:
-    """Of the fitted values' covariance and intervals."""
+    """Thresholds for the fitted values' covariance and intervals."""
 
     enough_rollouts: int = 6
     """Rollouts from which on their differences are believed: fewer say little about how much rollouts differ."""
@@ -17,7 +17,7 @@ class Covariance:
 
 @dataclass(frozen=True)
 class Jacobian:
-    """Of sensitivities that are taken over from an earlier fit."""
+    """Thresholds for sensitivities that are taken over from an earlier fit."""
 
     moved: float = 0.2
     """Share of a change that matters: so far a parameter may move before sensitivities near it are simulated again."""
@@ -25,7 +25,7 @@ class Jacobian:
 
 @dataclass(frozen=True)
 class LevenbergMarquardt:
-    """Of a fit that begins far from the data."""
+    """Thresholds for a fit that begins far from the data."""
 
     damping: float = 1e-3
     """The least damping, as a share of each parameter's own normal equation."""
@@ -34,7 +34,7 @@ class LevenbergMarquardt:
     more_damping: float = 10.0
     """Factor on the damping after a step that was no better."""
     less_damping: float = 0.1
-    """The same after one that was."""
+    """Factor on the damping after a step that was better."""
     settled: float = 0.995
     """Share of the cost that a step must leave less of, or it is the last."""
     free: float = 10.0
@@ -43,7 +43,7 @@ class LevenbergMarquardt:
 
 @dataclass(frozen=True)
 class ResponseSurface:
-    """Of the last step of a fit whose cost is rough."""
+    """Thresholds for the last step of a fit whose cost is rough."""
 
     step: float = 0.2
     """Share of a change that matters, to either side: what smooths the jumps and is still linear."""
@@ -55,7 +55,7 @@ class ResponseSurface:
 
 @dataclass(frozen=True)
 class IntegratorError:
-    """Of gains that a change of the integrator alone would bring."""
+    """Thresholds for gains that a change of the integrator alone would bring."""
 
     explained: float = 0.4
     """Share of an effect's gain from which on it is taken for the integrator's."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Naming:
-    """Of what a joint's missing torque is said to depend on."""
+    """Thresholds for the words on what a joint's missing torque depends on."""
 
     part_of_largest: float = 0.1
     """Share of the largest basis function's torque below which another one's quantities are not named."""
@@ -13,7 +13,7 @@ class Naming:
 
 @dataclass(frozen=True)
 class ReportedTorque:
-    """Of the comparison with the drive's own torque."""
+    """Thresholds for the comparison with the drive's own torque."""
 
     latest: float = 0.05
     """Delay up to which the best agreement is sought [s]."""
@@ -23,7 +23,7 @@ class ReportedTorque:
 
 @dataclass(frozen=True)
 class GapPage:
-    """Of what the page shows."""
+    """Size of the page: how much it shows."""
 
     motions: int = 15
     """Motions that are listed, the worst first."""

@@ -35,7 +35,7 @@ class SafetyMargins:
 
 @dataclass(frozen=True)
 class Unknowns:
-    """What a plan must be safe under where no diagnosis says what the robot is like."""
+    """Ranges that a plan must be safe under where no diagnosis says what the robot is like."""
 
     strength: tuple[float, float] = (0.8, 1.2)
     """Factors on all drives' strength: torque constants of a catalogue differ by as much from unit to unit."""
@@ -63,7 +63,7 @@ class Unknowns:
 
 @dataclass(frozen=True)
 class Motions:
-    """Of the candidate motions."""
+    """Thresholds for the candidate motions."""
 
     lead: float = 0.5
     """Rest in the start pose before a run [s]."""
@@ -80,7 +80,7 @@ class Motions:
     reach: tuple[float, float] = (0.25, 0.95)
     """Share of the free travel that a motion uses before limits shrink it."""
     support_reach: float = 0.12
-    """The same share for joints between a standing robot's base and its feet."""
+    """Share of the free travel for joints between a standing robot's base and its feet."""
     rocking: tuple[float, float] = (0.01, 0.05)
     """Half-width of small reversals [rad, m]: what backlash and hysteresis show in."""
     jumps: tuple[float, float] = (0.01, 0.06)
@@ -95,7 +95,7 @@ class Motions:
 
 @dataclass(frozen=True)
 class TrackingGains:
-    """Of the servo that follows a plan's targets on a robot whose drives take torques and whose gains are not said."""
+    """Gains of the servo that follows a plan's targets on a robot with torque drives and unknown gains."""
 
     frequency: float = 2.0
     """Natural frequency of the joint's inertia on the servo [Hz]: soft, and above most of the planned motion."""
@@ -123,12 +123,12 @@ class SensorNoise:
 
 @dataclass(frozen=True)
 class Information:
-    """Of expected information from simulated windows."""
+    """Thresholds for expected information from simulated windows."""
 
     windows: int = 12
     """Windows of a run that stand for all of its windows."""
     few: int = 6
-    """The same for models of many degrees of freedom, where each costs a third of a second."""
+    """Windows of a run for models of many degrees of freedom, where each costs a third of a second."""
     together: int = 12
     """Runs that are whitened at once: memory, a window of a humanoid has a factor of a megabyte."""
     prior: float = 10.0
@@ -182,7 +182,7 @@ class Information:
 
 @dataclass(frozen=True)
 class Choice:
-    """Of the runs that are chosen."""
+    """Thresholds for the runs that are chosen."""
 
     enough: float = 100.0
     """Chi-square that tells two effects apart in practice, ten standard errors: the diagnosis asks for about six, on

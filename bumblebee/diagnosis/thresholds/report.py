@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class PredictionError:
-    """Of the error block."""
+    """Settings of the error block."""
 
     resamples: int = 400
     """Bootstrap draws of the rollouts for an interval."""
@@ -15,7 +15,7 @@ class PredictionError:
 
 @dataclass(frozen=True)
 class MeasuredCurve:
-    """Of the mean of a missing torque over one quantity."""
+    """Settings of the mean of a missing torque over one quantity."""
 
     bins: int = 15
     """Bins of equally many windows."""
@@ -25,7 +25,7 @@ class MeasuredCurve:
 
 @dataclass(frozen=True)
 class Effects:
-    """Of the list of effects."""
+    """Settings of the list of effects."""
 
     comparable: float = 0.25
     """Share of the change of dry friction from which on friction that changes with direction or speed is one entry
@@ -36,7 +36,7 @@ class Effects:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Of the words on what is left."""
+    """Settings of the words on what is left."""
 
     joints: int = 3
     """Joints that get a sentence, and pictures on the page."""
@@ -44,7 +44,7 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Matters:
-    """Of the headline: what matters, and what is to be trusted."""
+    """Settings of the headline: what matters, and what is to be trusted."""
 
     carries: float = 0.02
     """Share of the excess chi-square that returns without an effect, from which on it carries the gain: below, one in
@@ -70,7 +70,7 @@ class Matters:
 
 @dataclass(frozen=True)
 class ExampleWindows:
-    """Of the windows to look at."""
+    """Settings of the windows to look at."""
 
     lengths: tuple[float, ...] = (1.0, 0.6, 0.2)
     """Lengths that are tried, until the logs are long enough [s]."""
@@ -79,12 +79,12 @@ class ExampleWindows:
     ticks: int = 120
     """Points at most that are drawn of one."""
     typical: float = 0.9
-    """Quantile of the gain among a joint's windows that is shown: telling, and no freak."""
+    """Quantile of the gain among a joint's windows that is shown: typical, not extreme."""
 
 
 @dataclass(frozen=True)
 class Verdicts:
-    """Of what is said of errors and of what is left."""
+    """Settings of the verdicts on errors and on what is left."""
 
     alike: float = 0.004
     """Delays of single joints closer than that are one delay [s]."""
@@ -110,7 +110,7 @@ class Verdicts:
 
 @dataclass(frozen=True)
 class Listing:
-    """Of how much page and terminal list."""
+    """Length of the lists on page and terminal."""
 
     effects: int = 6
     """Effects that the first sentence names."""

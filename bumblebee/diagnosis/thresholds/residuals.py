@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Whitening:
-    """Of what noise in the readings and in the starts does to a residual."""
+    """Settings of the noise of readings and starts in a residual."""
 
     curved: float = 0.5
     """Share of the variance that is not linear in the starts that counts.
@@ -22,7 +22,7 @@ class Whitening:
 
 @dataclass(frozen=True)
 class InitialState:
-    """Of starts that are moved to where the readings after them say that they were."""
+    """Settings of starts that are moved to where the readings after them say that they were."""
 
     outputs: int = 2
     """Compared ticks that say where a window started."""
@@ -32,7 +32,7 @@ class InitialState:
 
 @dataclass(frozen=True)
 class Nuisances:
-    """Of directions in which two correct simulators differ; a coefficient of 1 is also its prior's deviation."""
+    """Directions in which two correct simulators differ; a coefficient of 1 is also its prior's deviation."""
 
     unit: float = 0.001
     """Time that a coefficient of 1 stands for [s]."""
@@ -46,7 +46,7 @@ class Nuisances:
 
 @dataclass(frozen=True)
 class EmpiricalCovariance:
-    """Of the covariance of what a fit leaves, which takes the noise's place."""
+    """Settings of the covariance of what a fit leaves, which takes the noise's place."""
 
     rounds: int = 4
     """Rounds of covariance and weights."""
@@ -56,7 +56,7 @@ class EmpiricalCovariance:
 
 @dataclass(frozen=True)
 class Outliers:
-    """Of windows that jump or diverge."""
+    """Thresholds for windows that jump or diverge."""
 
     many: int = 12
     """Windows from which on one is held against the others."""
@@ -73,7 +73,7 @@ class Outliers:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Of the steps that sensitivities of many candidates are simulated in."""
+    """Settings of the steps that sensitivities of many candidates are simulated in."""
 
     damped: float = 2.0
     """Steps times the rate at which a joint is damped, from which on they are too coarse. By servos: 0 to 1.2 on robots

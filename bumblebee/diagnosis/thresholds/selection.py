@@ -8,7 +8,7 @@ from bumblebee.diagnosis.thresholds.proposals import ProposalThresholds
 
 @dataclass(frozen=True)
 class Forward:
-    """Of the forward selection and its state."""
+    """Thresholds of the forward selection and its state."""
 
     anew: float = 0.1
     """Share of the cost left, below which all candidates are screened anew."""
@@ -38,7 +38,7 @@ class Forward:
 
 @dataclass(frozen=True)
 class Screening:
-    """Of what is worth a trial."""
+    """Thresholds for candidates that are worth a trial."""
 
     second_look: float = 2.5
     """Times as many windows as are screened, from which on a second look is worth it."""
@@ -54,7 +54,7 @@ class Screening:
 
 @dataclass(frozen=True)
 class ScoreTests:
-    """Of score tests of all candidates."""
+    """Thresholds of the score tests of all candidates."""
 
     seen: float = 1e-3
     """Share of a column's power that must be left beside the chosen ones."""
@@ -66,7 +66,7 @@ class ScoreTests:
 
 @dataclass(frozen=True)
 class Trials:
-    """Of candidates tried in the simulator at their size."""
+    """Thresholds for candidates tried in the simulator at their size."""
 
     secants: int = 3
     """Secant steps at most."""
@@ -80,12 +80,12 @@ class Trials:
 
 @dataclass(frozen=True)
 class Swap:
-    """Of one catalogue effect in the place of others."""
+    """Thresholds for one catalogue effect in the place of others."""
 
     as_much: float = 0.95
     """Share of what the effects gain that a rival must promise."""
     part: float = 0.6
-    """The same of joint elasticity, whose loss has not been fitted yet."""
+    """Share of what the effects gain that joint elasticity must promise, whose loss has not been fitted yet."""
     rivals: int = 2
     """Rivals tried in the place of the same effects."""
     few: int = 4
@@ -96,7 +96,7 @@ class Swap:
 
 @dataclass(frozen=True)
 class FinalFit:
-    """Of the last fit."""
+    """Thresholds of the last fit."""
 
     sure: float = 3.0
     """z below which an effect is insignificant there."""
@@ -109,7 +109,7 @@ class FinalFit:
     still: float = 0.5
     """Share of an interval's half-width: a fit that moves less by whitening has settled."""
     steady: float = 0.1
-    """The same by weighing."""
+    """Share of an interval's half-width: a fit that moves less by weighing has settled."""
     same: float = 0.1
     """Mean square change of a window's prediction, in the noise's, below which whitening anew changes nothing."""
     many: int = 30
@@ -122,7 +122,7 @@ class FinalFit:
 
 @dataclass(frozen=True)
 class SimulationError:
-    """Of values that are moved to where the model predicts best."""
+    """Thresholds for values that are moved to where the model predicts best."""
 
     far: float = 25.0
     """Median chi-square by value of what is left, from which on noise is no measure: readings five times as far off."""
@@ -132,7 +132,7 @@ class SimulationError:
 
 @dataclass(frozen=True)
 class ToldApart:
-    """Of effects whose sensitivities are nearly the same, and which plain data tell apart all the same."""
+    """Thresholds for effects with nearly equal sensitivities that plain data tell apart all the same."""
 
     chi_square: float = 25.0
     """By which a rival must be worse on fitted and validation windows together, and by slopes: five standard errors."""
@@ -153,7 +153,7 @@ class ToldApart:
 
 @dataclass(frozen=True)
 class Confounding:
-    """Of effects that these data cannot tell apart."""
+    """Thresholds for effects that these data cannot tell apart."""
 
     same: float = 0.95
     """Cosine of whitened sensitivities from which on two effects are the same unless a refit tells them apart."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Impulses:
-    """Of the torques whose answers stand for all effects that are torques."""
+    """Settings of the torques whose answers stand for all effects that are torques."""
 
     segments: int = 5
     """Parts of a window, in each of which every degree of freedom is pushed."""
@@ -19,7 +19,7 @@ class Impulses:
 
 @dataclass(frozen=True)
 class TorqueSignatures:
-    """Of the torques that effects would have put on the joints."""
+    """Settings of the torques that effects would have put on the joints."""
 
     creep: float = 0.02
     """Speed [rad/s, m/s] below which there is no motion that dry friction could be told by."""

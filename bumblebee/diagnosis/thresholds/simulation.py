@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Windowing:
-    """Of the stretches of the logs that are restarted and compared."""
+    """Settings of the stretches of the logs that are restarted and compared."""
 
     lead: float = 0.1
     """A window starts this long after its rollout [s], so that a delayed command is known from the start."""
@@ -24,7 +24,7 @@ class Windowing:
 
 @dataclass(frozen=True)
 class ActuatorHistory:
-    """Of what drives remember from before a window's start."""
+    """Settings of the drives' memory from before a window's start."""
 
     smooth: int = 3
     """Ticks to either side that a velocity is a mean over: what a sensor's noise would wear off is no motion."""
@@ -38,7 +38,7 @@ class ActuatorHistory:
 
 @dataclass(frozen=True)
 class JointPath:
-    """Of a joint's path without its sensor's noise."""
+    """Settings of a joint's path without its sensor's noise."""
 
     least_rows: int = 8
     """Rows of a log below which it is left as it is."""
@@ -58,7 +58,7 @@ class JointPath:
 
 @dataclass(frozen=True)
 class BaseHeight:
-    """Of the height of a base that no sensor reads."""
+    """Settings of the height of a base that no sensor reads."""
 
     rest_depth: float = 0.001
     """Depth at which a standing robot rests in MuJoCo's soft floor with default contact parameters [m]."""
@@ -66,7 +66,7 @@ class BaseHeight:
 
 @dataclass(frozen=True)
 class CollisionCulling:
-    """Of geometries that can touch nothing within a window."""
+    """Settings of geometries that can touch nothing within a window."""
 
     fastest: float = 2.5
     """Speed at which a geometry may come down on the mean over a window [m/s]."""
@@ -76,7 +76,7 @@ class CollisionCulling:
 
 @dataclass(frozen=True)
 class HiddenStates:
-    """Of backlash, flexible shafts and yielding springs, whose states no sensor reads."""
+    """Settings of backlash, flexible shafts and yielding springs, whose states no sensor reads."""
 
     step_share: float = 0.5
     """Share of the usual step that backlash and shafts read on the joint need.
@@ -90,7 +90,7 @@ class HiddenStates:
 
 @dataclass(frozen=True)
 class Solver:
-    """Of MuJoCo's solver: what is compared is physics, not a solver's haste."""
+    """Settings of MuJoCo's solver: what is compared is physics, not a solver's haste."""
 
     iterations: int = 30
     """Iterations at least, whatever a training model allows itself."""
@@ -100,7 +100,7 @@ class Solver:
 
 @dataclass(frozen=True)
 class DriveProbe:
-    """Of the force law of an actuator, found by small changes."""
+    """Settings of the probe of an actuator's force law, by small changes."""
 
     step: float = 1e-4
     """Change of input [its unit] and of position [rad, m]."""
@@ -110,7 +110,7 @@ class DriveProbe:
 
 @dataclass(frozen=True)
 class Conditions:
-    """Of rollouts that were recorded under conditions other than the declared ones."""
+    """Settings of rollouts that were recorded under conditions other than the declared ones."""
 
     relative: float = 1e-3
     """Relative difference of gains or voltages below which they are the same: rounding in a file is smaller."""

@@ -155,7 +155,7 @@ class DeltaAction:
         return targets + correction(raw, self.limit) @ self._placement
 
     def on(self, device: torch.device) -> "DeltaAction":
-        """The same on a device, as a copy."""
+        """Copy of the delta action on a device."""
         twin = DeltaAction(copy.deepcopy(self.network).to(device), self.joints, self.limit)
         twin._placement = self._placement.to(device)
         return twin

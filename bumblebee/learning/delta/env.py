@@ -61,7 +61,7 @@ class DeltaEnv(VecEnv):
         self._restart(torch.arange(self.num_envs, device=device))
 
     def get_observations(self) -> TensorDict:
-        """What the policy and the critic see now."""
+        """Observations of the policy and the critic now."""
         seen = observe(self.engine.state(), self.recordings.targets[self._row])
         return TensorDict({"policy": seen, "critic": seen.clone()}, batch_size=[self.num_envs])
 

@@ -55,7 +55,7 @@ def beyond(values: Tensor, low: Tensor, high: Tensor) -> Tensor:
 
 
 def beyond_alone(values: Tensor, recorded: Tensor, low: Tensor, high: Tensor, slack: float = 0.0) -> Tensor:
-    """The same for any value more than `slack` outside whose recording (B, J) is inside, (B,).
+    """Penalty of any value more than `slack` outside whose recording (B, J) is inside, (B,).
 
     What the robot itself did costs nothing. With the row as printed a delta action earns more by keeping the
     simulator's joints off limits at which the robot's were than by following it (docs/decisions/delta-action.md).

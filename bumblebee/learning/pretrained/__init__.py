@@ -9,6 +9,6 @@ RANDOMISED = FOLDER / "randomised"
 IMU = FOLDER / "imu"
 """A third one: it learnt on such robots too, and sees what an IMU and encoders give, without odometry."""
 NAMES = {FOLDER: "pretrained", RANDOMISED: "pretrained-randomised", IMU: "pretrained-imu"}
-"""What a policy's card calls the parent that it began from."""
+"""Names of the parents that a policy began from, on its card."""
 SHIPPED = {"shipped": FOLDER, "randomised": RANDOMISED, "imu": IMU}
 """Names by which a user asks for them."""

@@ -13,10 +13,10 @@ from bumblebee.learning.world_model.body import change_of, difference, features,
 SPREADS = (0.05, 0.05, 0.05, 0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.6, 0.6, 0.6)
 """Errors of the root's place [m], turn [rad], velocity [m/s] and angular velocity [rad/s] that count as one."""
 ANGLE, SPEED = 0.1, 1.5
-"""The same for joint angles [rad] and joint velocities [rad/s]."""
+"""Errors of joint angles [rad] and joint velocities [rad/s] that count as one."""
 
 Predict = Callable[[Tensor, Tensor, Tensor, Tensor], Tensor]
-"""What `Dynamics.forward` does."""
+"""Signature of `Dynamics.forward`."""
 
 
 def past_targets(delay: float, dt: float) -> int:

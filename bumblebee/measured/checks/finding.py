@@ -17,9 +17,9 @@ class Finding:
     rule: str
     """Name of the rule."""
     expected: str
-    """What would have been accepted."""
+    """Value that would have been accepted."""
     came: str
-    """What was found instead."""
+    """Value that was found instead."""
     fatal: bool
     """True: the file is set aside; False: it is used, and the person is told."""
     do: str = ""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What still passes. Usual noise: joint_pos 5e-4 rad, joint_vel 0.02 rad/s, gyro 0.01 rad/s, quaternion 0.002."""
+    """Limits that pass. Usual noise: joint_pos 5e-4 rad, joint_vel 0.02 rad/s, gyro 0.01 rad/s, quaternion 0.002."""
 
     gap_warn: float = 1.8
     """Periods between two rows: from here on a tick is missing. Loggers wander by less than half a period."""
@@ -68,7 +68,7 @@ class Thresholds:
     """Standard errors by which a joint's response must oppose its command to be called reversed; with the whole state
     beside the command honest joints in contact reach 3."""
     response_late: float = 1.0
-    """The same for the mean command of the last 60 ms; a drive that answers 30 ms late reaches 0.6."""
+    """Standard errors for the mean command of the last 60 ms; a drive that answers 30 ms late reaches 0.6."""
     response_effect: float = 0.02
     """Share of the declared servo's effect on the free joint that the opposing effect must have: damping, a sampled
     servo and weak motors leave more, a slow reference that is tracked without error a twentieth of it."""

@@ -1,4 +1,4 @@
-"""What every check looks at: the rollout, the model's facts about its joints, the limits; and a place for findings."""
+"""View of a rollout for every check: the rollout, the model's facts about its joints, the limits; and its findings."""
 
 from dataclasses import dataclass, field
 from typing import Any

@@ -14,7 +14,7 @@ LEFT_OUT = "_"
 commands it."""
 
 DRIVE = {"kp": "J", "kd": "J", "target_vel": "J", "feed_forward": "J"}
-"""What a low-level command holds beside its target: kp [N m/rad], kd [N m s/rad], velocity target [rad/s], feed-forward
+"""Columns of a low-level command beside its target: kp [N m/rad], kd [N m s/rad], velocity target [rad/s], feed-forward
 torque [N m]. Constant gains become metadata; the others become part of the target (`drive.py`)."""
 
 NAMED: dict[str, int | str] = WIDTHS | DRIVE
@@ -47,9 +47,9 @@ class ColumnMap:
     hz: float = 0.0
     """Rate [Hz] of a log without time stamps (HDF5); 0: it has them."""
     clock: dict[str, str] = field(default_factory=dict)
-    """Of a bag, topic -> the stamp that counts: header, log or publish; under "" for all other topics."""
+    """Stamp that counts for each topic of a bag: header, log or publish; under "" for all other topics."""
     grid: Literal["states", "commands"] = "states"
-    """Of a bag, whose stamps become the rows: the joint states', or the commands'."""
+    """Stamps of a bag that become the rows: the joint states', or the commands'."""
     angle_unit: tuple[str, ...] = ()
     """Unit of joint positions, velocities and targets, one of `ANGLES` for all or one a joint; m of slides.
 
@@ -61,7 +61,7 @@ class ColumnMap:
     quat_order: Literal["wxyz", "xyzw"] = "wxyz"
     """Order of base_quat as the file's columns are named in the map."""
     names: tuple[str, ...] = ()
-    """What messages with names call the joints, where it is not as the model does; one a joint."""
+    """Names of the joints in messages, where they are not the model's; one a joint."""
     locked: tuple[str, ...] = ()
     """Joints of the model that the robot has locked or lacks: they are in no log, and stand still in the model."""
     order: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -77,7 +77,7 @@ class ColumnMap:
     scale: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Column of the contract -> factors, one a joint, on its values (in rad where they are angles)."""
     offset: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    """The same, added after the factors."""
+    """Column of the contract -> offsets, one a joint, added after the factors."""
     meta: dict[str, Any] = field(default_factory=dict)
     """robot, kp, kd, notes and other metadata of the contract."""
 

@@ -1,4 +1,4 @@
-"""What was different while logs were recorded, from a table that a person keeps beside them.
+"""Conditions of a recording, from a table that a person keeps beside the logs.
 
 Either a CSV whose first column names the log and whose others are conditions by the contract's names (`kp`, `kd`, one
 number for all joints or `kp[joint]`; `motion`; conditions such as `supply_voltage`; any other name is a label). Or a
@@ -41,7 +41,7 @@ class Column:
     body: str = ""
     """That carries an added mass."""
     position: tuple[float, ...] = ()
-    """Of it in the body's frame [m]."""
+    """Position of the added mass in the body's frame [m]."""
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def _by_number(name: str) -> tuple[str, int, str]:
 
 
 def _at(h5py: Any, where: str, group: Any, path: str) -> Any:
-    """What lies at a path in a group, every step of which is a plain link within this file."""
+    """Object at a path in a group, every step of which is a plain link within this file."""
     for part in filter(None, path.split("/")):
         link = group.get(part, getlink=True) if isinstance(group, h5py.Group) else None
         if link is None:

@@ -36,7 +36,7 @@ LEROBOT = {
     "time": "timestamp",
     "episode": "episode_index",
 }
-"""What LeRobot's datasets, v2 and v3, call their columns."""
+"""Columns of LeRobot's datasets, v2 and v3."""
 _IN_ANGLES = ("joint_pos", "joint_vel", "joint_target", "target_vel")
 
 
@@ -173,7 +173,7 @@ def _angle_unit(where: str, table: dict[str, Any], joints: int) -> tuple[str, ..
 
 
 def _require_scales(path: Path, chosen: ColumnMap) -> None:
-    """What is normalised leads to rad by factors that the map has."""
+    """Require that normalised columns have factors to rad in the map."""
     if "normalised" not in chosen.angle_unit:
         return
     for column in _IN_ANGLES:

@@ -13,7 +13,7 @@ from bumblebee.io.names import distinct_stems
 from bumblebee.io.read import decode, member_bytes, members, npz_arrays, open_file, read_bytes
 
 LOGS = Limits(ratio=200.0)
-"""Of logs: numbers that were measured have noise and pack ten times, not two hundred times."""
+"""Limits of logs: numbers that were measured have noise and pack ten times, not two hundred times."""
 
 
 @dataclass(frozen=True)

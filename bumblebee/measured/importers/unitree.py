@@ -18,7 +18,7 @@ UNITREE: dict[str, Any] = {
     "angle_unit": "rad",
     "quat_order": "wxyz",
 }
-"""What the layout `unitree_hg` puts into a map; which motor is which joint, and the clock, the map must say."""
+"""Entries of a map for the layout `unitree_hg`; which motor is which joint, and the clock, the map must say."""
 
 _IMU = "float32[4] quaternion\nfloat32[3] gyroscope\nfloat32[3] accelerometer\nfloat32[3] rpy\nint16 temperature"
 _STATE = (

@@ -1,1 +1,1 @@
-"""What a motion is, in words: captions of HumanML3D, of the user, and of file names, kept apart."""
+"""Captions of a motion: those of HumanML3D, of the user, and of file names, kept apart."""

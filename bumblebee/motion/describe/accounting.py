@@ -12,7 +12,7 @@ from bumblebee.motion.describe.table import Row
 
 @dataclass(frozen=True)
 class Account:
-    """What a describer gave to all motions of a run."""
+    """Account of what a describer gave to all motions of a run."""
 
     motions: dict[str, int]
     """Motions by source of their captions, "none" for those without; together all of them."""

@@ -69,7 +69,7 @@ def is_smplx(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class Found:
-    """What a path was taken for: a motion, or none, with the reason where one might have been expected."""
+    """Motion that a path was taken for, or none, with the reason where one might have been expected."""
 
     key: Key | None = None
     note: str = ""

@@ -1,4 +1,4 @@
-"""What became of the texts of one motion."""
+"""Texts of one motion, and what became of them."""
 
 from dataclasses import dataclass, field
 
@@ -34,13 +34,13 @@ class Described:
     captions: tuple[str, ...] = ()
     """Lines of `Clip.captions`: `caption#tokens/POS#from#to`, seconds from its first frame; 0 and 0: all of it."""
     source: str = ""
-    """Of `Clip.caption_source`: "file", "csv", "humanml3d", "name", or "" without captions."""
+    """Source of the captions, as in `Clip.caption_source`: "file", "csv", "humanml3d", "name", or ""."""
     notes: tuple[str, ...] = ()
     """One line each: captions that were dropped, a match that was not certain."""
     dropped: tuple[str, ...] = ()
     """The kind of reason for each caption that was dropped."""
     licence: str = ""
-    """Of the texts, where it is known; the motion keeps its own."""
+    """Licence of the texts, where it is known; the motion keeps its own."""
     used_rows: frozenset[int] = field(default_factory=frozenset)
     """Lines of the user's CSV that gave a caption."""
     dropped_rows: frozenset[int] = field(default_factory=frozenset)

@@ -33,7 +33,7 @@ class DescribeConfig(Ranged):
 
 
 def describer(config: DescribeConfig, root: Path) -> "Describer":
-    """What describes the motions of the folder or file `root`.
+    """Describer of the motions of the folder or file `root`.
 
     Raises:
         BadInput: a table or a data set that cannot be opened.
@@ -135,7 +135,7 @@ def _sorted_out(found: list[str | Dropped], source: str) -> Described:
 
 
 def _together(told: Described, more: Described) -> Described:
-    """What a further source says, with the notes of those before, which gave no caption."""
+    """Texts of a further source, with the notes of those before, which gave no caption."""
     return replace(
         more,
         notes=told.notes + more.notes,

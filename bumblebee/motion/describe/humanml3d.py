@@ -21,7 +21,7 @@ from bumblebee.motion.licences import UNKNOWN, licence_of
 from bumblebee.motion.texts import shown
 
 LICENCE = "MIT"
-"""Of the texts, index and code, as the repository EricGuo5513/HumanML3D states; AMASS's motions have their own."""
+"""Licence of texts, index and code, as the repository EricGuo5513/HumanML3D states; AMASS's motions have theirs."""
 _COLUMNS = ["source_path", "start_frame", "end_frame", "new_name"]
 _MAX_INDEX = 64 << 20  # bytes; the published index has 1 MB
 _MAX_FRAME = 10_000_000  # 139 hours at 20 Hz

@@ -21,7 +21,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class Span:
-    """The same on the motion: from `since` to `until` [s]; `stretch` seconds of it for one of HumanML3D's."""
+    """Span of a caption on the motion: from `since` to `until` [s]; `stretch` seconds of it for one of HumanML3D's."""
 
     since: float
     until: float

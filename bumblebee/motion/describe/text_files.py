@@ -13,7 +13,7 @@ from bumblebee.io.limits import Limits
 from bumblebee.io.read import decode, member_bytes, members, read_bytes
 
 LIMITS = Limits(file_bytes=256 << 20, unpacked_bytes=1 << 30, members=1_000_000)
-"""Of the archive: the published one has 11 MB, 17 MB unpacked, 29,232 files."""
+"""Limits of the archive: the published one has 11 MB, 17 MB unpacked, 29,232 files."""
 _TEXT = Limits(unpacked_bytes=1 << 20)  # of one text; the longest published one has 2,760 bytes
 _MAX_DIRECTORY = 128 << 20  # bytes of an archive's list of files; the published one's has 2 MB
 _END = 22 + (1 << 16)  # bytes: the record at an archive's end with the longest comment

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from bumblebee.motion.captions import parse_caption
 
 LEAST_OVERLAP = 0.5
-"""Of the shorter of caption and window: how much of it both must share.
+"""Share of the shorter of caption and window that both must share.
 
 With less, a window shows more of something else than of what the caption says, or lacks most of it: a pair that
 teaches the wrong word. With more, a caption that the cut between two windows halves would go to neither. Of the

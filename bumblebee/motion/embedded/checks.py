@@ -21,7 +21,7 @@ WEIGHT_OF_TORQUE = 1e-3
 
 @dataclass(frozen=True)
 class Loads:
-    """What the floor and the motors must do, for the frames looked at (K of them)."""
+    """Loads of the floor and the motors, for the frames looked at (K of them)."""
 
     frames: np.ndarray
     """(K,) frame numbers."""

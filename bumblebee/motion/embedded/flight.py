@@ -7,9 +7,9 @@ import numpy as np
 from bumblebee.motion.embedded.plan import FPS, Plan
 
 PITCH_INERTIA = 2.5
-"""Of the upper body about the centre of mass, roughly [kg m^2]; an error only costs passes."""
+"""Inertia of the upper body about the centre of mass, roughly [kg m^2]; an error only costs passes."""
 SMOOTH, SMALL = 3e-4, 1e-3
-"""What jerk and angle of the correction cost against the moment that remains."""
+"""Costs of jerk and angle of the correction against the moment that remains."""
 
 
 def spare_moment(plan: Plan, moment: np.ndarray) -> Plan:

@@ -80,7 +80,7 @@ def com_from_zmp(plan: Plan, target: np.ndarray) -> np.ndarray:
 
 
 def _rested(com: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """The same, eased into its first and last value: it leads the ZMP's first move by millimetres."""
+    """Path eased into its first and last value: it leads the ZMP's first move by millimetres."""
     start, end = ease(time / END_EASE)[:, None], ease((time[-1] - time) / END_EASE)[:, None]
     com = com[0] + (com - com[0]) * start
     return com[-1] + (com - com[-1]) * end
@@ -179,7 +179,7 @@ def derivatives(qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def floor_wrench(qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What the floor must supply, force and moment about the world's origin (T, 6), and generalised forces (T, 29)."""
+    """Wrench of the floor, force and moment about the world's origin (T, 6), and generalised forces (T, 29)."""
     model = plain_model()
     data = mujoco.MjData(model)
     qvel, qacc = derivatives(qpos)

@@ -19,7 +19,7 @@ DECISION_COLUMNS = (
 
 @dataclass(frozen=True)
 class Decision:
-    """What becomes of one motion."""
+    """Decision on one motion."""
 
     motion: str
     broken: tuple[dict[str, object], ...] = ()
@@ -28,12 +28,12 @@ class Decision:
 
     @property
     def by_rules(self) -> str:
-        """What the rules alone say: keep or drop."""
+        """Decision of the rules alone: keep or drop."""
         return "drop" if self.broken else "keep"
 
     @property
     def decision(self) -> str:
-        """What holds: keep or drop."""
+        """Decision that holds: keep or drop."""
         return self.overrule.decision if self.overrule else self.by_rules
 
     @property
@@ -65,7 +65,7 @@ def decisions_table(decisions: Iterable[Decision]) -> pd.DataFrame:
 
 
 def drops_table(decisions: Iterable[Decision]) -> pd.DataFrame:
-    """What was dropped, a row for each rule broken; one that a person dropped alone has the rule `overruled`."""
+    """Table of what was dropped, a row for each broken rule; one dropped by a person alone has the rule `overruled`."""
     rows: list[dict[str, object]] = []
     for one in decisions:
         if one.decision == "drop":

@@ -1,4 +1,4 @@
-"""What a rule finds in a motion, and how it looks for it."""
+"""Worst case of a rule in a motion, and how it is looked for."""
 
 from dataclasses import dataclass
 

@@ -12,7 +12,7 @@ from bumblebee.robot.facts import g1_bodies, joint_names
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """Of the 30 bodies depth-first, the pelvis first; velocities are those of the bodies' frames, not of their masses.
+    """Motion of the 30 bodies depth-first, the pelvis first; velocities are of the bodies' frames, not of their masses.
 
     `pos` (T, 30, 3) [m, world], `quat` (T, 30, 4) [wxyz, body to world], `lin_vel` (T, 30, 3) [m/s, world],
     `ang_vel` (T, 30, 3) [rad/s, world].
@@ -45,7 +45,7 @@ def body_motion(clip: Clip) -> BodyMotion:
 
 
 def _turning(facts: dict, quat: np.ndarray, joint_vel: np.ndarray) -> np.ndarray:
-    """What a body's own joint adds to its angular velocity, (T, 3) [rad/s, world]; the wrists are locked."""
+    """Angular velocity that a body's own joint adds, (T, 3) [rad/s, world]; the wrists are locked."""
     joint = facts.get("joint")
     if joint is None or joint["name"] not in joint_names():
         return np.zeros(3)

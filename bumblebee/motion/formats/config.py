@@ -1,4 +1,4 @@
-"""What a file of robot motion may leave unsaid, and who reads it must say."""
+"""Settings that a file of robot motion may leave unsaid, and who reads it must say."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal

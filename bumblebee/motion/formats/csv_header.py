@@ -1,4 +1,4 @@
-"""What a CSV file's first row says: which columns are the root, which the joints, in which units and orders.
+"""Layout of a CSV file by its first row: which columns are the root, which the joints, in which units and orders.
 
 Three layouts are known. Without a header: Unitree's (LAFAN1's retargets, g1_moves), xyz [m], quaternion xyzw, 29 or 23
 joints [rad]. With a header and a quaternion: the same units; names that end in w, x, y, z give its order. With a header
@@ -41,7 +41,7 @@ class CsvLayout:
     counter: int | None = None
     """Column that numbers the frames."""
     metres: float = 1.0
-    """Of a unit of the position."""
+    """Length of a unit of the position [m]."""
     degrees: bool = False
     euler: str = ""
     """Order of the Euler angles, "" for a quaternion."""
@@ -53,12 +53,12 @@ class CsvLayout:
 
     @property
     def unit(self) -> str:
-        """Of the position."""
+        """Unit of the position."""
         return next(name for name, metres in _METRES.items() if metres == self.metres)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a person should know of how the file is read."""
+        """Notes on how the file is read."""
         if not self.euler:
             return notes_of(self.names)
         why = "as set" if self.stated else "as the SOMA retargeter writes (BONES-SEED)"

@@ -17,7 +17,7 @@ from bumblebee.motion.remedy import say
 
 PICKLES = (".pkl", ".pickle", ".joblib", ".p")
 SUFFIXES = (".csv", ".npz", *PICKLES)
-"""Of files that may hold motions of the robot; an `.npz` may also hold one of a person (`is_robot_npz`)."""
+"""Suffixes of files that may hold motions of the robot; an `.npz` may also hold one of a person (`is_robot_npz`)."""
 
 __all__ = ["PICKLES", "SUFFIXES", "RobotConfig", "format_of", "is_robot_npz", "read_robot"]
 
@@ -55,7 +55,7 @@ def is_robot_npz(data: bytes) -> bool:
 
 
 def format_of(path: Path) -> str:
-    """What a table calls a file's format."""
+    """Name of a file's format in a table."""
     names = {".csv": "G1 CSV", ".npz": "robot .npz", **dict.fromkeys(PICKLES, "pickle")}
     return names.get(path.suffix.lower(), path.suffix.lower().lstrip(".") or "?")
 

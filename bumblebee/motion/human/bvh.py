@@ -26,7 +26,7 @@ _AGAIN = "Export or copy the file again."
 
 @dataclass(frozen=True, eq=False)
 class Bvh:
-    """What a file says: joints and the ends of chains, parents before children, and the channels' values.
+    """Content of a BVH file: joints and the ends of chains, parents before children, and the channels' values.
 
     `offsets` (J, 3) in the file's unit, `values` (T, C) in the file's unit and degrees.
     """
@@ -206,7 +206,7 @@ def _table(path: Path, lines: list[str], frames: int, columns: int) -> np.ndarra
 
 
 def _wrong_row(path: Path, lines: list[str], frames: int, columns: int) -> BadInput:
-    """What is wrong with the first row that is."""
+    """Error for the first row that is wrong."""
     for number, line in enumerate(lines, 1):
         words = line.split()
         where = f"{path}, frame {number}"

@@ -41,7 +41,7 @@ class Role:
 
 @dataclass(frozen=True, eq=False)
 class HumanMotion:
-    """What a reader of human motion returns, at the file's own rate, float64, nothing resampled or smoothed.
+    """Motion of a person at the file's own rate, float64, nothing resampled or smoothed.
 
     `positions` (T, 18, 3) [m, world, z up, floor near 0] of `LANDMARKS`; left is the person's left.
     """

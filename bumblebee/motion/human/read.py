@@ -33,7 +33,7 @@ _FAR = 1000.0  # m from the origin: beyond is damage
 
 @dataclass(frozen=True)
 class HumanConfig(Ranged):
-    """What a file of human motion does not say, for those of which the body does not tell it either."""
+    """Settings that a file of human motion does not say, for those of which the body does not tell it either."""
 
     unit: Literal["", "m", "dm", "cm", "mm", "inch", "cmu"] = ""
     """Unit of BVH files; empty: by the length of the legs. `cmu` is 1 / 0.45 inch."""

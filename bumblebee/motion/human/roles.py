@@ -18,7 +18,7 @@ from bumblebee.motion.human.words import AGAINST, SURE, WEAK, plain, weight
 
 NAME, PLACE, OTHERWISE = "by name", "by place and length", "by place and length, against its name"
 EVIDENCE = (NAME, PLACE, OTHERWISE)
-"""What may speak for a role."""
+"""Kinds of evidence for a role."""
 _BY = {SURE: NAME, WEAK: NAME, 0: PLACE, AGAINST: OTHERWISE}
 
 

@@ -26,7 +26,7 @@ class Shapes:
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """What is to be kept apart: `shapes` and the pairs of them (P, 2) that may meet."""
+    """Shapes to be kept apart: `shapes` and the pairs of them (P, 2) that may meet."""
 
     shapes: Shapes
     pairs: np.ndarray

@@ -26,7 +26,7 @@ class ContactConfig(Ranged):
 
 @dataclass(frozen=True)
 class RetargetConfig(Ranged):
-    """What the robot's trajectory is fitted to: each term's standard deviation, so that a smaller one counts more."""
+    """Terms that the robot's trajectory is fitted to: each one's standard deviation; a smaller one counts more."""
 
     cutoff: Annotated[float, Range(above=0, most=100)] = 8.0
     """Frequency above which the person's landmarks are noise; zero-phase low-pass [Hz]."""

@@ -48,7 +48,7 @@ class Robot:
     sole_body: np.ndarray
     sole: np.ndarray
     radius: float
-    """Of the spheres at the soles' corners [m]."""
+    """Radius of the spheres at the soles' corners [m]."""
     fastest: np.ndarray
     rest: np.ndarray
 

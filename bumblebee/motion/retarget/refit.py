@@ -22,7 +22,7 @@ from bumblebee.motion.retarget.targets import SEGMENTS, Targets
 from bumblebee.motion.retarget.tree import points, poses
 
 VERSION = 1
-"""Of the method: a cached result of another version is made again."""
+"""Version of the method: a cached result of another version is made again."""
 LEAST = 5  # frames: an acceleration needs three
 _NEAR = (0.10, 0.15)  # m over the robot's lowest point: a foot below stands, one above does not, whatever its speed
 _EDGE = 30  # frames by which the low-pass extends a motion at its ends
@@ -49,7 +49,7 @@ def refit(raw: RawMotion, grounding: GroundingConfig, config: RetargetConfig) ->
 def own_targets(
     raw: RawMotion, floor: np.ndarray, robot: Robot, grounding: GroundingConfig, config: RetargetConfig
 ) -> Targets:
-    """What the robot did, low-passed, over a `floor` (T,) [m] that is taken out."""
+    """Targets of what the robot did, low-passed, over a `floor` (T,) [m] that is taken out."""
     joint = low_passed(raw.joint_pos, raw.fps, config.cutoff)
     root = low_passed(raw.root_pos, raw.fps, config.cutoff) - floor[:, None] * np.array([0.0, 0.0, 1.0])
     quat = low_passed(quaternions.continuous(raw.root_quat), raw.fps, config.cutoff)

@@ -16,7 +16,7 @@ from bumblebee.motion.retarget.targets import Targets, at_rate, targets
 from bumblebee.robot.facts import joint_names
 
 VERSION = 3
-"""Of the method: a cached result of another version is made again."""
+"""Version of the method: a cached result of another version is made again."""
 _MOST_SECONDS = 3600.0
 _RATES = (1.0, 1000.0)  # Hz
 _REACH = 1000.0  # m from the world's origin
@@ -45,7 +45,7 @@ def retarget(motion: HumanMotion, fps: float = 50.0, config: RetargetConfig | No
 
 
 def aim(motion: HumanMotion, robot: Robot, fps: float, config: RetargetConfig) -> Targets:
-    """What a robot should do at `fps` [Hz]."""
+    """Targets for a robot at `fps` [Hz]."""
     _check(motion)
     positions = at_rate(motion, fps, config.cutoff)
     if len(positions) < _LEAST:

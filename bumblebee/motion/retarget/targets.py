@@ -1,4 +1,4 @@
-"""What the robot should do, in the robot's own size, from a person's landmarks."""
+"""Targets for the robot, in its own size, from a person's landmarks."""
 
 from dataclasses import dataclass
 

@@ -43,7 +43,7 @@ def read_index(folder: Path) -> pd.DataFrame:
 
 
 def read_places(folder: Path) -> pd.DataFrame:
-    """The same with `PLACE_COLUMNS`: name of the shard and position in it; "" and -1 for a clip in its own file."""
+    """Index with `PLACE_COLUMNS`: name of the shard and position in it; "" and -1 for a clip in its own file."""
     path = Path(folder) / FILE
     if not os.path.lexists(path):
         raise BadInput(path, "the index of a motion library", "no such file", "Run the stage that writes it.")
@@ -77,7 +77,7 @@ def write_index(folder: Path, rows: Iterable[Row]) -> None:
 
 
 def row_of(clip: Clip) -> Row:
-    """What the index says about a clip, without its place."""
+    """Row of the index on a clip, without its place."""
     return {column: getattr(clip, column) for column in INDEX_COLUMNS}
 
 

@@ -138,7 +138,7 @@ class Shard:
         return clip
 
     def rows(self) -> list[dict[str, Any]]:
-        """What the index says about the clips, but for the shard's name."""
+        """Rows of the index on the clips, but for the shard's name."""
         return [
             {
                 **{column: facts[column] for column in INDEX_COLUMNS if column in facts},

@@ -1,4 +1,4 @@
-"""The same work on every clip of a library, on all cores: the filter, statistics, features."""
+"""Work on every clip of a library, on all cores: the filter, statistics, features."""
 
 from collections.abc import Callable, Iterator
 from functools import lru_cache, partial

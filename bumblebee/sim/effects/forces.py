@@ -34,7 +34,7 @@ from bumblebee.sim.servo import Servos, servos_of
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """What n worlds remember at their start, where it is not what a world at rest would remember."""
+    """Memory of n worlds at their start, where it is not what a world at rest would remember."""
 
     time: np.ndarray
     """(n,) [s] since the rollout began."""
@@ -237,7 +237,7 @@ class StepHooks:
         return out
 
     def _shaped(self, told: np.ndarray) -> np.ndarray:
-        """What the servos follow (n, J) of the controls that they are told: the mean set-point over the step."""
+        """Set-points (n, J) that the servos follow, of the controls that they are told: the mean over the step."""
         h, step, scale = self._h, self._step, np.maximum(np.abs(self.servos.gear), 1e-12)
         mean, at, pace = told, told, self._pace
         for kind, some, values in (

@@ -18,8 +18,8 @@ from bumblebee.sim.effects.setpoints import NO_SPEED_LIMIT, SETPOINTS
 from bumblebee.sim.effects.terms import Term, read_term
 
 Acts = Literal["reading", "command", "start", "target", "gain", "loss", "limit", "feedback", "torque", "rotor", "terms"]
-"""What a hook changes: what sensors report; which commands arrive; what is set once as a world begins; or, before each
-physics step, the set-point of the servo, its gains, the dry friction, the torque's limit, the servo's feedback, a
+"""Places where a hook acts: what sensors report; which commands arrive; what is set once as a world begins; or, before
+each physics step, the set-point of the servo, its gains, the dry friction, the torque's limit, the servo's feedback, a
 torque beside it, its torque on a rotor. What discovered terms change, each says."""
 _BEFORE_STEPS: tuple[Acts, ...] = ("target", "gain", "loss", "limit", "feedback", "torque", "rotor", "terms")
 
@@ -30,7 +30,7 @@ def _none() -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class RuntimeHooks:
-    """What an engine does beside MuJoCo; an array of zeros where an effect is absent."""
+    """Hooks of an engine beside MuJoCo; an array of zeros where an effect is absent."""
 
     joints: tuple[str, ...]
     """Names of the J joints."""
@@ -167,11 +167,11 @@ class _Making:
         self.made["profile"] = np.tile((np.inf, NO_SPEED_LIMIT), (count, 1))
 
     def column(self, kind: str, place: str) -> int:
-        """Of the joint `place`."""
+        """Column of the joint `place`."""
         return _column(self.joints, kind, place)
 
     def columns(self, effect: Effect) -> Sequence[int]:
-        """Of the joints that an effect sits on."""
+        """Columns of the joints that an effect sits on."""
         return [self.column(effect.effect, place) for place in effect.where] or range(len(self.joints))
 
 

@@ -1,4 +1,4 @@
-"""What an effect means in MuJoCo's own numbers, shared by the spec (compiled anew) and by models varied in place."""
+"""Effects in MuJoCo's own numbers, shared by the spec (compiled anew) and by models varied in place."""
 
 import math
 from collections.abc import Sequence

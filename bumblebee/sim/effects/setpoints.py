@@ -1,4 +1,4 @@
-"""What a drive makes of the targets that it is told before its servo sees them, in closed form between two commands.
+"""Set-point that a drive makes of its targets before its servo sees them, in closed form between two commands.
 
 | effect | the set-point y of a target u that is held |
 |---|---|

@@ -60,7 +60,7 @@ def _drives(spec: mujoco.MjSpec, joint: str) -> list[Any]:
 
 
 def _servos(spec: mujoco.MjSpec, joint: str) -> list[Any]:
-    """The same of a joint that must have one."""
+    """Servos of a joint that must have one."""
     servos = _drives(spec, joint)
     if not servos:
         raise BadInput(f"effect on joint {joint!r}", "a joint with an actuator", "a passive joint")

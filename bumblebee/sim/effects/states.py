@@ -1,4 +1,4 @@
-"""What the terms of discovered effects remember: quantities that follow from a joint's past, one number a world.
+"""States of the terms of discovered effects: quantities that follow from a joint's past, one number a world.
 
 - `rested(T, d)` is 0 on a joint that moves and grows to 1 within T seconds of rest; d radians of motion wear it off:
   da/dt = (1 - a) / T - a abs(v) / d.
@@ -20,7 +20,7 @@ class State:
     """One remembered number."""
 
     column: int
-    """Of the joint."""
+    """Column of the joint."""
     key: str
     """As terms look it up."""
     numbers: tuple[float, ...]

@@ -74,7 +74,7 @@ class Term:
     names: frozenset[str]
     """Those of the joint's own names that it uses."""
     states: tuple[tuple[str, tuple[float, ...]], ...]
-    """What it remembers: (name in `values`, numbers)."""
+    """States that it remembers: (name in `values`, numbers)."""
     _tree: ast.expr
 
     @property

@@ -1,4 +1,4 @@
-"""What is forgotten of a new effect of the catalogue is said, with the file and what to add."""
+"""A new effect of the catalogue that lacks something says so, with the file and what to add."""
 
 import functools
 import importlib

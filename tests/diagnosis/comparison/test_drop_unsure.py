@@ -1,4 +1,4 @@
-"""What slopes call unsure stays where the simulator says that the others cannot make up for it."""
+"""Effects that slopes call unsure stay where the simulator says that the others cannot make up for them."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What does not pay on the judging windows beside all others is dropped; what is small and real stays."""
+"""Effects that do not pay on the judging windows beside all others are dropped; what is small and real stays."""
 
 from collections.abc import Sequence
 

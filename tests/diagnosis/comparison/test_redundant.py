@@ -1,4 +1,4 @@
-"""What takes nothing off the judging windows' error is not reported; what does, and limits, are."""
+"""Effects that take nothing off the judging windows' error are not reported; those that do, and limits, are."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_an_effect_that_only_spoils_the_judging_windows_is_dropped_and_the_rest_
 
 
 def test_of_an_effect_that_they_hardly_feel_the_judging_windows_say_nothing() -> None:
-    """Of a small share of that spring they change by less than what could be detected: it is chance how they err."""
+    """With a small share of that spring they change by less than what could be detected: it is chance how they err."""
     _, problem, judge = prepared(friction=(0.0, 0.05))
     ones = np.ones(len(problem.windows))
     for share, stays in ((1.0, False), (0.03, True)):

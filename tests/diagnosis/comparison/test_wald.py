@@ -1,4 +1,4 @@
-"""What is accepted: an effect found in its own direction, and no integrator's."""
+"""Acceptance: an effect found in its own direction, and no integrator's."""
 
 from dataclasses import replace
 

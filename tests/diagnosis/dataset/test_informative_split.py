@@ -43,7 +43,7 @@ def test_rollouts_keep_their_places_where_none_shows_more_or_a_fitted_one_does()
 
 
 def test_a_repeat_stays_on_its_side() -> None:
-    """Of motions that have names: what was put aside and its repeat are not parted."""
+    """Motions that have names and were put aside are not parted from their repeats."""
     rollouts = [replace(r, meta=r.meta | {"motion": f"m{i}"}) for i, r in enumerate(_four(False))]
     (aside,) = _session(rollouts).holdout
     rollouts[aside] = replace(_mixed(aside)[aside], meta=rollouts[aside].meta)

@@ -17,7 +17,7 @@ PLACE, SPEED = 0.0015, 0.02
 
 
 def _noise(rollouts: list[Rollout]) -> tuple[np.ndarray, np.ndarray]:
-    """Of positions and of velocities, (J,)."""
+    """Noise of positions and of velocities, (J,)."""
     layout = layout_of(make_plant(mujoco.MjSpec.from_string(arm.XML), rollouts[0], "arm"), False)
     sigma = estimate_noise(rollouts, layout, Noise())
     return sigma[layout.slices["joint_pos"]], sigma[layout.slices["joint_vel"]]

@@ -1,4 +1,4 @@
-"""What is held out: whole motions of every cluster, so that no repeat of a fitted motion is among them."""
+"""Held-out rollouts: whole motions of every cluster, so that no repeat of a fitted motion is among them."""
 
 import mujoco
 import numpy as np

@@ -1,4 +1,4 @@
-"""What a configuration sets decides in every room, from the reading of the logs to the columns of the candidates."""
+"""A configuration decides in every room, from the reading of the logs to the columns of the candidates."""
 
 import mujoco
 import numpy as np

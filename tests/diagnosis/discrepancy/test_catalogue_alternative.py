@@ -22,7 +22,7 @@ TABLE = "curve(v, -2, 1, -0.05, 1, 0.05, -1, 2, -1)"
 
 
 def taking(terms: dict[str, float], lines: list[str] | None = None, **truth: float | tuple[float, float]) -> Fit | None:
-    """What is swapped in for a discrepancy model on the pole, nothing having been found before it."""
+    """Fit that is swapped in for a discrepancy model on the pole, nothing having been found before it."""
     _, problem, judge = prepared(**truth)
     nothing = gauss_newton(problem, (), (), np.ones(len(problem.windows)))
     form = refitted(problem, (formula("pole", terms),), np.array(list(terms.values())))

@@ -40,7 +40,7 @@ def prepared(**truth: float | tuple[float, float]) -> tuple[Session, Problem, Pr
 
 
 def discovered(chosen: tuple[Candidate, ...] = (), lines: list[str] | None = None, **truth: float) -> Discovery:
-    """What is discovered beside the catalogue's effects `chosen`, fitted from their first trial."""
+    """Discovery beside the catalogue's effects `chosen`, fitted from their first trial."""
     session, problem, judge = prepared(**truth)
     ones = np.ones(len(problem.windows))
     start = np.concatenate([c.start for c in chosen]) if chosen else []

@@ -1,4 +1,4 @@
-"""What is set in `Thresholds` is what discrepancies are decided by, in each of the room's files."""
+"""Discrepancies are decided by what is set in `Thresholds`, in each of the room's files."""
 
 from dataclasses import replace
 

@@ -38,7 +38,7 @@ def _fitted(kind: str, place: str, value: float, seed: int) -> tuple[Problem, Fi
 
 @pytest.mark.parametrize(("kind", "place", "value"), [("command_delay", "j2", 0.013), ("viscous_friction", "j1", 0.3)])
 def test_errors_are_as_large_as_their_intervals_say(kind: str, place: str, value: float) -> None:
-    """Of z = error / (half-width / 1.96) none is beyond 3.5, their mean is near 0 and their spread near 1."""
+    """No z = error / (half-width / 1.96) is beyond 3.5, their mean is near 0 and their spread near 1."""
     z = []
     for seed in range(SEEDS):
         problem, fit, rng = _fitted(kind, place, value, 100 + seed)
@@ -114,7 +114,7 @@ def test_what_the_windows_say_nothing_of_has_no_end() -> None:
 
 
 def test_a_fit_whose_noisy_starts_diverge_keeps_its_whitening(monkeypatch) -> None:
-    """What stays finite in the windows may diverge from starts moved by noise: the fit goes on as it was whitened."""
+    """Windows that are finite may diverge from starts moved by noise: the fit goes on as it was whitened."""
     problem, fit, rng = _fitted("coulomb_friction", "j2", 1.0, 100)
 
     def diverging(*args: object, **settings: object) -> Problem:

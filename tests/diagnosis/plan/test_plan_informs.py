@@ -1,4 +1,4 @@
-"""What a plan is chosen for: effects that it tells apart, intervals that it narrows."""
+"""A plan is chosen for effects that it tells apart and intervals that it narrows."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What only a rollout shows that was not fitted is noted."""
+"""Effects that only an unfitted rollout shows are noted."""
 
 from bumblebee.diagnosis.report.notes import unseen_notes
 from bumblebee.sim.effects import single

@@ -1,4 +1,4 @@
-"""What must not be overlooked stands in the document, the terminal and the page, and no comfort beside it."""
+"""Warnings stand in the document, the terminal and the page, and no comfort beside them."""
 
 import copy
 

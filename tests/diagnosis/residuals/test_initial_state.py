@@ -45,7 +45,7 @@ def test_a_complete_model_is_at_the_noise(null: tuple) -> None:
 
 
 def test_a_mass_in_contact_comes_out_whole() -> None:
-    """Of several datasets the mean size is right to within its own scatter."""
+    """In several datasets the mean size is right to within its own scatter."""
     sizes = []
     for seed in range(4):
         session, problem, _ = _made(1.9, 10 + seed)

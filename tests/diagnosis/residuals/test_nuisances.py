@@ -1,4 +1,4 @@
-"""What the truth's integrator makes of it is no effect, whatever integrator the model declares."""
+"""Differences by the truth's integrator are no effect, whatever integrator the model declares."""
 
 from dataclasses import replace
 

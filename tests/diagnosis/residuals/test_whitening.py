@@ -1,4 +1,4 @@
-"""What steps of a finite length make of a window is weighed as the readings' noise is."""
+"""Errors by steps of a finite length are weighed as the readings' noise is."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ def sampled() -> Sampled:
 
 
 def by(change: np.ndarray, left: np.ndarray | None = None) -> Stepped:
-    """What longer steps change, and what is left in short ones, nothing by default."""
+    """Changes by longer steps, and what is left in short ones, nothing by default."""
     return Stepped(change, np.zeros_like(change) if left is None else left)
 
 
@@ -66,7 +66,7 @@ def test_where_far_more_is_left_in_most_windows_than_steps_change_they_take_no_w
 
 
 def test_a_signal_at_rest_that_shows_its_noise_does_not_take_the_steps_error_from_the_others(sampled: Sampled) -> None:
-    """What longer steps change of a joint that stands is nothing; its noise is more, and no missing effect."""
+    """Longer steps change nothing of a joint that stands; its noise is more, and no missing effect."""
     rule, rng = Whitening(), np.random.default_rng(0)
     stepped = 1e-3 * rng.standard_normal((WINDOWS, READINGS, 2)) * [1.0, 0.0]
     noise = SIGMA * rng.standard_normal((WINDOWS, READINGS, 2))

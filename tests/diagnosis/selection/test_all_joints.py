@@ -151,7 +151,7 @@ def test_windows_that_were_whitened_far_from_here_are_whitened_anew_first(
 
 
 FAR = {"power": 400.0, "left": 5.0, "cost": 10.0, "least": 100.0, "before": 110.0}
-"""Of 400 less than 2 % left, at a tenth of what the best effect by itself leaves."""
+"""Windows of an arm that is far off: less than 2 % of 400 left, at a tenth of what the best effect by itself leaves."""
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,7 @@ def test_a_large_robots_rotors_and_friction_begin_at_likely_sizes_where_none_are
 
 
 def test_a_large_robot_from_a_drawing_with_half_the_damping_is_found() -> None:
-    """Of a kd that is too large friction cannot be less than none; another start leaves `below` too."""
+    """Beside a kd that is too large friction cannot be less than none; another start leaves `below` too."""
     softer = re.sub(r'kv="(\d+)"', lambda m: f'kv="{int(m[1]) / 2}"', DRAWN)
     rollouts = arm.simulate({**TRUTH, **ROTORS}, count=3, seconds=5.0, xml=softer)
     session = arm.session_of(rollouts, DRAWN)

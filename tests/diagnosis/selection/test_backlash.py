@@ -49,7 +49,7 @@ def test_a_joint_is_odd_where_one_of_its_readings_is() -> None:
 
 @pytest.mark.parametrize("truth", [{}, {("backlash", "j2"): (0.006,)}])
 def test_a_gap_is_tried_where_there_is_one(truth: Truth) -> None:
-    """Of 6 mrad, less than what a first trial used to be."""
+    """A gap of 6 mrad is less than what a first trial used to be."""
     material = _material(truth)
     problem = material.problem
     fit = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))

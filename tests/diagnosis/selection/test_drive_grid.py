@@ -15,7 +15,7 @@ LIMIT, OFFSET = 1.2, -0.25
 
 @pytest.fixture(scope="module")
 def session() -> Session:
-    """Of an arm whose shoulder holds at most 1.2 N m, where its load asks for more, and whose elbow reads wrongly."""
+    """Session of an arm whose shoulder holds at most 1.2 N m, its load asks for more, and whose elbow reads wrongly."""
     robot = {("torque_limit", "j2"): LIMIT, ("encoder_offset", "j3"): OFFSET}
     return arm.session_of(arm.simulate(robot, count=4, seconds=3.0, seed=4))
 

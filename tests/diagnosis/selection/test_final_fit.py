@@ -67,7 +67,7 @@ def test_a_limit_whose_interval_holds_the_declared_one_is_not_named(
 def test_what_another_integrator_would_have_found_goes_but_not_what_the_windows_leave_open(
     monkeypatch: pytest.MonkeyPatch, alone: float, left: list[str]
 ) -> None:
-    """Of two whose intervals hold the declared values, an integrator's share included, the less sure one goes first."""
+    """Among two whose intervals hold the declared values, an integrator's share included, the less sure goes first."""
     session = arm.session_of(arm.simulate({("coulomb_friction", "j2"): 0.6}, count=2, seconds=4.0, seed=100))
     problem = arm.problem_of(session, [0, 1], 24)
     every = all_candidates(session.plant, session.rollouts, [])
@@ -93,7 +93,7 @@ def test_what_another_integrator_would_have_found_goes_but_not_what_the_windows_
 def test_what_the_others_cannot_make_up_for_stays_however_far_another_integrator_would_move_it(
     monkeypatch: pytest.MonkeyPatch, many: int, made_of: list[int]
 ) -> None:
-    """Of two frictions of two joints neither is an integrator's; an armature that is not there still is.
+    """Two frictions of two joints are no integrator's; an armature that is not there still is.
 
     Of many effects what goes is followed by a refit by slopes, and the last step comes once, at the end.
     """

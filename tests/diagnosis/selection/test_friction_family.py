@@ -108,7 +108,7 @@ def test_a_constant_torque_that_stands_for_the_difference_goes() -> None:
 
 
 def test_the_drag_is_in_the_model() -> None:
-    """What MJCF carries by the second coefficient of a joint's damping is -c v abs(v)."""
+    """MJCF carries -c v abs(v) by the second coefficient of a joint's damping."""
     spec = mujoco.MjSpec.from_string(XML)
     spec.joint("x").damping = [0.0, DRAG, 0.0]
     model = spec.compile()

@@ -1,4 +1,4 @@
-"""What the others make needless goes, of many effects by the slopes that there are."""
+"""Effects that the others make needless go, of many effects by the slopes that there are."""
 
 from dataclasses import replace
 

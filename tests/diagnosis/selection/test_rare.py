@@ -1,4 +1,4 @@
-"""What acts on a few windows only: lost commands and limits of torque are named although the rest is at noise."""
+"""Effects on a few windows only: lost commands and limits of torque are named although the rest is at noise."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""What one set of gains cannot tell apart, three sets can, fitted together."""
+"""Three sets of gains, fitted together, tell apart what one cannot."""
 
 from dataclasses import replace
 

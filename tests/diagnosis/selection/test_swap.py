@@ -35,7 +35,7 @@ def begun(xml: str, rollouts: list[Rollout], chosen: dict[tuple[str, str], float
 
 
 def names(run: SearchState) -> list[tuple[str, str]]:
-    """What it has found."""
+    """Names and places that it has found."""
     return [(c.effect, c.where) for c in run.fit.chosen]
 
 

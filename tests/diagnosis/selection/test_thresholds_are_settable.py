@@ -1,4 +1,4 @@
-"""What a proposal decides by is what the diagnosis was given, not what the product comes with."""
+"""A proposal decides by what the diagnosis was given, not by what the product comes with."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What is read between ticks: late joints on cubics, the square of a torque that a step of the command makes."""
+"""Readings between ticks: late joints on cubics, the square of a torque that a step of the command makes."""
 
 from dataclasses import replace
 

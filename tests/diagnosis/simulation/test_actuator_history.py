@@ -1,4 +1,4 @@
-"""What a spring with play remembers, followed on all rollouts at once, is what following each alone gives."""
+"""Memory of a spring with play, followed on all rollouts at once, equals following each alone."""
 
 import mujoco
 import numpy as np

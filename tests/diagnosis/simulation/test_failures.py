@@ -124,7 +124,7 @@ def test_many_failures_are_few_lines() -> None:
 
 
 def test_play_and_shafts_are_offered_only_where_mjcf_has_room_for_a_second_hinge() -> None:
-    """Of two joints on one body the first has none."""
+    """The first of two joints on one body has none."""
     crossed = cart.xml().replace('<body name="pole">', "").replace("</body></body>", "</body>")
     crossed = crossed.replace('<inertial pos="0 0 0" mass="2" diaginertia=".02 .02 .02"/>', "")
     session = cart.session_of(cart.record(count=1, seconds=2.0), crossed)

@@ -76,7 +76,7 @@ def test_sensitivities_are_simulated_in_fine_steps_where_a_joint_comes_to_rest_w
 
 
 def test_a_joints_own_damping_calls_for_fine_steps_too() -> None:
-    """Of an arm whose motors are told torques: the damping is in the model, the rotors are not."""
+    """An arm whose motors are told torques has the damping in its model, and not the rotors."""
     drawn = re.sub(r'armature="[.0-9]+"', 'armature="0" damping="20"', arm.XML)
     drawn = re.sub(r'kv="\d+"', 'kv="0"', drawn)
     session = arm.session_of(arm.simulate({}, count=1, seconds=4.0, xml=drawn), drawn)

@@ -1,4 +1,4 @@
-"""What the networks learn from: rows that belong together, in order, of one episode."""
+"""Samples that the networks learn from: rows that belong together, in order, of one episode."""
 
 import pytest
 import torch

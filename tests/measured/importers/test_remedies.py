@@ -18,7 +18,7 @@ CASES = {case.name: case for case in (*tables.CASES, *arrays.CASES, *recordings.
 HOME = Path(bumblebee.measured.__file__).parent
 SOURCES = (*sorted((HOME / "importers").rglob("*.py")), HOME / "tables.py", HOME / "csv_faults.py")
 NOT_WALKED = {"extras.py"}
-"""What installs the optional libraries is another test's: `tests/test_install_lines.py`."""
+"""Remedies of another test, `tests/test_install_lines.py`: they install the optional libraries."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""What is written reads back as it was, and is what other programs expect, judged by their rules."""
+"""Written motions read back as they were, and are as other programs expect, judged by their rules."""
 
 import io
 from dataclasses import replace

@@ -52,7 +52,7 @@ def small_model(extra: str = "", root: str = "<freejoint/>") -> mujoco.MjModel:
 
 
 def mapping() -> dict:
-    """Of the small humanoid."""
+    """Mapping of the small humanoid."""
     points: dict = {"neck": ["trunk", [0.0, 0.0, 0.38]]}
     soles = {}
     for side in ("left", "right"):

@@ -103,7 +103,7 @@ def turning_kick(turns: float = 1.5, seconds: float = 0.6, frames: int = 70) -> 
 
 
 def changed(motion: HumanMotion, how: Callable[[np.ndarray], np.ndarray]) -> HumanMotion:
-    """The same person with other positions."""
+    """The person with other positions."""
     return HumanMotion(motion.name, motion.fps, how(motion.positions), motion.file)
 
 

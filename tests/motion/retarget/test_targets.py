@@ -1,4 +1,4 @@
-"""What the robot should do, from people who are turned, shifted, scaled, mirrored, faster or slower."""
+"""Targets of the robot, from people who are turned, shifted, scaled, mirrored, faster or slower."""
 
 import numpy as np
 import pytest

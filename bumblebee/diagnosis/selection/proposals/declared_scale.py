@@ -33,7 +33,7 @@ def keep_declared_scale(run: SearchState) -> bool:
     fit = gauss_newton(run.problem, rest.chosen, start, run.weights, rule.iterations, coarse=True, known=run.fit)
     if fit.cost > run.fit.cost + run.bound**2:
         return False
-    run.say(f"the drives' declared strength explains as much as {factor:.3g} times of it with inertias that go along")
+    run.say(f"the declared strength of the drives fits as well as {factor:.3g} times it with scaled inertias; kept")
     run.renew(fit)
     run.prune()
     return True

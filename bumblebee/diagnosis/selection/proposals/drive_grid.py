@@ -76,7 +76,7 @@ def _values(c: Candidate, rule: DriveGrid) -> list[float]:
 
 
 class _Costs:
-    """What a fit costs with a parameter at several values, the chosen effects free to move linearly."""
+    """Costs of a fit with a parameter at several values, the chosen effects free to move linearly."""
 
     def __init__(self, problem: Problem, fit: Fit, weights: np.ndarray) -> None:
         self.problem, self.fit, self.beside = problem, fit, LeftOver(problem, fit, weights)

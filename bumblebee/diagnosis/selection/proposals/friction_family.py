@@ -108,5 +108,5 @@ def _drop_members(run: SearchState, where: str) -> None:
         if sure and criterion(run.problem, less) < criterion(run.problem, run.fit) - rule.clearly:
             continue
         if compare(run.problem, run.holdout, run.fit, less).passes(rules.no_worse_within_errors):
-            run.say(f"needless beside the rest of its friction: {c.effect} on {where}")
+            run.say(f"removed as redundant given its other friction: {c.effect} on {where}")
             run.renew(less)

@@ -39,7 +39,7 @@ Servo = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class _Course:
-    """What servos are compared by."""
+    """Comparison of servos: what they are compared by."""
 
     problem: Problem
     windows: Windows
@@ -51,7 +51,7 @@ class _Course:
 
     @property
     def rule(self) -> GainGrid:
-        """What is tried, and how servos are compared."""
+        """Thresholds: which servos are tried, and how they are compared."""
         return self.problem.thresholds.selection.proposals.gain_grid
 
     def scores(self, several: Sequence[Sequence[Servo]]) -> np.ndarray:
@@ -180,7 +180,7 @@ def start_with_gain_grid(run: SearchState) -> bool:
         return True
     for c, z in zip(fit.chosen, walds(run.problem, fit, weights, fit.chosen), strict=True):
         run.steps.append(evidence(c, float(z), len(run.candidates)))
-        run.say(f"found {c.effect} on {c.where}, far from the declared: {fit.of(c).round(5)}")
+        run.say(f"found {c.effect} on {c.where}, far from the declared value: {fit.of(c).round(5)}")
     run.screened_cost = 0.0
     run.renew(fit)
     run.given = len(fit.chosen)

@@ -55,7 +55,7 @@ def plain_gains(
             if set(factor) == set(both) or best.cost > most:
                 continue
         fit = best
-        say(f"the same in fewer words: {', '.join(c.effect for c in fit.chosen if c.where == where)} on {where}")
+        say(f"as good with fewer parameters: {', '.join(c.effect for c in fit.chosen if c.where == where)} on {where}")
     return fit
 
 

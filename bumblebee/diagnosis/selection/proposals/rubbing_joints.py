@@ -7,7 +7,7 @@ from bumblebee.diagnosis.selection.state import SearchState
 
 
 def worth_asking(run: SearchState, rubbing: Sequence[str]) -> list[str]:
-    """Of the joints with friction all, or where they are many those of the shortlist that lack most torque.
+    """Joints with friction that are worth asking: all, or of many those of the shortlist that lack most torque.
 
     Among several members on each of thirty joints one is always worth its number by chance, and each costs a refit.
     """

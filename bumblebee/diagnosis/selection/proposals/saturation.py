@@ -31,7 +31,7 @@ from bumblebee.sim.servo import Servos
 
 @dataclass(frozen=True, eq=False)
 class _Demand:
-    """What the servos were asked for in each of W windows."""
+    """Demand on the servos in each of W windows."""
 
     peak: np.ndarray
     """(W, J) largest torque asked for [N m]."""
@@ -57,11 +57,11 @@ class _Limit:
     reach: np.ndarray
     """(W,) sizes from which on the windows feel it."""
     changes: Changes
-    """What was simulated before."""
+    """Changes that were simulated before."""
 
     @property
     def rule(self) -> Saturation:
-        """What it is judged by."""
+        """Thresholds that it is judged by."""
         return self.problem.thresholds.selection.proposals.saturation
 
     def value(self, size: float) -> float:
@@ -191,7 +191,7 @@ def _sought(limit: _Limit, fresh: bool = False) -> tuple[float, float] | None:
 
 
 def _change(problem: Problem, fit: Fit, candidate: Candidate, value: float, felt: np.ndarray) -> np.ndarray:
-    """What a limit does to the prediction (W, M), simulated on the windows `felt` (W,) alone."""
+    """Change of the prediction (W, M) by a limit, simulated on the windows `felt` (W,) alone."""
     out = np.zeros_like(fit.residual)
     moved = [*fit.effects, candidate.at(candidate.clip([value]))]
     out[felt] = fit.residual[felt] - problem.on(np.flatnonzero(felt), moved)

@@ -1,4 +1,4 @@
-"""What a drive makes of its targets, tried at many sizes in the place of what it passes for.
+"""Set-points that a drive makes of its targets, tried at many sizes in the place of what passes for them.
 
 A filter of 30 ms is far from the 5 ms at which it is screened, and in part it looks like a delay, like damping, or like
 commands that come late here and there; a limited rate or acceleration acts more on large steps than on small ones. So

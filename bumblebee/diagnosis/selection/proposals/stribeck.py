@@ -63,6 +63,6 @@ def _on_level(fit: Fit, candidate: Candidate, dry: Candidate, rest: float) -> li
 
 
 def _slower(candidate: Candidate, share: float, scale: float) -> Candidate:
-    """The same friction at a share of its velocity; of that the share `scale` matters."""
+    """Law of the friction at a share of its velocity; of that the share `scale` matters."""
     speed = share * candidate.step[1]
     return replace(candidate, step=(candidate.step[0], speed), shape_scale=scale * speed)

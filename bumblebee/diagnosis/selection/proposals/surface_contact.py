@@ -40,7 +40,7 @@ class _Many:
     power: np.ndarray
     """(W,) mean square of what is left, in units of `size`."""
     most: float
-    """What a window counts at most, and one that diverges."""
+    """Largest cost of a window, that of one that diverges included."""
 
     def falls(self, keep: np.ndarray, models: Sequence[Sequence[Effect]]) -> np.ndarray:
         """Falls (V, K) of log(1 + power / its median) of some windows by each of some more effects."""
@@ -48,7 +48,7 @@ class _Many:
         return np.log1p(self.power[keep] / usual) - np.log1p(self._powers(keep, models) / usual)
 
     def _powers(self, keep: np.ndarray, models: Sequence[Sequence[Effect]]) -> np.ndarray:
-        """The same (V, K) of some windows under the fit's effects and each of some more."""
+        """Costs (V, K) of some windows under the fit's effects and each of some more."""
         effects = [[*self.fit.effects, *more] for more in models]
         return np.minimum(_left(self.problem, select(self.windows, keep), effects, self.size), self.most)
 

@@ -1,11 +1,11 @@
-"""What decides in proposals on drives: their gains, limits, set-points and the scale of their strength."""
+"""Thresholds of proposals on drives: their gains, limits, set-points and the scale of their strength."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Saturation:
-    """Of limits of torque, tried at many sizes on the windows that they reach."""
+    """Thresholds for limits of torque, tried at many sizes on the windows that they reach."""
 
     odd_power: float = 1.6
     """Whitened power from which on a window is off."""
@@ -18,7 +18,7 @@ class Saturation:
     promising_share: float = 2e-3
     """Share of the cost that a size must gain to be looked at closer."""
     earlier_share: float = 0.5
-    """Of that, what is enough where changes of an earlier fit were taken for this one's, and for trying further."""
+    """Share of that which is enough where an earlier fit's changes were taken for this one's, and to try further."""
     reached: tuple[int, ...] = (1, 2, 4, 7, 12, 24, 50, 100, 200)
     """Windows that the sizes tried reach."""
     below: tuple[float, ...] = (0.7, 0.5, 0.35, 0.25, 0.15, 0.1)
@@ -28,21 +28,21 @@ class Saturation:
     enough_windows: int = 12
     """Windows: where no size that reaches up to so many gains, no more are tried."""
     halvings: int = 5
-    """Of the interval around the best of the sizes."""
+    """Number of times that the interval around the best of the sizes is halved."""
     margin: float = 0.05
     """Share of a size: windows that feel a limit so much weaker are simulated, too, for the fit is not exact."""
 
 
 @dataclass(frozen=True)
 class SetPoints:
-    """Of filters, limits and profiles of the targets, tried at a series of sizes."""
+    """Thresholds for filters, limits and profiles of the targets, tried at a series of sizes."""
 
     windows: int = 24
     """Windows that the series is tried on, those that are furthest off."""
     factors: tuple[float, ...] = (0.35, 0.7, 1.2, 2.0, 3.2, 5.0, 8.0, 14.0, 25.0)
     """On the size of a first step: of 5 ms they make filters of 2 to 125 ms."""
     speeds: tuple[float, ...] = (1.0, 0.5, 0.25)
-    """The same on the speed of a profile that has one."""
+    """Factors on the speed of a profile that has one."""
     turns: int = 3
     """Times that size and speed are made finer in turn."""
     finer: tuple[float, ...] = (1.25, 1.12, 1.06, 1.03)
@@ -50,7 +50,7 @@ class SetPoints:
     least_gain: float = 40.0
     """Fall of the robust cost on all windows from which on a set-point is proposed."""
     least_gain_tried: float = 15.0
-    """The same on the windows that were tried, below which the others are not simulated."""
+    """Least gain on the windows that were tried, below which the others are not simulated."""
     step: float = 0.2
     """Share of the size that matters: five times what sensitivities are differences of."""
     near: float = 0.5
@@ -59,7 +59,7 @@ class SetPoints:
 
 @dataclass(frozen=True)
 class GainGrid:
-    """Of servo gains that are far from the declared ones, and dry friction with them."""
+    """Thresholds for servo gains that are far from the declared ones, and dry friction with them."""
 
     shared: tuple[float, ...] = (1.0, 0.3, 0.1, 0.03, 0.01, 3.0)
     """Factors on kp and on kd of all servos at once, each with each."""
@@ -105,7 +105,7 @@ class GainGrid:
 
 @dataclass(frozen=True)
 class DriveGrid:
-    """Of one drive's strength, gain or torque limit by factors, in a large-residual regime."""
+    """Factors on one drive's strength, gain or torque limit, tried in a large-residual regime."""
 
     factors: tuple[float, ...] = (0.01, 0.03, 0.1, 0.2, 0.5, 2.0, 5.0)
     """Factors on strength and gain that are tried."""
@@ -120,15 +120,15 @@ class DriveGrid:
     most: int = 4
     """Parameters that are tried on all windows then."""
     halvings: int = 4
-    """Of the way to the neighbouring factors, to a limit's own size: a coarse one errs by more than the limit does."""
+    """Number of halvings on the way to the neighbouring factors: a coarse limit errs by more than the limit does."""
 
 
 @dataclass(frozen=True)
 class GainParameters:
-    """Of two effects on one servo's gains."""
+    """Thresholds for two effects on one servo's gains."""
 
     share: float = 1e-3
-    """Of what the effects on a joint's gains explain, that fewer may explain less.
+    """Share that fewer may explain less of what the effects on a joint's gains explain.
 
     Differences of two simulators are significant, too.
     """
@@ -136,7 +136,7 @@ class GainParameters:
 
 @dataclass(frozen=True)
 class DeclaredScale:
-    """Of strength, inertia and friction that only one common factor tells apart."""
+    """Thresholds for strength, inertia and friction that only one common factor tells apart."""
 
     iterations: int = 4
     """Steps of the refit at the declared strengths: its start is on the scale, inertias are not yet."""

@@ -1,11 +1,11 @@
-"""What decides in proposals on the laws of friction."""
+"""Thresholds of proposals on the laws of friction."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Stribeck:
-    """Of friction that grows at rest and of the dry friction that it sits on."""
+    """Thresholds for friction that grows at rest and the dry friction that it sits on."""
 
     dry_z: float = 3.0
     """Standard errors of the dry friction: as a parameter of the same friction, not one of all candidates."""
@@ -16,24 +16,24 @@ class Stribeck:
     shape_scale: float = 0.3
     """Share of such a velocity that matters."""
     iterations: int = 5
-    """Of the joint fit of the two."""
+    """Iterations of the joint fit of the two."""
 
 
 @dataclass(frozen=True)
 class HysteresisLaw:
-    """Of the two laws of hysteresis, each tried in the place of the other."""
+    """Thresholds for the two laws of hysteresis, each tried in the place of the other."""
 
     widths: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
     """Widths of the other law, in those of the one: a spring that yields at a third of Dahl's width is most like it."""
     shape: float = 0.3
     """Share of a width that matters."""
     iterations: int = 4
-    """Of the joint refit."""
+    """Iterations of the joint refit."""
 
 
 @dataclass(frozen=True)
 class FrictionFamily:
-    """Of the sums of a joint's friction."""
+    """Thresholds for the sums of a joint's friction."""
 
     sure: float = 4.0
     """Standard errors that a further member must reach: as a number of the same friction, not one of all candidates."""
@@ -46,4 +46,4 @@ class FrictionFamily:
     few_joints: int = 8
     """Joints with friction up to which all are asked; of more, those of the shortlist that lack most torque."""
     iterations: int = 3
-    """Of the joint refit."""
+    """Iterations of the joint refit."""

@@ -1,18 +1,18 @@
-"""What decides in proposals on joints: play, elasticity, ripple, encoders' steps, and which joints err."""
+"""Thresholds of proposals on joints: play, elasticity, ripple, encoders' steps, and which joints err."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Backlash:
-    """Of backlash, tried at a geometric series of gaps on the windows that are furthest off."""
+    """Thresholds for backlash, tried at a geometric series of gaps on the windows that are furthest off."""
 
     most_usual_power: float = 2.0
     """Median chi-square above which all windows are off, for other reasons."""
     first: float = 0.2
     """The smallest gap, as a share of the encoder's noise."""
     ratio: float = 1.35
-    """Of one gap to the one before."""
+    """Ratio of one gap to the one before."""
     count: int = 22
     """Gaps of the series."""
     none: float = 1e-6
@@ -24,7 +24,7 @@ class Backlash:
     least_gain: float = 30.0
     """Fall of the robust cost on all windows from which on a gap is proposed."""
     least_gain_tried: float = 20.0
-    """The same on the windows that were tried, below which the others are not simulated."""
+    """Least gain on the windows that were tried, below which the others are not simulated."""
     window_gain: float = 4.0
     """Fall of a window's cost from which on it counts as better."""
     better_windows: int = 3
@@ -37,7 +37,7 @@ class Backlash:
 
 @dataclass(frozen=True)
 class JointElasticity:
-    """Of elastic joints, tried at a geometric series of stiffnesses; these are in units of the servo's own."""
+    """Thresholds for elastic joints, tried at a geometric series of stiffnesses in units of the servo's own."""
 
     joints: int = 2
     """Joints that are tried where nothing else is worth a trial."""
@@ -56,19 +56,19 @@ class JointElasticity:
     softest: tuple[float, float] = (3.0, 8.0)
     """The last stiffness: with the encoder on the motor, on the joint."""
     wide_ratio: float = 1.18
-    """Of one stiffness to the next."""
+    """Ratio of one stiffness to the next."""
     fine_ratio: float = 1.09
-    """The same where the servo reads the joint and shakes it if it is soft: shortly before, the swing lasts long."""
+    """Ratio of stiffnesses where the servo reads the joint, which it shakes if soft: before that, swings last long."""
     none: float = 1e-4
-    """Of the servo's compliance: as good as stiff."""
+    """Share of the servo's compliance that is as good as stiff."""
     damping: float = 0.1
-    """Of the critical one of the rotor on the elastic joint, tried first."""
+    """Share of the critical damping of the rotor on the elastic joint, tried first."""
     loss_factors: tuple[float, float] = (0.6, 1.7)
     """On the damping, tried around the best."""
     least_gain: float = 40.0
     """Fall of the robust cost on all windows from which on elasticity is proposed."""
     least_gain_tried: float = 15.0
-    """The same on the windows that were tried, below which the others are not simulated."""
+    """Least gain on the windows that were tried, below which the others are not simulated."""
     better_windows: int = 5
     """Windows that must be better."""
     largest_share: float = 0.5
@@ -81,7 +81,7 @@ class JointElasticity:
 
 @dataclass(frozen=True)
 class TorqueRipple:
-    """Of torque ripple, looked for at all numbers of periods in a turn of the joint."""
+    """Thresholds for torque ripple, looked for at all numbers of periods in a turn of the joint."""
 
     joints: int = 2
     """Joints that are asked in a round, those that lack most torque."""
@@ -103,7 +103,7 @@ class TorqueRipple:
 
 @dataclass(frozen=True)
 class EncoderResolution:
-    """Of encoders that read in steps."""
+    """Thresholds for encoders that read in steps."""
 
     samples: int = 20_000
     """Readings of a joint at most."""
@@ -112,13 +112,13 @@ class EncoderResolution:
     cells: int = 12
     """Steps that the joint crosses at least."""
     on_grid: float = 0.8
-    """Of the resultant that the noise leaves of a grid: what readings that lie on it have at least."""
+    """Share of the resultant that the noise leaves of a grid, which readings that lie on it reach at least."""
     chance: float = 1e-5
-    """Of a joint without a grid to look like this."""
+    """Probability that a joint without a grid looks like this."""
     coarsest: float = 0.7
-    """Of the largest resultant: a grid's multiples in frequency fit as well as itself, so the lowest is taken."""
+    """Share of the largest resultant: a grid's multiples in frequency fit as well as itself, so the lowest is taken."""
     overtones: tuple[int, ...] = (5, 4, 3, 2)
-    """Of a grid that is looked for once one of them was found."""
+    """Overtones of a grid, looked for once one of them was found."""
     fewest_cells: int = 3
     """Steps of such a grid that the joint crosses at least."""
     places: int = 40
@@ -129,10 +129,10 @@ class EncoderResolution:
 
 @dataclass(frozen=True)
 class JointMisfit:
-    """Of joints whose own readings are off in some windows."""
+    """Thresholds for joints whose own readings are off in some windows."""
 
     chance: float = 0.05
-    """Of noise to put any window of a joint so far off."""
+    """Probability that noise puts any window of a joint so far off."""
     joints: int = 2
     """The worst joints at most."""
     windows: int = 16

@@ -1,20 +1,20 @@
-"""What decides in proposals on the whole robot: all joints at once, lost commands, surfaces that it touches."""
+"""Thresholds of proposals on the whole robot: all joints at once, lost commands, surfaces that it touches."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class AllJoints:
-    """Of the usual effects of all joints, fitted together."""
+    """Thresholds for the usual effects of all joints, fitted together."""
 
     windows: int = 60
-    """Windows that the way from the declared values is gone on."""
+    """Number of windows used for the coarse fit."""
     steps: int = 9
     """Steps of Levenberg's and Marquardt's way at most."""
     steps_of_small: int = 20
-    """The same of a small robot: where every joint lacks its armature and friction the way is that long."""
+    """Steps of Levenberg's and Marquardt's way at most for a small robot: every joint lacks armature and friction."""
     steps_with_links: int = 5
-    """The same with the links' effects, which begin from the joints'."""
+    """Steps of that way with the links' effects, which begin from the joints'."""
     rounds: int = 3
     """Rounds of fitting on all windows and taking out what is not sure there."""
     small_robot: int = 12
@@ -36,9 +36,9 @@ class AllJoints:
     next_to_nothing: float = 0.02
     """Share of the declared model's median chi-square that all joints' effects leave less of where they come first."""
     little_of_large: float = 0.05
-    """The same of a large robot, whose windows are whitened around a model that is further from the truth."""
+    """Share of the median chi-square for a large robot, whitened around a model further from the truth."""
     enough_of_large: float = 0.05
-    """The same share, above which a large robot's strengths and kp are asked, too."""
+    """Share of the median chi-square above which a large robot's strengths and kp are asked, too."""
     likely_dry: float = 0.01
     """Share of a drive's limit at which a large robot's dry friction begins; the robots of
     `benchmarks.from_a_drawing` have .5 to 5 %."""
@@ -53,7 +53,7 @@ class AllJoints:
 
 @dataclass(frozen=True)
 class PacketLoss:
-    """Of commands that never arrived."""
+    """Thresholds for commands that never arrived."""
 
     longest: int = 3
     """Lost commands in a row at most, in ticks."""
@@ -89,14 +89,14 @@ class PacketLoss:
     first_share: float = 0.02
     """Share of lost commands from which expectation and maximisation begin."""
     iterations: int = 60
-    """Of these."""
+    """Iterations of expectation and maximisation."""
     rounds: int = 3
-    """Of finding nuisances beside the commands that arrived, and these beside the nuisances."""
+    """Rounds of finding nuisances beside the commands that arrived, and these beside the nuisances."""
 
 
 @dataclass(frozen=True)
 class SurfaceContact:
-    """Of contact with a surface that the model lacks: where the robot is when it is further off than usual."""
+    """Thresholds for contact with a surface that the model lacks: where the robot is when it is further off."""
 
     off: float = 5.0
     """Times the median power by which the furthest windows must be off."""
@@ -125,7 +125,7 @@ class SurfaceContact:
     tried: int = 24
     """Points that are tried in the simulator."""
     moved: int = 4
-    """Of these that are moved on."""
+    """Number of these that are moved on."""
     windows: int = 50
     """Windows on which they are: the lowest ones, and as many of the others."""
     heights: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75)
@@ -145,10 +145,10 @@ class SurfaceContact:
     nearly: float = 0.8
     """Share of these that must gain."""
     nearly_later: float = 0.7
-    """The same after 1 s, of one that was chosen."""
+    """Share of these that must gain after 1 s, for a surface that was chosen."""
     least_felt: int = 4
     """Windows of the fitted rollouts that must feel it."""
     least_felt_alone: int = 12
-    """The same where no other rollout reaches it."""
+    """Windows that must feel it where no other rollout reaches it."""
     step: float = 0.005
     """Change of the height that matters [m]."""

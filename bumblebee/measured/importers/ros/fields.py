@@ -32,7 +32,7 @@ def steps(where: str, path: str) -> tuple[Step, ...]:
 
 
 def decoder(where: str, topic: Topic) -> Callable[[bytes], Any]:
-    """What turns the bytes of a topic's messages into objects with its type's fields.
+    """Decoder of a topic's messages: bytes into objects with its type's fields.
 
     Raises:
         BadInput: a definition that cannot be read, or by which a message could hold more elements than bytes.

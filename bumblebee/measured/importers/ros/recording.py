@@ -1,4 +1,4 @@
-"""What both storages of rosbag2 hold: topics with their types, and messages as bytes with two stamps."""
+"""Content of both storages of rosbag2: topics with their types, and messages as bytes with two stamps."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace

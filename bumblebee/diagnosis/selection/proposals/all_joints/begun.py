@@ -24,7 +24,7 @@ Begun = tuple[Sequence[Candidate], np.ndarray]
 
 
 def usual_effects(candidates: Sequence[Candidate], torque: bool = False) -> list[Candidate]:
-    """Of `candidates` those that every joint of a real robot has; `torque`: whose drives are told torques."""
+    """Candidates that every joint of a real robot has; `torque`: whose drives are told torques."""
     kinds = USUAL_OF_TORQUE if torque else USUAL
     return [c for c in candidates if (c.effect in kinds and c.where) or (c.effect in USUAL_OF_ROBOT and not c.where)]
 

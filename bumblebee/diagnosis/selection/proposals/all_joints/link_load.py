@@ -35,7 +35,7 @@ def link_load(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Fit, .
 
 
 def _with_centre(problem: Problem, fit: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
-    """The same with the centre of mass free, where there is one."""
+    """Fits with the centre of mass free, where there is one."""
     rule = problem.thresholds.selection.proposals.all_joints
     centres = [c for c in candidates if (c.effect, c.where) == ("link_com", fit.chosen[0].where)]
     values = [np.concatenate((fit.values, absent([c]))) for c in centres]

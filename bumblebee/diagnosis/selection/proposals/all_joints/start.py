@@ -56,7 +56,7 @@ def start_with_all_joints(run: SearchState, stuck: bool = False) -> bool:
         return False
     if run.power() < run.rule.whiten_anew * run.whitened_at:
         _start_anew(run, *whitened_anew(run.problem, run.holdout, run.fit))
-        run.say(f"whitened anew around what was found: chi-square {run.power():.3g}")
+        run.say(f"whitened again around the effects found: chi-square {run.power():.3g}")
         if run.power() < run.config.many:
             return True
     run.tried_many = True
@@ -72,7 +72,7 @@ def start_far_off(run: SearchState, tried: Sequence[Trial]) -> bool:
     """Begin with the usual effects of all joints of a robot that is far from the data; whether it did.
 
     Only before anything is found, where they leave next to nothing, and where no effect that was `tried` by itself
-    comes near. One effect after the other leads into a by-way where every joint errs by factors.
+    comes near. A search effect by effect converges to a wrong local minimum where every joint errs by factors.
     """
     rule, declared = run.problem.thresholds.selection.proposals.all_joints, run.power()
     small = is_small(run.problem)
@@ -104,7 +104,7 @@ def begin_with(run: SearchState, fit: Fit) -> None:
     _start_anew(run, *whitened_anew(run.problem, run.holdout, fit))
     z = certainty(run.problem, run.fit, run.weights)
     run.steps = [evidence(c, float(least), len(run.candidates)) for c, least in zip(run.fit.chosen, z, strict=True)]
-    run.say(f"begun anew with {len(run.fit.chosen)} effects together: chi-square {run.power():.3g}")
+    run.say(f"restarting the search from {len(run.fit.chosen)} jointly fitted effects: chi-square {run.power():.3g}")
     run.tried_many, run.given = True, len(run.fit.chosen)
     run.patience = min(run.patience, run.rule.many_patience)
 

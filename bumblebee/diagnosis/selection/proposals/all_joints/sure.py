@@ -1,4 +1,4 @@
-"""What is sure of many effects that were fitted together, on all windows."""
+"""Sure effects among many that were fitted together, on all windows."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from bumblebee.diagnosis.residuals import Problem, by_misfit, window_weights
 
 
 def sure_of(problem: Problem, fit: Fit, known: Fit | None = None, simulated: bool = False) -> Fit | None:
-    """The same effects fitted on all windows, less those that are not sure there; `known` is a fit of these windows.
+    """The effects fitted on all windows, less those that are not sure there; `known` is a fit of these windows.
 
     Whether each one's going is `simulated`: of a large robot's hundred effects too many go by slopes alone.
     """
@@ -24,7 +24,7 @@ def sure_of(problem: Problem, fit: Fit, known: Fit | None = None, simulated: boo
 
 
 def sure_by_misfit(problem: Problem, fit: Fit) -> Fit | None:
-    """The same where the windows stay far from the noise: what is sure is asked by what is left, not by the noise.
+    """The sure effects where the windows stay far from the noise: sure by what is left, not by the noise.
 
     By the noise's measure hardly any effect would be sure there.
     """
@@ -37,7 +37,7 @@ def sure_by_misfit(problem: Problem, fit: Fit) -> Fit | None:
 
 
 def _fitted(problem: Problem, fit: Fit, iterations: int, known: Fit | None = None) -> Fit:
-    """The same effects fitted from where they are, windows weighed by what is left there."""
+    """The effects fitted from where they are, windows weighed by what is left there."""
     weights = window_weights(problem.residual([fit.effects])[0])
     least = problem.thresholds.estimation.levenberg_marquardt.damping
     return gauss_newton(problem, fit.chosen, fit.values, weights, iterations, coarse=True, damping=least, known=known)
