@@ -53,7 +53,8 @@ def view(
     from bumblebee.view.replay import record
     from bumblebee.view.sources import named
 
-    text = record(named(entries, name, path).make(), meshes_of_user(meshes), seconds, make)
+    entry = named(entries, name, path)
+    text = record(entry.make(), entry.name, meshes_of_user(meshes), seconds, make)
     write_file(out, text)
     print(f"written: {out}, {len(text) / 1e6:.1f} MB; it opens in a browser without a server")
 

@@ -1,31 +1,17 @@
 """One model that holds several robots side by side or through each other, for drawing alone."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from bumblebee.report.looks import dress, is_g1
+from bumblebee.report.replay import Drawn
 from bumblebee.robot.model import build_spec
 
-GHOST = (0.25, 0.55, 0.95, 0.3)
-"""Colour of a robot that is not there: the reference, or what a model says (RGBA)."""
 OTHERS = 1
 """Group of the geoms of all robots but the first."""
-FOUND = (0.10, 0.62, 0.35, 0.45)
-"""Colour of what the corrected model says (RGBA)."""
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """One robot in the picture."""
-
-    name: str
-    """Name in the page; unique in a picture."""
-    tint: tuple[float, float, float, float] | None = None
-    """RGBA of all its parts; None for its own colours."""
 
 
 def drawing(

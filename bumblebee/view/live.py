@@ -12,8 +12,8 @@ from bumblebee.deploy.robots import CONTROL_HZ, NominalRobots
 from bumblebee.deploy.runner import PolicyRunner, reference_library
 from bumblebee.evaluation.contract import StartNoise
 from bumblebee.motion.clip import Clip
+from bumblebee.report.replay import Drawn
 from bumblebee.tracking.terminations import FALL, beyond
-from bumblebee.view.drawing import Drawn
 from bumblebee.view.sources import REFERENCE, clip_states
 
 _ONE = np.array([0])

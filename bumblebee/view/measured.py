@@ -11,8 +11,8 @@ from bumblebee.diagnosis.simulation import Windows, choose_starts, cut, residual
 from bumblebee.diagnosis.thresholds.report import ExampleWindows
 from bumblebee.measured.model_file import load_spec
 from bumblebee.quaternions import conjugate, from_rotation_vector, multiply
+from bumblebee.report.replay import FOUND, GHOST, Drawn
 from bumblebee.sim.effects import Effect
-from bumblebee.view.drawing import FOUND, GHOST, Drawn
 from bumblebee.view.sources import Entry, Recorded, beside
 
 _ROBOTS = (Drawn("measured"), Drawn("declared", GHOST), Drawn("corrected", FOUND))

@@ -8,7 +8,8 @@ import numpy as np
 
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
-from bumblebee.view.drawing import GHOST, Drawn, states
+from bumblebee.report.replay import GHOST, Drawn
+from bumblebee.view.drawing import states
 
 REFERENCE = Drawn("reference", GHOST)
 """The motion that a policy follows."""

@@ -13,12 +13,12 @@ from bumblebee.measured.rollout import write_rollout
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import kinds
 from bumblebee.motion.formats.write import write_motion
+from bumblebee.report.replay import GHOST, LARGEST, Drawn
 from bumblebee.robot.facts import joint_names
-from bumblebee.view.drawing import GHOST, Drawn, drawing, states
+from bumblebee.view.drawing import drawing, states
 from bumblebee.view.live import LivePolicy
 from bumblebee.view.measured import window_entries
 from bumblebee.view.page import Page
-from bumblebee.view.replay import LARGEST
 from bumblebee.view.scene import Picture
 from bumblebee.view.server import open_server
 from bumblebee.view.shipped import shipped_policy
@@ -144,7 +144,7 @@ def test_a_replay_is_one_small_file_that_asks_for_nothing(tmp_path: Path, clip, 
     assert run([*order]) == 0
     text = out.read_text()
     assert len(text) < LARGEST
-    assert "__VISER_EMBED_DATA__" in text
+    assert '<pre class="replays" hidden>' in text
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=.https?:", text)
     with pytest.raises(BadInput, match="expected a new name"):
         run(order)
