@@ -101,6 +101,7 @@ NO_RESULT_OF = {
             # html also rounds the numbers in notes
             for name in _DRAWN
         },
+        "bumblebee/report/": _PAGE,
         "bumblebee/diagnosis/gap/": "another command writes it",
         "bumblebee/diagnosis/places.py": "refuses a folder that is in use",
     },

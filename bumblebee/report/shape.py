@@ -8,8 +8,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bumblebee.report.looks import HIDDEN, dress, is_g1
+from bumblebee.report.looks import dress, is_g1
 
+_SHOWN = 3  # groups of geoms that MuJoCo's viewer shows at first
 _STEPS = 30_000  # of the largest coordinate; an int16 holds them
 _MOST_BYTES = 1_000_000  # of the surfaces, before they are packed; beyond it they are made coarser
 
@@ -78,12 +79,16 @@ def _data(model: mujoco.MjModel, parts: list[Surface]) -> dict[str, Any]:
 
 
 def surfaces(model: mujoco.MjModel) -> list[Surface]:
-    """Every shown geom as triangles; the floor and what is transparent are left out."""
+    """Geoms as triangles: those of MuJoCo's visible groups, or all where none is in these; no floor, nothing unseen."""
+    return _surfaces(model, _SHOWN) or _surfaces(model, mujoco.mjNGROUP)
+
+
+def _surfaces(model: mujoco.MjModel, groups: int) -> list[Surface]:
     found = []
     for geom in range(model.ngeom):
         colour = model.geom_rgba[geom] if model.geom_matid[geom] < 0 else model.mat_rgba[model.geom_matid[geom]]
         mesh = _triangles(model, geom)
-        if mesh is None or model.geom_group[geom] >= min(3, HIDDEN) or colour[3] == 0:
+        if mesh is None or model.geom_group[geom] >= groups or colour[3] == 0:
             continue
         turn = np.empty(9)
         mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
