@@ -291,7 +291,7 @@
       [yaw, pitch] = [yaw + way[0], Math.min(1.5, Math.max(-0.2, pitch + way[1]))];
       draw();
     });
-    document.addEventListener("chosen", (event) => {  // by the map of the motions
+    if (figure.closest("figure.map")) document.addEventListener("chosen", (event) => {  // a motion of the map
       const one = mine.find((wanted) => wanted.name === event.detail.name);
       figure.hidden = !one;
       if (!one) return;

@@ -66,6 +66,12 @@ class Part:
     """What was thinned or left out for size; "" for nothing."""
 
 
+def side_by_side(robots: Sequence[np.ndarray]) -> np.ndarray:
+    """States (F, R * nq) of a replay from its robots' own, (F, nq) each; shorter ones stand still at their last."""
+    longest = max(len(states) for states in robots)
+    return np.concatenate([states[np.minimum(np.arange(longest), len(states) - 1)] for states in robots], axis=1)
+
+
 def part(takes: Sequence[Take], largest: int = LARGEST) -> Part:
     """All replays in at most `largest` bytes: first frames are dropped to 25 a second, then the last replays."""
     kept, note = list(takes), ""

@@ -15,8 +15,6 @@ from bumblebee.report.replay_page import holder, player, script, style
 from bumblebee.report.shape import shape
 from bumblebee.sim.effects import Effect
 
-WINDOWS = "windows"
-"""Group of the replays of measured windows."""
 _ROBOTS = (Drawn("measured"), Drawn("declared", GHOST), Drawn("corrected", FOUND))
 _EVERY = 10_000  # ticks of a window, all of which are drawn
 
@@ -69,21 +67,21 @@ def seen_windows(session: Session, effects: Sequence[Effect] = ()) -> list[SeenW
     return [_window(session, windows, left[:, w], error[:, w], int(w)) for w in order]
 
 
-def window_takes(session: Session, effects: Sequence[Effect] = (), before: str = "") -> list[Take]:
+def window_takes(session: Session, effects: Sequence[Effect] = (), group: str = "windows") -> list[Take]:
     """The worst and the median window of the declared model, and with effects those of the corrected one.
 
     Args:
         session: measured rollouts and their declared model.
         effects: those of a diagnosis.
-        before: words in front of each name.
+        group: figure of the page that shows them.
     """
     seen, drawn, takes = seen_windows(session, effects), shape(session.spec), []
     for which, model in enumerate(("declared", "corrected")[: 2 if effects else 1]):
         order = sorted(seen, key=lambda window: -np.nan_to_num(window.error[which], nan=np.inf))
         for rank, window in (("worst", order[0]), ("median", order[len(order) // 2])):
-            name = f"{before}{rank} window of the {model} model"
+            name = f"{rank} window of the {model} model"
             note = f"{window.name}: {window.text}"
-            takes.append(Take(name, WINDOWS, window.states, window.fps, window.robots, drawn, note))
+            takes.append(Take(name, group, window.states, window.fps, window.robots, drawn, note))
     return takes
 
 

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import mujoco
-import numpy as np
 
 from bumblebee.report.looks import dress, is_g1
 from bumblebee.report.replay import Drawn
@@ -60,10 +59,3 @@ def _keep_bodies(spec: mujoco.MjSpec, floor: bool) -> None:
     planes = [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_PLANE]
     for plane in planes[1 if floor else 0 :]:
         spec.delete(plane)
-
-
-def states(clip_or_parts: Sequence[np.ndarray]) -> np.ndarray:
-    """(F, nq) states of a picture from its robots' own, (F, n) each; shorter ones stand still at their last."""
-    longest = max(len(part) for part in clip_or_parts)
-    held = [part[np.minimum(np.arange(longest), len(part) - 1)] for part in clip_or_parts]
-    return np.concatenate(held, axis=1)

@@ -9,7 +9,6 @@ import numpy as np
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from bumblebee.report.replay import GHOST, Drawn
-from bumblebee.view.drawing import states
 
 REFERENCE = Drawn("reference", GHOST)
 """The motion that a policy follows."""
@@ -124,8 +123,3 @@ def of_clip(clip: Clip, joints: Sequence[str]) -> Recorded:
     lines = dict(zip(joints, ([column] for column in clip.joint_pos.T), strict=True))
     captions = "; ".join(text.split("#")[0] for text in clip.captions[:2])
     return Recorded(clip_states(clip), clip.fps, (MOTION,), captions, lines, ("motion",))
-
-
-def beside(parts: Sequence[tuple[Drawn, np.ndarray]], fps: float, note: str = "") -> Recorded:
-    """Several robots' states (F, n) on one clock."""
-    return Recorded(states([qpos for _, qpos in parts]), fps, tuple(drawn for drawn, _ in parts), note)

@@ -13,9 +13,9 @@ from bumblebee.measured.rollout import write_rollout
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import kinds
 from bumblebee.motion.formats.write import write_motion
-from bumblebee.report.replay import GHOST, LARGEST, Drawn
+from bumblebee.report.replay import GHOST, LARGEST, Drawn, side_by_side
 from bumblebee.robot.facts import joint_names
-from bumblebee.view.drawing import drawing, states
+from bumblebee.view.drawing import drawing
 from bumblebee.view.live import LivePolicy
 from bumblebee.view.measured import window_entries
 from bumblebee.view.page import Page
@@ -73,7 +73,7 @@ def test_a_picture_holds_each_robot_s_state_in_turn():
     model = drawing((Drawn("one"), Drawn("two", GHOST)))
     assert model.nq == 60
     assert model.nu == 0
-    assert states([np.zeros((3, 2)), np.ones((1, 1))]).tolist() == [[0, 0, 1]] * 3
+    assert side_by_side([np.zeros((3, 2)), np.ones((1, 1))]).tolist() == [[0, 0, 1]] * 3
 
 
 def test_words_find_entries_by_name_family_and_caption():
