@@ -2,11 +2,9 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from bumblebee.diagnosis.dataset import open_session
 from bumblebee.measured.rollout import Rollout, read_rollout
-from bumblebee.motion.clip import Clip
+from bumblebee.motion.clip import Clip, clip_states
 from bumblebee.motion.store import read_library
 from bumblebee.report.filmstrip import states
 from bumblebee.report.replay import GHOST, Drawn, Part, Take, part, side_by_side
@@ -57,7 +55,7 @@ def _motions(results: LoopResults) -> Iterator[Take]:
 
 
 def _motion(clip: Clip, rollout: Rollout | None, drawn: Shape) -> Take:
-    wanted = np.concatenate([clip.root_pos, clip.root_quat, clip.joint_pos], axis=1)
+    wanted = clip_states(clip)
     name = " ".join(clip.name.split())  # as the map has it
     if rollout is None or rollout.base_pos is None or rollout.control_hz != clip.fps:
         return Take(name, MOTIONS, wanted, clip.fps, (Drawn("motion"),), drawn)

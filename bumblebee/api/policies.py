@@ -91,6 +91,7 @@ def evaluate(
     noise: float = 0.0,
     seed: int = 0,
     threads: int = 2,
+    out: str | Path | None = None,
 ) -> "pd.DataFrame":
     """Let a policy follow motions in MuJoCo at 200 Hz, each from its first frame to its last.
 
@@ -101,6 +102,8 @@ def evaluate(
         noise: factor on the noise of start and sensors; 0 is none, 1 that of training.
         seed: seed of that noise.
         threads: CPU threads of the physics.
+        out: a new folder for this table with how each rollout ended (trials.csv) and its states, which
+            `bumblebee view` shows; None writes nothing.
 
     Returns:
         A row a rollout: `name`, `family`, `split`, `success` (bool: every key body within the threshold to the end, no
@@ -108,7 +111,7 @@ def evaluate(
             then).
 
     Raises:
-        BadInput: no such policy, no motions, or a number out of its range.
+        BadInput: no such policy, no motions, a number out of its range, or a folder that exists.
 
     Examples:
         >>> import bumblebee as bb
@@ -116,12 +119,21 @@ def evaluate(
         >>> table["success"].tolist()
         [True, True]
     """
+    from bumblebee.io.write import refuse_existing, try_output
     from bumblebee.learning.trial import Trials, World, try_policy
+    from bumblebee.learning.trial_folder import Kept
     from bumblebee.sim.sensors import load_model
 
-    clips, own = checks.motions(motions), _loaded(policy)
-    world = World(load_model(physics_hz=PHYSICS_HZ), threads=threads)
-    return try_policy(cast(Callable[..., Any], own), clips, world, ahead_of(own), Trials(repeats, noise, seed))
+    clips, own, kept = checks.motions(motions), _loaded(policy), Kept()
+    if out is not None:
+        refuse_existing(Path(out))
+        try_output(Path(out))
+    world, how = World(load_model(physics_hz=PHYSICS_HZ), threads=threads), Trials(repeats, noise, seed)
+    act, keep = cast(Callable[..., Any], own), None if out is None else kept.add
+    table = try_policy(act, clips, world, ahead_of(own), how, keep)
+    if out is not None:
+        kept.write(Path(out), table)
+    return table
 
 
 def follow(policy: "Policy | Deployed | str | Path", motion: Clip) -> Clip:

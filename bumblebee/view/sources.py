@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.clip import Clip
+from bumblebee.motion.clip import Clip, clip_states
 from bumblebee.report.replay import GHOST, Drawn
 
 REFERENCE = Drawn("reference", GHOST)
@@ -111,11 +111,6 @@ def named(entries: Sequence[Entry], name: str, where: object) -> Entry:
         some = ", ".join(entry.name for entry in entries[:8])
         raise BadInput(where, f"something called {name!r}", f"{len(entries)} others: {some}", "Name one with --name.")
     return chosen[0]
-
-
-def clip_states(clip: Clip) -> np.ndarray:
-    """(F, 30) states of the G1 from a clip."""
-    return np.concatenate([clip.root_pos, clip.root_quat, clip.joint_pos], axis=1).astype(np.float64)
 
 
 def of_clip(clip: Clip, joints: Sequence[str]) -> Recorded:
