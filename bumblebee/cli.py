@@ -65,6 +65,7 @@ def diagnose(
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
     from bumblebee.diagnosis.quick import QuickConfig, first_look, told
     from bumblebee.diagnosis.report import examples, plot, summary
+    from bumblebee.report.windows import windows_inlay
     from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
@@ -85,7 +86,7 @@ def diagnose(
     print(plain(summary(result.document, result.problem.thresholds.report)))  # said first: the disk may fail now
     shown = examples(result.session, result.effects, count=1)
     print(plain(plot(shown[0])) if shown else "", flush=True)
-    write_diagnosis(result, out, overwrite)
+    write_diagnosis(result, out, overwrite, windows_inlay(result.session, result.effects))
     print(f"written: {out / 'diagnosis.json'}, model.xml, effects.yaml, report.html")
 
 

@@ -67,6 +67,9 @@ def evaluate(
     policy: Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or `shipped`.")],
     motions: Annotated[str, typer.Argument(metavar="MOTIONS", help="Motion files, or `embedded`.")] = "embedded",
     out: Annotated[Path | None, typer.Option("--out", help="CSV file with a row a rollout.")] = None,
+    states: Annotated[
+        Path | None, typer.Option("--states", metavar="FOLDER", help="New folder that `bumblebee view` shows.")
+    ] = None,
     repeats: Annotated[int, typer.Option("--repeats", help="Rollouts of each motion.")] = 1,
     noise: Annotated[float, typer.Option("--noise", help="Factor on the noise of start and sensors.")] = 0.0,
     limit: Annotated[int | None, typer.Option("--limit", min=1, help="Motions at most.")] = None,
@@ -92,8 +95,10 @@ def evaluate(
     clips = read_motions(motions, **(embedded if motions == EMBEDDED else vars(files)))
     if not clips:
         raise BadInput(motions, "a motion", "none")
-    table = run(loaded, clips[:limit], repeats=repeats, noise=noise, seed=seed)
+    table = run(loaded, clips[:limit], repeats=repeats, noise=noise, seed=seed, out=states)
     print("\n".join(line for line in tried(table, {"train": "motions"}) if line))
     if out is not None:
         write_file(out, table.to_csv(index=False))
         print(f"written: {out}")
+    if states is not None:
+        print(f"written: {states}; `bumblebee view {states}` shows it")

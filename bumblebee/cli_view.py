@@ -25,7 +25,9 @@ Ticks = Annotated[int | None, typer.Option("--ticks", hidden=True, help="Rounds 
 
 
 def view(
-    path: Annotated[Path, typer.Argument(metavar="PATH", help="Motions, a policy's folder, or measured rollouts.")],
+    path: Annotated[
+        Path, typer.Argument(metavar="PATH", help="Motions, a policy, an evaluation, or measured rollouts.")
+    ],
     motions: Annotated[Path | None, typer.Option("--motions", help="Motions for a policy; without, ours.")] = None,
     model: Annotated[
         Path | None, typer.Option("--model", help="Declared MJCF that measured rollouts belong to.")
@@ -42,7 +44,7 @@ def view(
     meshes: Meshes = None,
     ticks: Ticks = None,
 ) -> None:
-    """Show motions, a policy live, or measured rollouts beside their simulation, in the browser."""
+    """Show motions, a policy live, an evaluation, or measured rollouts beside their simulation, in the browser."""
     if out is not None:
         _claim(out, [given for given in (path, motions, model, effects) if given])
     entries, title, make = _found(path, motions, model, effects, settings or [])
@@ -54,7 +56,8 @@ def view(
     from bumblebee.view.replay import record
     from bumblebee.view.sources import named
 
-    text = record(named(entries, name, path).make(), meshes_of_user(meshes), seconds, make)
+    entry = named(entries, name, path)
+    text = record(entry.make(), entry.name, meshes_of_user(meshes), seconds, make)
     write_file(out, text)
     print(f"written: {out}, {len(text) / 1e6:.1f} MB; it opens in a browser without a server")
 
@@ -74,8 +77,17 @@ def _found(
 ) -> "tuple[list[Entry], str, Callable[[], MjSpec] | None]":
     """Find what lies at the path: its entries, the page's title, and the spec of a robot of its own."""
     from bumblebee.motion.one_file import stated
-    from bumblebee.view.what import is_dataset, is_policy, motion_entries, policy_entries
+    from bumblebee.view.what import (
+        evaluation_entries,
+        is_dataset,
+        is_evaluation,
+        is_policy,
+        motion_entries,
+        policy_entries,
+    )
 
+    if is_evaluation(path):
+        return evaluation_entries(path), "An evaluation: the robot, and what it follows in pale blue", None
     if is_dataset(path):
         declared = model or path / "model.xml"
         if not declared.is_file():

@@ -11,6 +11,7 @@ from bumblebee.diagnosis.diagnose import diagnose
 from bumblebee.diagnosis.output import fill
 from bumblebee.diagnosis.report import summary
 from bumblebee.ranges import Range, Ranged, Seed
+from bumblebee.report.windows import windows_inlay
 from tasks import paths
 from tasks.run_form import Metric, milliseconds
 from tasks.stage import load, log_run, output_folder, run_stage
@@ -46,7 +47,7 @@ def main(round: int) -> None:
     session = open_session(measured / "model.xml", measured, diagnosis.thresholds.dataset)
     result = diagnose(session, diagnosis, say=lambda text: print(text, flush=True))
     with output_folder(paths.diagnosis(round)) as folder:
-        fill(result, folder)
+        fill(result, folder, windows_inlay(result.session, result.effects))
     print(summary(result.document, result.problem.thresholds.report))
     log_run("diagnose", round=round, params=config, metrics=_metrics(result.document))
 

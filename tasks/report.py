@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from bumblebee.report.wording import plural
 from tasks import paths
 from tasks.film import film_blocks
 from tasks.lineage import git_sha
+from tasks.replays import replays
 from tasks.rollouts_config import RolloutsConfig
 from tasks.sections import Loop, Round, loop
 from tasks.stage import load, log_run, output_file, run_stage
@@ -49,6 +50,8 @@ def main() -> None:
     """Write the page."""
     config, shape = load("report", ReportConfig), loop()
     results = collect(shape)
+    seen, players = replays(results)
+    results = replace(results, players=players)
     sections = [motions_section(results), clusters_section(results), training_section(results)]
     sections += [round_section(results, turn) for turn in results.rounds]
     sections += [success_section(results), registry_section(results)]
@@ -57,7 +60,7 @@ def main() -> None:
     subtitle = (
         f"BumbleBee · {when} · code {git_sha()[:12]} · evaluation contract {results.evaluation['contract_sha256'][:12]}"
     )
-    page = render(config.title or headline(results), subtitle, picture(results), sections, opening(results, film))
+    page = render(config.title or headline(results), subtitle, picture(results), sections, opening(results, film), seen)
     with output_file(paths.REPORT) as file:
         file.write_text(page)
     print(f"report: {paths.REPORT} ({paths.REPORT.stat().st_size / 1e6:.1f} MB)")

@@ -101,9 +101,11 @@ NO_RESULT_OF = {
             # html also rounds the numbers in notes
             for name in _DRAWN
         },
+        "bumblebee/report/": _PAGE,
         "bumblebee/diagnosis/gap/": "another command writes it",
         "bumblebee/diagnosis/places.py": "refuses a folder that is in use",
     },
+    "report": {"bumblebee/diagnosis/report/": "the diagnosis' own page"},
     "compensate": {"bumblebee/measured/model_file.py": "loads a user's model; the loop's is the G1"},
     "delta": {
         path: _NETWORK

@@ -77,6 +77,7 @@ def diagnose(
     from bumblebee.diagnosis.diagnose import diagnose as find
     from bumblebee.diagnosis.output import write_diagnosis
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder
+    from bumblebee.report.windows import windows_inlay
     from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
@@ -84,7 +85,7 @@ def diagnose(
         claim_folder(Path(out), DIAGNOSIS, False, [])
     found = find(_session(session), DiagnosisConfig(seed=seed, max_windows=max_windows), say)
     if out is not None:
-        write_diagnosis(found, Path(out))
+        write_diagnosis(found, Path(out), False, windows_inlay(found.session, found.effects))
     return found
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bumblebee.api import checks
+from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ def evaluate(
     noise: float = 0.0,
     seed: int = 0,
     threads: int = 2,
+    out: str | Path | None = None,
 ) -> "pd.DataFrame":
     """Let a policy follow motions in MuJoCo at 200 Hz, each from its first frame to its last.
 
@@ -87,6 +89,8 @@ def evaluate(
             folder with `policy.onnx` alone).
         seed: seed of that noise.
         threads: CPU threads of the physics.
+        out: a new folder for this table with how each rollout ended (trials.csv) and its states, which
+            `bumblebee view` shows; None writes nothing.
 
     Returns:
         A row a rollout: `name`, `family`, `split`, `success` (bool: every key body within the threshold to the end, no
@@ -94,7 +98,7 @@ def evaluate(
             then).
 
     Raises:
-        BadInput: no such policy, no motions, or a number out of its range.
+        BadInput: no such policy, no motions, a number out of its range, or a folder that exists.
 
     Examples:
         >>> import bumblebee as bb
@@ -103,14 +107,25 @@ def evaluate(
         [True, True]
     """
     from bumblebee.deploy.trial import try_exported
+    from bumblebee.io.write import refuse_existing, try_output
     from bumblebee.learning.trial import Trials, World, try_policy
+    from bumblebee.learning.trial_folder import Kept
     from bumblebee.sim.sensors import load_model
 
-    clips, own, trials = checks.motions(motions), _loaded(policy), Trials(repeats, noise, seed)
+    clips, own, kept = checks.motions(motions), _loaded(policy), Kept()
+    if out is not None:
+        if isinstance(own, Deployed):
+            place, do = own.exported.folder, "Evaluate it without `out`."
+            raise BadInput(place, "policy.pt, of whose rollouts the states are kept", "policy.onnx alone", do)
+        refuse_existing(Path(out))
+        try_output(Path(out))
     if isinstance(own, Deployed):
         return try_exported(own.exported, clips, repeats, noise, seed, threads)
-    world = World(load_model(physics_hz=PHYSICS_HZ), threads=threads)
-    return try_policy(own, clips, world, own.shape.ahead, trials)
+    world, how = World(load_model(physics_hz=PHYSICS_HZ), threads=threads), Trials(repeats, noise, seed)
+    table = try_policy(own, clips, world, own.shape.ahead, how, None if out is None else kept.add)
+    if out is not None:
+        kept.write(Path(out), table)
+    return table
 
 
 def follow(policy: "Policy | Deployed | str | Path", motion: Clip) -> Clip:

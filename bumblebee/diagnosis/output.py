@@ -13,7 +13,7 @@ import mujoco
 from bumblebee.diagnosis.diagnose import Diagnosis
 from bumblebee.diagnosis.gap import Gap, gap_page
 from bumblebee.diagnosis.places import DIAGNOSIS, GAP, Result, refuse_file, refuse_folder
-from bumblebee.diagnosis.report import examples, render_report
+from bumblebee.diagnosis.report import NO_INLAY, Inlay, examples, render_report
 from bumblebee.diagnosis.simulation import REFUSALS, effects_in_words
 from bumblebee.errors import BadInput
 from bumblebee.io.write import kept, write_file, write_folder
@@ -21,9 +21,16 @@ from bumblebee.measured.model_file import name_assets_in_full
 from bumblebee.sim.effects import Effect, add_to_spec, effects_yaml
 
 
-def write_diagnosis(diagnosis: Diagnosis, out: Path, overwrite: bool = False) -> None:
-    """Write all four files, or none; `overwrite` replaces an earlier diagnosis and nothing else."""
-    _write(Path(out), DIAGNOSIS, overwrite, contents(diagnosis))
+def write_diagnosis(diagnosis: Diagnosis, out: Path, overwrite: bool = False, replays: Inlay = NO_INLAY) -> None:
+    """Write all four files, or none.
+
+    Args:
+        diagnosis: what was found.
+        out: the folder.
+        overwrite: replace an earlier diagnosis and nothing else.
+        replays: 3D replays for the page.
+    """
+    _write(Path(out), DIAGNOSIS, overwrite, contents(diagnosis, replays))
 
 
 def write_gap(gap: Gap, out: Path, overwrite: bool = False) -> None:
@@ -41,14 +48,14 @@ def write_errors(errors: dict[str, Any], out: Path, overwrite: bool = False) -> 
         raise _elsewhere(error, out, {out.name: as_json(errors)}) from None
 
 
-def fill(diagnosis: Diagnosis, folder: Path) -> None:
-    """The four files in an existing folder."""
-    for name, text in contents(diagnosis).items():
+def fill(diagnosis: Diagnosis, folder: Path, replays: Inlay = NO_INLAY) -> None:
+    """Write the four files into an existing folder."""
+    for name, text in contents(diagnosis, replays).items():
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def contents(diagnosis: Diagnosis) -> dict[str, str]:
-    """The four files by name."""
+def contents(diagnosis: Diagnosis, replays: Inlay = NO_INLAY) -> dict[str, str]:
+    """Text of the four files by name."""
     rules = diagnosis.problem.thresholds.report
     shown = examples(diagnosis.session, diagnosis.effects, rule=rules.example_windows)
     xml, notes = corrected_xml(diagnosis.session.spec, diagnosis.effects)
@@ -57,7 +64,7 @@ def contents(diagnosis: Diagnosis) -> dict[str, str]:
         "diagnosis.json": as_json(document),
         "effects.yaml": effects_yaml(diagnosis.effects),
         "model.xml": xml,
-        "report.html": render_report(document, shown, rules),
+        "report.html": render_report(document, shown, rules, replays),
     }
 
 

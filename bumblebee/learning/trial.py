@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 import pandas as pd
 import torch
 from torch import Tensor
@@ -49,11 +50,20 @@ def try_policy(
     world: World,
     ahead: Sequence[float],
     trials: Trials | None = None,
+    keep: Callable[[Sequence[Clip], np.ndarray], None] | None = None,
 ) -> pd.DataFrame:
     """Roll out each clip, from its first frame.
 
     A `Policy` is shown what its shape says that it sees, and remembers each rollout from its start if it has a memory;
     any other function gets the demo's observation (N, D).
+
+    Args:
+        policy: what acts.
+        clips: what it follows.
+        world: where.
+        ahead: look-ahead times [s] of the reference that it sees.
+        trials: how often and how roughly.
+        keep: called with N clips at a time and their robots' states (F, N, 30), to the end of the longest.
 
     Returns:
         a row a rollout: name, family, split, success, share (of the clip until it failed), key_error [m] and
@@ -61,7 +71,9 @@ def try_policy(
     """
     trials = trials or Trials()
     every = [clip for clip in clips for _ in range(trials.repeats)]
-    tables = [_try_some(policy, every[i : i + _WORLDS], world, ahead, trials) for i in range(0, len(every), _WORLDS)]
+    tables = [
+        _try_some(policy, every[i : i + _WORLDS], world, ahead, trials, keep) for i in range(0, len(every), _WORLDS)
+    ]
     return pd.concat(tables, ignore_index=True)
 
 
@@ -73,16 +85,27 @@ def success_by_family(trials: pd.DataFrame) -> dict[str, float]:
 
 @torch.inference_mode()
 def _try_some(
-    policy: Callable[[Tensor], Tensor], clips: Sequence[Clip], world: World, ahead: Sequence[float], trials: Trials
+    policy: Callable[[Tensor], Tensor],
+    clips: Sequence[Clip],
+    world: World,
+    ahead: Sequence[float],
+    trials: Trials,
+    keep: Callable[[Sequence[Clip], np.ndarray], None] | None,
 ) -> pd.DataFrame:
     library = MotionLibrary(clips, ahead)
     engine = make_engine("mujoco", world.model, len(clips), min(world.threads, len(clips)), world.hooks)
     seen = policy.shape.seen if isinstance(policy, Policy) else ObservationConfig()
     manner = Manner(seen, noise=trials.noise, adapter=world.action_adapter)
-    judge = Judge(clips)
+    judge, seen_states = Judge(clips), []
     for tick in roll_out(policy, manner, library, engine, torch.Generator().manual_seed(trials.seed)):
-        if not bool(judge.see(tick).any()):
+        going = judge.see(tick)
+        if keep is not None:
+            now = tick.state
+            seen_states.append(torch.cat([now.root_pos_w, now.root_quat_w, now.joint_pos], dim=1).numpy())
+        elif not bool(going.any()):
             break
+    if keep is not None:
+        keep(clips, np.stack(seen_states))
     return pd.DataFrame(
         {
             "name": [clip.name for clip in clips],

@@ -96,3 +96,8 @@ def angular_velocity(quat: np.ndarray, fps: float) -> np.ndarray:
     after = np.minimum(np.arange(len(quat)) + 1, len(quat) - 1)
     turn = quaternions.rotation_vector(quaternions.multiply(quaternions.conjugate(quat[before]), quat[after]))
     return turn * fps / np.maximum(after - before, 1)[:, None]
+
+
+def clip_states(clip: Clip) -> np.ndarray:
+    """(F, 30) states of the G1 from a clip."""
+    return np.concatenate([clip.root_pos, clip.root_quat, clip.joint_pos], axis=1).astype(np.float64)

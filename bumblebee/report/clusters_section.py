@@ -41,7 +41,7 @@ def _pictures(results: LoopResults) -> list[Block]:
     still = plane_figure(results.labels, summary.get("plane_variance"))
     alt = f"Scatter plot: {plural(len(results.labels), 'motion')} in {plural(summary['k'], 'cluster')}."
     if results.points is not None and "map" in summary:
-        plane = map_block(results.points, summary, still, alt)
+        plane = map_block(results.points, summary, still, alt, results.players.get("motions", ""))
     else:
         caption = "First two principal components of the autoencoder's motion latents (no unit); filled: trained on."
         plane = image(still, "Motions in the latent plane", caption, alt)

@@ -108,6 +108,9 @@ for (const figure of document.querySelectorAll("figure.map")) {
     if (point.source === "name") say("p", "(words of its file's name)", about, "quiet");
     const split = point.split === "test" ? "held out" : "trained on";
     say("p", [point.cluster, `${point.seconds} s`, split, point.family, point.licence].filter(Boolean).join(" · "), about);
+    const asked = {name: point.name, shown: false};
+    document.dispatchEvent(new CustomEvent("chosen", {detail: asked}));  // a replay of this motion shows itself
+    if (asked.shown) return;
     if (point.poses) figures(point);
     else say("p", "No poses are kept of this motion; cluster.map_poses keeps more.", about, "quiet");
   };
@@ -162,4 +165,9 @@ for (const figure of document.querySelectorAll("figure.map")) {
   place();
   new ResizeObserver(place).observe(plot);
   choose(nearest(size[0] / 2, size[1] / 2, Infinity));
+  document.addEventListener("replays", () => {
+    const again = chosen;
+    chosen = -1;
+    choose(again);
+  });
 }

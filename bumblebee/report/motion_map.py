@@ -15,7 +15,7 @@ CHOICES = (("cluster", "cluster"), ("split", "split"), ("family", "family"), ("l
 _FULL = 1000  # of each axis, in the page
 
 
-def map_block(points: pd.DataFrame, summary: Json, still: str, alt: str) -> Block:
+def map_block(points: pd.DataFrame, summary: Json, still: str, alt: str, player: str = "") -> Block:
     """The block; without scripts it is the picture `still` with its `alt`.
 
     Args:
@@ -23,6 +23,7 @@ def map_block(points: pd.DataFrame, summary: Json, still: str, alt: str) -> Bloc
         summary: data/clusters/summary.json.
         still: a `data:` URI of the same as a picture.
         alt: what the picture shows, in words.
+        player: markup of the 3D replays of the motions.
     """
     names = {name: str(row["label"]) for name, row in summary["clusters"].items()}
     form, shares = summary["map"], summary.get("plane_variance") or ()
@@ -38,7 +39,7 @@ def map_block(points: pd.DataFrame, summary: Json, still: str, alt: str) -> Bloc
     }
     return Block(
         "map", text=rows(points, names, form["signs"]), title="Map of the motions", caption=caption, uri=picture.uri,
-        alt=picture.alt, facts=facts, choices=CHOICES,
+        alt=picture.alt, facts=facts, choices=CHOICES, player=player,
     )  # fmt: skip
 
 

@@ -13,8 +13,10 @@ from jinja2 import Environment, select_autoescape
 from markupsafe import Markup
 
 from bumblebee.io.page_policy import policy
+from bumblebee.report import replay as replays_of
 from bumblebee.report.chart import Strip
 from bumblebee.report.filmstrip import Sheet
+from bumblebee.report.replay_page import holder, style
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,8 @@ class Bar:
 class Block:
     """One piece of a section; which fields count depends on `kind`.
 
-    Kinds: text, note, heading, list, table, film, map, bars, strips, curves, warning, pairs (a table whose rows stack
-    on a phone); and, side by side where there is room: image, still.
+    Kinds: text, note, heading, list, table, film, replay, map, bars, strips, curves, warning, pairs (a table whose rows
+    stack on a phone); and, side by side where there is room: image, still.
     """
 
     kind: str
@@ -78,6 +80,8 @@ class Block:
     """Facts for the script of a map."""
     choices: tuple[tuple[str, str], ...] = ()
     """Columns that a map's points can be coloured by, each with its name on the page."""
+    player: str = ""
+    """Markup of `replay_page.player`: a replay, or a map's for the motion that is pointed at."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,7 @@ class Part:
         return [(name, list(run)) for name, run in groupby(self.blocks, key=_row)]
 
 
-_SCRIPTS = (("film", "player.js"), ("map", "map.js"), ("curves", "curves.js"))
+_SCRIPTS = (("film", "player.js"), ("replay", "replay.js"), ("map", "map.js"), ("curves", "curves.js"))
 
 
 def _row(block: Block) -> str:
@@ -180,6 +184,11 @@ def pairs(header: Sequence[str], rows: Sequence[Sequence[str | Cell]], title: st
     return Block("pairs", header=tuple(header), rows=filled, title=title, caption=caption)
 
 
+def replay(player: str) -> Block:
+    """A 3D replay by `replay_page.player`."""
+    return Block("replay", player=player)
+
+
 def _inside(uri: str) -> str:
     if not uri.startswith("data:image/"):
         raise ValueError("a report holds its images in itself")
@@ -205,12 +214,14 @@ def render(
     picture: str,
     sections: Sequence[Section],
     opening: Section | None = None,
+    replays: replays_of.Part | None = None,
 ) -> str:
-    """The page; `picture` is the only markup that is passed through, and must come from `loop_picture`."""
+    """The page; of markup only `loop_picture`'s and `replay_page`'s is passed through."""
     environment = Environment(autoescape=select_autoescape(default=True), trim_blocks=True, lstrip_blocks=True)
     folder = files("bumblebee.report")
     every = [*sections, *([opening] if opening else [])]
-    kinds = {block.kind for section in every for block in section.blocks}
+    blocks = [block for section in every for block in section.blocks]
+    kinds = {block.kind for block in blocks} | ({"replay"} if any(block.player for block in blocks) else set())
     script = "\n".join(folder.joinpath(file).read_text() for kind, file in _SCRIPTS if kind in kinds)
     return environment.from_string(folder.joinpath("page.html.j2").read_text()).render(
         title=title,
@@ -218,7 +229,8 @@ def render(
         opening=opening,
         picture=Markup(picture),
         sections=list(sections),
-        style=Markup(folder.joinpath("page.css").read_text()),
+        style=Markup(folder.joinpath("page.css").read_text() + (style() if "replay" in kinds else "")),
+        replays=holder(replays) if replays else "",
         script=Markup(script),
         policy=policy(script),
     )

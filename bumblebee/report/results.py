@@ -1,6 +1,6 @@
 """Results of a finished loop, as plain values: everything that the report's sections read."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pandas as pd
@@ -63,6 +63,8 @@ class LoopResults:
 
     points: pd.DataFrame | None = None
     """Points of the map, a row a motion; None where the clustering kept none."""
+    players: dict[str, str] = field(default_factory=dict)
+    """Markup of the 3D replays: "motions", and "windows-rN" for each round."""
 
     @property
     def real_robot(self) -> bool:

@@ -4,7 +4,7 @@ from typing import Any
 
 from bumblebee.report import noise_floor
 from bumblebee.report.compensation import compensation_table
-from bumblebee.report.page import Block, Cell, Section, bullets, heading, note, table, text
+from bumblebee.report.page import Block, Cell, Section, bullets, heading, note, replay, table, text
 from bumblebee.report.residual_chart import residual_chart, value_and_interval
 from bumblebee.report.results import LoopResults, RoundResults
 from bumblebee.report.truth import Match, match
@@ -29,6 +29,8 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
     blocks += residual_chart(diagnosis["error"])
     held = plural(len(diagnosis["holdout"]), "rollout")
     blocks += [note(f"On {held} that took no part in fitting. {noise_floor.WHAT}"), _error_table(diagnosis["error"])]
+    shown = results.players.get(f"windows-r{turn.n}", "")
+    blocks += [replay(shown)] if shown else []
     under = noise_floor.summary(diagnosis["error"], [key for key, *_ in _MEASURES if key != "chi2"])
     blocks += [note(under)] if under else []
     blocks.append(text(_remains(diagnosis)))

@@ -1,31 +1,16 @@
 """One model that holds several robots side by side or through each other, for drawing alone."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
-import numpy as np
 
 from bumblebee.report.looks import dress, is_g1
+from bumblebee.report.replay import Drawn
 from bumblebee.robot.model import build_spec
 
-GHOST = (0.25, 0.55, 0.95, 0.3)
-"""Colour of a robot that is not there: the reference, or what a model says (RGBA)."""
 OTHERS = 1
 """Group of the geoms of all robots but the first."""
-FOUND = (0.10, 0.62, 0.35, 0.45)
-"""Colour of what the corrected model says (RGBA)."""
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """One robot in the picture."""
-
-    name: str
-    """Name in the page; unique in a picture."""
-    tint: tuple[float, float, float, float] | None = None
-    """RGBA of all its parts; None for its own colours."""
 
 
 def drawing(
@@ -74,10 +59,3 @@ def _keep_bodies(spec: mujoco.MjSpec, floor: bool) -> None:
     planes = [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_PLANE]
     for plane in planes[1 if floor else 0 :]:
         spec.delete(plane)
-
-
-def states(clip_or_parts: Sequence[np.ndarray]) -> np.ndarray:
-    """(F, nq) states of a picture from its robots' own, (F, n) each; shorter ones stand still at their last."""
-    longest = max(len(part) for part in clip_or_parts)
-    held = [part[np.minimum(np.arange(longest), len(part) - 1)] for part in clip_or_parts]
-    return np.concatenate(held, axis=1)

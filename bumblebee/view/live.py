@@ -11,10 +11,10 @@ from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import CONTROL_HZ, NominalRobots
 from bumblebee.deploy.runner import PolicyRunner, reference_library
 from bumblebee.evaluation.contract import StartNoise
-from bumblebee.motion.clip import Clip
+from bumblebee.motion.clip import Clip, clip_states
+from bumblebee.report.replay import Drawn
 from bumblebee.tracking.terminations import FALL, beyond
-from bumblebee.view.drawing import Drawn
-from bumblebee.view.sources import REFERENCE, clip_states
+from bumblebee.view.sources import REFERENCE
 
 _ONE = np.array([0])
 _REST = round(1.5 * CONTROL_HZ)  # control steps that a fallen robot lies, or one that is done stands

@@ -68,7 +68,7 @@ class Page:
     def _gui(self, gui: viser.GuiApi, title: str) -> None:
         gui.add_markdown(f"**{title}**")
         labels = list(self._by_label)[:_LISTED]
-        self._words = gui.add_text("Search", "", hint="Words of the name, the family or the caption.")
+        self._words = gui.add_text("Search", "", hint="Words of the name, the family, the caption, or how it ended.")
         self._menu = gui.add_dropdown("Show", labels, initial_value=labels[0])
         self._note = gui.add_markdown("")
         self._button = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)

@@ -8,7 +8,8 @@ import numpy as np
 import viser
 from mjviser import ViserMujocoScene
 
-from bumblebee.view.drawing import OTHERS, Drawn, drawing
+from bumblebee.report.replay import Drawn
+from bumblebee.view.drawing import OTHERS, drawing
 
 _CAMERA = np.array([1.9, -1.9, 0.7])  # m from what it looks at
 _FIELD = np.radians(45.0)  # vertical field of view

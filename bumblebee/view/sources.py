@@ -7,8 +7,8 @@ from typing import Protocol
 import numpy as np
 
 from bumblebee.errors import BadInput
-from bumblebee.motion.clip import Clip
-from bumblebee.view.drawing import GHOST, Drawn, states
+from bumblebee.motion.clip import Clip, clip_states
+from bumblebee.report.replay import GHOST, Drawn
 
 REFERENCE = Drawn("reference", GHOST)
 """The motion that a policy follows."""
@@ -113,18 +113,8 @@ def named(entries: Sequence[Entry], name: str, where: object) -> Entry:
     return chosen[0]
 
 
-def clip_states(clip: Clip) -> np.ndarray:
-    """(F, 30) states of the G1 from a clip."""
-    return np.concatenate([clip.root_pos, clip.root_quat, clip.joint_pos], axis=1).astype(np.float64)
-
-
 def of_clip(clip: Clip, joints: Sequence[str]) -> Recorded:
     """A motion as it is in its file; curves of the joints [rad]."""
     lines = dict(zip(joints, ([column] for column in clip.joint_pos.T), strict=True))
     captions = "; ".join(text.split("#")[0] for text in clip.captions[:2])
     return Recorded(clip_states(clip), clip.fps, (MOTION,), captions, lines, ("motion",))
-
-
-def beside(parts: Sequence[tuple[Drawn, np.ndarray]], fps: float, note: str = "") -> Recorded:
-    """Several robots' states (F, n) on one clock."""
-    return Recorded(states([qpos for _, qpos in parts]), fps, tuple(drawn for drawn, _ in parts), note)

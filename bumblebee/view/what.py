@@ -1,4 +1,4 @@
-"""Tell what lies at a path, and how it is shown: motions, a policy, or measured rollouts."""
+"""Tell what lies at a path, and how it is shown: motions, a policy, an evaluation, or measured rollouts."""
 
 from collections.abc import Callable
 from functools import partial
@@ -7,13 +7,15 @@ from pathlib import Path
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import CONTROL_HZ
 from bumblebee.errors import BadInput
+from bumblebee.learning.trial_folder import ENDS, FOLLOWED, KeptRollout, is_kept, read_kept
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.convert import clips_at
 from bumblebee.motion.one_file import FileConfig
+from bumblebee.report.replay import Drawn, side_by_side
 from bumblebee.robot.facts import joint_names
 from bumblebee.view.live import LivePolicy
 from bumblebee.view.shipped import embedded_entries
-from bumblebee.view.sources import Entry, Source, of_clip
+from bumblebee.view.sources import REFERENCE, Entry, Recorded, Source, of_clip
 
 
 def is_policy(path: Path) -> bool:
@@ -24,6 +26,33 @@ def is_policy(path: Path) -> bool:
 def is_dataset(path: Path) -> bool:
     """Whether a folder holds measured rollouts."""
     return (path / "rollouts").is_dir()
+
+
+def evaluation_entries(path: Path) -> list[Entry]:
+    """Rollouts of an evaluation, those that fell first, then those of which a part was off.
+
+    Raises:
+        BadInput: an evaluation without states.
+    """
+    if not is_kept(path):
+        remedy = "`bumblebee evaluate POLICY MOTIONS --states FOLDER`, then `bumblebee view FOLDER`."
+        raise BadInput(path, "an evaluation with the robot's states", "one without", remedy)
+    rollouts = sorted(read_kept(path), key=lambda kept: (ENDS.index(kept.ended), kept.share, kept.name))
+    return [Entry(kept.name, kept.ended, kept.family, partial(_kept, kept)) for kept in rollouts]
+
+
+def is_evaluation(path: Path) -> bool:
+    """Whether a folder is an evaluation: by `bumblebee evaluate`, or by the loop, which keeps no states."""
+    return is_kept(path) or (path / "episodes.parquet").is_file()
+
+
+def _kept(kept: KeptRollout) -> Recorded:
+    seconds = len(kept.robot) / kept.fps
+    lost = "" if kept.ended == FOLLOWED else f", after {100 * kept.share:.0f} % of the motion"
+    curves = {name: [kept.robot[:, 7 + j], kept.motion[:, 7 + j]] for j, name in enumerate(joint_names())}
+    note = f"{kept.ended}{lost}; {seconds:.1f} s shown"
+    states = side_by_side([kept.robot, kept.motion])
+    return Recorded(states, kept.fps, (Drawn("robot"), REFERENCE), note, curves, ("robot", "reference"))
 
 
 def motion_entries(path: Path, files: FileConfig) -> list[Entry]:

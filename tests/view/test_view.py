@@ -5,24 +5,31 @@ import socket
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from bumblebee.api.policies import ahead_of, load_policy
 from bumblebee.cli import run
 from bumblebee.errors import BadInput
+from bumblebee.learning.trial import World, try_policy
+from bumblebee.learning.trial_folder import ENDS, FELL, FOLLOWED, KEY_BODY_OFF, PELVIS_OFF, Kept, ended
 from bumblebee.measured.rollout import write_rollout
+from bumblebee.motion.clip import clip_states
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import kinds
 from bumblebee.motion.formats.write import write_motion
+from bumblebee.report.replay import GHOST, LARGEST, Drawn, side_by_side
 from bumblebee.robot.facts import joint_names
-from bumblebee.view.drawing import GHOST, Drawn, drawing, states
+from bumblebee.sim.sensors import load_model
+from bumblebee.view.drawing import drawing
 from bumblebee.view.live import LivePolicy
 from bumblebee.view.measured import window_entries
 from bumblebee.view.page import Page
-from bumblebee.view.replay import LARGEST
 from bumblebee.view.scene import Picture
 from bumblebee.view.server import open_server
 from bumblebee.view.shipped import shipped_policy
 from bumblebee.view.sources import Entry, found, of_clip
+from bumblebee.view.what import evaluation_entries
 from tests.diagnosis import cart
 
 
@@ -73,7 +80,7 @@ def test_a_picture_holds_each_robot_s_state_in_turn():
     model = drawing((Drawn("one"), Drawn("two", GHOST)))
     assert model.nq == 60
     assert model.nu == 0
-    assert states([np.zeros((3, 2)), np.ones((1, 1))]).tolist() == [[0, 0, 1]] * 3
+    assert side_by_side([np.zeros((3, 2)), np.ones((1, 1))]).tolist() == [[0, 0, 1]] * 3
 
 
 def test_words_find_entries_by_name_family_and_caption():
@@ -144,9 +151,69 @@ def test_a_replay_is_one_small_file_that_asks_for_nothing(tmp_path: Path, clip, 
     assert run([*order]) == 0
     text = out.read_text()
     assert len(text) < LARGEST
-    assert "__VISER_EMBED_DATA__" in text
+    assert '<pre class="replays" hidden>' in text
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=.https?:", text)
     with pytest.raises(BadInput, match="expected a new name"):
         run(order)
     with pytest.raises(BadInput, match="expected something called 'jump'"):
         run([*order[:3], str(tmp_path / "other.html"), "--name", "jump"])
+
+
+@pytest.fixture(scope="module")
+def evaluation(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A motion tried by the shipped policy, and one by a policy that does nothing."""
+    out, world = tmp_path_factory.mktemp("evaluation") / "tried", World(load_model(physics_hz=200.0), threads=1)
+    kept, shipped = Kept(), load_policy()
+    tables = []
+    for policy, name, ahead in ((shipped, "look_left", ahead_of(shipped)), (lambda seen: 0 * seen[:, :23], "walk", ())):
+        clip = make(next(kind for kind in kinds() if kind.name == name), 0, EmbeddedConfig())
+        tables.append(try_policy(policy, [clip], world, ahead, None, kept.add))
+    kept.write(out, pd.concat(tables, ignore_index=True))
+    return out
+
+
+def test_a_rollout_fell_or_its_pelvis_or_a_key_body_was_off(clip):
+    robot = clip_states(clip)[1:]
+    lost = (False, 0.5)
+    assert ended(clip, robot, True, 1.0) == FOLLOWED
+    assert ended(clip, robot, *lost) == KEY_BODY_OFF
+    assert ended(clip, robot + np.eye(30)[0], *lost) == PELVIS_OFF
+    assert ended(clip, robot - 0.5 * np.eye(30)[2], *lost) == FELL
+
+
+def test_rollouts_of_an_evaluation_are_sorted_by_how_they_were_lost_and_found_by_it(evaluation: Path):
+    entries = evaluation_entries(evaluation)
+    order = [ENDS.index(entry.group) for entry in entries]
+    assert order == sorted(order) and len(set(order)) > 1
+    lost = found(entries, entries[0].group)
+    assert entries[0] in lost and entries[-1] not in lost
+    shown = entries[0].make()
+    assert entries[0].group in shown.said()
+    assert shown.qpos().shape == (60,)
+    np.testing.assert_allclose(shown.qpos()[:3], shown.qpos()[30:33], atol=0.1)  # at the start it is on the motion
+
+
+def test_the_page_of_an_evaluation_opens_and_its_replay_is_one_file(evaluation: Path, tmp_path: Path):
+    assert run(["view", str(evaluation), "--port", "0", "--ticks", "2"]) == 0
+    assert run(["view", str(evaluation), "--out", str(tmp_path / "one.html"), "--seconds", "0.2"]) == 0
+
+
+def test_an_evaluation_without_states_is_one_line_whose_remedy_works(tmp_path: Path):
+    loop = tmp_path / "evaluation"
+    loop.mkdir()
+    (loop / "contract.json").write_text("{}")
+    (loop / "episodes.parquet").write_bytes(b"")
+    with pytest.raises(BadInput, match=r"evaluation with the robot's states.*evaluate POLICY MOTIONS --states FOLDER"):
+        run(["view", str(loop)])
+    made = tmp_path / "tried"
+    assert run(["evaluate", "shipped", "embedded", "--limit", "1", "--states", str(made)]) == 0
+    assert run(["view", str(made), "--port", "0", "--ticks", "1"]) == 0
+    with pytest.raises(BadInput, match="a new name"):
+        run(["evaluate", "shipped", "embedded", "--limit", "1", "--states", str(made)])
+
+
+def test_a_damaged_evaluation_is_one_line(evaluation: Path, tmp_path: Path):
+    (tmp_path / "trials.csv").write_bytes((evaluation / "trials.csv").read_bytes().replace(b"end,", b"enx,"))
+    (tmp_path / "states.parquet").write_bytes((evaluation / "states.parquet").read_bytes()[:-9])
+    with pytest.raises(BadInput, match=r"expected trials\.csv and states\.parquet of an evaluation"):
+        run(["view", str(tmp_path)])

@@ -4,6 +4,8 @@ from bumblebee.diagnosis.report.document import Findings, document
 from bumblebee.diagnosis.report.effect_entries import effect_entries, law_notes, loss_entries
 from bumblebee.diagnosis.report.example_windows import examples
 from bumblebee.diagnosis.report.html import (
+    NO_INLAY,
+    Inlay,
     error_rows,
     figure,
     html_page,
@@ -29,8 +31,10 @@ from bumblebee.diagnosis.report.terminal import gap_summary, plot, summary
 
 __all__ = [
     "ALONE",
+    "NO_INLAY",
     "Findings",
     "HorizonWindows",
+    "Inlay",
     "cloud_picture",
     "document",
     "effect_entries",

@@ -1,6 +1,7 @@
 """Building blocks of the two reports: the page, tables and numbers with intervals; all text from files is escaped."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import Any
 
@@ -30,12 +31,25 @@ details{margin:.6rem 0}summary{cursor:pointer;color:#6b7385}.good{color:#1b8a6b}
 .values{min-width:13rem;display:inline-block}"""
 
 
-def html_page(title: str, parts: Sequence[str]) -> str:
-    """A whole page; it loads nothing from anywhere."""
+@dataclass(frozen=True)
+class Inlay:
+    """HTML that another room makes for a page, with its own style and script."""
+
+    html: str = ""
+    style: str = ""
+    script: str = ""
+
+
+NO_INLAY = Inlay()
+
+
+def html_page(title: str, parts: Sequence[str], inlay: Inlay = NO_INLAY) -> str:
+    """A whole page; it loads nothing from anywhere, and runs the inlay's script alone."""
     view = "<meta name='viewport' content='width=device-width,initial-scale=1'>"
-    head = f"<meta charset='utf-8'>{policy_tag()}{view}<title>{escape(title)}</title>"
-    body = "\n".join(part for part in parts if part)
-    return f"<!doctype html><html lang='en'><head>{head}<style>{_STYLE}</style></head><body>\n{body}\n</body></html>\n"
+    head = f"<meta charset='utf-8'>{policy_tag(inlay.script)}{view}<title>{escape(title)}</title>"
+    style, body = _STYLE + inlay.style, "\n".join(part for part in parts if part)
+    body += f"<script>{inlay.script}</script>" if inlay.script else ""
+    return f"<!doctype html><html lang='en'><head>{head}<style>{style}</style></head><body>\n{body}\n</body></html>\n"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:

@@ -6,7 +6,18 @@ from typing import Any
 
 from bumblebee.diagnosis.candidates import short_term
 from bumblebee.diagnosis.report.headline import effect_groups, experiments, headline
-from bumblebee.diagnosis.report.html import error_rows, figure, html_page, items, number, probability, table, warning
+from bumblebee.diagnosis.report.html import (
+    NO_INLAY,
+    Inlay,
+    error_rows,
+    figure,
+    html_page,
+    items,
+    number,
+    probability,
+    table,
+    warning,
+)
 from bumblebee.diagnosis.report.left_table import what_is_left_table
 from bumblebee.diagnosis.report.notes import unexplained_error, what_is_left, worse_horizons
 from bumblebee.diagnosis.report.svg import NAMES, curve_picture, line_picture
@@ -15,9 +26,12 @@ from bumblebee.diagnosis.thresholds.report import Listing, ReportThresholds, Ver
 
 
 def render_report(
-    document: dict[str, Any], examples: Sequence[dict[str, Any]], rules: ReportThresholds | None = None
+    document: dict[str, Any],
+    examples: Sequence[dict[str, Any]],
+    rules: ReportThresholds | None = None,
+    replays: Inlay = NO_INLAY,
 ) -> str:
-    """HTML of the document and of windows to look at."""
+    """HTML of the document and of windows to look at, with 3D replays of some under their curves."""
     held, rules = bool(document["holdout"]), rules or ReportThresholds()
     bad = worse_horizons(document["error"], rules.verdicts)
     parts = [
@@ -26,6 +40,7 @@ def render_report(
         *[warning(text) for text in [*document.get("warnings", []), *bad]],
         *[warning(f"{a['rollout']} was set aside: {a['reason']}") for a in document.get("set_aside", [])],
         *_pictures(examples),
+        replays.html,
         what_is_left_table(document),
         "<h2>Effects</h2>",
         _effects(document, rules),
@@ -39,7 +54,7 @@ def render_report(
         "<h2>Notes</h2>",
         items(_notes(document)),
     ]
-    return html_page("Diagnosis", parts)
+    return html_page("Diagnosis", parts, replays)
 
 
 def _opening(document: dict[str, Any], rules: ReportThresholds) -> list[str]:
