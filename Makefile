@@ -28,7 +28,7 @@ else
 PIP_TORCH = --require-hashes -r requirements-torch.lock
 endif
 
-.PHONY: help setup demo smoke serve test test-all unit e2e lab-test figures fuzz kills format check type lock clean
+.PHONY: help setup demo smoke serve test test-all unit e2e lab-test figures fuzz kills format check docs type lock clean
 
 help:  ## these lines
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -90,8 +90,11 @@ format: setup  ## lay out the code
 	$(BIN)/ruff check --fix --select I .
 	$(BIN)/ruff format .
 
-check: setup  ## ruff's rules
+check: setup docs  ## ruff's rules, and the documentation site with all its links
 	$(BIN)/ruff check .
+
+docs: setup  ## the documentation site in site/; open site/index.html
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build -q --strict
 
 type: setup  ## mypy
 	$(BIN)/mypy
@@ -100,5 +103,5 @@ lock:  ## write requirements.lock and requirements-torch.lock from what is insta
 	$(BIN)/python -m tests.lock
 
 clean:  ## remove caches, workspaces and servers' data; keeps .venv, data/ and models/
-	rm -rf runs .servers .scratch .hypothesis kills.jsonl .pytest_cache .ruff_cache .mypy_cache build *.egg-info
+	rm -rf runs site .servers .scratch .hypothesis kills.jsonl .pytest_cache .ruff_cache .mypy_cache build *.egg-info
 	find bumblebee tasks flows tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -22,8 +22,9 @@ from bumblebee.baselines.trial import Manner, follow
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.evaluation.intervals import Estimate, mean_by_motion, wilson
 from bumblebee.learning.config import PpoConfig
+from bumblebee.learning.learner import CURVE
 from bumblebee.learning.policy import load_policy
-from bumblebee.learning.ppo import CURVE, Trainer
+from bumblebee.learning.ppo import Trainer
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import make_library
 from bumblebee.motion.filter import filter_clips

@@ -4,7 +4,8 @@
     python -m benchmarks.world_model --motions motions.npz --minutes 6 --out results/world_model
 
 The task, the motions and the trial are those of `python -m benchmarks.baselines --method ours`, beside which it is run.
-A run goes on from `resume.pt` in its folder, with new episodes; `--call-minutes` ends a call early.
+A run goes on from the checkpoint in its folder, exactly where it was; `--call-minutes` ends a call early. What the
+model gets wrong in held-out worlds is printed at the end, and is in `model_error.csv` by iteration.
 `--set learner.horizon=32 env.threshold_end=0.4` changes single settings.
 """
 
@@ -15,14 +16,12 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.baselines.__main__ import RESUME, SETTINGS, Clock, _tell, main, make_env, training_clips
+from benchmarks.baselines.__main__ import SETTINGS, Clock, _tell, main, make_env, training_clips
 from benchmarks.baselines.methods import RANDOMISATIONS, changed, method
 from benchmarks.baselines.trial import Tried, report
 from benchmarks.motion_pack import read_pack
 from bumblebee.baselines.trial import Manner
-from bumblebee.files import save_tensors
-from bumblebee.learning.checkpoint import load_checkpoint
-from bumblebee.learning.ppo import CURVE
+from bumblebee.learning.learner import CURVE
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.trainer import WorldModelTrainer
 from bumblebee.tracking.config import EnvConfig
@@ -70,8 +69,7 @@ def run(options: argparse.Namespace) -> int:
     made = make_env(replace(method("ours"), env=settings.env), training_clips(rows), options.seed, 1.0)
     config = replace(settings.learner, iterations=_ENDLESS, checkpoint_every=_ENDLESS)
     trainer = WorldModelTrainer(made, config, options.out, options.seed, options.parent)
-    if (options.out / RESUME).exists():
-        trainer.load_state_dict(load_checkpoint(options.out / RESUME))
+    if trainer.iteration:
         print(f"goes on after {trainer.iteration} iterations, {trainer._seconds / 60:.1f} min", flush=True)
 
     marks: list[tuple[int, float]] = []
@@ -86,13 +84,18 @@ def run(options: argparse.Namespace) -> int:
         if clock.due("tell", _TELL_EVERY):
             _tell(options.out / CURVE)
         if clock.due("save", _SAVE_EVERY):
-            save_tensors(options.out / RESUME, trainer.state_dict())
+            trainer.save_checkpoint()
         return trainer._seconds >= 60 * options.minutes or clock.over
 
     trainer.train("world model", enough)
-    save_tensors(options.out / RESUME, trainer.state_dict())
+    trainer.save_checkpoint()
     trainer.policy().save(options.out)
     print(f"trained {trainer.frames / 1e6:.1f} M steps in {trainer._seconds / 60:.1f} min", flush=True)
+    errors = trainer.accuracy().by_horizon
+    print(
+        "model, RMS in held-out worlds: " + ", ".join(f"{name} {value:.1f}" for name, value in errors.items()),
+        flush=True,
+    )
     if options.jobs and (trainer._seconds >= 60 * options.minutes or not clock.over):
         report(
             [Tried("world_model", options.out, Manner(settings.env.observation))],

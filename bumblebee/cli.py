@@ -1,28 +1,26 @@
-"""Command line: `bumblebee import`, `gap`, `diagnose`, `replay`, `plan`, `compensate`, `motions`, and plug-ins.
+"""Entry point of `bumblebee`, and its commands `import`, `gap`, `diagnose`, `replay`, `compensate`.
 
-Status 0: done, 2: unusable input or output, 1: an error that should not happen; one line on standard error each.
+Status 0: done, 2: unusable input or output, 1: an internal error; one line on standard error each.
 """
 
 import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from bumblebee import __version__, cli_motions, cli_plan
+from bumblebee import __version__
+from bumblebee.commands import COMMANDS, Commands, missing
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput, plain
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 
-app = typer.Typer(help="Close the loop with measured data.", add_completion=False, pretty_exceptions_enable=False)
-app.add_typer(cli_motions.app, name="motions")
-app.command()(cli_plan.plan)
-for _plugin in sorted(entry_points(group="bumblebee.commands")):
-    with suppress(ImportError):  # what it needs is not installed
-        app.add_typer(_plugin.load(), name=_plugin.name)
+_EPILOG = "`bumblebee COMMAND --help` explains a command; docs/commands.md has an example of each."
+# Plain text for the list of commands: importing `rich` would take longer than all the rest of it.
+app = typer.Typer(
+    cls=Commands, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, epilog=_EPILOG
+)
 _UNUSABLE = typer.BadParameter.__bases__[0]  # the library's UsageError, which it does not export
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
@@ -37,17 +35,14 @@ def _version(wanted: bool) -> None:
 
 
 @app.callback()
-def quiet(
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Say it, end.")] = False,
+def root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
 ) -> None:
-    """Close the loop with measured data."""
-    import mujoco
-
-    # Some of what is tried diverges and is judged so: MuJoCo says no line of it, and writes no MUJOCO_LOG.TXT.
-    mujoco.set_mju_user_warning(lambda text: None)
+    """From motion capture to a humanoid's policy, and from the robot's logs back to the simulator."""
 
 
-@app.command()
 def diagnose(
     model: Model,
     dataset: Data,
@@ -70,7 +65,9 @@ def diagnose(
     from bumblebee.diagnosis.places import DIAGNOSIS, claim_folder, inputs_of
     from bumblebee.diagnosis.quick import QuickConfig, first_look, told
     from bumblebee.diagnosis.report import examples, plot, summary
+    from bumblebee.sim.quiet import quiet_mujoco
 
+    quiet_mujoco()
     held_out = read_held_out(held) if held else None
     if quick:
         if out is not None:
@@ -92,7 +89,6 @@ def diagnose(
     print(f"written: {out / 'diagnosis.json'}, model.xml, effects.yaml, report.html")
 
 
-@app.command()
 def replay(
     model: Model,
     dataset: Data,
@@ -106,14 +102,15 @@ def replay(
     from bumblebee.diagnosis.places import claim_file, inputs_of
     from bumblebee.diagnosis.replay import replay
     from bumblebee.sim.effects import read_effects
+    from bumblebee.sim.quiet import quiet_mujoco
 
+    quiet_mujoco()
     claim_file(out, overwrite, inputs_of(model, dataset, effects))
     chosen = read_effects(effects) if effects else []
     write_errors(replay(open_session(model, dataset), chosen), out, overwrite)
     print(f"written: {out}")
 
 
-@app.command()
 def gap(
     model: Model,
     dataset: Data,
@@ -126,7 +123,9 @@ def gap(
     from bumblebee.diagnosis.output import write_gap
     from bumblebee.diagnosis.places import GAP, claim_folder, inputs_of
     from bumblebee.diagnosis.report import gap_summary
+    from bumblebee.sim.quiet import quiet_mujoco
 
+    quiet_mujoco()
     if out:
         claim_folder(out, GAP, overwrite, inputs_of(model, dataset))
     report = compare(open_session(model, dataset))
@@ -136,7 +135,6 @@ def gap(
         print(f"written: {out / 'gap.html'}, gap.json")
 
 
-@app.command(name="import")
 def import_(
     source: Annotated[Path, typer.Argument(metavar="SOURCE", help="Folder, zip archive or file of logs.")],
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="New folder for rollouts/*.parquet.")],
@@ -166,7 +164,6 @@ def import_(
     print("\n".join(notes_of(dataset)))
 
 
-@app.command()
 def compensate(
     effects: Annotated[Path, typer.Argument(metavar="EFFECTS.yaml", help="What the diagnosis found.")],
     out: Annotated[Path, typer.Option("--out", help="File for the compensation, JSON.")],
@@ -209,10 +206,15 @@ def run(arguments: list[str]) -> int:
     """Run one command; what is wrong in its options is said in one line."""
     command = typer.main.get_command(app)
     try:
-        with command.make_context("bumblebee", list(arguments)) as context:
+        with command.make_context("bumblebee", list(arguments) or ["--help"]) as context:
             command.invoke(context)
     except typer.Exit as end:
         return end.exit_code
+    except ModuleNotFoundError as error:
+        name = next((word for word in arguments if word in COMMANDS), "")
+        if name and (error.name or "").split(".")[0] not in ("bumblebee", "tasks", "flows"):
+            raise missing(error, name) from None
+        raise
     except typer.Abort:
         return EXIT_INTERRUPTED
     except _UNUSABLE as error:

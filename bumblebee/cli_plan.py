@@ -46,7 +46,9 @@ def plan(
     from bumblebee.diagnosis.places import inputs_of, model_files
     from bumblebee.diagnosis.plan import PlanConfig, claim_plan, make_plan, read_findings, summary, write_plan
     from bumblebee.measured.model_file import load_spec
+    from bumblebee.sim.quiet import quiet_mujoco
 
+    quiet_mujoco()
     inputs = model_files(model) if dataset is None else inputs_of(model, dataset)
     claim_plan(out, overwrite, [*inputs, *([diagnosis] if diagnosis else [])])
     if (dataset is None) != (diagnosis is None):

@@ -1,6 +1,6 @@
 """`bumblebee gate list|show|approve|reject|more`: the gates of a workspace from any terminal, under one's own login.
 
-The library's command line finds it as a plug-in (entry point `bumblebee.commands`), since it knows nothing of flows.
+`bumblebee/commands.py` names it as text, since the library imports nothing of flows.
 """
 
 import re
@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 HELP = "Answer what the loop asks people: may it learn from a round's logs, may a version become champion?"
-app = typer.Typer(help=HELP, no_args_is_help=True)
+app = typer.Typer(help=HELP, no_args_is_help=True, add_completion=False)
 
 Workspace = Annotated[Path, typer.Option("--workspace", help="Folder with params.yaml; by default this one.")]
 What = Annotated[str, typer.Argument(help="The number of a round, or a model's name for its promotion.")]

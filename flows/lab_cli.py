@@ -1,6 +1,6 @@
 """`bumblebee lab user add|remove|list`: the people who may use this workspace's servers from elsewhere.
 
-A plug-in of the library's command line (entry point `bumblebee.commands`); `python -m flows.lab_cli` is the same.
+`bumblebee/commands.py` names it as text; `python -m flows.lab_cli` is the same.
 """
 
 from pathlib import Path

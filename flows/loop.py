@@ -27,6 +27,7 @@ from flows.environment import SERVERS, environment, without_login
 from flows.owned import require_own
 from flows.runs import recorded
 from flows.stages import Stage, changed_stages, downstream, read_stages, to_run
+from tasks import params
 from tasks.lab import on_cluster
 
 ON_CLUSTER = 32  # stages that may wait for a machine at once; each is a process here
@@ -97,7 +98,20 @@ def is_chatter(line: str) -> bool:
     return line.startswith(chatter) or line.rstrip().endswith(pushed) or any(words in line for words in advice)
 
 
-@flow(name="loop", log_prints=False, persist_result=False, validate_parameters=False)
+def run_name() -> str:
+    """`demo, seed 4, round 1`: the workspace, the stand-in robot's seed, the last round; no more than is known."""
+    folder = Path(os.environ.get("BUMBLEBEE_WORKSPACE", ".")).resolve()
+    name = folder.name if folder.parent.name == "runs" else "demo"
+    try:
+        content = params.read(folder / params.FILE)
+    except BadInput:
+        return name  # the run itself says what is wrong
+    seal, last = content.get("seal"), content.get("final_round")
+    seed = seal.get("seed") if isinstance(seal, dict) and not (content.get("rollouts") or {}).get("source") else None
+    return name + (f", seed {seed}" if seed is not None else "") + (f", round {last}" if last else "")
+
+
+@flow(name="loop", flow_run_name=run_name, log_prints=False, persist_result=False, validate_parameters=False)
 def loop(workspace: str = "") -> State[Any]:
     """Walk the stages; ends completed, failed, or named WaitingForAnswer where a gate has no answer yet.
 

@@ -238,13 +238,13 @@ def headline(summary: dict) -> dict[str, float]:
 
 def tell(summary: dict) -> None:
     """The same as a table on the terminal."""
-    print(f"{'policy':<18}{'engine':<10}{'success [95 %]':<24}{'MPJPE rad':>10}{'MPKPE mm':>10}")
+    print(f"{'policy':<28}{'engine':<10}{'success [95 %]':<24}{'MPJPE rad':>10}{'MPKPE mm':>10}")
     for r in summary["results"]:
         if r["split"] == r["group"] == "all":
             low, high = r["success"]["ci95"]
             rate = f"{r['success']['value']:.0%} [{low:.0%}, {high:.0%}] of {r['n']}"
             print(
-                f"{r['policy']:<18}{r['engine']:<10}{rate:<24}{r['mpjpe_rad']['value']:>10.3f}{r['mpkpe_mm']['value']:>10.0f}"
+                f"{r['policy']:<28}{r['engine']:<10}{rate:<24}{r['mpjpe_rad']['value']:>10.3f}{r['mpkpe_mm']['value']:>10.0f}"
             )
 
 

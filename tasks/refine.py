@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bumblebee.learning.delta import action_adapter, load_delta
-from bumblebee.learning.ppo import CURVE
+from bumblebee.learning.learner import CURVE
 from bumblebee.learning.trial import World
 from bumblebee.sim.effects import read_effects, runtime_hooks
 from bumblebee.sim.sensors import load_model

@@ -12,17 +12,16 @@ import pandas as pd
 from bumblebee.evaluation.summary import comparisons
 from bumblebee.learning.pretrained import NAMES
 from bumblebee.motion.store import read_index
-from bumblebee.ranges import Line, Name, Ranged, Seed
+from bumblebee.ranges import Line, Ranged, Seed
 from bumblebee.report.clusters_section import clusters_section
 from bumblebee.report.data_sections import motions_section
 from bumblebee.report.loop_picture import Box, loop_picture
 from bumblebee.report.names import reference, same_files
-from bumblebee.report.opening import opening, opening_lines
+from bumblebee.report.opening import headline, opening, opening_lines
 from bumblebee.report.page import render
 from bumblebee.report.policy_sections import registry_section, success_section, training_section
 from bumblebee.report.results import LoopResults, RoundResults
 from bumblebee.report.round_sections import round_section
-from bumblebee.report.verdict import verdict
 from bumblebee.report.wording import plural
 from tasks import paths
 from tasks.film import film_blocks
@@ -36,8 +35,8 @@ from tasks.stage import load, log_run, output_file, run_stage
 class ReportConfig(Ranged):
     """What the page shows beside the numbers."""
 
-    title: Name = "BumbleBee: from motions to a registered generalist"
-    """The page's heading."""
+    title: Line = ""
+    """The page's heading; empty: what the loop found."""
     film: bool = True
     """Run a motion that the round won back on the stand-in robot, before and after, and show both."""
     film_motion: Line = ""
@@ -55,8 +54,10 @@ def main() -> None:
     sections += [success_section(results), registry_section(results)]
     film = film_blocks(results, config.film_motion, config.seed) if config.film and not results.real_robot else []
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    subtitle = f"{when} · code {git_sha()[:12]} · evaluation contract {results.evaluation['contract_sha256'][:12]}"
-    page = render(config.title, subtitle, verdict(results), picture(results), sections, opening(results, film))
+    subtitle = (
+        f"BumbleBee · {when} · code {git_sha()[:12]} · evaluation contract {results.evaluation['contract_sha256'][:12]}"
+    )
+    page = render(config.title or headline(results), subtitle, picture(results), sections, opening(results, film))
     with output_file(paths.REPORT) as file:
         file.write_text(page)
     print(f"report: {paths.REPORT} ({paths.REPORT.stat().st_size / 1e6:.1f} MB)")

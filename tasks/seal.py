@@ -102,21 +102,21 @@ def main() -> None:
     """Draw until the robot is worth it, and seal."""
     config = load("seal", SealConfig)
     rehearsed = load("rollouts", RolloutsConfig).source is None
-    sealed = found(config) if config.n_effects and rehearsed else sealed_robot(config, 0)
+    sealed = found(config, trial_clips(config)) if config.n_effects and rehearsed else sealed_robot(config, 0)
     with output_file(paths.SEALED_ROBOT) as path:
         path.write_text(json.dumps(sealed, indent=1) + "\n")
     print(f"sealed {len(sealed['effects'])} effects, sha256 {sealed['sha256'][:12]}")
     log_run("seal", params=config, metrics=sealed.get("trial", {}), tags={"sealed": sealed["sha256"]})
 
 
-def found(config: SealConfig) -> dict[str, Any]:
+def found(config: SealConfig, motions: Sequence[Clip]) -> dict[str, Any]:
     """The first robot drawn on which the shipped policy loses enough, and stands long enough to be measured.
 
     Where there is none among the draws, the one on which it loses most: a line says so, and the loop goes on.
     """
     with tempfile.TemporaryDirectory() as scratch:
         policy = export_shipped(Path(scratch) / "shipped")
-        clips = followed(policy, trial_clips(config), config.trial_seed, config.threads)
+        clips = followed(policy, motions, config.trial_seed, config.threads)
         if not clips:
             print("the shipped policy follows none of the trial's motions on the declared model: nothing to lose")
             return sealed_robot(config, 0)

@@ -14,13 +14,16 @@ from bumblebee.errors import BadInput
 from bumblebee.learning import pretrained
 from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.export import export_policy
+from bumblebee.learning.learner import CURVE, Learner
+from bumblebee.learning.learners import Name as LearnerName
+from bumblebee.learning.learners import make_learner
 from bumblebee.learning.policy import Policy, load_policy
-from bumblebee.learning.ppo import CURVE, Trainer
 from bumblebee.learning.ranks import Ranks, check_gpus, join, launch, leave, this_command
 from bumblebee.learning.trial import Trials, World, success_by_family, try_policy
+from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.store import read_library
-from bumblebee.ranges import Few, Ranged, Seed
+from bumblebee.ranges import Few, Ranged, Seed, Unfit
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import EnvConfig
 from bumblebee.tracking.env import TrackingEnv
@@ -41,21 +44,29 @@ class TrainingConfig(Ranged):
     """Of the network, the draws of clips and frames, and the differences between the worlds."""
     env: EnvConfig = field(default_factory=EnvConfig)
     """The task."""
+    learner: LearnerName = "ppo"
+    """Learner: `ppo`, or `world_model`, through a model of the robot; each has the section of its name."""
     ppo: PpoConfig = field(default_factory=PpoConfig)
-    """The algorithm."""
+    """PPO, where it trains."""
+    world_model: WorldModelConfig = field(default_factory=WorldModelConfig)
+    """The learner through a model of the robot, where it trains."""
     trials: Trials = field(default_factory=Trials)
     """How the policy is tried before and after."""
     gpus: Few = 1
     """GPUs of this machine that train together, each with `env.num_worlds` worlds; for the engine `mujoco_warp`."""
 
     def __post_init__(self) -> None:
-        """Refuse batches that are smaller than their parts, and several GPUs for an engine that has no use for them."""
+        """Refuse a task that the learner cannot take, and several GPUs for an engine that has no use for them."""
         super().__post_init__()
-        batch, least = self.env.num_worlds * self.ppo.steps, max(self.ppo.mini_batches, 2)
-        parts = f"at least {least} control steps an update (env.num_worlds times ppo.steps, here {batch})"
-        self.require(batch >= least, "ppo", parts)
+        for name, expected, came in self.algorithm.misfits(self.env):
+            raise Unfit(type(self), name, expected, came)
         engine = self.env.engine
         self.require(self.gpus == 1 or engine == "mujoco_warp", "gpus", "1, or the engine `mujoco_warp`")
+
+    @property
+    def algorithm(self) -> PpoConfig | WorldModelConfig:
+        """The settings of the learner that trains."""
+        return self.ppo if self.learner == "ppo" else self.world_model
 
 
 @dataclass(frozen=True)
@@ -138,8 +149,9 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     engine = make_engine(own.engine, model, own.num_worlds, own.threads, world.hooks, buffers, ranks.device)
     library = MotionLibrary(job.clips, own.ahead, device=engine.device)
     env = TrackingEnv(library, engine, own, ranks.seed(config.seed), world.action_adapter, job.share)
-    trainer = Trainer(env, config.ppo, folder, config.seed, job.parent, ranks)
-    config = replace(config, ppo=trainer.config)  # a child has its parent's layers: card and run say which
+    trainer = make_learner(config.algorithm, env, folder, config.seed, job.parent, ranks)
+    # A child has its parent's layers: card and run say which.
+    config = replace(config, **{config.learner: trainer.config})
     if not ranks.first:
         trainer.train(job.name)
         leave()
@@ -147,7 +159,7 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     if trainer.iteration == 0:
         _try(trainer.policy(), job, config).to_parquet(folder / BEFORE)
     else:
-        print(f"{job.name}: goes on after iteration {trainer.iteration} of {config.ppo.iterations}", flush=True)
+        print(f"{job.name}: goes on after iteration {trainer.iteration} of {config.algorithm.iterations}", flush=True)
     before = pd.read_parquet(folder / BEFORE)
     trainer.train(job.name)
     leave()
@@ -198,22 +210,23 @@ def _score(trials: pd.DataFrame) -> tuple[float, float]:
 
 
 def _card(
-    job: Job, config: TrainingConfig, trainer: Trainer, before: pd.DataFrame, after: pd.DataFrame
+    job: Job, config: TrainingConfig, trainer: Learner, before: pd.DataFrame, after: pd.DataFrame
 ) -> dict[str, Any]:
-    curve = pd.read_csv(trainer.folder / CURVE)
+    curve, unused = pd.read_csv(trainer.folder / CURVE), {"ppo", "world_model"} - {config.learner}
     return {
         "schema": 1,
         "stage": job.stage,
         "cluster": job.cluster,
         "round": job.round,
         "parent": _named(job.parent) if job.parent else None,
+        "learner": config.learner,
         "iterations": trainer.iteration,
         "frames": trainer.frames,
         "unstable_worlds": int(curve["unstable"].sum()),
         "training_clips": [clip.name for clip in job.clips],
         "rollouts_a_clip": config.trials.repeats,
         "trained": {"success": success_by_family(after), "gained": _new(after, before), "lost": _new(before, after)},
-        "config": asdict(config),
+        "config": {name: value for name, value in asdict(config).items() if name not in unused},
     }
 
 

@@ -160,7 +160,7 @@ mujoco.mj_step(m, d)"""
 @pytest.mark.parametrize("quiet", [True, False])
 def test_a_simulation_that_diverges_leaves_no_log_where_the_user_is(tmp_path: Path, quiet: bool) -> None:
     """Some of what a diagnosis tries diverges; MuJoCo alone would write MUJOCO_LOG.TXT into the working folder."""
-    first = "import mujoco\n" + ("from bumblebee.cli import quiet\nquiet()\n" if quiet else "")
+    first = "import mujoco\n" + ("from bumblebee.sim.quiet import quiet_mujoco\nquiet_mujoco()\n" if quiet else "")
     environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
     subprocess.run([sys.executable, "-c", first + DIVERGE], cwd=tmp_path, check=True, env=environment)
     assert (tmp_path / "MUJOCO_LOG.TXT").exists() != quiet
@@ -343,7 +343,6 @@ def test_a_diagnosis_that_is_stopped_leaves_no_half_folder(
         ("diagnose", "m"),
         ("replay", "m", "d", "--out"),
         ("nonsense",),
-        (),
     ],
 )
 def test_unusable_options_are_one_line_and_status_two(

@@ -110,6 +110,7 @@ NO_RESULT_OF = {
         for path in (
             "bumblebee/tracking/",
             "bumblebee/motion/",
+            "bumblebee/learning/learner.py",
             "bumblebee/learning/policy.py",
             "bumblebee/learning/ranks.py",
         )

@@ -31,8 +31,9 @@ from bumblebee.baselines.library import MovingLibrary
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.files import save_tensors
 from bumblebee.learning.distill import DistillConfig, distill
+from bumblebee.learning.learner import CURVE
 from bumblebee.learning.policy import Policy, load_policy
-from bumblebee.learning.ppo import CURVE, Trainer
+from bumblebee.learning.ppo import Trainer
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.pieces import motion_of
 from bumblebee.sim.engine_choice import make_engine

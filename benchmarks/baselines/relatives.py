@@ -64,7 +64,10 @@ def try_relatives(folder: Path, motions: Path, kind: str, robots: str = "none") 
 
 
 def table_of(trials: pd.DataFrame) -> str:
-    """Markdown: success with 95 % intervals over motions, a row for each policy, a column for each kind and split."""
+    """Markdown: success by key bodies and by the pelvis rule, with 95 % intervals over motions.
+
+    A row for each policy, a column for each kind and split.
+    """
     kinds = [(kind, split) for kind in dict.fromkeys(trials["kind"]) for split in ("train", "test")]
     lines = ["| policy | " + " | ".join(f"{kind}, {split}" for kind, split in kinds) + " |"]
     lines.append("|" + "---|" * (len(kinds) + 1))
@@ -80,8 +83,10 @@ def table_of(trials: pd.DataFrame) -> str:
 def _cell(rows: pd.DataFrame) -> str:
     if rows.empty:
         return "-"
-    done = rows["success"].to_numpy(dtype=bool)
-    return f"{int(done.sum())} of {len(done)}, {rate(success_rate(done, rows['name'].to_numpy()).as_dict())}"
+    names = rows["name"].to_numpy()
+    both = (rows[rule].to_numpy(dtype=bool) for rule in ("success", "success_upright"))
+    key, pelvis = (f"{int(done.sum())} of {len(done)}, {rate(success_rate(done, names).as_dict())}" for done in both)
+    return f"{key}; pelvis rule {pelvis}"
 
 
 def main() -> None:

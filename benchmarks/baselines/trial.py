@@ -25,6 +25,7 @@ from bumblebee.sim.sensors import load_model
 PHYSICS_HZ = 200.0
 REAL = "real"
 TRIALS, RESULTS, TABLE = "trials.csv", "results.json", "table.md"
+RATES = {"success": "success", "success_local": "success, own place", "success_upright": "pelvis rule"}
 METRICS = {"mpjpe_rad": "MPJPE [rad]", "mpkpe_mm": "MPKPE [mm]", "mpkpe_local_mm": "MPKPE, own place [mm]"}
 
 
@@ -77,7 +78,7 @@ def summary(trials: pd.DataFrame) -> list[dict]:
     for (policy, kind, group, split), rows in pd.concat([trials, real]).groupby(keys, sort=True):
         motions = rows["name"].str.replace(r"_p\d+$", "", regex=True).to_numpy()
         entry = {"policy": policy, "kind": kind, "group": group, "split": split, "n": len(rows)}
-        for name in ("success", "success_local"):
+        for name in RATES:
             entry[name] = success_rate(rows[name].to_numpy(dtype=bool), motions).as_dict()
         for name in METRICS:
             values = rows[name].to_numpy(dtype=float)
@@ -90,11 +91,11 @@ def summary(trials: pd.DataFrame) -> list[dict]:
 
 def table_of(results: Sequence[dict]) -> str:
     """The results as Markdown: rates and errors with 95 % intervals; errors until the loss, over all motions."""
-    head = ["policy", "motions", "split", "n", "success", "success, own place", *METRICS.values()]
+    head = ["policy", "motions", "split", "n", *RATES.values(), *METRICS.values()]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for entry in results:
         cells = [entry["policy"], f"{entry['group']}, {entry['kind']}", entry["split"], str(entry["n"])]
-        cells += [rate(entry[name]) for name in ("success", "success_local")]
+        cells += [rate(entry[name]) for name in RATES]
         cells += [_number(entry[name], 3 if name == "mpjpe_rad" else 0) for name in METRICS]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"

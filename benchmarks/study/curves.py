@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from benchmarks.study.jobs import Job
-from bumblebee.learning.ppo import CURVE
+from bumblebee.learning.learner import CURVE
 
 COLUMNS = {"success": "success of training episodes", "key_error": "key body error [m]"}
 _SMOOTH = 15  # iterations

@@ -9,7 +9,7 @@ from benchmarks.study.motions import Motions
 from benchmarks.study.settings import Study
 from benchmarks.study.tables import SPLITS, cell, estimate, head, line, rate, read_trials
 from benchmarks.study.trying import TRIALS
-from bumblebee.learning.ppo import CURVE
+from bumblebee.learning.learner import CURVE
 
 
 def paper_tables(out: Path, study: Study, motions: Motions) -> str:

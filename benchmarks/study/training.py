@@ -25,7 +25,8 @@ from benchmarks.study.settings import SMALL, Study, settings_of
 from benchmarks.study.steps import GOES_ON
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.learning.config import PpoConfig
-from bumblebee.learning.ppo import CHECKPOINT, Trainer
+from bumblebee.learning.learner import CHECKPOINT
+from bumblebee.learning.ppo import Trainer
 from bumblebee.motion.clip import Clip
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.env import TrackingEnv

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from bumblebee.tracking.needs import READINGS
 from bumblebee.tracking.terms import TERMS
 
 REFERENCE = "the reference at the end of the coming control step"
@@ -21,8 +22,10 @@ MEANINGS: dict[str, tuple[str, str, str]] = {
     "last_action": ("the previous output, zeros at the start", "1", "joints"),
     "key_pos_b": ("own key bodies from the pelvis", "m", "base"),
     "key_error_b": ("from own key bodies to the reference's", "m", "base"),
+    "posture_error": ("from own key bodies to the reference's, each from its pelvis", "m", "each its base"),
     "ref_rotation": ("orientation of the reference, two columns of its matrix", "1", "base"),
     "ref_lin_vel_b": ("velocity of the reference", "m/s", "base"),
+    "ref_lin_vel_o": ("velocity of the reference", "m/s", "reference's base"),
     "ref_ang_vel": ("angular velocity of the reference", "rad/s", "reference's base"),
     "ref_height": ("height of the reference above the floor", "m", "world"),
     "ref_joint_pos": ("servo targets that hold the reference against gravity", "rad", "joints"),
@@ -40,6 +43,7 @@ MEANINGS: dict[str, tuple[str, str, str]] = {
 }
 _AHEAD = {
     "root_pos_b": ("pelvis of the reference {seconds} s further on, from the pelvis", "m", "base"),
+    "root_pos_o": ("pelvis of the reference {seconds} s further on, from its own before", "m", "reference's base"),
     "rotation": ("its orientation {seconds} s further on, two columns of its matrix", "1", "base"),
     "joint_pos": ("its joint angles {seconds} s further on", "rad", "joints"),
 }
@@ -63,6 +67,15 @@ def observation_size(contract: dict[str, Any]) -> int:
     """Entries of the observation, of all control steps that the policy sees."""
     newest = sum(part["size"] for part in contract.get("observation_now", []))
     return int(contract.get("history", 1) * sum(part["size"] for part in contract["observation"]) + newest)
+
+
+def sensors_line(contract: dict[str, Any]) -> str:
+    """One line of Markdown: the readings that the policy takes, and those that it does without."""
+    taken = contract.get("sensors")
+    if taken is None:
+        return "Sensors: not said."
+    without = ", ".join(name for name in READINGS if name not in taken)
+    return f"Sensors: {', '.join(taken)}." + (f" Not needed: {without}." if without else "")
 
 
 def observation_table(contract: dict[str, Any]) -> Iterator[str]:

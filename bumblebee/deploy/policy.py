@@ -13,7 +13,8 @@ from bumblebee.io.read import read_bytes, read_json
 from bumblebee.robot.facts import ROBOT, joint_names, joints
 from bumblebee.robot.model import gains
 from bumblebee.tracking.config import ObservationConfig
-from bumblebee.tracking.terms import parts
+from bumblebee.tracking.needs import needed
+from bumblebee.tracking.terms import expanded, parts
 
 if TYPE_CHECKING:
     import onnxruntime
@@ -85,6 +86,11 @@ class ExportedPolicy:
         return ahead_frames(self.contract)
 
     @property
+    def sensors(self) -> tuple[str, ...]:
+        """Readings that it takes, names of `tracking.needs.READINGS`; no other has any effect on it."""
+        return _sensors(self.contract)
+
+    @property
     def memory(self) -> tuple[int, int] | None:
         """(M, E) of what it remembers of one robot; None for a policy without a memory."""
         return memory_shape(self.contract)
@@ -126,6 +132,9 @@ def read_policy_contract(path: Path) -> dict[str, Any]:
     seen = observed(contract)
     for key, terms in (("observation", seen.terms), ("observation_now", seen.now)):
         _check_parts(f"{path}: {key}", terms, contract, key)
+    if contract.get("sensors", list(_sensors(contract))) != list(_sensors(contract)):
+        expected, came = ", ".join(_sensors(contract)), str(contract["sensors"])[:80]
+        raise BadInput(f"{path}: sensors", f"{expected}, as its terms take", came, "Export it with this version.")
     if "ahead" in contract and len(contract["ahead"]) != ahead_frames(contract):
         came = str(len(contract["ahead"]))
         raise BadInput(f"{path}: ahead", f"{ahead_frames(contract)} times, as in the observation", came)
@@ -155,6 +164,11 @@ def observed(contract: dict[str, Any]) -> ObservationConfig:
     return ObservationConfig(terms, history, now)
 
 
+def _sensors(contract: dict[str, Any]) -> tuple[str, ...]:
+    seen = observed(contract)
+    return needed(expanded((*seen.terms, *seen.now)), len(contract["joints"]), ahead_frames(contract))
+
+
 def memory_shape(contract: dict[str, Any]) -> tuple[int, int] | None:
     """(M, E) of one robot's memory; None where the contract has none."""
     stated = contract.get("memory")
@@ -164,7 +178,7 @@ def memory_shape(contract: dict[str, Any]) -> tuple[int, int] | None:
 def ahead_frames(contract: dict[str, Any]) -> int:
     """Number of further reference frames that the contract's observation holds."""
     return sum(
-        str(part["name"]).startswith("ahead") and str(part["name"]).endswith("_root_pos_b")
+        str(part["name"]).startswith("ahead") and str(part["name"]).endswith("_joint_pos")
         for part in contract["observation"]
     )
 

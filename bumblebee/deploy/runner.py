@@ -5,6 +5,7 @@ joints where the simulator would know the bodies' places.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -35,6 +36,13 @@ def robot_state(sensors: Sensors) -> RobotState:
         joint_vel=_float(sensors.joint_vel),
         key_pos_w=_float(keys),
     )
+
+
+def _taken(sensors: Sensors, named: Sequence[str]) -> Sensors:
+    """The readings with zeros for those of odometry that are not among the `named` ones, which may be no numbers."""
+    known = np.array(["place" in named, "place" in named, "height" in named])
+    speed = sensors.base_lin_vel if "velocity" in named else np.zeros_like(sensors.base_lin_vel)
+    return replace(sensors, base_pos=np.where(known, sensors.base_pos, 0.0), base_lin_vel=speed)
 
 
 class PolicyRunner:
@@ -103,7 +111,7 @@ class PolicyRunner:
         Before its first step a robot saw the same; tick 0 is a clip's first step, whatever was before it.
         """
         rows, seen, started = torch.as_tensor(robots), self._seen, tick > 0
-        state, ref = robot_state(sensors), self._reference(robots, tick)
+        state, ref = robot_state(_taken(sensors, self.policy.sensors)), self._reference(robots, tick)
         terms, alone = (expanded(names) for names in (seen.terms, seen.now))
         last = self._last_action[rows] * started
         row = see(terms, state, ref, last)[:, None]

@@ -1,9 +1,12 @@
 """Settings of PPO, a section of params.yaml."""
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from bumblebee.ranges import Factor, Few, Positive, Range, Ranged, Rate, Share, Widths
+from bumblebee.tracking.config import EnvConfig
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,12 @@ class PpoConfig(Ranged):
         """Refuse bounds that run backwards."""
         super().__post_init__()
         self.require_order("learning_rate_range")
+
+    def misfits(self, task: EnvConfig) -> Iterator[tuple[str, str, object]]:
+        """Settings of a training that this learner cannot take: which, what was expected and what came."""
+        least = math.ceil(max(self.mini_batches, 2) / task.num_worlds)
+        if self.steps < least:
+            yield "ppo.steps", f"at least {least} for {self.mini_batches} mini-batches of all worlds' steps", self.steps
 
 
 PAPER = PpoConfig(

@@ -13,8 +13,9 @@ from bumblebee.learning.transformer import TransformerModel
 from bumblebee.robot.facts import ROBOT, joint_names, joints, stand_pose
 from bumblebee.robot.model import gains
 from bumblebee.tracking.config import ObservationConfig
+from bumblebee.tracking.needs import needed
 from bumblebee.tracking.observations import action_scale
-from bumblebee.tracking.terms import parts
+from bumblebee.tracking.terms import expanded, parts
 
 ONNX, CONTRACT = "policy.onnx", "contract.json"
 
@@ -62,8 +63,9 @@ def contract(
     """What a runner must know to feed the policy and to use its output.
 
     "observation" lists the parts of one control step; the input has "history" of them, the oldest first, and then the
-    parts "observation_now" of the newest step alone. A policy with a memory has "memory": zeros of that shape go in at
-    a clip's start, then what the step before gave out.
+    parts "observation_now" of the newest step alone. "sensors" names the readings that it takes
+    (`tracking.needs.READINGS`), and no other has any effect. A policy with a memory has "memory": zeros of that shape
+    go in at a clip's start, then what the step before gave out.
     """
     table, counts = [gains(joint) for joint in joints()], (len(joints()), len(ahead))
     looks_ahead = any(name.startswith("ahead") for name, _ in parts((*seen.terms, *seen.now), *counts))
@@ -82,6 +84,7 @@ def contract(
             "scale": [round(float(s), 6) for s in action_scale()],
             "feed_forward": "quasi-static",  # tracking/feed_forward.py, of the clip and the declared model
         },
+        "sensors": list(needed(expanded((*seen.terms, *seen.now)), *counts)),
         "terms": list(seen.terms),
         "history": seen.history,
         "now": list(seen.now),

@@ -1,13 +1,11 @@
-"""PPO of rsl_rl around the tracking environment: our loop, curve, curriculum and checkpoints (paper, section 3.2).
+"""PPO of rsl_rl as a learner in the tracking environment (paper, section 3.2).
 
-rsl_rl's own `learn` prints a screen an iteration and forgets the environment in its checkpoints; the steps between are
-its, unchanged, or its update is recorded (`update`).
+rsl_rl's own `learn` prints a screen an iteration and forgets the environment in its checkpoints, so the loop is
+`learner`'s; the steps between are rsl_rl's, unchanged, or its update is recorded (`update`).
 """
 
 import contextlib
 import io
-import time
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,17 +15,13 @@ import torch
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.bounded_ppo import BoundedPpo
-from bumblebee.learning.checkpoint import load_checkpoint, save_checkpoint
 from bumblebee.learning.config import PpoConfig
-from bumblebee.learning.curve import CurveWriter
-from bumblebee.learning.policy import Policy, load_policy, model_config, new_actor, shape_of
+from bumblebee.learning.learner import Learner, parent_policy
+from bumblebee.learning.policy import Policy, model_config, new_actor, shape_of
 from bumblebee.learning.ranks import Ranks
-from bumblebee.progress import progress
 from bumblebee.sim.warp_limits import within_memory
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.mirror import augmentation
-
-CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
 
 
 def runner_config(config: PpoConfig) -> dict[str, Any]:
@@ -60,8 +54,8 @@ def runner_config(config: PpoConfig) -> dict[str, Any]:
     }
 
 
-class Trainer:
-    """Trains one policy in `env`, and can be killed at any time.
+class Trainer(Learner):
+    """Trains one policy in `env` by PPO.
 
     Args:
         env: the task.
@@ -72,6 +66,8 @@ class Trainer:
         ranks: the processes that train this policy together, each with such a trainer around its own worlds.
     """
 
+    name = "ppo"
+
     def __init__(
         self,
         env: TrackingEnv,
@@ -81,10 +77,10 @@ class Trainer:
         parent: Path | None = None,
         ranks: Ranks | None = None,
     ) -> None:
-        origin = None if parent is None else load_policy(parent)
+        origin = None if parent is None else parent_policy(parent, env)
         if origin is not None:
             config = replace(config, hidden=origin.shape.hidden)
-        self.env, self.config, self.folder, self.ranks = env, config, Path(folder), ranks or Ranks()
+        super().__init__(env, config, folder, ranks)
         torch.manual_seed(seed)
         on_gpu = torch.device(env.device).type == "cuda"
         if config.captured is None:
@@ -100,56 +96,18 @@ class Trainer:
                 built = BoundedPpo.construct_algorithm(env.get_observations(), env, settings, env.device)
         assert isinstance(built, BoundedPpo)
         self.algorithm = built
-        self.iteration, self._seconds = 0, 0.0
         if origin is not None:
             self._start_from(origin, str(parent))
         if self.ranks.count > 1:
             self.algorithm.broadcast_parameters()
             torch.manual_seed(self.ranks.seed(seed))  # the networks are alike everywhere, the noise is not
+        self.algorithm.train_mode()
         self._resume()
 
     @property
     def frames(self) -> int:
         """Control steps seen so far, of all worlds of all ranks."""
-        return self.iteration * self._frames_an_iteration
-
-    @property
-    def _frames_an_iteration(self) -> int:
-        return self.config.steps * self.env.num_envs * self.ranks.count
-
-    def train(self, what: str = "policy", enough: Callable[[], bool] = lambda: False) -> None:
-        """Train up to the configured iterations, or until it is `enough`; a line of `curve.csv` each."""
-        config, per_iteration = self.config, self._frames_an_iteration
-        self.algorithm.train_mode()
-        with self._told(what) as tell:
-            while self.iteration < config.iterations and not self.ranks.decide(enough):
-                began = time.monotonic()
-                with within_memory(self.env.num_envs):
-                    scalars = self._iterate()
-                self._seconds += time.monotonic() - began
-                self.iteration += 1
-                tell({"frames": self.frames, "seconds": self._seconds, **scalars}, per_iteration)
-                if self.iteration % config.checkpoint_every == 0:
-                    self.save_checkpoint()
-
-    @contextlib.contextmanager
-    def _told(self, what: str) -> Iterator[Callable[[dict[str, float], int], None]]:
-        """What writes an iteration's row to the curve and counts its frames; on the first rank alone."""
-        if not self.ranks.first:
-            yield lambda row, frames: None
-            return
-        curve = CurveWriter(self.folder / CURVE, self.iteration)
-        total = self.config.iterations * self._frames_an_iteration
-        with progress(total, f"train {what}", "frames", start=self.frames) as bar:
-
-            def tell(row: dict[str, float], frames: int) -> None:
-                for name, value in row.items():
-                    curve.add_scalar(name, value, self.iteration)
-                curve.flush()
-                bar.update(frames, f"success {row['success']:.2f}, key error {row['key_error']:.3f} m")
-
-            yield tell
-        curve.stop()
+        return self.iteration * self.config.steps * self.env.num_envs * self.ranks.count
 
     def policy(self) -> Policy:
         """The policy as it is now; a copy."""
@@ -159,45 +117,29 @@ class Trainer:
         critic = {name: tensor.cpu().clone() for name, tensor in self.algorithm.critic.state_dict().items()}
         return Policy(actor, critic, shape)
 
-    def save_checkpoint(self) -> None:
-        """Write all that the next iteration depends on, of all ranks, whole or not at all; all ranks must call it."""
-        each = self.ranks.gather({"env": self.env.state_dict(), "random": _random_state()})
-        if each is None:
-            return
-        self.folder.mkdir(parents=True, exist_ok=True)
-        content = {
+    def state_dict(self) -> dict[str, Any]:
+        """Networks, optimiser and counts."""
+        return {
             "algorithm": self.algorithm.save(),
             "learning_rate": self.algorithm.learning_rate,
             "iteration": self.iteration,
             "seconds": self._seconds,
-            "ranks": each,
         }
-        save_checkpoint(self.folder / CHECKPOINT, content)
 
-    def _resume(self) -> None:
-        path = self.folder / CHECKPOINT
-        if not path.exists():
-            return
-        content = load_checkpoint(path)
-        self.algorithm.load(content["algorithm"], None, True)
-        self.algorithm.learning_rate = content["learning_rate"]
-        self.iteration, self._seconds = content["iteration"], content["seconds"]
-        each = content["ranks"]
-        if len(each) == self.ranks.count:
-            self.env.load_state_dict(each[self.ranks.rank]["env"])
-            _set_random_state(each[self.ranks.rank]["random"])
-        elif self.ranks.first:
-            print(f"{path}: of {len(each)} GPUs, goes on with {self.ranks.count} and new episodes", flush=True)
+    def load_state_dict(self, saved: dict[str, Any]) -> None:
+        """Go on from what `state_dict` gave."""
+        self.algorithm.load(saved["algorithm"], None, True)
+        self.algorithm.learning_rate = saved["learning_rate"]
+        self.iteration, self._seconds = saved["iteration"], saved["seconds"]
 
     def _start_from(self, parent: Policy, name: str) -> None:
-        here, there = shape_of(self.env, self.config.hidden), parent.shape
-        for field in ("ahead", "terms", "history", "now", "action", "observation", "critic_observation"):
-            wanted, came = getattr(here, field), getattr(there, field)
-            if wanted != came:
-                raise BadInput(f"{name}: {field}", f"{wanted} as in `env`", str(came), "Start from another policy.")
         if not parent.critic_state:
-            wanted = "a policy with its critic, as PPO leaves it"
-            raise BadInput(f"{name}: critic", wanted, "none", "Start from another policy.")
+            wanted, do = "a policy with its critic, as PPO leaves it", "Set `learner: world_model`, which needs none."
+            raise BadInput(f"{name}: critic", wanted, "none", do)
+        here, there = shape_of(self.env, self.config.hidden), parent.shape
+        if here.critic_observation != there.critic_observation:
+            wanted = f"{here.critic_observation} entries as in `env`"
+            raise BadInput(f"{name}: critic", wanted, str(there.critic_observation), "Start from another policy.")
         self.algorithm.actor.load_state_dict(parent.actor.state_dict())
         self.algorithm.critic.load_state_dict(parent.critic_state)
 
@@ -223,15 +165,3 @@ class Trainer:
         if not np.isfinite(scalars["loss_value"]):
             raise FloatingPointError(f"the critic's loss is no number at iteration {self.iteration}")
         return scalars
-
-
-def _random_state() -> dict[str, torch.Tensor]:
-    """The state of torch's own generators."""
-    state = {"cpu": torch.get_rng_state()}
-    return state | {"cuda": torch.cuda.get_rng_state()} if torch.cuda.is_available() else state
-
-
-def _set_random_state(state: dict[str, torch.Tensor]) -> None:
-    torch.set_rng_state(state["cpu"])
-    if "cuda" in state and torch.cuda.is_available():
-        torch.cuda.set_rng_state(state["cuda"])

@@ -63,6 +63,14 @@ class Ranks:
         self.add(packed)
         return dict(zip(values, (packed / self.count).tolist(), strict=True))
 
+    def moments(self, rows: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean and standard deviation (D,) float64 of the rows (B, D) of all ranks."""
+        rows = rows.double()
+        sums = torch.cat((rows.new_full((1,), len(rows)), rows.sum(0), rows.square().sum(0)))
+        self.add(sums)
+        mean, square = (sums[1:] / sums[0]).view(2, -1)
+        return mean, (square - mean.square()).clamp(min=0).sqrt()
+
     def decide(self, question: Callable[[], bool]) -> bool:
         """The first rank's answer, for all."""
         answer = [question() if self.first else False]

@@ -149,14 +149,14 @@ def clip_of(raw: RawMotion, fps: float | None, digest: str = "") -> tuple[Clip, 
 
 
 def clips_at(
-    path: Path, files: FileConfig, tell: Callable[[str], None]
+    path: Path, files: FileConfig, tell: Callable[[str], None], fps: float | None = None
 ) -> Iterator[tuple[Clip, list[tuple[str, str]]]]:
-    """The motions at `path` as clips at their own rates, under distinct names, each with its notes (place, note).
+    """The motions at `path` as clips at `fps` [Hz], or their own rates, under distinct names, with notes (place, note).
 
     `tell` gets a line for what gives none.
     """
     done = Converted()
-    for clip in _clips(path, ConvertConfig("asap", files=files), done, tell):
+    for clip in _clips(path, ConvertConfig("asap", fps, files), done, tell):
         yield clip, done.notes
         done.notes = []
 

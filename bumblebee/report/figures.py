@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 INK, QUIET, GRID = "#22262b", "#59626d", "#e3e7ec"
-PALETTE = ("#d9880f", "#2f6db5", "#3a8f5c", "#a4478f", "#7a6a52", "#c2423b", "#4aa3a8", "#85858f")
+PALETTE = ("#d9880f", "#2f6db5", "#3a8f5c", "#a4478f", "#7a6a52", "#c2423b", "#4aa3a8", "#85858f", "#8a6fd1")
 WIDTH = 3.35
 """Of a figure [inch]: 322 CSS pixels."""
 SMALLEST = 9.7
@@ -53,10 +53,11 @@ def canvas(height: float = 3.0, width: float = WIDTH) -> tuple[Figure, Axes]:
 
 
 def legend_below(figure: Figure, axis: Axes, columns: int = 2) -> None:
-    """A legend under the plot, for which the figure grows: the plot keeps its height."""
+    """A legend under the plot, for which the figure grows: the plot keeps its height. Names too long for it are cut."""
     handles, labels = axis.get_legend_handles_labels()
     if not handles:
         return
+    columns = columns if all(len(label) <= 40 // columns for label in labels) else 1
     rows = -(-len(handles) // columns)
     figure.set_figheight(figure.get_figheight() + 0.19 * rows + 0.1)
     figure.legend(handles, [short(label, 40 // columns) for label in labels], loc="outside lower left", ncols=columns,

@@ -30,7 +30,7 @@ for (const figure of document.querySelectorAll("figure.map")) {
     point.dot = draw("circle", {r: radius, "stroke-width": 1.6, "fill-opacity": held ? 0 : 0.75}, svg);
   }
   draw("g", {}, svg).append(ring);
-  for (const [key, value] of Object.entries({r: radius + 5, fill: "none", stroke: "#22262b", "stroke-width": 2.5}))
+  for (const [key, value] of Object.entries({r: radius + 5, fill: "none", stroke: "currentColor", "stroke-width": 2.5}))
     ring.setAttribute(key, value);
   svg.setAttribute("aria-hidden", "true");
   plot.append(svg);
@@ -87,13 +87,13 @@ for (const figure of document.querySelectorAll("figure.map")) {
         const [across, up] = [signs.indexOf(point.poses[at]) * step, signs.indexOf(point.poses[at + 1]) * step];
         xy.push([(pose * wide + across - 0.9 + wide / 2).toFixed(2), (high - 0.05 - up).toFixed(2)]);
       }
-      const shades = ["#22262b", "#2f6db5", "#b06d0a", "#2f6db5", "#b06d0a"];
+      const shades = ["currentColor", "#2f6db5", "#b06d0a", "#2f6db5", "#b06d0a"];
       bones.forEach((bone, i) => {
         const d = "M" + bone.map((joint) => xy[joint].join(" ")).join("L");
         draw("path", {d, fill: "none", stroke: shades[i], "stroke-width": 0.035, "stroke-linecap": "round", "stroke-linejoin": "round"}, made);
       });
       const [x, y] = xy[bones[0][bones[0].length - 1]];
-      draw("circle", {cx: x, cy: y, r: 0.07, fill: "#22262b"}, made);
+      draw("circle", {cx: x, cy: y, r: 0.07, fill: "currentColor"}, made);
     }
     say("div", `At ${seconds.join(", ")} s; its left in blue.`, about, "quiet");
   };

@@ -4,7 +4,9 @@ The floor is no bound: it is the error that a perfect model would show, drawn fr
 interval of its own, and a measured error may come out below it by chance, or because the sensors are better than said.
 """
 
-from bumblebee.report.residual_figure import value_and_interval
+from collections.abc import Sequence
+
+from bumblebee.report.residual_chart import value_and_interval
 from bumblebee.report.results import Json
 from bumblebee.report.wording import plural
 
@@ -33,29 +35,22 @@ def meaning(after: Json | None, floor: Json | None) -> str:
     return ""
 
 
-def summary(error: Json, measures: dict[str, tuple[str, float, str]]) -> tuple[str, list[str]]:
-    """How many errors of the corrected model lie below their floor, and a line for each one below its interval.
-
-    Args:
-        error: the diagnosis' error block.
-        measures: key -> (name, factor to the unit shown, unit).
-    """
-    count, under, lines = 0, 0, []
+def summary(error: Json, measures: Sequence[str]) -> str:
+    """One sentence on how many errors of the corrected model lie below their floor, and below its interval."""
+    count, under, below = 0, 0, 0
     for horizon, entries in error.get("after", {}).items():
-        for key, (name, factor, unit) in measures.items():
-            (value, _, _), floor = (
-                value_and_interval(entries.get(key)),
-                error.get("floor", {}).get(horizon, {}).get(key),
-            )
-            level, low, high = value_and_interval(floor)
+        for key in measures:
+            value, _, _ = value_and_interval(entries.get(key))
+            level, low, _ = value_and_interval(error.get("floor", {}).get(horizon, {}).get(key))
             count += value == value and level == level
             under += value < level
-            if value < low:
-                numbers = f"{factor * value:.3g} {unit} against {factor * level:.3g}"
-                interval = f"[{factor * low:.3g}, {factor * high:.3g}]"
-                lines.append(f"{name} after {horizon} s, {numbers} {interval}: {meaning(entries[key], floor)}")
+            below += value < low
     if not under:
-        return "", []
-    inside = f"{under - len(lines)} of them within its interval (no more than sensor noise explains)."
+        return ""
     lie = "lies" if under == 1 else "lie"
-    return f"Of the corrected model's {plural(count, 'error')}, {under} {lie} below the floor, {inside}", lines
+    told = f"Of the corrected model's {plural(count, 'error')}, {under} {lie} below the floor"
+    if not below:
+        return f"{told}, within its interval: no more than sensor noise explains."
+    return (
+        f"{told}, {below} of them below its interval: the sensors are less noisy than the estimate, or the windows few."
+    )

@@ -6,7 +6,8 @@ from bumblebee.report.compensation import compensation_line, planned
 from bumblebee.report.effect_words import found_size, named, outside, places, sealed_size
 from bumblebee.report.held_out import error_line
 from bumblebee.report.names import label, last_policy, pair, reference, same_files
-from bumblebee.report.page import Bar, Block, Cell, Section, Share, bars, bullets, heading, note, pairs, text
+from bumblebee.report.next_steps import next_steps, price
+from bumblebee.report.page import Bar, Block, Cell, Section, Share, bars, bullets, heading, note, pairs, text, warning
 from bumblebee.report.policy_sections import ENGINES, engines
 from bumblebee.report.results import Json, LoopResults, RoundResults
 from bumblebee.report.success_figure import pick
@@ -15,13 +16,17 @@ from bumblebee.report.truth import Match, hits, match
 from bumblebee.report.wording import percent, plural
 
 _BRACKETS = "Motions followed to the end. Square brackets: 95 % interval."
+_NOTHING = (
+    "Explains 0 %: the tests hold the effect for real, but on the held-out rollouts the others alone predict as well. "
+    "It may matter in other motions."
+)
 _ON_ROBOT, _ON_DECLARED = ("on the robot", "on the declared model")
 
 
 def opening(results: LoopResults, film: Sequence[Block] = ()) -> Section:
     """Everything above the fold; `film` is shown as it is, with its heading."""
-    blocks: list[Block] = [text(line) for line in _headlines(results)]
     turn = _last(results)
+    blocks: list[Block] = [warning(paid)] if turn is not None and (paid := price(results, turn)) else []
     if turn is not None:
         blocks += [
             heading("Undeclared, and found" if results.sealed is not None else "Found"),
@@ -29,8 +34,8 @@ def opening(results: LoopResults, film: Sequence[Block] = ()) -> Section:
         ]
         blocks += [heading("Success"), *_success(results, turn)]
     blocks += film
-    if turn is not None and (gains := _differences(results, turn)):
-        blocks += [heading("What each step gained, paired by motion"), bullets(gains)]
+    if todo := next_steps(results):
+        blocks += [heading("What still fails, and what to do next"), bullets(todo)]
     return Section("opening", "What this loop showed", tuple(blocks))
 
 
@@ -39,13 +44,14 @@ def opening_lines(results: LoopResults) -> list[str]:
     lines, turn = [headline(results)], _last(results)
     if turn is None:
         return lines
+    lines += [paid] if (paid := price(results, turn)) else []
     for *row, share in effect_rows(results, turn):
         lines.append(" -> ".join(row) + f" (explains {share})")
-    lines += [*_remarks(results, turn), error_line(turn)]
+    lines += [*_remarks(turn), error_line(turn)]
     for step in _steps(results, turn):
         told = [f"{percent(rate)} {where}" for rate, where in _rates(results, step) if rate is not None]
         lines.append(f"{step.called}: {', '.join(told)}")
-    return lines + _differences(results, turn)
+    return lines + _differences(results, turn) + next_steps(results)
 
 
 def effect_rows(results: LoopResults, turn: RoundResults) -> list[tuple[str, ...]]:
@@ -135,10 +141,10 @@ def _effects(results: LoopResults, turn: RoundResults) -> list[Block]:
     if results.sealed is None:
         header: tuple[str, ...] = ("found, not in the declared model", "explains")
     else:
-        header = ("undeclared (seal opened now)", "found", "explains")
+        header = ("undeclared", "found", "explains")
     shown = [pairs(header, rows, "effects")] if rows else []
     nothing = [] if rows or results.sealed is not None else [text("No effect passed the tests: the model stands.")]
-    return [*shown, *nothing, *(note(line) for line in _remarks(results, turn)), text(error_line(turn))]
+    return [*shown, *nothing, *(note(line) for line in _remarks(turn)), text(error_line(turn))]
 
 
 def _rows(results: LoopResults, turn: RoundResults) -> list[tuple[str | Cell, ...]]:
@@ -186,13 +192,10 @@ def _left_over(diagnosis: Json) -> str:
     return f"not named, but flagged: structure left in {places(left['where'])}, depending on {depends}"
 
 
-def _remarks(results: LoopResults, turn: RoundResults) -> list[str]:
-    """What is left unexplained, and what was undone at the joint."""
-    left, sealed = turn.diagnosis["unexplained"], (results.sealed or {}).get("effects", [])
-    flagged = any(_flagged(row, turn.diagnosis) for row in match(sealed, turn.diagnosis["effects"]))
-    told = left["significant"] and bool(left.get("description")) and not flagged  # a flagged effect's row says it
-    said = f"Unexplained: {left['description']}." if told else ""
-    return [line for line in (said, compensation_line(turn.compensation)) if line]
+def _remarks(turn: RoundResults) -> list[str]:
+    """Explain a share of 0 %, and say what was undone at the joint."""
+    nothing = any(_share(effect).startswith("0") for effect in turn.diagnosis["effects"])
+    return [line for line in (_NOTHING if nothing else "", compensation_line(turn.compensation)) if line]
 
 
 def _share(effect: Json | None) -> str:

@@ -13,15 +13,19 @@ from jinja2 import Environment, select_autoescape
 from markupsafe import Markup
 
 from bumblebee.io.page_policy import policy
+from bumblebee.report.chart import Strip
 from bumblebee.report.filmstrip import Sheet
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A table's cell with a mark: "found", "missed" or ""."""
+    """A table's cell with a mark: "found", "missed" or "", and a share from 0 to 1 that shades it."""
 
     text: str
     mark: str = ""
+    shade: float | None = None
+    tip: str = ""
+    """Words that pointing at it shows."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +54,8 @@ class Bar:
 class Block:
     """One piece of a section; which fields count depends on `kind`.
 
-    Kinds: text, note, heading, list, table, film, map, bars, pairs (a table whose rows stack on a phone); and, side by
-    side where there is room: image, still.
+    Kinds: text, note, heading, list, table, film, map, bars, strips, curves, warning, pairs (a table whose rows stack
+    on a phone); and, side by side where there is room: image, still.
     """
 
     kind: str
@@ -65,6 +69,9 @@ class Block:
     rows: tuple[tuple[str | Cell, ...], ...] = ()
     sheet: Sheet | None = None
     bars: tuple[Bar, ...] = ()
+    strips: tuple[Strip, ...] = ()
+    folded: str = ""
+    """Title of a table that opens on a click."""
     panels: tuple[str, ...] = ()
     """Headings over the parts of a film that stand side by side in it."""
     facts: dict[str, str] = field(default_factory=dict)
@@ -101,7 +108,7 @@ class Part:
     @property
     def lead(self) -> bool:
         """Whether these are introductory words alone, which stand above the other parts."""
-        return all(block.kind in ("text", "note") for block in self.blocks)
+        return all(block.kind in ("text", "note", "warning") for block in self.blocks)
 
     @property
     def aside(self) -> bool:
@@ -114,11 +121,11 @@ class Part:
         return [(name, list(run)) for name, run in groupby(self.blocks, key=_row)]
 
 
-_SCRIPTS = (("film", "player.js"), ("map", "map.js"))
+_SCRIPTS = (("film", "player.js"), ("map", "map.js"), ("curves", "curves.js"))
 
 
 def _row(block: Block) -> str:
-    return {"image": "figures", "still": "stills"}.get(block.kind, "flow")
+    return {"image": "figures", "curves": "figures", "still": "stills"}.get(block.kind, "flow")
 
 
 def text(words: str) -> Block:
@@ -129,6 +136,11 @@ def text(words: str) -> Block:
 def note(words: str) -> Block:
     """A paragraph in small print."""
     return Block("note", text=words)
+
+
+def warning(words: str) -> Block:
+    """A paragraph about something that went the wrong way."""
+    return Block("warning", text=words)
 
 
 def heading(words: str) -> Block:
@@ -174,16 +186,22 @@ def _inside(uri: str) -> str:
     return uri
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str | Cell]], caption: str = "", title: str = "") -> Block:
-    """A table; `title` names it for a screen reader."""
-    filled = tuple(tuple(row) for row in rows)
-    return Block("table", header=tuple(header), rows=filled, caption=caption, title=title or ", ".join(header[:2]))
+def strips(rows: Sequence[Strip], ends: Sequence[str], legend: Sequence[tuple[str, str]], title: str) -> Block:
+    """A chart of rows; `ends` are the axis' ends in words, `legend` each tone and what it means."""
+    return Block("strips", strips=tuple(rows), header=tuple(ends), choices=tuple(legend), title=title)
+
+
+def table(
+    header: Sequence[str], rows: Sequence[Sequence[str | Cell]], caption: str = "", title: str = "", folded: str = ""
+) -> Block:
+    """A table; `title` names it for a screen reader, `folded` is the line that opens it."""
+    filled, named = tuple(tuple(row) for row in rows), title or ", ".join(header[:2])
+    return Block("table", header=tuple(header), rows=filled, caption=caption, title=named, folded=folded)
 
 
 def render(
     title: str,
     subtitle: str,
-    verdict: Sequence[str],
     picture: str,
     sections: Sequence[Section],
     opening: Section | None = None,
@@ -198,7 +216,6 @@ def render(
         title=title,
         subtitle=subtitle,
         opening=opening,
-        verdict=list(verdict),
         picture=Markup(picture),
         sections=list(sections),
         style=Markup(folder.joinpath("page.css").read_text()),

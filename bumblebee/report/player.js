@@ -39,4 +39,5 @@ for (const figure of document.querySelectorAll("figure.film")) {
   bar.hidden = false;
   stop();
   show(0);
+  if (!still.matches) start();
 }

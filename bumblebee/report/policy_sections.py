@@ -1,15 +1,20 @@
 """Sections about the policies: how they learned and follow, which step of the loop helped, what is published."""
 
-from bumblebee.report.curves_figure import curves_figures
+from bumblebee.report.curves_chart import curves_charts
+from bumblebee.report.gains_chart import gains_chart
 from bumblebee.report.names import everyone, label, pair, reference
-from bumblebee.report.page import Block, Section, heading, image, note, table, text
+from bumblebee.report.page import Block, Section, heading, note, table, text
 from bumblebee.report.results import Json, LoopResults
-from bumblebee.report.success_figure import pick, success_figure
+from bumblebee.report.success_figure import pick, success_grid
 from bumblebee.report.wording import MEASURES, SAME_FILE, change, number, percent, plural
 
 NOT_YOURS = (
     "Policies were evaluated in simulation only: on the declared model and on a stand-in robot with made-up effects. "
     "Neither is your robot, on which only the measured rollouts were taken."
+)
+PRETRAINED = (
+    "Training began from the policy that comes along, which real motions on a GPU had taught most of this already; "
+    "motions held out here may be among what it saw (bumblebee/learning/pretrained/README.md)."
 )
 ENGINES = {"stand_in": "on the stand-in robot", "nominal": "on the declared model"}
 _CLAIMS = (
@@ -29,18 +34,15 @@ def training_section(results: LoopResults) -> Section:
     base = {n: c for n, c in results.curves.items() if n == "base"}
     experts = {n: c for n, c in results.curves.items() if n.startswith("expert")}
     rest = {n: c for n, c in results.curves.items() if n == "generalist"}
-    blocks: list[Block] = []
+    blocks: list[Block] = [note(PRETRAINED)] if results.pretrained else []
     start = "from the policy that comes along" if results.pretrained else "from scratch"
     groups = {
         f"Base policy, {start}": (base, "Episodes start anywhere in a clip, with noise and a shrinking threshold."),
         "Experts": (experts, "r0: fine-tuned from the base policy; r1 and later: refined in the corrected simulator."),
         "Generalist": (rest, "By DAgger from the final experts."),
     }
-    measures = {"success": "episodes that end well", "key_error": "key body error"}
     for name, (curves, caption) in groups.items():
-        for measure, picture in curves_figures(curves).items():
-            alt = f"Learning curves of {', '.join(curves)}: {measures[measure]} against simulated frames."
-            blocks.append(image(picture, f"{name}: {measures[measure]}", caption, alt))
+        blocks += curves_charts(curves, name, caption)
     return Section("training", "Learning", tuple(blocks))
 
 
@@ -59,21 +61,16 @@ def success_section(results: LoopResults) -> Section:
     ]
     if results.real_robot:
         blocks.append(text(NOT_YOURS))
-    for engine in engines(results):
-        blocks += [heading(f"{ENGINES[engine]}".capitalize()), _rates(results, policies, engine)]
-        for group in ("family", "cluster"):
-            named = {policy: label(results, policy) for policy in policies}
-            picture = success_figure(entries, named, engine, group)
-            if picture:
-                blocks.append(
-                    image(picture, f"Success by {group}, {ENGINES[engine]}", "All motions; lines: 95 % intervals.")
-                )
+    named = {policy: label(results, policy) for policy in policies}
     blocks += [heading("Which step helped"), *_steps(results)]
+    for engine in engines(results):
+        blocks += [heading(f"{ENGINES[engine]}".capitalize()), *success_grid(entries, named, engine, "family")]
+        blocks += [*success_grid(entries, named, engine, "cluster"), _rates(results, policies, engine)]
     return Section("success", "Success", tuple(blocks))
 
 
 def _steps(results: LoopResults) -> list[Block]:
-    """Every paired comparison in all three measures, and in words."""
+    """Success on the robot as a chart; every paired comparison in all three measures folded below it."""
     parts = {"all": "all", "test": "held out"}
     where = {engine: name.removeprefix("on the ") for engine, name in ENGINES.items()}
     rows = [
@@ -89,7 +86,24 @@ def _steps(results: LoopResults) -> list[Block]:
         if c["engine"] == engine and c["split"] in parts
     ]
     header = ("step", "where", "motions", "n", *(name for name, *_ in MEASURES.values()))
-    return [table(header, rows, _CLAIMS, "steps of the loop")]
+    charts = [
+        block for engine in engines(results) for block in gains_chart(_loop_steps(results, engine), ENGINES[engine])
+    ]
+    return [
+        *charts,
+        note(_CLAIMS),
+        table(header, rows, "", "steps of the loop", folded="All comparisons, all measures"),
+    ]
+
+
+def _loop_steps(results: LoopResults, engine: str) -> list[tuple[str, Json]]:
+    """The comparisons that are steps of the loop or hold a step against its control, over all motions."""
+    first = reference(results.evaluation)
+    return [
+        (f"{label(results, c['from'])} → {label(results, c['to'])}", c)
+        for c in results.evaluation["comparisons"]
+        if c["engine"] == engine and c["split"] == "all" and (c["from"] != first or c["to"] == "generalist")
+    ]
 
 
 def _three(comparison: Json) -> tuple[str, ...]:
@@ -115,7 +129,8 @@ def _rates(results: LoopResults, policies: list[str], engine: str) -> Block:
         "MPJPE, MPKPE: mean error of joint angles and of key bodies' positions, over all episodes up to their end. "
         "Their intervals come from few motions where they are wide."
     )
-    return table(header, rows, caption, f"success {ENGINES[engine]}")
+    folded = "Numbers of training and held-out motions, with errors"
+    return table(header, rows, caption, f"success {ENGINES[engine]}", folded)
 
 
 def registry_section(results: LoopResults) -> Section:

@@ -12,8 +12,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from bumblebee.report.looks import dress, meshes_of_user
+
 BACKENDS = ("egl", "osmesa")
-_SOLE_CENTRE, _SOLE_HALF = (0.04, 0.0, -0.024), (0.095, 0.031, 0.011)
 
 
 def render_frames(
@@ -46,7 +47,7 @@ def render_frames(
 
 
 def dressed(xml: str) -> mujoco.MjSpec:
-    """The model with a chequered floor, soles and a neck to look at; physics is not touched, only drawn."""
+    """The model with a chequered floor and the G1's visible shape; physics is not touched, only drawn."""
     spec = mujoco.MjSpec.from_string(xml)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1280, 960
     spec.visual.headlight.ambient, spec.visual.headlight.diffuse = [0.45] * 3, [0.35] * 3
@@ -64,13 +65,7 @@ def dressed(xml: str) -> mujoco.MjSpec:
     )
     spec.add_material(name="squares", textures=["", "squares"], texrepeat=[2, 2], texuniform=True)
     spec.geom("floor").material = "squares"
-    dark = [0.2, 0.22, 0.26, 1]
-    for side in ("left", "right"):
-        foot = spec.body(f"{side}_ankle_roll_link")
-        shape = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": _SOLE_HALF, "pos": _SOLE_CENTRE}
-        foot.add_geom(contype=0, conaffinity=0, mass=0, rgba=dark, **shape)
-    neck = {"type": mujoco.mjtGeom.mjGEOM_CAPSULE, "fromto": [0, 0, 0.25, 0, 0, 0.4], "size": [0.035, 0, 0]}
-    spec.body("torso_link").add_geom(contype=0, conaffinity=0, mass=0, rgba=dark, **neck)
+    dress(spec, meshes_of_user())
     return spec
 
 

@@ -4,8 +4,8 @@ from typing import Any
 
 from bumblebee.report import noise_floor
 from bumblebee.report.compensation import compensation_table
-from bumblebee.report.page import Block, Cell, Section, bullets, heading, image, note, table, text
-from bumblebee.report.residual_figure import residual_figure, value_and_interval
+from bumblebee.report.page import Block, Cell, Section, bullets, heading, note, table, text
+from bumblebee.report.residual_chart import residual_chart, value_and_interval
 from bumblebee.report.results import LoopResults, RoundResults
 from bumblebee.report.truth import Match, match
 from bumblebee.report.wording import effect_line, plural, signed
@@ -26,21 +26,11 @@ def round_section(results: LoopResults, turn: RoundResults) -> Section:
     blocks: list[Block] = [text(_arrived(turn))]
     blocks += [heading("Effects that the simulator lacked"), *_effects(results.sealed, diagnosis)]
     blocks.append(heading("Error of the simulator before and after"))
-    picture = residual_figure(diagnosis["error"])
-    if picture:
-        blocks.append(
-            image(
-                picture,
-                "Joint position error by joint",
-                f"After 0.2 s, on {plural(len(diagnosis['holdout']), 'rollout')} that took no part in fitting.",
-                "Bars by joint: error of the declared and of the corrected model, beside the noise floor.",
-            )
-        )
-    blocks += [heading("Error by horizon"), _error_table(diagnosis["error"]), note(noise_floor.WHAT)]
-    measures = {key: (name, factor, unit) for key, name, factor, unit in _MEASURES if key != "chi2"}
-    under, lines = noise_floor.summary(diagnosis["error"], measures)
+    blocks += residual_chart(diagnosis["error"])
+    held = plural(len(diagnosis["holdout"]), "rollout")
+    blocks += [note(f"On {held} that took no part in fitting. {noise_floor.WHAT}"), _error_table(diagnosis["error"])]
+    under = noise_floor.summary(diagnosis["error"], [key for key, *_ in _MEASURES if key != "chi2"])
     blocks += [note(under)] if under else []
-    blocks += [bullets(lines)] if lines else []
     blocks.append(text(_remains(diagnosis)))
     undone = compensation_table(turn.compensation)
     blocks += [heading("Undone at the joint, without training"), *undone] if undone else []
@@ -73,7 +63,8 @@ def _effects(sealed: Json | None, diagnosis: Json) -> list[Block]:
         return [text("Nothing was sealed and nothing was found: no false alarm.")]
     header = ("sealed in the stand-in", "sealed value", "found", "estimate [95 %]", "explains")
     caption = (
-        "Explains: share of the held-out excess error that the effect removes. The diagnosis cannot read the seal."
+        "Explains: share of the held-out excess error that the effect removes; the shares of effects that act together "
+        "can add up to more than 100 %. The diagnosis cannot read the seal."
     )
     return [table(header, compared, caption, "effects sealed and found")]
 
@@ -112,7 +103,8 @@ def _error_table(error: Json) -> Block:
             if cells[0] != "–":
                 rows.append((shown, f"{name} [{unit}]" if unit else name, *cells))
                 shown = ""
-    return table(("after", "error", "declared model", "corrected model", "noise floor"), rows, "", "error by horizon")
+    header = ("after", "error", "declared model", "corrected model", "noise floor")
+    return table(header, rows, "", "error by horizon", folded="Error by horizon, all measures")
 
 
 def _cell(entry: Any, factor: float) -> str:

@@ -1,9 +1,9 @@
-"""Success rates with their intervals: policies side by side, by family or cluster of motion."""
+"""Success rates by policy and by family or cluster of motion, as a shaded grid whose cells say their intervals."""
 
 from typing import Any
 
-from bumblebee.report.figures import GRID, canvas, colour, legend_below, short, svg_uri
-from bumblebee.report.wording import plural
+from bumblebee.report.page import Block, Cell, table
+from bumblebee.report.wording import percent, plural
 
 
 def pick(results: list[dict[str, Any]], **wanted: Any) -> list[dict[str, Any]]:
@@ -11,39 +11,34 @@ def pick(results: list[dict[str, Any]], **wanted: Any) -> list[dict[str, Any]]:
     return [entry for entry in results if all(entry[key] == value for key, value in wanted.items())]
 
 
-def success_figure(
-    results: list[dict[str, Any]], policies: dict[str, str], engine: str, group_by: str, split: str = "all"
-) -> str | None:
-    """Image URI: a point with its 95 % interval for each policy, by family or cluster; None for nothing.
+def success_grid(results: list[dict[str, Any]], policies: dict[str, str], engine: str, by: str) -> list[Block]:
+    """A row for each policy and a column for each family or cluster; nothing where nothing was evaluated.
 
-    `policies`: their names in `results` and what they are called here.
+    Args:
+        results: entries of the evaluation summary.
+        policies: their names in `results` and what they are called here.
+        engine: "stand_in" or "nominal".
+        by: "family" or "cluster".
     """
     entries = {
         (entry["policy"], entry["group"]): entry
-        for entry in pick(results, engine=engine, split=split, group_by=group_by)
-        if entry["policy"] in policies
+        for entry in pick(results, engine=engine, split="all", group_by=by)
+        if entry["policy"] in policies and entry["success"]["value"] is not None
     }
     groups = sorted({group for _, group in entries})
-    if not groups:
-        return None
-    step = 0.8 / len(policies)
-    figure, axis = canvas(height=0.7 + len(groups) * max(0.5, 0.13 * len(policies)))
-    for i, (policy, called) in enumerate(policies.items()):
-        for g, group in enumerate(groups):
-            entry = entries.get((policy, group))
-            if entry is None or entry["success"]["value"] is None:
-                continue
-            value, (low, high) = entry["success"]["value"], entry["success"]["ci95"]
-            y = g - 0.4 + (i + 0.5) * step
-            axis.plot([100 * low, 100 * high], [y, y], color=colour(i), lw=1.5)
-            axis.plot([100 * value], [y], "o", ms=4.5, color=colour(i))
-        axis.plot([], [], "-o", ms=4.5, lw=1.5, color=colour(i), label=called)
-    counts = {group: entries[p, group]["success"]["motions"] for p, group in entries}
-    names = [f"{short(group or 'unknown', 14)}\n{plural(counts[group], 'motion')}" for group in groups]
-    axis.set_yticks(range(len(groups)), names)
-    for g in range(1, len(groups)):
-        axis.axhline(g - 0.5, color=GRID)
-    axis.set(xlim=(-3, 103), ylim=(len(groups) - 0.5, -0.5), xlabel="motions followed to the end [%]")
-    axis.grid(axis="y", visible=False)
-    legend_below(figure, axis)
-    return svg_uri(figure)
+    rows = [
+        (called, *(_cell(entries.get((policy, group)), f"{called}, {group or 'unknown'}") for group in groups))
+        for policy, called in policies.items()
+        if any((policy, group) in entries for group in groups)
+    ]
+    header = (f"[%] by {by}", *(group or "unknown" for group in groups))
+    caption = "Motions followed to the end [%]; pointing at a number shows its 95 % interval."
+    return [table(header, rows, caption, f"success by {by}")] if rows else []
+
+
+def _cell(entry: dict[str, Any] | None, what: str) -> Cell:
+    if entry is None:
+        return Cell("–")
+    success = entry["success"]
+    tip = f"{what}: {percent(success)} of {plural(success['motions'], 'motion')}"
+    return Cell(f"{100 * success['value']:.0f}", shade=success["value"], tip=tip)

@@ -122,6 +122,8 @@ class EnvConfig(Ranged):
     """Length of the stretches of a clip whose own failure rates are followed [s]; 0: whole clips' rates."""
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     """What the policy sees; the critic sees the same without noise, forces, torques and the time left."""
+    critic: tuple[Name, ...] = ()
+    """Terms that the critic sees beside that, exact: `demo` for a policy of `imu`, which sees less than the state."""
     student: ObservationConfig = field(default_factory=lambda: ObservationConfig(terms=()))
     """What a student of the policy sees, as a group of its own; nothing where nobody is distilled."""
     action: Literal["reference", "default"] = "reference"
@@ -144,8 +146,9 @@ class EnvConfig(Ranged):
         self.require(self.physics_hz % 50 == 0, "physics_hz", "a multiple of the policy's 50 Hz")
         expected = f"at most threshold_start, {self.threshold_start:g}"
         self.require(self.threshold_end <= self.threshold_start, "threshold_end", expected)
-        for name in ("observation", "student"):
-            seen = getattr(self, name)
-            for term in {*seen.terms, *seen.now} - {*SETS, *TERMS}:
-                raise Unfit(type(self), f"{name}.terms", f"terms among {', '.join([*SETS, *TERMS][:8])} ...", term)
+        groups = {"observation.terms": self.observation, "student.terms": self.student}
+        named = {name: (*own.terms, *own.now) for name, own in groups.items()}
+        for name, terms in (named | {"critic": self.critic}).items():
+            for term in {*terms} - {*SETS, *TERMS}:
+                raise Unfit(type(self), name, f"terms among {', '.join([*SETS, *TERMS][:8])} ...", term)
         self.require(bool(self.observation.terms or self.observation.now), "observation", "at least one term")

@@ -29,6 +29,7 @@ from bumblebee.tracking.starts import start_state
 from bumblebee.tracking.statistics import Statistics
 from bumblebee.tracking.stretches import StretchSampler
 from bumblebee.tracking.terminations import fallen, threshold_at
+from bumblebee.tracking.terms import expanded, see
 from bumblebee.tracking.terrain import Ground
 from bumblebee.tracking.threads import Aside, one_thread
 
@@ -86,6 +87,7 @@ class TrackingEnv(VecEnv):
         wanted = {"policy": config.observation} | ({"student": config.student} if config.student.terms else {})
         sizes, noise = (n, j, len(library.ahead)), config.observation_noise
         self.groups = {name: Group(own, sizes, noise, device, config.compile) for name, own in wanted.items()}
+        self._critic = expanded(config.critic)
         self.episode_length_buf = torch.zeros(n, dtype=torch.long, device=device)
         self._clip, self._frame = torch.zeros_like(self.episode_length_buf), torch.zeros_like(self.episode_length_buf)
         self._command = torch.zeros(n, j, device=device)
@@ -315,7 +317,8 @@ class TrackingEnv(VecEnv):
             left[:, None].clamp(max=2.0),
             self._threshold.expand(self.num_envs, 1),
         )
-        return torch.cat((exact, *extras), dim=-1)
+        beside = [see(self._critic, self._state, self._ref, self._action)] if self._critic else []
+        return torch.cat((exact, *beside, *extras), dim=-1)
 
 
 def _copy(source: RobotState | ReferenceFrame, into: RobotState | ReferenceFrame) -> None:

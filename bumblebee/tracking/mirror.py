@@ -12,7 +12,7 @@ from torch import Tensor
 from bumblebee.errors import BadInput
 from bumblebee.robot.facts import FEET, KEY_BODIES, joints
 from bumblebee.tracking.env import TrackingEnv
-from bumblebee.tracking.terms import Part
+from bumblebee.tracking.terms import Part, parts
 
 Reflection = tuple[list[int], list[float]]
 """For each entry of a reflected vector the entry that it comes from, and the sign that it gets."""
@@ -73,7 +73,8 @@ def augmentation(env: TrackingEnv) -> Callable[..., tuple[TensorDict | None, Ten
     """rsl_rl's function (env, obs, actions) that appends the reflected samples to either, if given."""
     policy = env.groups["policy"]
     seen = policy.parts * env.cfg.observation.history + policy.parts_now
-    tables = {"policy": reflection(seen), "critic": reflection(seen + critic_extras(env.num_actions))}
+    beside = parts(env.cfg.critic, env.num_actions, len(env.library.ahead)) + critic_extras(env.num_actions)
+    tables = {"policy": reflection(seen), "critic": reflection(seen + beside)}
     on_device = {name: _tensors(table, env.device) for name, table in tables.items()}
     turn = _tensors(joint_reflection(), env.device)
 
@@ -107,13 +108,13 @@ def _known() -> dict[Part, Reflection]:
     turned = ("joint_pos", "joint_vel", "last_action", "ref_joint_pos", "ref_joint_vel", "torque")
     bodies = ("key_error_b", "target_key_pos_g", "target_key_pos_b")
     sets = (
-        ((*polar, "target_root_pos_g", "target_root_pos_b"), _POLAR),
+        ((*polar, "target_root_pos_g", "target_root_pos_b", "ref_lin_vel_o", "root_pos_o"), _POLAR),
         (("root_ang_vel_b", "ref_ang_vel", "target_ang_vel"), _AXIAL),
         (("root_height", "ref_height", "time_left", "threshold"), _SAME),
         (rotations, _COLUMNS),
         ((*turned, "target_joint_pos", "target_joint_vel"), turn),
         ((*bodies, "key_pos_b"), keys),
-        (("key_pos_b",), but_pelvis),
+        (("key_pos_b", "posture_error"), but_pelvis),
         (("foot_force",), body_reflection(FEET)),
     )
     return {(name, len(own[0])): own for names, own in sets for name in names}

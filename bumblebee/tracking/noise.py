@@ -11,6 +11,7 @@ LEVELS = {
     "joint_pos": 0.01,  # rad
     "joint_vel": 0.3,  # rad/s
     "key_pos_b": 0.005,
+    "posture_error": 0.005,
     "key_error_b": 0.02,  # m
     "ref_rotation": 0.02,
     "ref_lin_vel_b": 0.02,

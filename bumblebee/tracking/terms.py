@@ -16,6 +16,7 @@ from bumblebee.errors import BadInput
 from bumblebee.robot.facts import KEY_BODIES
 from bumblebee.sim.engine import RobotState
 from bumblebee.sim.rotations import conjugate, matrix, multiply, turned
+from bumblebee.tracking.imu import imu_layout, observe_imu
 from bumblebee.tracking.library import ReferenceFrame, over_robot
 from bumblebee.tracking.noise import LEVELS
 from bumblebee.tracking.observations import layout, observe
@@ -168,6 +169,11 @@ def demo_in_place(seen: Seen) -> Tensor:
     return observe(seen.state, over_robot(seen.ref, seen.state.root_pos_w), seen.last_action)
 
 
+def imu(seen: Seen) -> Tensor:
+    """All that IMU and encoders give, without odometry, of many parts: `tracking.imu.observe_imu`."""
+    return observe_imu(seen.state, seen.ref, seen.last_action)
+
+
 Term = Callable[[Seen], Tensor]
 _THREE, _KEYS = 3, 3 * len(KEY_BODIES)
 _SIZES: dict[Term, int | None] = {  # None: one entry a joint
@@ -192,7 +198,9 @@ _SIZES: dict[Term, int | None] = {  # None: one entry a joint
     target_lin_vel_b: _THREE,
     target_ang_vel: _THREE,
 }
-TERMS: dict[str, Term] = {term.__name__: term for term in (*_SIZES, demo, demo_in_place)}
+LAYOUTS = {demo.__name__: layout, demo_in_place.__name__: layout, imu.__name__: imu_layout}
+"""Parts of the terms that have many, by joints and further reference frames."""
+TERMS: dict[str, Term] = {term.__name__: term for term in (*_SIZES, demo, demo_in_place, imu)}
 """Every term by its name."""
 
 SETS: dict[str, tuple[str, ...]] = {
@@ -253,8 +261,8 @@ def parts(terms: Sequence[str], joints: int = 23, ahead: int = 0) -> list[Part]:
     """Names and sizes of the parts of one control step, in order; `ahead` counts further reference frames."""
     out: list[Part] = []
     for name in expanded(terms):
-        if name in (demo.__name__, demo_in_place.__name__):
-            out += layout(joints, ahead)
+        if name in LAYOUTS:
+            out += LAYOUTS[name](joints, ahead)
         else:
             size = _SIZES[TERMS[name]]
             out.append((name, joints if size is None else size))

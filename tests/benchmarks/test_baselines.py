@@ -88,6 +88,7 @@ def test_the_table_counts_motions_and_not_pieces():
         group="asap",
         split="train",
         success_local=True,
+        success_upright=True,
         mpjpe_rad=0.1,
         mpkpe_mm=[10.0, 20.0, 60.0],
     )
@@ -142,7 +143,7 @@ def results(folder: Path, success: list[bool], mpkpe: list[float], method: str =
     """A folder as `benchmarks.baselines` leaves it, with a teacher who is not to count."""
     rows = pd.DataFrame({"name": list("abcdefgh"), "success": success, "mpkpe_mm": mpkpe})
     rows = rows.assign(policy=method, kind="whole", group="asap", split="train", success_local=True, mpjpe_rad=0.1)
-    rows["mpkpe_local_mm"] = 5.0
+    rows["mpkpe_local_mm"], rows["success_upright"] = 5.0, True
     folder.mkdir()
     pd.concat([rows, rows.assign(policy="teacher", success=False)]).to_csv(folder / TRIALS, index=False)
     (folder / "settings.json").write_text(json.dumps({"method": method}))

@@ -1,6 +1,8 @@
 """The robot's 50 Hz step is the training environment's."""
 
+import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +15,17 @@ from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.deploy.robots import NominalRobots
 from bumblebee.deploy.runner import PolicyRunner, reference_library, robot_state
 from bumblebee.deploy.sensors import NO_NOISE, SensorNoise, Sensors, add_noise, draws
+from bumblebee.errors import BadInput
 from bumblebee.evaluation.contract import StartNoise
+from bumblebee.learning.export import export_policy
+from bumblebee.learning.policy import Policy, Shape, new_actor
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.rotations import from_rotation_vector, multiply
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.library import AHEAD, MotionLibrary
 from bumblebee.tracking.observations import joint_targets, observe
 from bumblebee.tracking.terminations import FALL, fallen
+from bumblebee.tracking.terms import parts
 from tests.deploy.conftest import nod
 
 
@@ -144,3 +150,31 @@ def test_a_robot_falls_on_the_robot_where_it_falls_in_training(degrees: float, d
     ref = MotionLibrary([clip]).frames(torch.zeros(1, dtype=torch.long), torch.full((1,), 0.02))
     assert episodes._fallen(true, [clip], np.array([0]), 1, FALL).tolist() == [falls]
     assert fallen(robot_state(true), ref).tolist() == [falls]
+
+
+def test_a_policy_of_imu_and_encoders_acts_alike_whatever_odometry_says(tmp_path: Path) -> None:
+    """Also where it says nothing: readings that the contract does not name are not looked at."""
+    size = sum(size for _, size in parts(["imu"], 23, len(AHEAD)))
+    shape = Shape(size, critic_observation=1, actions=23, hidden=(8,), ahead=AHEAD, terms=("imu",))
+    export_policy(tmp_path, Policy(new_actor(shape), {}, shape))
+    policy, clip, first = ExportedPolicy.load(tmp_path), nod(), np.array([0])
+    assert policy.sensors == ("imu", "heading", "encoders") and policy.ahead == len(AHEAD)
+    assert json.loads((tmp_path / "contract.json").read_text())["sensors"] == list(policy.sensors)
+    robots = NominalRobots(1, threads=1)
+    qpos = np.concatenate([clip.root_pos[:1], clip.root_quat[:1], clip.joint_pos[:1]], axis=1).astype(np.float64)
+    robots.reset(qpos, np.random.default_rng(0).normal(0, 0.1, (1, 29)), qpos[:, 7:])
+    sensors, library = robots.read(), reference_library(policy, [clip])
+    nothing = replace(sensors, base_pos=np.full((1, 3), np.nan), base_lin_vel=np.full((1, 3), np.nan))
+    steps = [PolicyRunner(policy, library, [clip.name]).step(first, 0, read) for read in (sensors, nothing)]
+    assert np.array_equal(steps[0][0], steps[1][0]) and np.isfinite(steps[1][1].target).all()
+
+
+def test_a_contract_that_names_other_sensors_than_its_terms_take_is_refused(policy_folder: Callable[..., Path]) -> None:
+    path = policy_folder() / "contract.json"
+    stated = json.loads(path.read_text())
+    path.write_text(json.dumps(stated | {"sensors": ["imu", "encoders"]}))
+    with pytest.raises(BadInput, match=r"sensors: expected imu, heading, .*Export it with this version"):
+        ExportedPolicy.load(path.parent)
+    del stated["sensors"]  # as before there was a choice
+    path.write_text(json.dumps(stated))
+    assert "place" in ExportedPolicy.load(path.parent).sensors

@@ -21,7 +21,7 @@ import psutil
 import pytest
 import yaml
 
-from bumblebee.learning.ppo import CHECKPOINT
+from bumblebee.learning.learner import CHECKPOINT
 from flows import demo, login, servers
 from flows import workspace as workspaces
 from flows.environment import environment

@@ -10,7 +10,7 @@ import yaml
 from dvc.repo import Repo
 from dvc_objects.fs.local import LocalFileSystem
 
-from bumblebee.learning import distill, ppo
+from bumblebee.learning import distill, learner
 from flows import checkpoints
 from flows.parcel import REMOTE
 
@@ -30,7 +30,7 @@ def scratch(folder: Path, text: str = "first") -> Path:
 
 
 def test_the_names_are_those_that_trainings_write() -> None:
-    assert set(checkpoints.WRITTEN) == {ppo.CHECKPOINT, distill.CHECKPOINT}
+    assert set(checkpoints.WRITTEN) == {learner.CHECKPOINT, distill.CHECKPOINT}
 
 
 def test_another_machine_gets_all_files_of_the_last_one(tmp_path: Path) -> None:

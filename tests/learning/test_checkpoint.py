@@ -11,7 +11,7 @@ import torch
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.checkpoint import load_checkpoint, save_checkpoint
-from bumblebee.learning.ppo import CHECKPOINT
+from bumblebee.learning.learner import CHECKPOINT
 from tests.learning.test_ppo import model, trainer  # noqa: F401
 
 

@@ -14,7 +14,8 @@ from rsl_rl.models import MLPModel
 
 from bumblebee.learning.config import PAPER, PpoConfig
 from bumblebee.learning.curve import CurveWriter
-from bumblebee.learning.ppo import CHECKPOINT, CURVE, BoundedPpo, Trainer, runner_config
+from bumblebee.learning.learner import CHECKPOINT, CURVE
+from bumblebee.learning.ppo import BoundedPpo, Trainer, runner_config
 from bumblebee.sim.mujoco_cpu import MujocoCpu
 from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.config import EnvConfig

@@ -16,7 +16,7 @@ import pytest
 import torch
 
 from bumblebee.errors import BadInput
-from bumblebee.learning.ppo import CHECKPOINT, CURVE
+from bumblebee.learning.learner import CHECKPOINT, CURVE
 from bumblebee.learning.ranks import Ranks, join, launch
 from tests.learning.two_ranks import CONFIG
 

@@ -15,8 +15,9 @@ from bumblebee.errors import BadInput
 from bumblebee.learning.config import PAPER
 from bumblebee.learning.distill import PAPER_DAGGER, distill
 from bumblebee.learning.export import export_policy
+from bumblebee.learning.learner import CURVE
 from bumblebee.learning.policy import Policy, load_policy, new_actor, shape_of
-from bumblebee.learning.ppo import CURVE, Trainer
+from bumblebee.learning.ppo import Trainer
 from bumblebee.learning.teacher_student import make_env, train_student, train_teacher
 from bumblebee.learning.trial import World, try_policy
 from bumblebee.sim.sensors import load_model

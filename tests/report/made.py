@@ -10,12 +10,11 @@ import pandas as pd
 from bumblebee.report.clusters_section import clusters_section
 from bumblebee.report.data_sections import motions_section
 from bumblebee.report.loop_picture import Box, loop_picture
-from bumblebee.report.opening import opening
+from bumblebee.report.opening import headline, opening
 from bumblebee.report.page import Block, Section, render
 from bumblebee.report.policy_sections import registry_section, success_section, training_section
 from bumblebee.report.results import LoopResults, RoundResults
 from bumblebee.report.round_sections import round_section
-from bumblebee.report.verdict import verdict
 
 RATES = {"untrained": 0.0, "base": 0.6, "experts-r0": 0.7, "experts-r1": 0.8, "generalist": 0.9}
 TRUTH = {"effect": "coulomb_friction", "where": ["left_knee_joint"], "parameters": {"frictionloss": 1.2}, "unit": "N m"}
@@ -222,4 +221,4 @@ def page_of(results: LoopResults, more: list[Section] | None = None, film: Seque
     sections += [round_section(results, turn) for turn in results.rounds]
     sections += [success_section(results), registry_section(results), *(more or [])]
     picture = loop_picture([Box("a", "1")], [Box("b", "2")], "back")
-    return render("Title", "sub", verdict(results), picture, sections, opening(results, film))
+    return render(headline(results), "sub", picture, sections, opening(results, film))

@@ -3,12 +3,12 @@
 import pytest
 
 from bumblebee.report import noise_floor
+from bumblebee.report.held_out import error_line
 from bumblebee.report.opening import opening_lines
-from bumblebee.report.verdict import verdict
 from tests.report.made import TRUTH, block, found, loop_results
 
 FLOOR = {"value": 4.39, "ci95": [3.0, 5.0]}
-MEASURES = {"joint_pos_rmse": ("joint positions", 1e3, "mrad")}
+MEASURES = ["joint_pos_rmse"]
 
 
 @pytest.mark.parametrize(
@@ -23,19 +23,19 @@ def test_what_an_error_beside_its_floor_means(value: float, said: str) -> None:
 
 def test_nothing_is_said_without_a_floor() -> None:
     assert noise_floor.meaning({"value": 1.0, "ci95": None}, None) == ""
-    assert noise_floor.summary({"after": block(0.01)}, MEASURES) == ("", [])
+    assert noise_floor.summary({"after": block(0.01)}, MEASURES) == ""
 
 
-def test_the_verdict_explains_an_error_below_the_floor_and_shows_the_floors_interval() -> None:
+def test_the_first_screen_explains_an_error_below_the_floor_and_shows_the_floors_interval() -> None:
     results = loop_results([found()], [TRUTH])
     results.rounds[0].diagnosis["error"] |= {"after": block(0.00325), "floor": block(0.0034)}
-    (line,) = [line for line in verdict(results) if "noise floor" in line]
+    line = error_line(results.rounds[0])
     assert "noise floor 3.40 [3.06, 3.74] mrad (no more than sensor noise explains)" in line
     assert any("noise floor 3.40 [3.06, 3.74]" in line for line in opening_lines(results))
 
 
-def test_errors_below_the_floors_interval_are_listed_one_by_one() -> None:
-    inside, lines = noise_floor.summary({"after": block(0.0095), "floor": block(0.01)}, MEASURES)
-    assert "1 error, 1 lies below the floor, 1 of them within" in inside and lines == []
-    _, lines = noise_floor.summary({"after": block(0.005), "floor": block(0.01)}, MEASURES)
-    assert len(lines) == 1 and "5 mrad against 10 [9, 11]" in lines[0]
+def test_errors_below_the_floor_are_counted_in_one_sentence_that_says_what_it_means() -> None:
+    inside = noise_floor.summary({"after": block(0.0095), "floor": block(0.01)}, MEASURES)
+    assert "1 error, 1 lies below the floor, within its interval: no more than sensor noise explains" in inside
+    below = noise_floor.summary({"after": block(0.005), "floor": block(0.01)}, MEASURES)
+    assert "1 of them below its interval: the sensors are less noisy" in below

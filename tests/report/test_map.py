@@ -36,7 +36,7 @@ def points(count: int = 30) -> pd.DataFrame:
 def page(table: pd.DataFrame) -> str:
     made = loop_results([found()], [TRUTH])
     results = replace(made, points=table, clusters={**made.clusters, "map": form()})
-    return render("Title", "sub", [], "", [clusters_section(results)])
+    return render("Title", "sub", "", [clusters_section(results)])
 
 
 def test_a_row_holds_its_values_between_tabs_and_no_name_can_add_one() -> None:

@@ -12,18 +12,17 @@ from bumblebee.measured.rollout import Rollout
 from bumblebee.report import filmstrip
 from bumblebee.report.loop_picture import Box, loop_picture
 from bumblebee.report.page import image
-from bumblebee.report.policy_sections import training_section
+from bumblebee.report.policy_sections import PRETRAINED, training_section
 from bumblebee.report.truth import match
-from bumblebee.report.verdict import PRETRAINED, verdict
 from bumblebee.report.wording import change, effect_line, number, percent, plural, shown, signed
 from bumblebee.robot.facts import joint_names, stand_pose
 from bumblebee.robot.model import build_spec
-from tests.report.made import TRUTH, estimate, found, loop_results, page
+from tests.report.made import TRUTH, estimate, found, loop_results, page, page_of
 
 
 def test_a_page_loads_nothing_and_runs_nothing() -> None:
     html = page([found()], [TRUTH])
-    assert "<script" not in html and "&lt;script&gt;" in html  # the gate's answer was signed by "Ada <script>"
+    assert html.count("<script") == 1 and "&lt;script&gt;" in html  # the gate's answer was signed by "Ada <script>"
     assert not re.search(r'(src|href)="(?!data:|#)', html)
     assert "default-src 'none'" in html
 
@@ -37,14 +36,14 @@ def test_a_found_effect_stands_beside_the_truth_with_its_error() -> None:
     html = page([found()], [TRUTH])
     assert '<td class="found">found</td>' in html
     assert "(\u22124.2 %, interval holds it)" in html
-    assert "1 of 1 sealed effect found; 0 reported" in html
+    assert "1 effect of the stand-in robot was not in its model; 1 found." in html
 
 
 def test_a_missed_and_a_false_effect_are_said() -> None:
     html = page([found("viscous_friction", "right_knee_joint")], [TRUTH])
     assert '<td class="missed">not found</td>' in html
     assert "(not sealed)" in html
-    assert "0 of 1 sealed effect found; 1 reported that was not sealed" in html
+    assert "0 found, 1 reported that is not there" in html
 
 
 def test_an_effect_of_the_same_class_counts_as_found_but_not_as_exact() -> None:
@@ -66,7 +65,7 @@ def test_nothing_sealed_and_nothing_found_is_said() -> None:
 def test_a_real_robot_has_no_truth_to_show() -> None:
     html = page([found()], None)
     assert "sealed in the stand-in" not in html and "1 effect found" in html
-    assert html.count("Neither is your robot") == 2  # in the verdict and beside the rates
+    assert html.count("Neither is your robot") == 1
     assert "Neither is your robot" not in page([found()], [TRUTH])
 
 
@@ -92,27 +91,20 @@ def test_every_version_of_this_run_is_listed() -> None:
 
 def test_a_base_policy_that_was_not_made_here_is_said() -> None:
     made = loop_results([found()], [TRUTH])
-    assert PRETRAINED not in verdict(made)
     told = replace(made, pretrained=True)
-    assert PRETRAINED in verdict(told)
+    assert (PRETRAINED in page_of(told), PRETRAINED in page_of(made)) == (True, False)
     captions = "".join(f"{block.title} {block.caption}" for block in training_section(told).blocks)
     assert "from the policy that comes along" in captions and "from scratch" not in captions
 
 
-def test_an_interval_across_zero_is_no_gain_in_the_verdict() -> None:
-    lines = verdict(loop_results([found()], [TRUTH]))
-    assert any("base → experts-r0" in line and "no difference shown" in line for line in lines)
-    assert "untrained: 0 %" in lines[0]
-
-
 def test_a_name_with_a_dollar_is_no_formula_in_a_figure() -> None:
-    assert page([found()], [TRUTH], name="$x_{$").count("data:image/svg") > 5
+    assert page([found()], [TRUTH], name="$x_{$").count("data:image/svg") > 1
 
 
 def test_every_figure_says_what_it_is_and_shows_in_words() -> None:
     html = page([found()], [TRUTH])
     images = re.findall(r'<figure><figcaption><b>(.*?)</b></figcaption><img [^>]*alt="(.*?)"', html, re.S)
-    assert len(images) == html.count("<img ") > 5
+    assert len(images) == html.count("<img ") > 1
     assert all(title and len(alt) > 20 for title, alt in images)
 
 

@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 
 from bumblebee.deploy.describe import MEANINGS, meaning
-from bumblebee.tracking.observations import layout
-from bumblebee.tracking.terms import SETS, TERMS
+from bumblebee.tracking.terms import LAYOUTS, SETS, TERMS
 from tasks.model_card import Evaluated, licences_of, model_card
 from tasks.run_form import fitted
 from tests.deploy.conftest import policy_folder  # noqa: F401
@@ -23,11 +22,9 @@ RESULT = {
 
 def test_every_part_of_an_observation_has_meaning_unit_and_frame() -> None:
     home = "bumblebee.tracking"
-    whole = ("demo", "demo_in_place")  # of many parts, which `layout` names
-    own = [term for name, term in TERMS.items() if term.__module__.startswith(home) and name not in whole]
-    names = (
-        {term.__name__ for term in own} | {name for name, _ in layout(23, 2)} | {n for s in SETS.values() for n in s}
-    )
+    own = [term for name, term in TERMS.items() if term.__module__.startswith(home) and name not in LAYOUTS]
+    laid = {name for layout in LAYOUTS.values() for name, _ in layout(23, 2)}
+    names = {term.__name__ for term in own} | laid | {n for s in SETS.values() for n in s}
     for name in names:
         what, unit, frame = meaning(name, [0.1, 0.3])
         assert what and unit and frame, name
@@ -38,7 +35,9 @@ def test_every_part_of_an_observation_has_meaning_unit_and_frame() -> None:
 def test_the_card_says_what_it_takes_gives_and_is_worth(policy_folder) -> None:  # noqa: F811
     folder = policy_folder()
     (folder / "card.json").write_text(
-        json.dumps({"stage": "experts", "cluster": "c0", "round": 0, "frames": 2048, "config": {"seed": 3}})
+        json.dumps(
+            {"stage": "experts", "cluster": "c0", "round": 0, "frames": 2048, "learner": "ppo", "config": {"seed": 3}}
+        )
     )
     card = model_card("expert-c0", "expert-c0-r0", folder, "base", Evaluated("a" * 64, "stand_in", RESULT), {"MIT": 2})
     for said in (
@@ -49,7 +48,9 @@ def test_the_card_says_what_it_takes_gives_and_is_worth(policy_folder) -> None: 
         "error of joint angles: 0.05 rad (95 % interval 0.04 to 0.06)",
         "- from: base",
         "- seed: 3",
+        "- learner: ppo",
         "- licences of the motions: MIT (2)",
+        "Sensors: imu, heading, encoders, velocity, height, place.",
         "Simulation only",
         "No safety layer",
         "holds a target for 20 ms",

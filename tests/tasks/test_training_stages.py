@@ -13,8 +13,9 @@ from bumblebee.errors import BadInput
 from bumblebee.learning import pretrained
 from bumblebee.learning.policy import load_policy
 from bumblebee.motion.store import write_library
+from bumblebee.sim.sensors import load_model
 from bumblebee.tracking.sampler import ClipSampler
-from tasks import base, experts, training
+from tasks import base, experts, params, refine, training
 from tasks.candidates import came_along
 from tests.tracking.clips import waving
 
@@ -56,6 +57,72 @@ def test_base_then_expert(workspace: Path) -> None:
     assert expert["parent"] == "models/base"
     trials = pd.read_csv("models/experts/r0/c1/trials.csv")
     assert set(trials["name"]) == {"b", "d"}
+
+
+MODEL = {
+    "env": {"num_worlds": 4, "threads": 1},
+    "learner": "world_model",
+    "world_model": {"iterations": 2, "steps": 2, "memory": 6, "window": 3, "horizon": 3, "warm_up": 2}
+    | {"model_updates": 1, "policy_updates": 1, "model_batch": 8, "policy_batch": 8}
+    | {"hidden": [8], "model_hidden": [8], "value_hidden": [8]},
+}
+
+
+def test_a_world_model_trains_base_expert_and_refinement_and_no_later_stage_sees_a_difference(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files, contract and columns are PPO's; PPO, which needs a critic, says how to go on from there."""
+    base.main()
+    folders = ("models/base", "models/experts/r0/c1", "models/experts/r1/c1")
+    files, contract = contents(Path(folders[0]))
+    shape = {"clusters": ["c0", "c1"], "rounds": [{"n": 1, "parent": 0}], "base": MODEL | {"init": "scratch"}}
+
+    def write(**sections: object) -> None:
+        Path("params.yaml").write_text(yaml.safe_dump(shape | sections))
+
+    write(experts=TINY)
+    base.main()
+    with pytest.raises(BadInput, match="critic: expected") as caught:
+        experts.main("c1")
+    assert caught.value.do == "Set `learner: world_model`, which needs none."
+    assert not Path(folders[1]).exists()
+    write(experts=MODEL, refine=MODEL)
+    experts.main("c1")
+    world = training.World(load_model(physics_hz=100), threads=1)
+    monkeypatch.setattr(refine, "learned", lambda *_: True)
+    monkeypatch.setattr(refine, "corrected_world", lambda *_: world)
+    monkeypatch.setattr(refine.paths, "corrected_model", lambda _: None)
+    monkeypatch.setattr(refine, "log_run", lambda *args, **kwargs: None)
+    refine.main(1, "c1")
+    for folder in map(Path, folders):
+        names, stated = contents(folder)
+        assert names == files and stated == contract
+        card = json.loads((folder / "card.json").read_text())
+        assert card["learner"] == "world_model" and "ppo" not in card["config"]
+        assert card["iterations"] == 2 and card["frames"] == (6 + 2) * 4
+        curve = pd.read_csv(folder / "curve.csv")
+        assert {"iteration", "frames", "success", "key_error", "unstable"} <= set(curve)
+
+
+def contents(folder: Path) -> tuple[set[str], dict[str, object]]:
+    """The names of a policy's files, and its contract but for the network's hash."""
+    stated = json.loads((folder / "contract.json").read_text())
+    return {path.name for path in folder.iterdir()}, stated | {"onnx_sha256": ""}
+
+
+@pytest.mark.parametrize(
+    ("env", "key", "fits"),
+    [
+        ({"episode_seconds": 0.1}, "world_model.horizon: expected at most 5", {"episode_seconds": 0.5}),
+        ({"observation": {"history": 2}}, "env.observation.history: expected 1", {"observation": {"history": 1}}),
+    ],
+)
+def test_a_task_that_a_world_model_cannot_take_is_bad_input(env: dict, key: str, fits: dict) -> None:
+    section = MODEL | {"world_model": MODEL["world_model"] | {"horizon": 6}}
+    with pytest.raises(BadInput, match=f"params.yaml: base.{key}"):
+        params.build(base.BaseConfig, section | {"env": env}, "params.yaml", "base")
+    params.build(base.BaseConfig, section | {"env": fits}, "params.yaml", "base")
+    params.build(base.BaseConfig, section | {"env": env, "learner": "ppo"}, "params.yaml", "base")
 
 
 def test_an_expert_gives_the_others_their_share(workspace: Path) -> None:

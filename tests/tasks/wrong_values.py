@@ -137,6 +137,9 @@ WRONG: list[tuple[str, Any, str]] = [
     *_same("base.ppo.clip", 0, -1),
     *_same("base.ppo.entropy", -1),
     *_same("base.ppo.value", -1),
+    *_same("base.learner", "dreamer", None),
+    *_same("base.world_model.window", 0, 64),
+    *_same("base.world_model.gamma", 1.0, NAN),
     *_same("base.ppo.grad_norm", 0),
     *_same("base.ppo.learning_rate", 0, -1e-4, 1.5),
     ("base.ppo.learning_rate_range", [-1e-5, 1e-3], "base.ppo.learning_rate_range[0]"),
@@ -218,7 +221,7 @@ WRONG: list[tuple[str, Any, str]] = [
     *_same("publish.promotion.people", 0, 10),
     ("publish.promotion.people", 2, "publish.promotion.mode"),  # which is auto
     *_same("publish.promotion.group", 1, "a\nb"),
-    *_same("report.title", "", "a\nb"),
+    *_same("report.title", "a\nb"),
     *_same("report.film", "yes"),
     *_same("report.seed", -1),
 ]

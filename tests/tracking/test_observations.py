@@ -18,7 +18,7 @@ from bumblebee.sim.rotations import (
 from bumblebee.tracking.library import MotionLibrary, ReferenceFrame
 from bumblebee.tracking.noise import LEVELS, noise_levels
 from bumblebee.tracking.observations import joint_targets, layout, observe
-from bumblebee.tracking.terms import TERMS
+from bumblebee.tracking.terms import LAYOUTS, TERMS
 from tests.tracking.clips import waving
 
 GENERATOR = torch.Generator().manual_seed(0)
@@ -123,7 +123,7 @@ def test_rotations_agree_with_each_other() -> None:
 
 def test_every_noise_level_names_a_part() -> None:
     """No level is written for a part that does not exist, and the reference's joints carry none."""
-    names = {name for name, _ in layout(23, 2)} | set(TERMS)
+    names = {name for layout in LAYOUTS.values() for name, _ in layout(23, 2)} | set(TERMS)
     assert set(LEVELS) <= names
     assert part(noise_levels(layout(23, 2))[None], "ref_joint_vel").max() == 0
 

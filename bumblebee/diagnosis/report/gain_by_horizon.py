@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bumblebee.diagnosis.thresholds.report import ReportThresholds
+from bumblebee.diagnosis.simulation import pick, rows
+from bumblebee.diagnosis.thresholds.report import ReportThresholds, Verdicts
 
 _BETTER, _WORSE, _FLOOR, _OPEN = "better", "worse", "at the noise floor", "open"
 
@@ -52,6 +53,39 @@ def gain_by_horizon(removed: Mapping[str, Sequence[Mapping[str, Any]]], rules: R
         return {name: some for name, some in kinds.items() if some}
 
     return GainByHorizon(are(_BETTER), are(_WORSE), are(_FLOOR), are(_OPEN))
+
+
+def gain_of(document: Mapping[str, Any], rules: ReportThresholds) -> GainByHorizon:
+    """The one verdict of a document: from `summary.removed`, and worse wherever a warning says so."""
+    gain = gain_by_horizon(document["summary"]["removed"], rules)
+    worse: dict[str, tuple[str, ...]] = dict(gain.worse)
+    for name, what in worse_measures(document["error"], rules.verdicts):
+        worse[name] = (*worse.get(name, ()), *([] if what in worse.get(name, ()) else [what]))
+
+    def rest(part: Kinds) -> dict[str, tuple[str, ...]]:
+        left = {name: tuple(kind for kind in kinds if kind not in worse.get(name, ())) for name, kinds in part.items()}
+        return {name: kinds for name, kinds in left.items() if kinds}
+
+    return GainByHorizon(rest(gain.better), worse, rest(gain.floor), rest(gain.open))
+
+
+def worse_measures(error: Mapping[str, Any], rule: Verdicts) -> list[tuple[str, str]]:
+    """(horizon, "base" or kind of joints) where the corrected model's RMS position error is larger."""
+    return [(horizon, what) for horizon, what, *_ in worse_rows(error, rule)]
+
+
+def worse_rows(error: Mapping[str, Any], rule: Verdicts) -> list[tuple[str, str, str, float, float]]:
+    """(horizon, what, unit, declared, corrected) of every position that the corrected model predicts worse."""
+    found = []
+    for horizon, measures in error["before"].items():
+        for _, unit, scale, key in rows(measures):
+            if key[0] not in ("joint_pos_rmse", "base_pos_rmse"):
+                continue
+            before, after = (pick(error[part].get(horizon, {}), key).get("value") for part in ("before", "after"))
+            if before is not None and after is not None and after > rule.worse * before:
+                what = "base" if key[0].startswith("base") else f"{key[1] or 'joint'}s"
+                found.append((horizon, what, unit, scale * before, scale * after))
+    return found
 
 
 def _verdict(entry: Mapping[str, Any], rules: ReportThresholds) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee.diagnosis.report.gain_by_horizon import gain_by_horizon, leaves_floor, whole_model
+from bumblebee.diagnosis.report.gain_by_horizon import gain_of, leaves_floor, whole_model
 from bumblebee.diagnosis.report.html import number
 from bumblebee.diagnosis.report.what_matters import BESIDE, CARRY, LEFT, WIDE
 from bumblebee.diagnosis.thresholds.report import Matters, ReportThresholds
@@ -127,7 +127,7 @@ def trusted(document: Mapping[str, Any], rules: ReportThresholds) -> str:
     told = document["summary"]
     if not told["trust"]:
         return ""
-    gain = gain_by_horizon(told["removed"], rules)
+    gain = gain_of(document, rules)
     text = whole_model(gain)
     if not gain.better and not gain.nothing_to_gain:
         return f"{text}."
@@ -163,7 +163,7 @@ def effect_groups(document: Mapping[str, Any], rules: ReportThresholds) -> list[
     effects, told = document["effects"], document.get("summary")
     if not told:
         return [("Effects", list(effects))] if effects else []
-    titles = dict(GROUPS) if gain_by_horizon(told["removed"], rules).better else dict.fromkeys(GROUPS, FITTED)
+    titles = dict(GROUPS) if gain_of(document, rules).better else dict.fromkeys(GROUPS, FITTED)
     fold = f"{rules.matters.wide:g}-fold"
     titles[WIDE] = f"{GROUPS[WIDE]}: interval wider than {fold}, or with the declared value in it"
     groups: dict[str, list[dict[str, Any]]] = {title: [] for title in titles.values()}

@@ -25,8 +25,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bumblebee.diagnosis.dataset import Session, window_errors
+from bumblebee.diagnosis.report.gain_by_horizon import worse_rows
 from bumblebee.diagnosis.report.html import number
-from bumblebee.diagnosis.simulation import pick, position_rows, rows
+from bumblebee.diagnosis.simulation import pick, position_rows
 from bumblebee.diagnosis.thresholds.report import Verdicts
 from bumblebee.sim.effects import Effect
 
@@ -123,20 +124,11 @@ def unseen_notes(
 
 def worse_horizons(error: dict[str, Any], rule: Verdicts) -> list[str]:
     """A line for every horizon and measure at which the corrected model errs more than the declared one."""
-    lines = []
-    for horizon, measures in error["before"].items():
-        for _, unit, scale, key in rows(measures):
-            if key[0] not in ("joint_pos_rmse", "base_pos_rmse"):
-                continue
-            before, after = (pick(error[part].get(horizon, {}), key).get("value") for part in ("before", "after"))
-            if before is not None and after is not None and after > rule.worse * before:
-                what = "base" if key[0].startswith("base") else f"{key[1] or 'joint'}s"
-                lines.append(
-                    f"WORSE after {horizon} s: the RMS error of the {what} is {scale * before:.3g} {unit} with the "
-                    f"declared model and {scale * after:.3g} {unit} with the corrected one. Do not predict over that "
-                    "horizon with it."
-                )
-    return lines
+    return [
+        f"WORSE after {horizon} s: the RMS error of the {what} is {before:.3g} {unit} with the declared model and "
+        f"{after:.3g} {unit} with the corrected one. Do not predict over that horizon with it."
+        for horizon, what, unit, before, after in worse_rows(error, rule)
+    ]
 
 
 def told_horizon(block: Mapping[str, Any]) -> str | None:

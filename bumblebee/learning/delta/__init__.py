@@ -12,7 +12,7 @@ from bumblebee.learning.delta.action import (
     save_delta,
 )
 from bumblebee.learning.delta.env import DeltaEnv
-from bumblebee.learning.delta.gain import Gain, compare, replay_error
+from bumblebee.learning.delta.gain import Gain, by_rollout, compare, replay_error, state_error
 from bumblebee.learning.delta.learn import learn_delta, total_frames
 from bumblebee.learning.delta.recordings import Recordings, recorded_state, stack
 from bumblebee.learning.delta.regression import fit_delta
@@ -27,6 +27,7 @@ __all__ = [
     "Gain",
     "Recordings",
     "action_adapter",
+    "by_rollout",
     "compare",
     "fit_delta",
     "learn_delta",
@@ -37,6 +38,7 @@ __all__ = [
     "replay_error",
     "save_delta",
     "stack",
+    "state_error",
     "total_frames",
     "train_delta",
 ]

@@ -59,10 +59,11 @@ def replay_error(
             for horizon, at in zip(HORIZONS, frames, strict=True):
                 if k + 1 == at:
                     reached = (filled + at <= end)[:count]
-                    error = _error(engine.state(), recordings.qpos[torch.minimum(filled + at, end)])[:count]
+                    state, wanted = engine.state(), recordings.qpos[torch.minimum(filled + at, end)]
+                    error = state_error(state.root_quat_w, state.joint_pos, wanted)[:count]
                     errors[horizon][begin : begin + count] = torch.where(reached, error, torch.nan)
     owner = recordings.owner(rows_all).numpy()
-    return {str(h): _by_rollout(errors[h].numpy(), owner, len(recordings.ids)) for h in HORIZONS}
+    return {str(h): by_rollout(errors[h].numpy(), owner, len(recordings.ids)) for h in HORIZONS}
 
 
 def compare(without: dict[str, np.ndarray], with_delta: dict[str, np.ndarray], motions: Sequence[str]) -> Gain:
@@ -86,7 +87,7 @@ def compare(without: dict[str, np.ndarray], with_delta: dict[str, np.ndarray], m
         mean = float(by_motion.mean()) if len(by_motion) else float("nan")
         values = (float(before[both].mean()), float(after[both].mean())) if both.any() else (float("nan"),) * 2
         change[horizon] = {"without": values[0], "with": values[1], "relative": mean, "low": low, "high": high}
-    longest = change[str(max(HORIZONS))]
+    longest = change[max(change, key=float)]
     worse = any(c["low"] > 0 for c in change.values())
     if change and all(c["with"] == c["without"] for c in change.values()):
         reason = "nothing was found that it should correct"
@@ -101,12 +102,20 @@ def compare(without: dict[str, np.ndarray], with_delta: dict[str, np.ndarray], m
     return Gain(count, len(told), change, False, reason)
 
 
-def _error(state: RobotState, qpos: Tensor) -> Tensor:
-    joints = (state.joint_pos - qpos[:, 7:]).square().mean(-1).sqrt()
-    return joints + angle_between(qpos[:, 3:7], state.root_quat_w)
+def state_error(root_quat: Tensor, joint_pos: Tensor, qpos: Tensor) -> Tensor:
+    """Root mean square over joints (B, J) of their error, plus the angle of the base's rotation error, (B,) [rad].
+
+    Args:
+        root_quat: (B, 4) wxyz.
+        joint_pos: (B, J) [rad].
+        qpos: (B, 7 + J) recorded.
+    """
+    joints = (joint_pos - qpos[:, 7:]).square().mean(-1).sqrt()
+    return joints + angle_between(qpos[:, 3:7], root_quat)
 
 
-def _by_rollout(errors: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
+def by_rollout(errors: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
+    """Root mean square (count,) of each rollout's finite errors (W,), NaN without any; `owner` (W,) says whose."""
     means = np.full(count, np.nan)
     for r in range(count):
         own = errors[(owner == r) & np.isfinite(errors)]

@@ -40,7 +40,7 @@ class Recordings:
     motions: tuple[str, ...]
 
     def to(self, device: torch.device | str) -> "Recordings":
-        """The same on a device."""
+        """Copy to a device."""
         moved = {name: getattr(self, name).to(device) for name in ("qpos", "qvel", "targets", "start", "length")}
         return Recordings(**moved, ids=self.ids, motions=self.motions)
 
@@ -81,7 +81,7 @@ def stack(rollouts: Sequence[Rollout], model: mujoco.MjModel) -> Recordings:
     """Lay rollouts of the G1 end to end, columns in `joint_names()` order.
 
     Raises:
-        BadInput: if a column that the replay needs was not logged.
+        BadInput: for another robot, or if a column that the replay needs was not logged.
     """
     if not rollouts:
         raise BadInput("replay", "at least one measured rollout", "none")
@@ -97,6 +97,9 @@ def _states(rollout: Rollout, model: mujoco.MjModel) -> tuple[np.ndarray, np.nda
         if getattr(rollout, column) is None:
             do = "Log it, or leave the rollout out of the delta stage."
             raise BadInput(f"{rollout.rollout_id}: column {column}", "a logged column", "none", do)
+    if other := sorted(set(rollout.joints) ^ set(joint_names())):
+        came = f"{len(rollout.joints)} joints, of which {other[0]} is in one alone"
+        raise BadInput(f"{rollout.rollout_id}: joints", f"the G1's {len(joint_names())}", came, "Leave it out.")
     order = [rollout.joints.index(name) for name in joint_names()]
     joints = rollout.joint_pos[:, order]
     turn = Rotation.from_quat(rollout.base_quat, scalar_first=True)

@@ -36,6 +36,16 @@ def joint_pos(body: Tensor) -> Tensor:
     return body[..., ROOT : ROOT + (body.shape[-1] - ROOT) // 2]
 
 
+def name_of(entry: int, size: int) -> str:
+    """Name an entry of a state of `size` = 13 + 2 J entries."""
+    joints = (size - ROOT) // 2
+    if entry < ROOT:
+        return ("root position", "root orientation", "root velocity", "root angular velocity")[
+            (entry >= 3) + (entry >= POSE) + (entry >= POSE + 3)
+        ]
+    return f"{'angle' if entry < ROOT + joints else 'velocity'} of joint {(entry - ROOT) % joints}"
+
+
 def features(body: Tensor) -> Tensor:
     """Everything of a state that physics depends on (B, 10 + 2 J): no place in the plane, no heading."""
     down = torch.zeros_like(body[..., :3])

@@ -48,6 +48,15 @@ class Collector:
         self._last = action.masked_fill(fresh, 0.0)
         return seen
 
+    def state_dict(self) -> dict[str, Tensor]:
+        """Actions and servo targets of the last steps, which the next rows of the memory tell of."""
+        return {"last": self._last.cpu(), "earlier": self._earlier.cpu(), "before": self._before.cpu()}
+
+    def load_state_dict(self, saved: dict[str, Tensor]) -> None:
+        """Go on from what `state_dict` gave."""
+        device = self._last.device
+        self._last, self._earlier, self._before = (saved[name].to(device) for name in ("last", "earlier", "before"))
+
     def _held(self) -> Tensor:
         """Targets (N, P J) [rad] that a robot's servos are held at when its episode begins in this frame."""
         ref = self._env.library.frames(self._env.clip, self._env.frame * self._env.dt)

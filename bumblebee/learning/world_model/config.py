@@ -1,9 +1,14 @@
 """Settings of the world-model learner, a section of params.yaml."""
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
 from bumblebee.ranges import Factor, Few, PartOf, Positive, Range, Ranged, Rate, Share, Widths
+from bumblebee.tracking.config import EnvConfig
+
+_CONTROL_HZ = 50  # of the policy
 
 
 @dataclass(frozen=True)
@@ -63,3 +68,19 @@ class WorldModelConfig(Ranged):
         """Refuse windows that the memory cannot hold."""
         super().__post_init__()
         self.require(self.window < self.memory, "window", "fewer steps than `memory`")
+
+    def misfits(self, task: EnvConfig, longest: float = math.inf) -> Iterator[tuple[str, str, object]]:
+        """Settings of a training that this learner cannot take: which, what was expected and what came.
+
+        Args:
+            task: its task.
+            longest: control steps of the longest motion, where it is known.
+        """
+        if (history := task.observation.history) > 1:
+            yield "env.observation.history", "1 with the learner `world_model`, which imagines no history", history
+        if task.num_worlds < 2:
+            yield "env.num_worlds", "at least 2 with the learner `world_model`, which holds one out", task.num_worlds
+        steps = int(min(round(task.episode_seconds * _CONTROL_HZ), longest))
+        for name in ("window", "horizon"):
+            if (came := getattr(self, name)) > steps:
+                yield f"world_model.{name}", f"at most {steps} control steps, the longest episode", came

@@ -1,11 +1,14 @@
 """Gradient steps on some weights, in tensors that stay where they are, so that a step can be recorded."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
 from torch import Tensor, nn
+
+from bumblebee.learning.ranks import Ranks
+from bumblebee.learning.update_graph import Recorded
 
 _LOWEST = 0.1  # of the learning rate, at the end of its cosine
 
@@ -22,7 +25,7 @@ class Descent:
     def __init__(self, weights: Sequence[nn.Parameter], rate: float, grad_norm: float) -> None:
         self.weights, self._first, self._norm = list(weights), rate, grad_norm
         device = self.weights[0].device
-        self.rate = torch.tensor(rate, device=device)
+        self.rate, self.steepness = torch.tensor(rate, device=device), torch.zeros((), device=device)
         self._adam = torch.optim.Adam(self.weights, lr=self.rate, fused=True, capturable=device.type == "cuda")
         self._gradients = [torch.zeros_like(weight) for weight in self.weights]
         for weight, gradient in zip(self.weights, self._gradients, strict=True):
@@ -32,10 +35,20 @@ class Descent:
         """Set the rate for a training of which the share `done` lies behind."""
         self.rate.fill_(self._first * (_LOWEST + (1 - _LOWEST) * 0.5 * (1 + math.cos(math.pi * done))))
 
-    def __call__(self, loss: Tensor) -> None:
-        """One step down the gradient of `loss` ()."""
+    def differentiate(self, loss: Tensor) -> None:
+        """Take the gradient of `loss` ()."""
         torch._foreach_copy_(self._gradients, torch.autograd.grad(loss, self.weights))
-        torch.nn.utils.clip_grad_norm_(self.weights, self._norm)
+
+    def exchange(self, ranks: Ranks) -> None:
+        """Replace the gradient by its mean over all ranks, equal to the bit on all."""
+        flat = torch.cat([gradient.flatten() for gradient in self._gradients])
+        ranks.add(flat)
+        parts = (flat / ranks.count).split([gradient.numel() for gradient in self._gradients])
+        torch._foreach_copy_(self._gradients, [p.view_as(g) for p, g in zip(parts, self._gradients, strict=True)])
+
+    def step(self) -> None:
+        """Go one step down the gradient; `steepness` () is its norm before it is bounded."""
+        self.steepness.copy_(torch.nn.utils.clip_grad_norm_(self.weights, self._norm))
         self._adam.step()
 
     def state_dict(self) -> dict[str, Any]:
@@ -47,3 +60,39 @@ class Descent:
         self._adam.load_state_dict(saved)
         for group in self._adam.param_groups:
             group["lr"] = self.rate
+
+
+class Learning:
+    """A gradient step of several networks, which ranks take together; recorded on a GPU.
+
+    Several ranks exchange their gradients between two halves, of which the first alone is then recorded.
+
+    Args:
+        differentiate: takes the gradients of all `descents`.
+        apply: steps down them.
+        descents: of the networks.
+        ranks: the processes that learn together.
+    """
+
+    def __init__(
+        self,
+        differentiate: Callable[[], None],
+        apply: Callable[[], None],
+        descents: Sequence[Descent],
+        ranks: Ranks,
+    ) -> None:
+        self._differentiate, self._apply, self._descents, self._ranks = differentiate, apply, descents, ranks
+        recorded = self._whole if ranks.count == 1 else differentiate
+        self._recorded = Recorded(recorded, descents[0].rate.device, lambda: [])
+
+    def __call__(self) -> None:
+        """Learn once."""
+        self._recorded()
+        if self._ranks.count > 1:
+            for descent in self._descents:
+                descent.exchange(self._ranks)
+            self._apply()
+
+    def _whole(self) -> None:
+        self._differentiate()
+        self._apply()

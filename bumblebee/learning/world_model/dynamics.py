@@ -7,6 +7,7 @@ from copy import deepcopy
 import torch
 from torch import Tensor, nn
 
+from bumblebee.learning.ranks import Ranks
 from bumblebee.learning.world_model.body import change_of, difference, features, joint_pos, moved
 
 SPREADS = (0.05, 0.05, 0.05, 0.1, 0.1, 0.1, 0.3, 0.3, 0.3, 0.6, 0.6, 0.6)
@@ -89,12 +90,16 @@ class Dynamics(nn.Module):
         return twin
 
     @torch.no_grad()
-    def normalise(self, body: Tensor, target: Tensor, before: Tensor, context: Tensor, after: Tensor) -> None:
-        """Take the spreads of inputs and of changes from first transitions (B, ...), none of them broken."""
-        seen, change = self.seen(body, target, before, context), change_of(body, after, self.dt)
-        self.mean.copy_(seen.mean(0))
-        self.std.copy_(seen.std(0).clamp(min=1e-2))
-        self.scale.copy_(change.square().mean(0).sqrt().clamp(min=1e-5))
+    def normalise(
+        self, body: Tensor, target: Tensor, before: Tensor, context: Tensor, after: Tensor, ranks: Ranks | None = None
+    ) -> None:
+        """Take the spreads of inputs and changes from first transitions (B, ...) of all ranks, none of them broken."""
+        ranks = ranks or Ranks()
+        mean, std = ranks.moments(self.seen(body, target, before, context))
+        about, spread = ranks.moments(change_of(body, after, self.dt))
+        self.mean.copy_(mean)
+        self.std.copy_(std.clamp(min=1e-2))
+        self.scale.copy_((about.square() + spread.square()).sqrt().clamp(min=1e-5))
 
     def unrolled(
         self, body: Tensor, targets: Tensor, before: Tensor, context: Tensor, step: Predict | None = None

@@ -4,9 +4,9 @@ from typing import Any
 
 import torch
 
-from bumblebee.learning.update_graph import Recorded
+from bumblebee.learning.ranks import Ranks
 from bumblebee.learning.world_model.config import WorldModelConfig
-from bumblebee.learning.world_model.descent import Descent
+from bumblebee.learning.world_model.descent import Descent, Learning
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.memory import Memory
 
@@ -20,26 +20,27 @@ class ModelUpdate:
         model: what learns.
         memory: full when this is called.
         config: batch, window and rate.
+        ranks: the processes that learn one model together, each from its own memory.
     """
 
-    def __init__(self, model: Dynamics, memory: Memory, config: WorldModelConfig) -> None:
-        self.model, self._memory, self._config = model, memory, config
+    def __init__(self, model: Dynamics, memory: Memory, config: WorldModelConfig, ranks: Ranks | None = None) -> None:
+        self.model, self._memory, self._config, self._ranks = model, memory, config, ranks or Ranks()
         self._predict = torch.compile(model.forward, dynamic=False) if config.compile else model.forward
         self.descent = Descent(list(model.parameters()), config.model_rate, config.grad_norm)
-        self.told = {"loss_model": torch.zeros((), device=model.mean.device)}
-        self._recorded = Recorded(self._step, model.mean.device, lambda: [])
+        self.told = {"loss_model": torch.zeros((), device=model.mean.device), "gradient_model": self.descent.steepness}
+        self._learn = Learning(self._differentiate, self.descent.step, [self.descent], self._ranks)
 
     def begin(self) -> None:
         """Normalise the model by the first full memory, and let it learn alone for a while."""
         window = self._memory.windows(1, _FIRST)
         columns = (window.bodies[0], window.targets[0], window.before, window.context, window.bodies[1])
-        self.model.normalise(*(column[window.valid[0]] for column in columns))
+        self.model.normalise(*(column[window.valid[0]] for column in columns), self._ranks)
         for _ in range(self._config.warm_up):
             self()
 
     def __call__(self) -> None:
         """Learn once."""
-        self._recorded()
+        self._learn()
 
     def decay(self, done: float) -> None:
         """Set the learning rate for a training of which the share `done` lies behind."""
@@ -54,10 +55,10 @@ class ModelUpdate:
         self.model.load_state_dict(saved["model"])
         self.descent.load_state_dict(saved["descent"])
 
-    def _step(self) -> None:
+    def _differentiate(self) -> None:
         window = self._memory.windows(self._config.window, self._config.model_batch)
         first = (window.bodies[0], window.targets, window.before, window.context)
         predicted = self.model.unrolled(*first, self._predict)
         loss = self.model.loss(predicted, window.bodies[1:], window.valid)
-        self.descent(loss)
+        self.descent.differentiate(loss)
         self.told["loss_model"].copy_(loss.detach())

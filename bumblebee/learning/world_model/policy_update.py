@@ -7,13 +7,15 @@ import torch
 from rsl_rl.models import MLPModel
 from torch import Tensor
 
-from bumblebee.learning.update_graph import Recorded
+from bumblebee.learning.ranks import Ranks
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.critic import Critic, error, objective, targets
-from bumblebee.learning.world_model.descent import Descent
+from bumblebee.learning.world_model.descent import Descent, Learning
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory
+
+_TOLD = ("imagined", "alive", "value", "loss_value")
 
 
 class PolicyUpdate:
@@ -25,10 +27,17 @@ class PolicyUpdate:
         imagination: the task.
         memory: where rollouts begin; full when this is called.
         config: batch, horizon, discount and rates.
+        ranks: the processes that learn one policy together.
     """
 
     def __init__(
-        self, actor: MLPModel, model: Dynamics, imagination: Imagination, memory: Memory, config: WorldModelConfig
+        self,
+        actor: MLPModel,
+        model: Dynamics,
+        imagination: Imagination,
+        memory: Memory,
+        config: WorldModelConfig,
+        ranks: Ranks | None = None,
     ) -> None:
         device = model.mean.device
         self.actor, self.average = actor, deepcopy(actor).requires_grad_(False)
@@ -39,13 +48,13 @@ class PolicyUpdate:
             "policy": Descent(list(actor.mlp.parameters()), config.policy_rate, config.grad_norm),
             "value": Descent(list(self.critic.network.parameters()), config.value_rate, config.grad_norm),
         }
-        names = ("imagined", "alive", "value", "loss_value")
-        self.told = {name: torch.zeros((), device=device) for name in names}
-        self._recorded = Recorded(self._step, device, lambda: [])
+        self.told = {name: torch.zeros((), device=device) for name in _TOLD}
+        self.told |= {f"gradient_{name}": descent.steepness for name, descent in self.descents.items()}
+        self._learn = Learning(self._differentiate, self._apply, list(self.descents.values()), ranks or Ranks())
 
     def __call__(self) -> None:
         """Learn once."""
-        self._recorded()
+        self._learn()
 
     def look(self, seen: Tensor) -> None:
         """Normalise by these observations (N, D) too, in tensors that stay where they are."""
@@ -71,24 +80,30 @@ class PolicyUpdate:
             descent.load_state_dict(saved["descents"][name])
         self._seen.load_state_dict(self.actor.obs_normalizer.state_dict())
 
-    def _step(self) -> None:
+    def _differentiate(self) -> None:
+        """Gradients of both networks; the value's depends on the policy by what was imagined alone."""
         config = self._config
         rollout = self._imagination.rollout(self._act, self._model, self._memory.starts(config.policy_batch))
         seen, after = self.actor.obs_normalizer(rollout.seen), self.actor.obs_normalizer(rollout.after)
         last = self.critic.steady(after)
-        self.descents["policy"](-objective(rollout, last, config.gamma))
-        own, kept = (list(network.mlp.parameters()) for network in (self.actor, self.average))
-        torch._foreach_lerp_(kept, own, 1 - config.average)
+        self.descents["policy"].differentiate(-objective(rollout, last, config.gamma))
         with torch.no_grad():
             values = torch.cat((self.critic.steady(seen), last[None]))
             wanted = targets(rollout, values, config.gamma, config.trace)
         loss = error(rollout, self.critic(seen), wanted)
-        self.descents["value"](loss)
-        self.critic.follow(1 - config.value_average)
+        self.descents["value"].differentiate(loss)
         alive = rollout.alive[:-1].float().mean()
         found = (rollout.reward.mean(), alive, wanted.mean(), loss)
-        for told, value in zip(self.told.values(), found, strict=True):
-            told.copy_(value.detach())
+        for name, value in zip(_TOLD, found, strict=True):
+            self.told[name].copy_(value.detach())
+
+    def _apply(self) -> None:
+        """A step of both networks; their averages follow."""
+        for descent in self.descents.values():
+            descent.step()
+        own, kept = (list(network.mlp.parameters()) for network in (self.actor, self.average))
+        torch._foreach_lerp_(kept, own, 1 - self._config.average)
+        self.critic.follow(1 - self._config.value_average)
 
     def _act(self, seen: Tensor) -> Tensor:
         """Mean actions (B, J) of the policy that learns."""

@@ -12,6 +12,7 @@ from bumblebee.diagnosis.diagnose import Diagnosis, diagnose
 from bumblebee.diagnosis.output import contents
 from bumblebee.diagnosis.replay import replay
 from bumblebee.diagnosis.report import summary
+from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.diagnosis.thresholds.report import (
     Effects,
@@ -70,7 +71,9 @@ def test_the_document_goes_by_what_was_set(set_: Diagnosis, default: Diagnosis) 
 def test_page_and_terminal_go_by_what_was_set(set_: Diagnosis, default: Diagnosis) -> None:
     page, usual = (contents(made)["report.html"] for made in (set_, default))
     assert "WORSE" in page and "WORSE" not in usual
-    assert "and 1 more" in page and "more in diagnosis.json" in page
+    assert "Do not trust the corrected model" in page and "more in diagnosis.json" in page
+    better = render_report(set_.document, [], replace(RULES, verdicts=Verdicts(large=0.0)))
+    assert "and 1 more" in better and "and 1 more" not in usual
     assert page.count("<svg") == 3 and len(page) < len(usual)
     assert "WORSE" in summary(set_.document, RULES) and "WORSE" not in summary(default.document)
 

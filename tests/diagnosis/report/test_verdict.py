@@ -9,10 +9,11 @@ import pytest
 from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.dataset.undriven import commanded_undriven
 from bumblebee.diagnosis.gap.gap import gap
-from bumblebee.diagnosis.report.notes import unexplained_error, what_is_left
+from bumblebee.diagnosis.report.gain_by_horizon import gain_of, whole_model
+from bumblebee.diagnosis.report.notes import unexplained_error, what_is_left, worse_horizons
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.terminal import summary
-from bumblebee.diagnosis.thresholds.report import Verdicts
+from bumblebee.diagnosis.thresholds.report import ReportThresholds, Verdicts
 from bumblebee.errors import BadInput
 from tests.diagnosis import cart
 
@@ -42,6 +43,23 @@ def test_a_large_error_without_an_effect_is_said_and_nothing_comforts():
     for text in (summary(made), render_report(made, [])):
         assert "no effect of the catalogue explains it" in text
         assert "structure in the residual (p" not in text and "No effect of the catalogue is missing" not in text
+
+
+def test_a_page_with_a_red_box_never_trusts_the_model_as_a_whole():
+    entries = {name: {"joint_pos_rmse": {"value": 0.1}, "base_pos_rmse": {"value": 0.01}} for name in ("0.2", "1.0")}
+    after = {
+        "0.2": {"joint_pos_rmse": {"value": 0.01}, "base_pos_rmse": {"value": 0.005}},
+        "1.0": {"joint_pos_rmse": {"value": 0.05}, "base_pos_rmse": {"value": 0.03}},
+    }
+    gone = [{"what": "joints", "share": 0.9, "ci95": [0.8, 1.0], "before": 0.1, "after": 0.01, "floor": 0.005}]
+    made = {"error": {"before": entries, "after": after, "floor": {}}, "effects": [],
+            "summary": {"removed": {"0.2": gone, "1.0": gone}}}  # fmt: skip
+    rules = ReportThresholds()
+    assert len(worse_horizons(made["error"], rules.verdicts)) == 1
+    said = whole_model(gain_of(made, rules))
+    assert "as a whole" not in said and "worse than the declared one after 1.0 s (base)" in said
+    better = {**made, "error": {"before": entries, "after": {"0.2": after["0.2"], "1.0": after["0.2"]}, "floor": {}}}
+    assert "as a whole" in whole_model(gain_of(better, rules))
 
 
 def test_a_large_error_beside_effects_is_said_too():

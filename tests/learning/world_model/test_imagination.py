@@ -1,5 +1,7 @@
 """The task is one and the same in the simulator and in imagination."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 from torch._dynamo.utils import counters
@@ -12,9 +14,10 @@ from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory, Starts
 from bumblebee.motion.embedded import make_library
 from bumblebee.sim.engine_choice import make_engine
-from bumblebee.tracking.config import EnvConfig, Randomisation
+from bumblebee.tracking.config import EnvConfig, ObservationConfig, Randomisation
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.library import MotionLibrary
+from bumblebee.tracking.mirror import augmentation
 from bumblebee.tracking.model import task_model
 from bumblebee.tracking.terms import see
 from tests.learning.tiny import env_of
@@ -22,13 +25,36 @@ from tests.learning.tiny import env_of
 WORLDS, STEPS = 8, 60
 
 
+CONFIG = EnvConfig(
+    num_worlds=WORLDS, threads=1, observation_noise=0.0, randomisation=Randomisation(push=0.0, gains=0.0)
+)
+
+
 @pytest.fixture(scope="module")
 def env() -> TrackingEnv:
-    config = EnvConfig(
-        num_worlds=WORLDS, threads=1, observation_noise=0.0, randomisation=Randomisation(push=0.0, gains=0.0)
-    )
-    engine = make_engine("mujoco", task_model(config), WORLDS, 1)
-    return TrackingEnv(MotionLibrary(make_library()[::12], config.ahead), engine, config, seed=3)
+    engine = make_engine("mujoco", task_model(CONFIG), WORLDS, 1)
+    return TrackingEnv(MotionLibrary(make_library()[::12], CONFIG.ahead), engine, CONFIG, seed=3)
+
+
+def test_a_policy_of_imu_and_encoders_sees_the_same_in_both_and_its_critic_the_state() -> None:
+    """Over whole episodes; the critic's further terms are those of a policy that sees them, and mirrored like them."""
+    env, full = env_of(replace(CONFIG, observation=ObservationConfig(("imu",)), critic=("demo",))), env_of(CONFIG)
+    imagination, generator, ended = Imagination(env, horizon=1), torch.Generator().manual_seed(0), 0
+    for _ in range(STEPS):
+        (state, ref), last = env.now, env._action
+        shown = see(imagination.terms, imagination.state(packed(state))[0], ref, last)
+        torch.testing.assert_close(shown, env.groups["policy"].exact, atol=1e-4, rtol=1e-4)
+        seen, other = env.get_observations(), full.get_observations()
+        assert torch.equal(seen["critic"][:, shown.shape[1] :], other["critic"])
+        action = 0.5 * torch.randn(WORLDS, env.num_actions, generator=generator)
+        done = env.step(action)[2]
+        assert torch.equal(done, full.step(action)[2])
+        ended += int(done.sum())
+    assert ended > 0, "some episodes must end for this to say anything"
+    both, _ = augmentation(env)(env, seen, None)
+    mirrored, _ = augmentation(full)(full, other, None)
+    assert both is not None and mirrored is not None
+    assert torch.equal(both["critic"][:, shown.shape[1] :], mirrored["critic"])
 
 
 def test_observation_reward_and_end_are_those_of_the_environment_over_whole_episodes(env: TrackingEnv) -> None:

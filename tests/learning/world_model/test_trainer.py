@@ -1,6 +1,5 @@
 """Training through a model on two waving clips, tiny and on a CPU."""
 
-import shutil
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.memory import Memory
 from bumblebee.learning.world_model.model_update import ModelUpdate
-from bumblebee.learning.world_model.trainer import CHECKPOINT, WorldModelTrainer
+from bumblebee.learning.world_model.trainer import WorldModelTrainer
 from bumblebee.tracking.config import EnvConfig, Randomisation
 from tests.learning.tiny import env_of
 
@@ -54,26 +53,6 @@ def weights(trainer: WorldModelTrainer) -> dict[str, torch.Tensor]:
 
     walk("", saved)
     return found
-
-
-def test_a_resumed_training_goes_on_with_equal_networks(trained: WorldModelTrainer, tmp_path: Path) -> None:
-    again = WorldModelTrainer(env_of(TASK, seed=1), SMALL, trained.folder, seed=1)
-    assert again.iteration == SMALL.iterations and again.frames == trained.frames
-    kept, found = weights(trained), weights(again)
-    assert kept.keys() == found.keys() and any("critic" in name for name in kept)
-    for name, value in kept.items():
-        torch.testing.assert_close(found[name], value, rtol=0, atol=0, msg=name)
-
-
-def test_a_resumed_training_collects_new_episodes_and_learns_on(trained: WorldModelTrainer, tmp_path: Path) -> None:
-    shutil.copy(trained.folder / CHECKPOINT, tmp_path)
-    longer = replace(SMALL, iterations=4)
-    again = WorldModelTrainer(env_of(TASK), longer, tmp_path)
-    again.train()
-    assert again.iteration == 4 and again.frames == trained.frames + SMALL.memory * TASK.num_worlds
-    kept, found = weights(trained), weights(again)
-    assert all(torch.isfinite(value).all() for value in found.values())
-    assert any(not torch.equal(kept[name], found[name]) for name in kept if ".actor.mlp" in name)
 
 
 def test_the_policies_are_normalised_by_all_that_was_seen_in_tensors_that_stay(trained: WorldModelTrainer) -> None:

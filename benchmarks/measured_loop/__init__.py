@@ -1,0 +1,1 @@
+"""The measured loop in the world model: four arms on sealed robots."""

@@ -1,0 +1,98 @@
+"""Command line: `bumblebee train`, `evaluate`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bumblebee.errors import BadInput, plain
+
+CsvFps = Annotated[float | None, typer.Option("--csv-fps", min=1, max=1000, help="Rate of CSV files, which hold none.")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="What files leave unsaid: docs/data.md.")
+]
+_PIECE = 10.0  # s: the longest episode of a training
+
+
+def train(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Motion files of any known format.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder for the policy, its card and its film.")] = Path("policy"),
+    minutes: Annotated[float, typer.Option("--minutes", help="Time of the training itself.")] = 15.0,
+    gpu: Annotated[bool, typer.Option("--gpu", help="Simulate on an NVIDIA GPU.")] = False,
+    start: Annotated[str, typer.Option("--from", help="`shipped`, `nothing`, or a policy's folder.")] = "shipped",
+    learner: Annotated[str, typer.Option("--learner", help="ppo or world_model.")] = "ppo",
+    held_out: Annotated[float, typer.Option("--held-out", help="Share of the motions to hold out.")] = 0.15,
+    worlds: Annotated[int | None, typer.Option("--worlds", help="Robots; 512 on a CPU, 4,096 on a GPU.")] = None,
+    threads: Annotated[int, typer.Option("--threads", help="CPU threads of the physics.")] = 2,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the network and of all draws.")] = 0,
+    csv_fps: CsvFps = None,
+    settings: Settings = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a policy of an earlier training.")] = False,
+) -> None:
+    """Train a policy on a folder of motions. Stopped, the same command goes on from its last checkpoint."""
+    from dataclasses import asdict
+
+    from bumblebee.api.policy_card import tried
+    from bumblebee.api.training import TrainConfig
+    from bumblebee.api.training import train as fit
+    from bumblebee.io.write import refuse_overlap
+    from bumblebee.motion.few_lines import few_lines
+    from bumblebee.motion.folder import ReadConfig, read_folder
+    from bumblebee.motion.one_file import stated
+    from bumblebee.sim.quiet import quiet_mujoco
+
+    quiet_mujoco()
+    chosen = {"minutes": minutes, "gpu": gpu, "start": start, "learner": learner, "held_out": held_out}
+    config = TrainConfig(**chosen, worlds=worlds, threads=threads, seed=seed)  # type: ignore[arg-type]
+    refuse_overlap(out, [folder])
+    files = ReadConfig(**vars(stated(settings or [], csv_fps=csv_fps)), max_seconds=_PIECE)
+    reading = read_folder(folder, files)
+    for told in few_lines(zip(reading.skipped["file"], reading.skipped["reason"], strict=True)):
+        print(plain(f"skipped: {told.line}: {told.whose}"))
+    counts = f"{len(reading.clips)} motions of at most {_PIECE:g} s read, {len(reading.skipped)} files skipped"
+    print(counts, flush=True)
+
+    def say(text: str) -> None:
+        print(plain(text), flush=True)
+
+    made = fit(reading.clips, out, overwrite=overwrite, say=say, **asdict(config))
+    for told in few_lines(zip(made.dropped["motion"], made.dropped["explanation"], strict=True)):
+        print(plain(f"dropped: {told.line}: {told.whose}"))
+    print("\n".join(line for line in tried(made.trials) if line))
+    print(f"written: {out}: policy.onnx, contract.json, README.md (the card), film.gif, policy.pt, trials.csv")
+
+
+def evaluate(
+    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or `shipped`.")],
+    motions: Annotated[str, typer.Argument(metavar="MOTIONS", help="Motion files, or `embedded`.")] = "embedded",
+    out: Annotated[Path | None, typer.Option("--out", help="CSV file with a row a rollout.")] = None,
+    repeats: Annotated[int, typer.Option("--repeats", help="Rollouts of each motion.")] = 1,
+    noise: Annotated[float, typer.Option("--noise", help="Factor on the noise of start and sensors.")] = 0.0,
+    limit: Annotated[int | None, typer.Option("--limit", min=1, help="Motions at most.")] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the noise.")] = 0,
+    csv_fps: CsvFps = None,
+    settings: Settings = None,
+) -> None:
+    """Let a policy follow motions in MuJoCo, and print how many it follows and how closely."""
+    from bumblebee.api.motions import EMBEDDED, read_motions
+    from bumblebee.api.policies import evaluate as run
+    from bumblebee.api.policies import load_policy
+    from bumblebee.api.policy_card import tried
+    from bumblebee.io.write import refuse_existing, try_output, write_file
+    from bumblebee.motion.one_file import stated
+    from bumblebee.sim.quiet import quiet_mujoco
+
+    quiet_mujoco()
+    if out is not None:
+        refuse_existing(out)
+        try_output(out)
+    loaded, files = load_policy(policy), stated(settings or [], csv_fps=csv_fps)
+    embedded = {} if limit is None else {"limit": limit}
+    clips = read_motions(motions, **(embedded if motions == EMBEDDED else vars(files)))
+    if not clips:
+        raise BadInput(motions, "a motion", "none")
+    table = run(loaded, clips[:limit], repeats=repeats, noise=noise, seed=seed)
+    print("\n".join(line for line in tried(table, {"train": "motions"}) if line))
+    if out is not None:
+        write_file(out, table.to_csv(index=False))
+        print(f"written: {out}")

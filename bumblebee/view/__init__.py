@@ -1,0 +1,1 @@
+"""Robots in the browser: a policy live, motions, measured rollouts; on loopback, behind one port."""

@@ -1,0 +1,83 @@
+"""One model that holds several robots side by side or through each other, for drawing alone."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from bumblebee.report.looks import dress, is_g1
+from bumblebee.robot.model import build_spec
+
+GHOST = (0.25, 0.55, 0.95, 0.3)
+"""Colour of a robot that is not there: the reference, or what a model says (RGBA)."""
+OTHERS = 1
+"""Group of the geoms of all robots but the first."""
+FOUND = (0.10, 0.62, 0.35, 0.45)
+"""Colour of what the corrected model says (RGBA)."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One robot in the picture."""
+
+    name: str
+    """Name in the page; unique in a picture."""
+    tint: tuple[float, float, float, float] | None = None
+    """RGBA of all its parts; None for its own colours."""
+
+
+def drawing(
+    robots: Sequence[Drawn], meshes: Path | None = None, make: Callable[[], mujoco.MjSpec] | None = None
+) -> mujoco.MjModel:
+    """A model whose state is the robots' states (F, nq) one after the other; nothing in it is simulated.
+
+    Args:
+        robots: at least one; the camera follows the first.
+        meshes: folder of the G1's meshes, as `dress` takes it.
+        make: spec of another robot than the declared G1; one that is no G1 is drawn by its own geoms.
+    """
+    parent: mujoco.MjSpec | None = None
+    for robot in robots:
+        spec = make() if make else build_spec()
+        if is_g1(spec):
+            dress(spec, meshes, robot.tint)
+        elif robot.tint:
+            _paint(spec, robot.tint)
+        _keep_bodies(spec, floor=parent is None)
+        if parent is None:
+            parent = spec
+        else:
+            _put_in_group(spec, OTHERS)
+            parent.attach(spec, prefix=f"{robot.name}/", frame=parent.worldbody.add_frame())
+    assert parent is not None
+    return parent.compile()
+
+
+def _put_in_group(spec: mujoco.MjSpec, group: int) -> None:
+    for geom in spec.geoms:
+        geom.group = group if geom.rgba[3] > 0 else geom.group
+
+
+def _paint(spec: mujoco.MjSpec, tint: tuple[float, float, float, float]) -> None:
+    for geom in spec.geoms:
+        if geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
+            geom.rgba, geom.material = tint, ""
+
+
+def _keep_bodies(spec: mujoco.MjSpec, floor: bool) -> None:
+    """Leave out what moves, measures or lights, and the floor of all robots but the first."""
+    for parts in (spec.keys, spec.actuators, spec.sensors, spec.lights, spec.cameras, spec.excludes):
+        for part in list(parts):
+            spec.delete(part)
+    planes = [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_PLANE]
+    for plane in planes[1 if floor else 0 :]:
+        spec.delete(plane)
+
+
+def states(clip_or_parts: Sequence[np.ndarray]) -> np.ndarray:
+    """(F, nq) states of a picture from its robots' own, (F, n) each; shorter ones stand still at their last."""
+    longest = max(len(part) for part in clip_or_parts)
+    held = [part[np.minimum(np.arange(longest), len(part) - 1)] for part in clip_or_parts]
+    return np.concatenate(held, axis=1)

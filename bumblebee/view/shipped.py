@@ -1,0 +1,32 @@
+"""The policy that comes with BumbleBee, live on the embedded motions: no training, no files, no other server."""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bumblebee.deploy.policy import ExportedPolicy
+from bumblebee.learning.export import export_shipped
+from bumblebee.motion.embedded import EmbeddedConfig, make
+from bumblebee.motion.embedded.kinds import Kind, kinds
+from bumblebee.view.live import LivePolicy
+from bumblebee.view.sources import Entry, Source
+
+_FIRST = "walk"
+
+
+@contextmanager
+def shipped_policy() -> Iterator[ExportedPolicy]:
+    """The shipped policy as it is deployed, from a folder that is gone afterwards."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield ExportedPolicy.load(export_shipped(Path(folder) / "policy"))
+
+
+def embedded_entries(policy: ExportedPolicy) -> list[Entry]:
+    """The embedded motions, each made when it is chosen; a walk comes first."""
+    order = sorted(kinds(), key=lambda kind: kind.name != _FIRST)
+    return [Entry(kind.name, kind.family, kind.captions[0], _maker(policy, kind)) for kind in order]
+
+
+def _maker(policy: ExportedPolicy, kind: Kind) -> Callable[[], Source]:
+    return lambda: LivePolicy(policy, make(kind, 0, EmbeddedConfig()))

@@ -1,0 +1,135 @@
+"""`import bumblebee as bb`: the names are there, the examples run, wrong arguments are one line with shapes."""
+
+import doctest
+import json
+import re
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bumblebee as bb
+from bumblebee.api import training
+from bumblebee.motion.embedded import EmbeddedConfig, make_library
+from tests.deploy.conftest import nod
+
+PAGE = Path(__file__).parents[2] / "docs" / "api.md"
+T = 4
+UPRIGHT = np.tile([1, 0, 0, 0], (T, 1))
+GOOD = {"root_pos": np.tile([0, 0, 0.76], (T, 1)), "root_quat": UPRIGHT, "joint_pos": np.zeros((T, 23))}
+FILES = {"policy.pt", "policy.onnx", "contract.json", "card.json", "README.md", "curve.csv", "trials.csv", "film.gif"}
+
+
+@pytest.fixture(autouse=True)
+def quick(tmp_path, monkeypatch):
+    """Work in a folder of its own; embedded motions are made once, films drawn as stick figures."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("bumblebee.report.playback.render_frames", lambda *rest: (None, "not here"))
+    monkeypatch.setattr("bumblebee.motion.embedded.make_library", lambda config: STAND[: config.limit])
+
+
+def short(clip):
+    """Its first 1.2 s."""
+    arrays = {name: getattr(clip, name)[:60] for name in ("root_pos", "root_quat", "joint_pos", "key_pos")}
+    return replace(clip, **arrays)
+
+
+STAND = [short(clip) for clip in make_library(EmbeddedConfig(families=("stand",), limit=2))]
+
+
+def test_the_examples_of_the_page_run():
+    scope: dict = {}
+    for block in re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.S):
+        exec(block, scope)
+    assert {path.name for path in Path("policy").iterdir()} == FILES
+    assert json.loads(Path("policy/card.json").read_text())["parent"] == "shipped"
+    assert [path.name for path in Path().glob(".*")] == []  # checkpoints are gone
+    assert bb.load_policy("policy").shape.actions == 23
+
+
+@pytest.mark.parametrize("room", ["motions", "policies"])
+def test_the_examples_of_the_docstrings_run(room):
+    assert doctest.testmod(import_module(f"bumblebee.api.{room}")).failed == 0
+
+
+def test_every_name_that_is_offered_is_there_and_on_the_page():
+    for name in bb.__all__:
+        assert getattr(bb, name) and name in dir(bb)
+    for path in re.findall(r"^::: bumblebee\.(\S+)", PAGE.read_text(), re.M):
+        module, _, name = path.rpartition(".")
+        assert getattr(import_module(f"bumblebee.{module}"), name).__doc__
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"joint_pos": np.zeros((T, 29))}, "joint_pos: expected an array (T, 23) of numbers, came shape (4, 29)"),
+        ({"root_quat": np.zeros((T, 4))}, "root_quat: expected quaternions that are not zero"),
+        ({"root_pos": np.full((T, 3), np.nan)}, "root_pos: expected finite numbers, came 12"),
+        ({"root_pos": np.zeros((T + 1, 3))}, "expected one length T of at least 1, came lengths [5, 4, 4]"),
+        ({"root_pos": "x"}, "root_pos: expected an array (T, 3) of numbers, came str"),
+    ],
+)
+def test_an_array_of_a_wrong_shape_is_one_line_with_both_shapes(change, said):
+    with pytest.raises(bb.BadInput) as caught:
+        bb.make_motion("m", 50, **(GOOD | change))
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_wrong_arguments_are_one_line_with_what_to_do():
+    for call, said in (
+        (lambda: bb.evaluate("shipped", "folder"), "bumblebee.read_motions(path)"),
+        (lambda: bb.evaluate("shipped", []), "an empty list"),
+        (lambda: bb.gap("dataset"), "bumblebee.open_dataset(model, dataset)"),
+        (lambda: bb.read_motions("embedded", speed=2), "'speed'"),
+        (lambda: bb.train([nod()], "p", minutes=-1), "TrainConfig.minutes"),
+        (lambda: bb.train([nod()], "p", hours=1), "'hours'"),
+        (lambda: bb.retarget(np.zeros((9, 17, 3)), 50), "(T, 18, 3) of numbers, came shape (9, 17, 3)"),
+        (lambda: bb.load_policy("nowhere"), "a trained policy"),
+    ):
+        with pytest.raises(bb.BadInput, match=re.escape(said)):
+            call()
+    assert not Path("p").exists()
+
+
+def test_a_training_that_was_killed_goes_on(monkeypatch):
+    """Stopped after its training, the same call neither trains again nor starts over."""
+    monkeypatch.setattr(training, "_kept", lambda *rest: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        bb.train(STAND, "policy", minutes=0.005, worlds=8)
+    iterations = []
+    monkeypatch.setattr(training, "_kept", lambda learner, *rest: iterations.append(learner.iteration))
+    monkeypatch.setattr("bumblebee.learning.ppo.Trainer._iterate", lambda self: pytest.fail("trained again"))
+    bb.train(STAND, "policy", minutes=0.005, worlds=8)
+    assert iterations[0] >= 1 and not Path(".policy.training").exists()
+
+
+@dataclass(frozen=True)
+class Ends:
+    iterations: int = 0
+
+
+class Hastens:
+    """A learner whose iterations get faster: by the first ones, fewer would do."""
+
+    def __init__(self, folder: Path) -> None:
+        self.config, self.iteration, self._seconds, self.saved = Ends(), 0, 0.0, folder / "saved"
+
+    def train(self, what, enough):
+        last = self.config.iterations
+        while self.iteration < last and not enough():
+            self._seconds += 1.0 if self.iteration < 4 else 0.125
+            self.iteration += 1
+
+    def save_checkpoint(self):
+        self.saved.touch()
+
+
+def test_a_training_takes_the_time_that_it_was_given_however_fast_it_becomes(tmp_path):
+    learner = Hastens(tmp_path)
+    training.train_for(learner, 20.0)
+    assert learner._seconds == 20.0 and learner.saved.exists()
+    training.train_for(learner, 20.0)  # killed after its end, it has nothing left to do
+    assert learner._seconds == 20.0
