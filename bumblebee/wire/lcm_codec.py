@@ -19,6 +19,7 @@ from bumblebee.wire.messages import VERSION, Card, Mode, Order, State
 _WORD = (1 << 64) - 1
 _KINDS = {"int32_t": ">i4", "int64_t": ">i8", "double": ">f8"}
 MAX_JOINTS = 256
+_CARD = ">Qiiqi"  # what stands before a card's texts
 
 Member = tuple[str, str, str | int | None]
 """Name, type, and number of entries: a member's name, a number, None for one value."""
@@ -31,7 +32,9 @@ def members(struct_name: str) -> tuple[Member, ...]:
     body = re.search(rf"struct {struct_name}\s*{{(.*?)}}", text, re.DOTALL)
     assert body is not None, struct_name
     found = re.findall(r"(\w+)\s+(\w+)(?:\[(\w+)\])?\s*;", body[1])
-    return tuple((name, kind, None if not size else int(size) if size.isdigit() else size) for kind, name, size in found)
+    return tuple(
+        (name, kind, None if not size else int(size) if size.isdigit() else size) for kind, name, size in found
+    )
 
 
 @dataclass(frozen=True)
@@ -50,32 +53,35 @@ class Codec:
 
     def state(self, message: bytes) -> State:
         """What `encode_state` wrote; BadInput for bytes that are no such message."""
-        return State(**_unpacked("state", self.joints, message))
+        return State(**_moded("state", _unpacked("state", self.joints, message)))
 
     def order(self, message: bytes) -> Order:
         """What `encode_order` wrote; BadInput for bytes that are no such message."""
-        read = _unpacked("order", self.joints, message)
-        try:
-            return Order(**read | {"mode": Mode(read["mode"])})
-        except ValueError:
-            raise BadInput("wire: order: mode", "0 to 3", str(read["mode"])) from None
+        return Order(**_moded("order", _unpacked("order", self.joints, message)))
+
+
+def _moded(what: str, read: dict[str, Any]) -> dict[str, Any]:
+    try:
+        return read | {"mode": Mode(read["mode"])}
+    except ValueError:
+        raise BadInput(f"wire: {what}: mode", "0 to 3", str(read["mode"])) from None
 
 
 def encode_card(card: Card) -> bytes:
     """The card's message."""
     numbers = np.concatenate(([card.state_hz], card.kp_most, card.kd_most)).astype(">f8").tobytes()
-    head = struct.pack(">Qiiq", fingerprint("card_t"), VERSION, len(card.joints), card.robot)
+    head = struct.pack(_CARD, fingerprint("card_t"), VERSION, len(card.joints), card.robot, card.simulated)
     return head + b"".join(map(_text, (card.name, *card.joints))) + numbers
 
 
 def decode_card(message: bytes) -> Card:
     """What `encode_card` wrote; BadInput for bytes that are no such message."""
     try:
-        mark, version, count, robot = struct.unpack_from(">Qiiq", message)
+        mark, version, count, robot, simulated = struct.unpack_from(_CARD, message)
         _check("card", mark, version)
         if not 1 <= count <= MAX_JOINTS:
             raise BadInput("wire: card: num_joints", f"1 to {MAX_JOINTS}", str(count))
-        texts, at = [], struct.calcsize(">Qiiq")
+        texts, at = [], struct.calcsize(_CARD)
         for _ in range(1 + count):
             (size,) = struct.unpack_from(">i", message, at)
             if not 1 <= size <= 256 or at + 4 + size > len(message):
@@ -85,7 +91,15 @@ def decode_card(message: bytes) -> Card:
         numbers = np.frombuffer(message, ">f8", 1 + 2 * count, at).astype(np.float64)
     except (struct.error, ValueError) as error:
         raise BadInput("wire: card", "a message of bumblebee_wire.lcm", str(error)[:80]) from None
-    return Card(robot, texts[0], tuple(texts[1:]), float(numbers[0]), numbers[1 : 1 + count], numbers[1 + count :])
+    return Card(
+        robot,
+        bool(simulated),
+        texts[0],
+        tuple(texts[1:]),
+        float(numbers[0]),
+        numbers[1 : 1 + count],
+        numbers[1 + count :],
+    )
 
 
 @cache

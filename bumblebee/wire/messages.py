@@ -1,4 +1,4 @@
-"""What robot and controller tell each other, whichever wire carries it (paper, section 4.1: 50 Hz policy, 200 Hz drives)."""
+"""Messages between robot and controller, whichever wire carries them (paper, section 4.1: 50 and 200 Hz)."""
 
 import hashlib
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ VERSION = 1
 
 
 class Mode(IntEnum):
-    """What the drives are to do with an order."""
+    """Instruction to the drives, beside an order's targets."""
 
     OFF = 0
     """No torque at all."""
@@ -25,7 +25,7 @@ class Mode(IntEnum):
 
 @dataclass(frozen=True)
 class State:
-    """What one robot with J joints says at one instant of its own clock; arrays are float64."""
+    """Readings of one robot with J joints at one instant of its own clock; arrays are float64."""
 
     robot: int
     """Drawn anew when the robot boots: another number is another robot, or one that fell over in between."""
@@ -48,21 +48,33 @@ class State:
     base_lin_vel: np.ndarray
     """(3,) [m/s] in the base frame, by odometry."""
     base_pos: np.ndarray
-    """(3,) [m] by odometry, from where the robot booted."""
+    """(3,) [m] by odometry: x, y from where the robot booted, z above the floor."""
+    foot_force: np.ndarray
+    """(2,) vertical force on the left and the right foot [N]; NaN where it is not measured."""
     temperature: np.ndarray
     """(J,) of the motors [degrees Celsius]; NaN where it is not measured."""
     error: np.ndarray
     """(J,) int64, 0 for a drive that is well."""
+    mode: Mode
+    """Mode that the drives are in: DAMP where no order came in time."""
+    controller: int
+    """Controller that the robot listens to; 0 for none."""
+    heard: int
+    """Sequence of the order in force; -1 for none."""
+    heard_ns: int
+    """When that order came, by the robot's clock [ns]."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """What the drives are told, in force until the next one; arrays are float64 (J,)."""
+    """Command to the drives, in force until the next one; arrays are float64 (J,)."""
 
     controller: int
     """Drawn when the controller starts: a robot listens to the one that spoke first, until that one is silent."""
     layout: int
+    """`layout_of` the joints."""
     sequence: int
+    """Counts up by one with each order."""
     answers: int
     """Sequence of the newest state that was known."""
     stamp_ns: int
@@ -83,13 +95,17 @@ class Card:
     """Who a robot is; sent once a second, so that a controller can refuse it before anything moves."""
 
     robot: int
+    simulated: bool
+    """Whether it is a simulation, which nobody needs to hold a key for."""
     name: str
+    """Kind of robot, as exported policies name it."""
     joints: tuple[str, ...]
     state_hz: float
     """States a second."""
     kp_most: np.ndarray
-    """(J,) largest gains that its drives take."""
+    """(J,) largest kp that its drives take [N m/rad]."""
     kd_most: np.ndarray
+    """(J,) largest kd [N m s/rad]."""
 
 
 def layout_of(joints: Sequence[str]) -> int:

@@ -20,8 +20,13 @@ def state(sequence: int = 7, stamp_ns: int = 123_456_789_012, **other: Any) -> S
         "base_ang_vel": np.zeros(3),
         "base_lin_vel": np.zeros(3),
         "base_pos": np.array([0.0, 0.0, 0.8]),
+        "foot_force": np.array([160.0, 160.0]),
         "temperature": np.full(3, 35.0),
         "error": np.zeros(3, dtype=np.int64),
+        "mode": Mode.HOLD,
+        "controller": 5,
+        "heard": 4,
+        "heard_ns": stamp_ns - 3_000_000,
     }
     return State(11, layout_of(JOINTS), sequence, stamp_ns, **values | other)
 
@@ -35,4 +40,4 @@ def order(mode: Any = Mode.RUN, **other: Any) -> Order:
 
 def card() -> Card:
     """Who it is."""
-    return Card(11, "three", JOINTS, 500.0, np.full(3, 500.0), np.full(3, 20.0))
+    return Card(11, True, "three", JOINTS, 500.0, np.full(3, 500.0), np.full(3, 20.0))
