@@ -152,12 +152,9 @@ def _unpacked(what: str, joints: int, message: bytes) -> dict[str, Any]:
             raise BadInput(f"wire: {what}: num_joints", str(joints), str(count))
     if len(message) != layout.itemsize:
         raise BadInput(f"wire: {what}", f"{layout.itemsize} bytes", str(len(message)))
-    record = np.frombuffer(message, layout)[0]
-    read = {}
-    for name, kind, size in members(f"{what}_t")[2:]:
-        native = np.int64 if kind.startswith("int") else np.float64
-        read[name] = record[name].astype(native) if size is not None else record[name].item()
-    return read
+    record = np.frombuffer(message, layout).astype(layout.newbyteorder("="))[0]  # all numbers turned at once
+    named = members(f"{what}_t")[2:]
+    return {name: record[name] if size is not None else record[name].item() for name, _, size in named}
 
 
 def _check(what: str, mark: int, version: int) -> None:

@@ -1,0 +1,50 @@
+"""Keys of a terminal, one by one, and a few lines that are drawn over each other."""
+
+import os
+import select
+import sys
+import termios
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+HOLD, GO, END = " ", "g", "q"
+"""Dead-man's key, go on, end in good order; every other key stops."""
+HELP = "hold SPACE; g: go on; q: end after the clip; ANY OTHER KEY: STOP (again: torque off)"
+
+
+class Terminal:
+    """The terminal that the process was started from; without one there are no keys."""
+
+    def __init__(self) -> None:
+        self.keys = sys.stdin.isatty()
+        """Whether there are keys to be pressed."""
+        self._drawn = 0
+
+    @contextmanager
+    def raw(self) -> Iterator[None]:
+        """Keys come at once and unseen."""
+        if not self.keys:
+            yield
+            return
+        before = termios.tcgetattr(0)
+        try:
+            tty.setcbreak(0)
+            yield
+        finally:
+            termios.tcsetattr(0, termios.TCSADRAIN, before)
+
+    def pressed(self) -> str:
+        """Keys since the last call."""
+        if not self.keys or not select.select([0], [], [], 0)[0]:
+            return ""
+        return os.read(0, 1024).decode("latin-1")
+
+    def draw(self, lines: list[str]) -> None:
+        """Draw lines in the place of the last ones; nothing where nobody looks."""
+        if not sys.stdout.isatty():
+            return
+        up = f"\x1b[{self._drawn}A" if self._drawn else ""
+        sys.stdout.write(up + "".join(f"\x1b[2K{line}\n" for line in lines))
+        sys.stdout.flush()
+        self._drawn = len(lines)
