@@ -80,7 +80,7 @@ def robot(
     from bumblebee.deploy.stand_in_effects import read_sealed
     from bumblebee.sim.quiet import quiet_mujoco
     from bumblebee.wire.line import LineFaults
-    from bumblebee.wire.realtime import harden
+    from bumblebee.wire.realtime import ROBOT, harden
     from bumblebee.wire.robot import RobotSettings
     from bumblebee.wire.robot_process import run_robot
 
@@ -88,7 +88,7 @@ def robot(
     faults = LineFaults(delay / 1e3, jitter / 1e3, dropped, late)
     settings = RobotSettings(seed=seed, states=faults, orders=faults)
     effects = read_sealed(sealed) if sealed else []
-    harden()
+    harden(ROBOT)
     print(f"a simulated G1 on the wire {wire}; Ctrl-C ends it", flush=True)
     made = run_robot(wire, at, effects, settings, slow, seconds, lambda line: print(line, flush=True))
     refused = dict(made.hearing.refused) or "none"

@@ -21,7 +21,7 @@ from bumblebee.wire.keys import decode_keys
 from bumblebee.wire.lcm_codec import Codec
 from bumblebee.wire.link import ORDER, STATE, Link, open_link
 from bumblebee.wire.questions import decode_answer, encode_question
-from bumblebee.wire.realtime import harden
+from bumblebee.wire.realtime import GUARD, harden
 
 RECORD, END = b"R", b"E"
 """First byte of what the console gets: a journal's record, or how the run ended, as JSON."""
@@ -97,7 +97,7 @@ def main() -> None:
     job, ends = decode_job(sys.argv[1]), [socket.socket(fileno=int(number)) for number in sys.argv[2:4]]
     link = open_link(job.wire, [STATE], job.at)
     loop = GuardLoop(job, link, *ends)
-    permitted = harden()
+    permitted = harden(GUARD)
     try:
         ended = loop.run()
     finally:

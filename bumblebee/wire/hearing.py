@@ -50,7 +50,7 @@ class Hearing:
             self.order = None
         if self.order is None:
             return Mode.OFF if self.came == 0 else Mode.DAMP
-        return self.order.mode if now - self.came <= DEADLINE * SECOND else Mode.DAMP
+        return self.order.mode if now - self.came < DEADLINE * SECOND else Mode.DAMP
 
     def _unfit(self, order: Order) -> str:
         last = self.order

@@ -51,8 +51,8 @@ def drives_of(contract: Mapping[str, Any]) -> Drives:
 class Limits(Ranged):
     """Settings of the safety layer; what is a share or a factor is one of the drives' own limits."""
 
-    soft_zone: Share = 0.03
-    """Share of a joint's range at each end in which no target lies."""
+    soft_zone: Annotated[float, Range(above=0, most=0.5)] = 0.03
+    """Share of a joint's range at each end in which the push outward fades."""
     beyond: Share = 0.05
     """Share of a joint's range by which a reading beyond the range damps."""
     speed: Factor = 0.8

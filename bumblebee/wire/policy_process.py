@@ -15,7 +15,7 @@ from bumblebee.wire.brain import Brain
 from bumblebee.wire.lcm_codec import Codec
 from bumblebee.wire.messages import Mode, State
 from bumblebee.wire.questions import Question, decode_question, encode_answer
-from bumblebee.wire.realtime import harden
+from bumblebee.wire.realtime import POLICY, harden
 
 READY = "ready"
 
@@ -60,7 +60,7 @@ def main() -> None:
     """Run the process."""
     policy, clips, compensation, number = sys.argv[1:5]
     brain = load(Path(policy), Path(clips), Path(compensation) if compensation else None)
-    harden()
+    harden(POLICY)
     print(READY, flush=True)
     serve(brain, socket.socket(fileno=int(number)), len(brain.hold()))
 

@@ -1,6 +1,5 @@
 """What is refused before anything moves: each a line that names what was expected, what came and what to do."""
 
-import math
 import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from bumblebee import quaternions
 from bumblebee.errors import BadInput
 from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import sole_points
@@ -18,6 +16,7 @@ from bumblebee.wire.lcm_codec import Codec, decode_card
 from bumblebee.wire.limits import Drives, Limits
 from bumblebee.wire.link import CARD, STATE, Link
 from bumblebee.wire.messages import Card, State, layout_of
+from bumblebee.wire.rules import lean
 
 _PATIENCE = 5.0  # s of wall time for a card, which comes once a second, and a state
 MAX_LIFT = 0.10
@@ -138,12 +137,9 @@ def _check_start(state: State, wanted: Wanted) -> None:
             expected = f"{drives.joints[j]} from {drives.low[j]:g} to {drives.high[j]:g} rad"
             raise BadInput(what, expected, f"{angles[j]:.3g} rad", do)
     quat = clip.root_quat[0].astype(np.float64)
-    up = np.array([0.0, 0.0, 1.0])
-    cosine = float(quaternions.rotate(quat, up) @ quaternions.rotate(state.base_quat, up))
-    lean = math.degrees(math.acos(min(1.0, max(-1.0, cosine))))
-    if lean >= wanted.limits.tilt_deg:
+    if (angle := lean(quat, state.base_quat)) >= wanted.limits.tilt_deg:
         expected = f"a pelvis within {wanted.limits.tilt_deg:g} degrees of the robot's"
-        raise BadInput(name, expected, f"{lean:.0f} degrees", "Hang the robot as the clip begins, or choose another.")
+        raise BadInput(name, expected, f"{angle:.0f} degrees", "Hang the robot as the clip begins, or choose another.")
     place = clip.root_pos[:1].astype(np.float64)
     lift = float(sole_points(place, quat[None], clip.joint_pos[:1].astype(np.float64))[..., 2].min())
     if abs(lift) > MAX_LIFT:

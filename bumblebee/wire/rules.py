@@ -10,7 +10,6 @@ from enum import IntEnum
 
 import numpy as np
 
-from bumblebee import quaternions
 from bumblebee.wire.limits import Drives, Limits
 from bumblebee.wire.messages import Mode, State
 
@@ -98,11 +97,12 @@ def torque_of(state: State, wish: Wish) -> np.ndarray:
 def cut(state: State, wish: Wish, drives: Drives, limits: Limits) -> tuple[Wish, np.ndarray]:
     """The wish within range and torque, and which drives (J,) bool would have given more than their torque.
 
-    Targets keep out of the soft zones, but a joint that already is in one is not thrown out of it.
+    A servo's target may lie beyond the range, as its distance makes the torque. In a soft zone what pushes outward
+    fades, from all of it at the zone's inner edge to nothing at the end of the range.
     """
-    margin = limits.soft_zone * (drives.high - drives.low)
-    target = np.clip(wish.target, drives.low + margin, drives.high - margin)
-    soft = Wish(target, wish.kp, wish.kd, wish.torque)
+    room, reach = _room(state, wish, drives, limits), wish.target - state.joint_pos
+    soft = Wish(state.joint_pos + reach * room, wish.kp, wish.kd, wish.torque)
+    target = soft.target
     torque, most = torque_of(state, soft), limits.torque * drives.effort
     over = np.clip(torque, -most, most) - torque
     strong = wish.kp > 0
@@ -110,11 +110,27 @@ def cut(state: State, wish: Wish, drives: Drives, limits: Limits) -> tuple[Wish,
     return Wish(target, wish.kp, wish.kd, wish.torque), over != 0
 
 
+def _room(state: State, wish: Wish, drives: Drives, limits: Limits) -> np.ndarray:
+    """Share (J,) of the soft zone that is left in the direction in which the wish pulls; 1 outside of it."""
+    width = limits.soft_zone * (drives.high - drives.low)
+    ahead = np.where(wish.target > state.joint_pos, drives.high - state.joint_pos, state.joint_pos - drives.low)
+    return np.clip(ahead / width, 0.0, 1.0)
+
+
+def lean(quat: np.ndarray, other: np.ndarray) -> float:
+    """Angle [degrees] between the up axes of two orientations (4,)."""
+    cosine = sum(a * b for a, b in zip(_up(quat), _up(other), strict=True))
+    return math.degrees(math.acos(min(1.0, max(-1.0, cosine))))
+
+
+def _up(quat: np.ndarray) -> tuple[float, float, float]:
+    w, x, y, z = quat.tolist()
+    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
+
+
 def soft_zone(now: Moment, drives: Drives, limits: Limits) -> Step:
-    """A target lies in a soft zone: it is cut."""
-    margin = limits.soft_zone * (drives.high - drives.low)
-    inside = (now.wish.target >= drives.low + margin) & (now.wish.target <= drives.high - margin)
-    return Step.GO if inside.all() else Step.WARN
+    """A joint is pushed outward in a soft zone: the push is cut."""
+    return Step.GO if (_room(now.state, now.wish, drives, limits) >= 1.0).all() else Step.WARN
 
 
 def joint_range(now: Moment, drives: Drives, limits: Limits) -> Step:
@@ -151,10 +167,9 @@ def tilt(now: Moment, drives: Drives, limits: Limits) -> Step:
     """The pelvis leans away from its reference, or is below it."""
     if not now.carries or now.reference is None:
         return Step.GO
-    up = np.array([0.0, 0.0, 1.0])
-    cosine = quaternions.rotate(now.state.base_quat, up) @ quaternions.rotate(now.reference.quat, up)
     fallen = now.reference.height - now.state.base_pos[2] >= limits.drop_m
-    return Step.DAMP if fallen or cosine <= math.cos(math.radians(limits.tilt_deg)) else Step.GO
+    leans = lean(now.state.base_quat, now.reference.quat) >= limits.tilt_deg
+    return Step.DAMP if fallen or leans else Step.GO
 
 
 def contact(now: Moment, drives: Drives, limits: Limits) -> Step:
@@ -242,8 +257,8 @@ def own_ticks(now: Moment, drives: Drives, limits: Limits) -> Step:
 RULES: dict[str, Rule] = {
     rule.__name__: rule
     for rule in (
-        soft_zone, joint_range, speed, torque, stall, power, tilt, contact, temperature, motor_error, silent,
-        policy_late, policy_number, policy_far, deaf, other_controller, robot_damps, dead_man, console, stop_key,
+        policy_number, soft_zone, joint_range, speed, torque, stall, power, tilt, contact, temperature, motor_error,
+        silent, policy_late, policy_far, deaf, other_controller, robot_damps, dead_man, console, stop_key,
         own_ticks,
     )
 }  # fmt: skip
