@@ -1,6 +1,7 @@
 """Command line: `bumblebee deploy run`, `robot`, `rollouts`."""
 
 import getpass
+import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +13,8 @@ from bumblebee.errors import BadInput, plain
 if TYPE_CHECKING:
     from bumblebee.motion.clip import Clip
 
+STOPPED = 4
+"""Exit status of a run that a safety rule ended."""
 app = typer.Typer(add_completion=False, no_args_is_help=True, help="Run a policy on a robot, over a wire.")
 _WIRES = "sim (sockets of this machine) or lcm."
 At = Annotated[str, typer.Option("--at", help="Address of the wire: a folder for sim, an LCM URL for lcm.")]
@@ -60,7 +63,7 @@ def run(
     print(f"written: {rollout}" if rollout else "nothing measured: the policy did not carry the robot")
     if ended.reason:
         print(f"stopped by the rule {ended.reason}")
-        raise typer.Exit(3)
+        raise typer.Exit(STOPPED)
 
 
 @app.command("robot")
@@ -110,8 +113,6 @@ def rollouts(
 
 
 def _require_keys() -> None:
-    import sys
-
     if not sys.stdin.isatty():
         do = "Start it in a terminal, or give --unattended with a simulated robot."
         raise BadInput("bumblebee deploy run", "a terminal, for the dead-man's key", "none", do)

@@ -19,7 +19,8 @@ from bumblebee.wire.job import Job, decode_job
 from bumblebee.wire.journal import Entry, record
 from bumblebee.wire.keys import decode_keys
 from bumblebee.wire.lcm_codec import Codec
-from bumblebee.wire.link import ORDER, STATE, Link, open_link
+from bumblebee.wire.link import Link, open_link
+from bumblebee.wire.messages import ORDER, STATE
 from bumblebee.wire.questions import decode_answer, encode_question
 from bumblebee.wire.realtime import GUARD, harden
 

@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from bumblebee.errors import BadInput
+from bumblebee.io.names import require_stem
 from bumblebee.wire.guard import Tick
+from bumblebee.wire.lcm_codec import MAX_JOINTS
 from bumblebee.wire.messages import State
 from bumblebee.wire.rules import RULES
 
@@ -150,14 +152,23 @@ def read_journal(path: Path) -> tuple[dict[str, Any], np.ndarray]:
     try:
         head, _, body = path.read_bytes().partition(b"\n")
         about = json.loads(head)
-        joints = len(about["joints"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise BadInput(path, "a journal of `bumblebee deploy run`", type(error).__name__) from None
-    if about.get("journal") != _SCHEMA:
-        raise BadInput(
-            f"{path}: journal", str(_SCHEMA), str(about.get("journal"))[:20], "Read it with its own version."
-        )
+    if not isinstance(about, dict) or about.get("journal") != _SCHEMA:
+        came = str(about.get("journal"))[:20] if isinstance(about, dict) else type(about).__name__
+        raise BadInput(f"{path}: journal", str(_SCHEMA), came, "Read it with its own version.")
+    _check_head(path, about)
+    joints = len(about["joints"])
     size = layout(joints).itemsize
     rows = np.frombuffer(body[: len(body) // size * size], layout(joints))
     torn = np.flatnonzero((rows["mark"] != _MARK) | (rows["end"] != _MARK))
     return about, rows[: torn[0]] if len(torn) else rows
+
+
+def _check_head(path: Path, about: dict[str, Any]) -> None:
+    names, rate = about.get("joints"), about.get("control_hz")
+    if not isinstance(names, list) or not 1 <= len(names) <= MAX_JOINTS or not all(isinstance(n, str) for n in names):
+        raise BadInput(f"{path}: joints", f"1 to {MAX_JOINTS} names", repr(names)[:60])
+    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 1 <= rate <= 1000:
+        raise BadInput(f"{path}: control_hz", "a number from 1 to 1000 Hz", repr(rate)[:60])
+    require_stem(f"{path}: id", about.get("id"))

@@ -4,7 +4,7 @@ import select
 from collections.abc import Sequence
 
 from bumblebee.errors import BadInput
-from bumblebee.wire.link import CHANNELS
+from bumblebee.wire.messages import CHANNELS
 
 URL = "udpm://239.255.76.67:7667?ttl=0"
 
@@ -16,8 +16,8 @@ class LcmLink:
         try:
             import lcm
         except ModuleNotFoundError:
-            where, do = "--robot lcm", "In the checkout: pip install -e '.[wire]', or use --robot sim."
-            raise BadInput(where, "the package lcm", "no module 'lcm'", do) from None
+            do = "Use --robot sim, or in the checkout: pip install -e '.[wire]'"
+            raise BadInput("--robot lcm", "the package lcm", "no module 'lcm'", do) from None
         try:
             self._lcm = lcm.LCM(at or URL)
         except RuntimeError as error:

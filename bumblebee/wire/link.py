@@ -5,7 +5,6 @@ from typing import Protocol
 
 from bumblebee.errors import BadInput
 
-STATE, ORDER, CARD = CHANNELS = ("BUMBLEBEE_STATE", "BUMBLEBEE_ORDER", "BUMBLEBEE_CARD")
 WIRES = ("sim", "lcm")
 """`sim`: sockets of this machine, nothing to install; `lcm`: UDP multicast, the package lcm."""
 

@@ -8,6 +8,8 @@ from enum import IntEnum
 import numpy as np
 
 VERSION = 1
+STATE, ORDER, CARD = CHANNELS = ("BUMBLEBEE_STATE", "BUMBLEBEE_ORDER", "BUMBLEBEE_CARD")
+"""Channels of a wire, one for each kind of message."""
 
 
 class Mode(IntEnum):

@@ -14,8 +14,8 @@ from bumblebee.robot.facts import ROBOT
 from bumblebee.wire.clock import Clock
 from bumblebee.wire.lcm_codec import Codec, decode_card
 from bumblebee.wire.limits import Drives, Limits
-from bumblebee.wire.link import CARD, STATE, Link
-from bumblebee.wire.messages import Card, State, layout_of
+from bumblebee.wire.link import Link
+from bumblebee.wire.messages import CARD, STATE, Card, State, layout_of
 from bumblebee.wire.rules import lean
 
 _PATIENCE = 5.0  # s of wall time for a card, which comes once a second, and a state

@@ -14,7 +14,7 @@ from bumblebee.wire.journal import Entry
 from bumblebee.wire.keys import Keys
 from bumblebee.wire.lcm_codec import Codec
 from bumblebee.wire.limits import Drives
-from bumblebee.wire.link import STATE
+from bumblebee.wire.messages import STATE
 from bumblebee.wire.plan import Plan
 from bumblebee.wire.questions import Answer
 from bumblebee.wire.robot import WireRobot

@@ -27,8 +27,7 @@ from bumblebee.wire.gantry import Gantry
 from bumblebee.wire.hearing import Hearing
 from bumblebee.wire.lcm_codec import Codec, encode_card
 from bumblebee.wire.line import Line, LineFaults
-from bumblebee.wire.link import CARD, STATE
-from bumblebee.wire.messages import Card, Mode, State, layout_of
+from bumblebee.wire.messages import CARD, STATE, Card, Mode, State, layout_of
 
 _HANGING, _ROPE = 0.10, 0.2  # m of soles above the floor while it hangs; m/s of the rope
 _SLIP = 0.05  # s that a busy machine may be behind before the robot's clock stands still

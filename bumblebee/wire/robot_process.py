@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 from bumblebee.deploy.stand_in_effects import Json
 from bumblebee.wire.clock import SECOND, Clock
-from bumblebee.wire.link import ORDER, open_link
-from bumblebee.wire.messages import Mode
+from bumblebee.wire.link import open_link
+from bumblebee.wire.messages import ORDER, Mode
 from bumblebee.wire.robot import RobotSettings, WireRobot
 
 

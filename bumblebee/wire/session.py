@@ -21,7 +21,8 @@ from bumblebee.wire.console import Ended, operate
 from bumblebee.wire.job import Job
 from bumblebee.wire.journal import read_journal
 from bumblebee.wire.limits import Limits, drives_of
-from bumblebee.wire.link import CARD, STATE, open_link
+from bumblebee.wire.link import open_link
+from bumblebee.wire.messages import CARD, STATE
 from bumblebee.wire.phases import Ramps
 from bumblebee.wire.plan import ORDER_HZ, Plan
 from bumblebee.wire.preflight import Wanted, check, meet, new_controller

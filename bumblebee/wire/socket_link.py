@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from bumblebee.errors import BadInput
-from bumblebee.wire.link import CHANNELS
+from bumblebee.wire.messages import CHANNELS
 
 _LETTERS = dict(zip(CHANNELS, "SOC", strict=True))
 _NAMES = {letter: channel for channel, letter in _LETTERS.items()}

@@ -64,7 +64,8 @@ def test_a_kill_loses_at_most_a_second(tmp_path: Path) -> None:
     code = (
         "import sys; from pathlib import Path; from bumblebee.wire.journal import Writer\n"
         "from tests.wire.small import small_records\n"
-        "records, writer = small_records(), Writer(Path(sys.argv[1]), {'joints': [1, 2, 3]})\n"
+        "about = {'id': 'a', 'joints': ['a', 'b', 'c'], 'control_hz': 50}\n"
+        "records, writer = small_records(), Writer(Path(sys.argv[1]), about)\n"
         "while True: writer.add(records); print('added', flush=True)\n"
     )
     process = subprocess.Popen(

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from bumblebee.errors import BadInput
-from bumblebee.wire.link import CARD, ORDER, STATE, Link, open_link
+from bumblebee.wire.link import Link, open_link
+from bumblebee.wire.messages import CARD, ORDER, STATE
 
 
 def lcm_here() -> bool:

@@ -13,8 +13,8 @@ from bumblebee.errors import BadInput
 from bumblebee.wire.clock import Clock
 from bumblebee.wire.lcm_codec import Codec, encode_card
 from bumblebee.wire.limits import Limits, drives_of, read_limits
-from bumblebee.wire.link import CARD, ORDER, STATE, Link, open_link
-from bumblebee.wire.messages import Card, State, layout_of
+from bumblebee.wire.link import Link, open_link
+from bumblebee.wire.messages import CARD, ORDER, STATE, Card, State, layout_of
 from bumblebee.wire.preflight import Wanted, check, meet
 from bumblebee.wire.robot import RobotSettings, WireRobot
 from tests.deploy.conftest import nod

@@ -23,8 +23,8 @@ from bumblebee.wire.journal import read_journal
 from bumblebee.wire.keys import Keys, encode_keys
 from bumblebee.wire.lcm_codec import Codec
 from bumblebee.wire.limits import Limits
-from bumblebee.wire.link import ORDER, STATE, open_link
-from bumblebee.wire.messages import Mode, Order
+from bumblebee.wire.link import open_link
+from bumblebee.wire.messages import ORDER, STATE, Mode, Order
 from bumblebee.wire.phases import Phase
 from bumblebee.wire.policy_process import serve
 from bumblebee.wire.questions import decode_question, encode_answer

@@ -11,8 +11,7 @@ from bumblebee.robot.model import gains
 from bumblebee.wire.clock import SECOND
 from bumblebee.wire.lcm_codec import Codec, decode_card
 from bumblebee.wire.line import Line, LineFaults
-from bumblebee.wire.link import CARD, STATE
-from bumblebee.wire.messages import Mode, Order, State, layout_of
+from bumblebee.wire.messages import CARD, STATE, Mode, Order, State, layout_of
 from bumblebee.wire.robot import RobotSettings, WireRobot
 
 MS = SECOND // 1000
