@@ -46,6 +46,8 @@ def run(options: argparse.Namespace) -> None:
     newest = max((options.out / "journals").iterdir(), key=lambda path: path.stat().st_mtime)
     rows = read_journal(newest)[1]
     running = rows[rows["phase"] == Phase.RUN]
+    if not len(running):
+        return
     missed = running["missed"]
     print(f"run: {len(running) / 200:.0f} s, missed ticks {missed.sum()}, most in a row {missed.max()}")
     found = latency(rows)

@@ -1,7 +1,5 @@
 """The policy behind its questions: one clip, one robot; `policy_process` gives it the guard's."""
 
-from collections.abc import Sequence
-
 import mujoco
 import numpy as np
 import torch
@@ -78,15 +76,15 @@ class Brain:
 
 def _sensors(state: State, alignment: Alignment) -> Sensors:
     pos, quat = alignment.seen(state.base_pos, state.base_quat)
-    rows: Sequence[np.ndarray] = (
-        state.joint_pos,
-        state.joint_vel,
-        quat,
-        state.base_ang_vel,
-        state.base_lin_vel,
-        pos,
-        state.joint_torque,
-    )
     foot = np.zeros((1, 2, 3))
     foot[0, :, 2] = np.nan_to_num(state.foot_force)
-    return Sensors(*(row[None] for row in rows), foot)
+    return Sensors(
+        joint_pos=state.joint_pos[None],
+        joint_vel=state.joint_vel[None],
+        base_quat=quat[None],
+        base_ang_vel=state.base_ang_vel[None],
+        base_lin_vel=state.base_lin_vel[None],
+        base_pos=pos[None],
+        joint_torque=state.joint_torque[None],
+        foot_force=foot,
+    )

@@ -12,7 +12,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +24,10 @@ from bumblebee.wire.clock import SECOND, Clock
 from bumblebee.wire.guard_process import END, RECORD
 from bumblebee.wire.job import Job, encode_job
 from bumblebee.wire.journal import Writer
-from bumblebee.wire.keys import Keys, encode_keys
+from bumblebee.wire.keys import HELP, Hand, encode_keys
 from bumblebee.wire.policy_process import READY
 from bumblebee.wire.screen import Numbers
-from bumblebee.wire.terminal import END as END_KEY
-from bumblebee.wire.terminal import GO, HELP, HOLD, Terminal
+from bumblebee.wire.terminal import Terminal
 
 _SAY, _DRAW = 0.05, 0.25  # s between two words to the guard, two pictures
 
@@ -91,44 +90,34 @@ def _attend(
     clock: Clock, guard: socket.socket, writer: Writer, terminal: Terminal, joints: int, process: subprocess.Popen
 ) -> Ended:
     """Pass on keys and records until the guard has said its last word."""
-    numbers, keys, told = Numbers(joints), Keys(clock.now()), dict[str, Any]()
+    numbers, hand, told = Numbers(joints), Hand(clock.now()), dict[str, Any]()
     said = drawn = 0
     while True:
         now = clock.now()
         try:
-            keys = _pressed(keys, terminal.pressed(), now)
+            hand.press(terminal.pressed(), now)
             if now - said >= _SAY * SECOND:
                 said = now
                 with suppress(packets.Gone):  # its last words are still to be read
-                    packets.send(guard, encode_keys(keys))
+                    packets.send(guard, encode_keys(hand.keys))
             for message in packets.received(guard):
                 if message[:1] == RECORD:
                     writer.add(message[1:])
                     numbers.add(message[1:])
                 elif message[:1] == END:
                     told = json.loads(message[1:])
+            if now - drawn >= _DRAW * SECOND:
+                drawn = now
+                terminal.draw([*numbers.lines(), HELP])
+            select.select([guard.fileno(), *([0] if terminal.keys else [])], [], [], _SAY)
         except packets.Gone:
             break
         except KeyboardInterrupt:  # Ctrl-C is a stop key as any other
-            keys = replace(keys, stops=keys.stops + 1)
-        if now - drawn >= _DRAW * SECOND:
-            drawn = now
-            terminal.draw([*numbers.lines(), HELP])
-        select.select([guard, *([0] if terminal.keys else [])], [], [], _SAY)
+            hand.stop()
     if not told:
         process.wait()
         raise BadInput("guard", "a guard that ends in good order", f"status {process.returncode}", "The robot damps.")
     return Ended(str(told["reason"]), numbers, told)
-
-
-def _pressed(keys: Keys, pressed: str, now: int) -> Keys:
-    """The keys with those that were pressed now."""
-    if not pressed:
-        return keys
-    goes, ends = pressed.count(GO), pressed.count(END_KEY)
-    others = sum(key not in (HOLD, GO, END_KEY) for key in pressed)
-    held = now if HOLD in pressed else keys.held_ns
-    return Keys(held, keys.goes + min(goes, 1), keys.stops + min(others, 1), keys.ends + ends)
 
 
 @contextmanager

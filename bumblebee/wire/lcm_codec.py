@@ -128,7 +128,7 @@ def _mixed_text(value: int, text: str) -> int:
 
 @cache
 def _layout(struct_name: str, joints: int) -> np.dtype:
-    fields = [("fingerprint", ">u8")]
+    fields: list[tuple[str, Any] | tuple[str, Any, tuple[int]]] = [("fingerprint", ">u8")]
     for name, kind, size in members(struct_name):
         count = joints if isinstance(size, str) else size
         fields.append((name, _KINDS[kind]) if count is None else (name, _KINDS[kind], (count,)))

@@ -43,7 +43,7 @@ def received(end: socket.socket) -> list[bytes]:
     Raises:
         Gone: nothing has come and nothing will.
     """
-    found = []
+    found: list[bytes] = []
     with suppress(BlockingIOError):
         while True:
             try:

@@ -73,5 +73,5 @@ def decode_answer(message: bytes, joints: int) -> Answer:
     read = np.frombuffer(message, _layout(joints), 1)[0]
     wish = Wish(*(read[name].copy() for name in ("target", "kp", "kd", "torque")))
     reference = Reference(read["reference"].copy(), read["quat"].copy(), float(read["height"]))
-    numbers = (int(read[name]) for name in ("tick", "asked_ns", "sequence"))
-    return Answer(*numbers, wish, reference, read["action"].copy())
+    tick, asked, sequence = (int(read[name]) for name in ("tick", "asked_ns", "sequence"))
+    return Answer(tick, asked, sequence, wish, reference, read["action"].copy())

@@ -50,7 +50,7 @@ class Rehearsal:
 
     def entries(self) -> Iterator[Entry]:
         """Run, and give what the guard's journal gets, tick by tick."""
-        codec, orders, waiting = Codec(len(self.drives.joints)), [], list[tuple[int, int, Answer]]()
+        codec, orders, waiting = Codec(len(self.drives.joints)), list[bytes](), list[tuple[int, int, Answer]]()
         for now in range(0, round(self.longest * SECOND), _STEP):
             for channel, message in self.robot.advance(now, orders):
                 if channel == STATE and not self.deaf:

@@ -1,5 +1,6 @@
 """Live numbers of a run for a terminal: phase, latencies of every stage, what was counted."""
 
+from array import array
 from collections import Counter
 from typing import Any
 
@@ -21,7 +22,7 @@ class Numbers:
 
     def __init__(self, joints: int) -> None:
         self._layout = layout(joints)
-        self._times: dict[str, list[float]] = {name: [] for name in (*STAGES, "wake to send", "policy", "state age")}
+        self._times = {name: array("d") for name in (*STAGES, "wake to send", "policy", "state age")}
         self.rules: Counter[str] = Counter()
         """Rule -> ticks in which it asked for anything."""
         self.missed = 0
@@ -46,7 +47,7 @@ class Numbers:
 
     def table(self) -> dict[str, tuple[float, float, float]]:
         """Stage -> median, 99th percentile and worst [ms]."""
-        rows = {name: np.array(times) for name, times in self._times.items() if times}
+        rows = {name: np.frombuffer(times).copy() for name, times in self._times.items() if times}
         return {name: (*np.percentile(times, (50, 99)), times.max()) for name, times in rows.items()}
 
     def lines(self) -> list[str]:

@@ -8,10 +8,6 @@ import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-HOLD, GO, END = " ", "g", "q"
-"""Dead-man's key, go on, end in good order; every other key stops."""
-HELP = "hold SPACE; g: go on; q: end after the clip; ANY OTHER KEY: STOP (again: torque off)"
-
 
 class Terminal:
     """The terminal that the process was started from; without one there are no keys."""
