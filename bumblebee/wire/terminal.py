@@ -10,12 +10,16 @@ from contextlib import contextmanager
 
 
 class Terminal:
-    """The terminal that the process was started from; without one there are no keys."""
+    """The terminal that the process was started from; without one there are no keys.
 
-    def __init__(self) -> None:
-        self.keys = sys.stdin.isatty()
+    Args:
+        number: file descriptor that keys come from.
+    """
+
+    def __init__(self, number: int = 0) -> None:
+        self.keys = os.isatty(number)
         """Whether there are keys to be pressed."""
-        self._drawn = 0
+        self._number, self._drawn = number, 0
 
     @contextmanager
     def raw(self) -> Iterator[None]:
@@ -23,18 +27,18 @@ class Terminal:
         if not self.keys:
             yield
             return
-        before = termios.tcgetattr(0)
+        before = termios.tcgetattr(self._number)
         try:
-            tty.setcbreak(0)
+            tty.setcbreak(self._number)
             yield
         finally:
-            termios.tcsetattr(0, termios.TCSADRAIN, before)
+            termios.tcsetattr(self._number, termios.TCSADRAIN, before)
 
     def pressed(self) -> str:
         """Keys since the last call."""
-        if not self.keys or not select.select([0], [], [], 0)[0]:
+        if not self.keys or not select.select([self._number], [], [], 0)[0]:
             return ""
-        return os.read(0, 1024).decode("latin-1")
+        return os.read(self._number, 1024).decode("latin-1")
 
     def draw(self, lines: list[str]) -> None:
         """Draw lines in the place of the last ones; nothing where nobody looks."""

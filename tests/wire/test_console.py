@@ -1,10 +1,15 @@
 """The console: what keys do, and the numbers that it shows."""
 
+import os
+import select
+import termios
+
 import numpy as np
 
 from bumblebee.wire.journal import Entry, record
 from bumblebee.wire.keys import END, GO, HELP, HOLD, OFF, Hand, decode_keys, encode_keys
 from bumblebee.wire.screen import Numbers
+from bumblebee.wire.terminal import Terminal
 from tests.wire.small import Small, small_records
 
 SECOND = 1_000_000_000
@@ -39,6 +44,22 @@ def test_the_operators_own_keys_say_that_somebody_is_there_and_others_do_not() -
     assert pressed((5.0, END)).keys.ends == 1
     keys = pressed((1.0, GO + HOLD), (2.0, "x")).keys
     assert decode_keys(encode_keys(keys)) == keys and all(word in HELP for word in ("SPACE", "g:", "q:", "0:"))
+
+
+def test_keys_come_at_once_without_enter_and_the_terminal_is_as_it_was_afterwards() -> None:
+    ours, theirs = os.openpty()
+    terminal, before = Terminal(theirs), termios.tcgetattr(theirs)
+    assert terminal.keys and terminal.pressed() == ""
+    with terminal.raw():
+        os.write(ours, b" g")
+        assert select.select([theirs], [], [], 5.0)[0] and terminal.pressed() == " g" and terminal.pressed() == ""
+    assert termios.tcgetattr(theirs) == before
+    os.close(ours)
+    os.close(theirs)
+    read, write = os.pipe()
+    assert not Terminal(read).keys and Terminal(read).pressed() == ""
+    os.close(read)
+    os.close(write)
 
 
 def test_numbers_are_those_of_all_records_and_fit_a_terminal() -> None:

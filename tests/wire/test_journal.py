@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
-from bumblebee.measured.checks import check_rollout
+from bumblebee.measured.intake import intake
 from bumblebee.measured.rollout import read_rollout
 from bumblebee.robot.facts import joint_names
 from bumblebee.robot.model import build_model
@@ -83,7 +84,7 @@ def rows_of(run: Rehearsal) -> np.ndarray:
 
 
 def test_a_run_becomes_a_rollout_that_the_intake_has_nothing_against(
-    rehearsal: Callable[..., Rehearsal], tmp_path: Path
+    rehearsal: Callable[..., Rehearsal], shipped: ExportedPolicy, tmp_path: Path
 ) -> None:
     run = rehearsal(noise=1.0, state_hz=500, states=LineFaults(delay=0.001, jitter=0.001, dropped=0.02))
     rows = rows_of(run)
@@ -96,8 +97,10 @@ def test_a_run_becomes_a_rollout_that_the_intake_has_nothing_against(
     writer.close()
     path = write_down(tmp_path / "nod-1.journal", tmp_path / "dataset")
     assert path is not None and (tmp_path / "dataset" / "model.xml").is_file()
-    found = check_rollout(read_rollout(path), build_model())
-    assert [finding for finding in found if finding.fatal] == []
+    contracts = {"": shipped.contract}
+    sorted_ = intake(tmp_path / "dataset", tmp_path / "good", tmp_path / "bad", build_model(), contracts)
+    assert [path.name for path in (tmp_path / "good").iterdir()] == ["nod-1.parquet"], sorted_.findings
+    assert read_rollout(path).meta["kp"] == pytest.approx(shipped.contract["kp"], rel=1e-6)
     with pytest.raises(BadInput, match="never-overwritten"):
         write_down(tmp_path / "nod-1.journal", tmp_path / "dataset")
 

@@ -169,10 +169,13 @@ def test_a_policy_runs_a_robot_in_another_process_and_its_log_is_a_dataset(
     at = str(tmp_path / "w") if wire == "sim" else f"udpm://239.255.76.67:{20000 + uuid.uuid4().int % 40000}?ttl=0"
     code = (
         "from bumblebee.wire.robot_process import run_robot; from bumblebee.wire.robot import RobotSettings\n"
-        f"run_robot({wire!r}, {at!r}, [], RobotSettings(state_hz=250), {SLOW}, 60.0)"
+        f"run_robot({wire!r}, {at!r}, [], RobotSettings(state_hz=250), {SLOW}, 60.0, print)"
     )
-    robot = subprocess.Popen([sys.executable, "-c", code], cwd=HOME, env=os.environ | {"PYTHONPATH": str(HOME)})
+    words, env = [sys.executable, "-u", "-c", code], os.environ | {"PYTHONPATH": str(HOME)}
+    robot = subprocess.Popen(words, cwd=HOME, env=env, stdout=subprocess.PIPE)
+    assert robot.stdout is not None
     try:
+        robot.stdout.readline()  # it is there
         job = Run(
             shipped.folder, nod(frames=12), wire, tmp_path / "set", at, None, PATIENT, SHORT, True, SLOW, "a test"
         )
