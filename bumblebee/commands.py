@@ -40,6 +40,7 @@ TABLE: dict[str, tuple[Command, ...]] = {
         Command("fetch", "flows.cli_loop:fetch", "Copy a registered policy out of a workspace or a server."),
     ),
     MEASURE: (
+        Command("deploy", "bumblebee.cli_deploy:app", "Run a policy on a robot over a wire, or be a simulated robot."),
         Command("import", "bumblebee.cli:import_", "Turn logs of a robot into a dataset."),
         Command("gap", "bumblebee.cli:gap", "Show where a model errs, before anything is fitted."),
         Command("diagnose", "bumblebee.cli:diagnose", "Find which effects the model lacks."),

@@ -54,6 +54,14 @@ def normalised(quat: ArrayLike) -> FloatArray:
     return quat / np.linalg.norm(quat, axis=-1, keepdims=True)
 
 
+def heading(quat: ArrayLike) -> FloatArray:
+    """Rotations (..., 4) about the vertical that turn as far as `quat` does; upside down has none, and no turn."""
+    w, _, _, z = _parts(quat)
+    length = np.hypot(w, z)
+    safe = np.where(length > 0, length, 1.0)
+    return _joined(np.where(length > 0, w / safe, 1.0), 0 * w, 0 * w, z / safe)
+
+
 def continuous(quat: ArrayLike) -> FloatArray:
     """Signs (T, 4) flipped so that neighbours are close; the first has w >= 0. The rotations stay the same."""
     quat = np.asarray(quat)

@@ -17,7 +17,7 @@ FLOORS = [
     {"clustering", "tracking", "diagnosis"},
     {"learning", "evaluation"},
     {"deploy", "baselines"},
-    {"report"},
+    {"report", "wire"},
     {"api", "view"},
 ]
 ONLY = {"clustering": {"motion"}, "tracking": {"motion", "sim"}, "diagnosis": {"sim", "measured"}}

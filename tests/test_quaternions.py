@@ -46,3 +46,13 @@ def test_continuous_signs_do_not_depend_on_the_signs_that_come(quats):
     np.testing.assert_array_equal(came, quaternions.continuous(path))
     assert (np.sum(came[1:] * came[:-1], axis=1) > 0).all()
     assert came[0, 0] >= 0
+
+
+def test_the_heading_turns_about_the_vertical_and_leaves_no_turn_about_it() -> None:
+    rng = np.random.default_rng(5)
+    quat = quaternions.normalised(rng.standard_normal((50, 4)))
+    turn = quaternions.heading(quat)
+    assert np.allclose(turn[:, 1:3], 0) and np.allclose(np.linalg.norm(turn, axis=1), 1)
+    rest = quaternions.multiply(quaternions.conjugate(turn), quat)
+    assert np.allclose(rest[:, 3], 0, atol=1e-12)
+    assert quaternions.heading(np.array([0.0, 1.0, 0.0, 0.0])).tolist() == [1, 0, 0, 0]

@@ -4,7 +4,7 @@ The observation is the training environment's own (`tracking.terms.see`), fed wi
 joints where the simulator would know the bodies' places.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,13 +20,16 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import forward_key_positions
 from bumblebee.sim.engine import RobotState
 from bumblebee.tracking.library import AHEAD, MotionLibrary, ReferenceFrame
-from bumblebee.tracking.observations import action_middle, joint_targets
+from bumblebee.tracking.observations import action_middle, joint_targets, middle_targets
 from bumblebee.tracking.terms import expanded, see
 
+Keys = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""Forward kinematics as `forward_key_positions`."""
 
-def robot_state(sensors: Sensors) -> RobotState:
+
+def robot_state(sensors: Sensors, forward: Keys = forward_key_positions) -> RobotState:
     """The state that the observation takes, from readings alone; key bodies by forward kinematics."""
-    keys = forward_key_positions(sensors.base_pos, sensors.base_quat, sensors.joint_pos)
+    keys = forward(sensors.base_pos, sensors.base_quat, sensors.joint_pos)
     return RobotState(
         root_pos_w=_float(sensors.base_pos),
         root_quat_w=_float(sensors.base_quat),
@@ -53,6 +56,7 @@ class PolicyRunner:
         library: the reference motions, as `reference_library` makes them for this policy.
         names: (B) the clip of each robot.
         compensation: what is undone at the joints; None for nothing.
+        forward: forward kinematics; for one robot there is a faster one than for many.
     """
 
     def __init__(
@@ -61,13 +65,15 @@ class PolicyRunner:
         library: MotionLibrary,
         names: Sequence[str],
         compensation: Compensation | None = None,
+        forward: Keys = forward_key_positions,
     ) -> None:
-        self.policy, self._library = policy, library
+        self.policy, self._library, self._forward = policy, library, forward
         order = {name: index for index, name in enumerate(library.names)}
         self._ids = torch.tensor([order[name] for name in names])
         self._scale = torch.as_tensor(policy.scale, dtype=torch.float32)
         self._dt = 1.0 / float(policy.contract["control_hz"])
         self._last_action = torch.zeros(len(names), len(self._scale))
+        self._readings = policy.sensors
         self._seen, self._middle = policy.seen, action_middle(policy.contract["action"]["base"])
         self._past: Tensor | None = None  # (B, H, D) terms of the last control steps, the oldest first
         self._memory = policy.empty_memory(len(names))
@@ -80,6 +86,11 @@ class PolicyRunner:
         """Joint targets (B, J) [rad] that carry each clip's first frame: what the servos hold before the start."""
         held = self._reference(np.arange(len(self._ids)), -1).hold_pos.numpy().astype(np.float64)
         return held if self._undo is None else self._undo.hold(held)
+
+    def untouched(self, robots: np.ndarray, tick: int) -> np.ndarray:
+        """Joint targets (n, J) [rad] of a policy that does nothing at control tick `tick`, as the drives are told."""
+        target = middle_targets(self._reference(robots, tick), self._middle).numpy().astype(np.float64)
+        return target if self._undo is None else self._undo.hold(target)
 
     def observe(self, robots: np.ndarray, tick: int, sensors: Sensors) -> Tensor:
         """Observations (n, D) of `robots` (n,) at control tick `tick`; sensors are those of these robots."""
@@ -111,7 +122,7 @@ class PolicyRunner:
         Before its first step a robot saw the same; tick 0 is a clip's first step, whatever was before it.
         """
         rows, seen, started = torch.as_tensor(robots), self._seen, tick > 0
-        state, ref = robot_state(_taken(sensors, self.policy.sensors)), self._reference(robots, tick)
+        state, ref = robot_state(_taken(sensors, self._readings), self._forward), self._reference(robots, tick)
         terms, alone = (expanded(names) for names in (seen.terms, seen.now))
         last = self._last_action[rows] * started
         row = see(terms, state, ref, last)[:, None]

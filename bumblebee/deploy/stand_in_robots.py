@@ -14,6 +14,7 @@ from bumblebee.deploy.robots import BatchView
 from bumblebee.deploy.sensors import Sensors
 from bumblebee.deploy.servo_command import ServoCommand
 from bumblebee.deploy.stand_in_effects import Json, declared_g1, to_laws
+from bumblebee.deploy.undeclared.law import Law
 from bumblebee.deploy.undeclared.simulation import CYCLES, TrueRobots
 from bumblebee.sim.sensors import add_foot_sensors
 
@@ -24,16 +25,17 @@ class StandInRobots:
     Args:
         count: number of robots.
         effects: entries of the sealed file, empty for none.
+        more: laws of the world around it, such as a gantry's.
     """
 
-    def __init__(self, count: int, effects: Sequence[Json]) -> None:
+    def __init__(self, count: int, effects: Sequence[Json], more: Sequence[Law] = ()) -> None:
         robot = declared_g1()
         spec = robot.spec.copy()
         add_foot_sensors(spec)
         for actuator in spec.actuators:
             actuator.set_to_motor()
         rng = np.random.default_rng(0)
-        self._body = TrueRobots(replace(robot, spec=spec), to_laws(effects), count, rng, solver=None)
+        self._body = TrueRobots(replace(robot, spec=spec), [*to_laws(effects), *more], count, rng, solver=None)
         self.model: mujoco.MjModel = self._body.model
         self.batch, self.kp, self.kd = self._body.batch, self._body.kp, self._body.kd
         self._view = BatchView(self.batch)
@@ -58,6 +60,14 @@ class StandInRobots:
     def step(self, robots: np.ndarray, command: ServoCommand, cycles: int = CYCLES) -> None:
         """Command the drives of `robots` (n,) for 20 ms: 20 servo cycles of 1 ms; the others stand still in time."""
         self._body.step(command, robots, cycles)
+
+    def issued(self, command: ServoCommand) -> ServoCommand:
+        """What becomes of a command to all robots when it is issued; `go_on` moves them under it."""
+        return self._body.issued(command)
+
+    def go_on(self, arrived: ServoCommand, cycles: int) -> None:
+        """Let all robots move for some servo cycles of 1 ms under a command that has arrived."""
+        self._body.go_on(arrived, cycles)
 
 
 def _chance(qpos: np.ndarray, qvel: np.ndarray) -> np.random.Generator:

@@ -156,14 +156,21 @@ class TrueRobots:
 
     def arrived(self, target: np.ndarray) -> np.ndarray:
         """Targets (R, J) [rad] as they arrive at the servos when they are issued."""
-        command = ServoCommand(target)
-        for i in self._acting["tick"]:
-            command = self.laws[i].tick(self.world, command)
-        return command.target
+        return self.issued(ServoCommand(target)).target
 
     def hold(self, arrived: np.ndarray) -> None:
         """Hold what has arrived (R, J) for one control period."""
-        self._hold(self._moving(None), ServoCommand(arrived), CYCLES)
+        self.go_on(ServoCommand(arrived), CYCLES)
+
+    def issued(self, command: ServoCommand) -> ServoCommand:
+        """What becomes of a command to all robots when it is issued."""
+        for i in self._acting["tick"]:
+            command = self.laws[i].tick(self.world, command)
+        return command
+
+    def go_on(self, arrived: ServoCommand, cycles: int) -> None:
+        """Let all robots move for some milliseconds under a command that has arrived."""
+        self._hold(self._moving(None), arrived, cycles)
 
     def settle(self, target: np.ndarray) -> None:
         """Forces and accelerations where the robots are, under targets (R, J); no time passes."""

@@ -1,0 +1,143 @@
+"""Command line: `bumblebee deploy run`, `robot`, `rollouts`."""
+
+import getpass
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bumblebee.errors import BadInput, plain
+
+if TYPE_CHECKING:
+    from bumblebee.motion.clip import Clip
+
+STOPPED = 4
+"""Exit status of a run that a safety rule ended."""
+app = typer.Typer(add_completion=False, no_args_is_help=True, help="Run a policy on a robot, over a wire.")
+_WIRES = "sim (sockets of this machine) or lcm."
+At = Annotated[str, typer.Option("--at", help="Address of the wire: a folder for sim, an LCM URL for lcm.")]
+Slow = Annotated[
+    float, typer.Option("--slow", min=1, max=100, help="Times slower than real time, the same on both sides.")
+]
+
+
+@app.command("run")
+def run(
+    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or `shipped`.")],
+    clip: Annotated[str, typer.Option("--clip", help="Name of the motion to follow.")],
+    robot: Annotated[str, typer.Option("--robot", help=_WIRES)] = "sim",
+    at: At = "",
+    motions: Annotated[str, typer.Option("--motions", help="Motion files, or `embedded`.")] = "embedded",
+    out: Annotated[Path, typer.Option("--out", help="Dataset folder; a run adds a journal and a rollout.")] = Path(
+        "deployed"
+    ),
+    limits: Annotated[Path | None, typer.Option("--limits", help="YAML file of limits; docs/deploy.md.")] = None,
+    compensation: Annotated[
+        Path | None, typer.Option("--compensation", help="File of `bumblebee compensate`, undone on the way.")
+    ] = None,
+    unattended: Annotated[
+        bool, typer.Option("--unattended", help="No keys: goes on by itself; simulated robots only.")
+    ] = False,
+    slow: Slow = 1.0,
+    operator: Annotated[str, typer.Option("--operator", help="Who runs it, for the log; your login by default.")] = "",
+) -> None:
+    """Check robot and policy, stand up slowly, run one clip, damp; the log is a dataset of measured rollouts."""
+    from bumblebee.learning.export import export_shipped
+    from bumblebee.wire.limits import Limits, read_limits
+    from bumblebee.wire.session import Run
+    from bumblebee.wire.session import run as go
+
+    bounds = read_limits(limits) if limits else Limits()
+    if not unattended:
+        _require_keys()
+    chosen = _clip(motions, clip)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = export_shipped(Path(scratch) / "shipped") if policy == "shipped" else _folder(policy)
+        job = Run(folder, chosen, robot, out, at, compensation, bounds, unattended=unattended, slow=slow,
+                  operator=operator or getpass.getuser())  # fmt: skip
+        ended, rollout = go(job, lambda line: print(plain(line), flush=True))
+    print("\n".join(ended.numbers.lines()[1:]))
+    print(f"guard: {', '.join(ended.told['permitted'])}; refused states: {ended.told['refused'] or 'none'}")
+    print(f"written: {rollout}" if rollout else "nothing measured: the policy did not carry the robot")
+    if ended.reason:
+        print(f"stopped by the rule {ended.reason}")
+        raise typer.Exit(STOPPED)
+
+
+@app.command("robot")
+def robot(
+    wire: Annotated[str, typer.Option("--wire", help=_WIRES)] = "sim",
+    at: At = "",
+    sealed: Annotated[Path | None, typer.Option("--sealed", help="File of undeclared effects; none without.")] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of noise, faults and clock.")] = 0,
+    delay: Annotated[float, typer.Option("--delay", min=0, help="Delay of each message, both ways [ms].")] = 0.0,
+    jitter: Annotated[float, typer.Option("--jitter", min=0, help="Largest further delay, both ways [ms].")] = 0.5,
+    dropped: Annotated[float, typer.Option("--dropped", help="Share of messages lost, both ways.")] = 0.0,
+    late: Annotated[float, typer.Option("--late", help="Share of messages 50 ms late, both ways.")] = 0.0,
+    slow: Slow = 1.0,
+    seconds: Annotated[float | None, typer.Option("--seconds", min=0, help="End after so long; else Ctrl-C.")] = None,
+) -> None:
+    """Be a robot: a simulated G1 in a gantry, in real time, with IMU, encoders and odometry, until Ctrl-C."""
+    from bumblebee.deploy.stand_in_effects import read_sealed
+    from bumblebee.sim.quiet import quiet_mujoco
+    from bumblebee.wire.line import LineFaults
+    from bumblebee.wire.realtime import ROBOT, harden
+    from bumblebee.wire.robot import RobotSettings
+    from bumblebee.wire.robot_process import run_robot
+
+    quiet_mujoco()
+    faults = LineFaults(delay / 1e3, jitter / 1e3, dropped, late)
+    settings = RobotSettings(seed=seed, states=faults, orders=faults)
+    effects = read_sealed(sealed) if sealed else []
+    harden(ROBOT)
+    print(f"a simulated G1 on the wire {wire}; Ctrl-C ends it", flush=True)
+    made = run_robot(wire, at, effects, settings, slow, seconds, lambda line: print(line, flush=True))
+    refused = dict(made.hearing.refused) or "none"
+    print(f"orders refused: {refused}; time lost to a busy machine: {made.slipped / 1e9:.2f} s")
+
+
+@app.command("rollouts")
+def rollouts(
+    journal: Annotated[Path, typer.Argument(metavar="JOURNAL", help="journals/*.journal of a run that was killed.")],
+    out: Annotated[Path, typer.Option("--out", help="Dataset folder that gets the rollout.")],
+) -> None:
+    """Turn a journal into a measured rollout; `run` does this by itself unless it is killed."""
+    from bumblebee.wire.session import write_down
+
+    path = write_down(journal, out)
+    if path is None:
+        raise BadInput(journal, "a run in which the policy carried the robot", "none", "Run it again.")
+    print(f"written: {path}")
+
+
+def _require_keys() -> None:
+    if not sys.stdin.isatty():
+        do = "Start it in a terminal, or give --unattended with a simulated robot."
+        raise BadInput("bumblebee deploy run", "a terminal, for the dead-man's key", "none", do)
+
+
+def _folder(policy: str) -> Path:
+    if "@" in policy and not Path(policy).exists():
+        do = f"Run: bumblebee fetch {policy} --out policy; then deploy the folder policy."
+        raise BadInput(policy, "a policy's folder", "a registered name", do)
+    return Path(policy)
+
+
+def _clip(motions: str, name: str) -> "Clip":
+    from bumblebee.motion.embedded import EmbeddedConfig, make
+    from bumblebee.motion.embedded.kinds import kinds
+
+    if motions == "embedded":
+        made = {kind.name: kind for kind in kinds()}
+        if name in made:
+            return make(made[name], 0, EmbeddedConfig())
+        raise BadInput("--clip", f"one of {', '.join(made)}", repr(name)[:60])
+    from bumblebee.motion.folder import read_folder
+    from bumblebee.motion.settings import ReadConfig
+
+    clips = {clip.name: clip for clip in read_folder(Path(motions), ReadConfig()).clips}
+    if name not in clips:
+        raise BadInput("--clip", f"one of {', '.join(sorted(clips)[:20])}", repr(name)[:60])
+    return clips[name]

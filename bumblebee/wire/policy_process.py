@@ -1,0 +1,69 @@
+"""The policy's process: answers the guard's newest question, and ends when the guard is gone.
+
+python -m bumblebee.wire.policy_process POLICY CLIPS COMPENSATION SOCKET     (COMPENSATION may be empty)
+"""
+
+import select
+import socket
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from bumblebee.wire import packets
+from bumblebee.wire.brain import Brain
+from bumblebee.wire.lcm_codec import Codec
+from bumblebee.wire.messages import Mode, State
+from bumblebee.wire.questions import Question, decode_question, encode_answer
+from bumblebee.wire.realtime import POLICY, harden
+
+READY = "ready"
+
+
+def load(policy: Path, clips: Path, compensation: Path | None) -> Brain:
+    """The brain of a policy's folder and a library with one clip, tried once."""
+    import torch
+
+    from bumblebee.deploy.compensation_file import read_compensation
+    from bumblebee.deploy.policy import ExportedPolicy
+    from bumblebee.motion.store import read_library
+
+    torch.set_num_threads(1)
+    (clip,) = read_library(clips)
+    undone = read_compensation(compensation) if compensation else None
+    brain = Brain(ExportedPolicy.load(policy), clip, undone)
+    for tick in range(3):
+        brain.answer(Question(tick, 0, _standing(brain.hold())))
+    return brain
+
+
+def serve(brain: Brain, end: socket.socket, joints: int) -> None:
+    """Answer until nobody asks any more."""
+    codec = Codec(joints)
+    while True:
+        select.select([end], [], [])
+        try:
+            question = decode_question(packets.received(end)[-1], codec)
+            packets.send(end, encode_answer(brain.answer(question)))
+        except packets.Gone:
+            return
+
+
+def _standing(pose: np.ndarray) -> State:
+    """A state to try the policy with."""
+    zero, none = np.zeros_like(pose), np.zeros(3)
+    upright, feet = np.array([1.0, 0, 0, 0]), np.zeros(2)
+    return State(0, 0, 0, 0, pose, zero, zero, upright, none, none, none, feet, zero, zero, Mode.OFF, 0, -1, 0)
+
+
+def main() -> None:
+    """Run the process."""
+    policy, clips, compensation, number = sys.argv[1:5]
+    brain = load(Path(policy), Path(clips), Path(compensation) if compensation else None)
+    harden(POLICY)
+    print(READY, flush=True)
+    serve(brain, socket.socket(fileno=int(number)), len(brain.hold()))
+
+
+if __name__ == "__main__":
+    main()

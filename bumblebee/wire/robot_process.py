@@ -1,0 +1,56 @@
+"""The stand-in robot's process: a `WireRobot` in real time on a wire."""
+
+from collections.abc import Callable, Sequence
+
+from bumblebee.deploy.stand_in_effects import Json
+from bumblebee.wire.clock import SECOND, Clock
+from bumblebee.wire.link import open_link
+from bumblebee.wire.messages import ORDER, Mode
+from bumblebee.wire.robot import RobotSettings, WireRobot
+
+
+def run_robot(
+    wire: str,
+    at: str,
+    effects: Sequence[Json],
+    settings: RobotSettings,
+    slow: float = 1.0,
+    seconds: float | None = None,
+    say: Callable[[str], None] = lambda line: None,
+) -> WireRobot:
+    """Let the robot live on a wire.
+
+    Args:
+        wire: as for `open_link`.
+        at: address of the wire.
+        effects: entries of the sealed file, empty for none.
+        settings: of the robot and its line.
+        slow: how much slower than real time.
+        seconds: when to end, in the robot's time; None for no end.
+        say: told when the mode changes.
+    """
+    clock, link = Clock(slow), open_link(wire, [ORDER], at)
+    begun = clock.now()
+    robot, mode = WireRobot(effects, settings, begun), None
+    try:
+        while seconds is None or clock.now() - begun < seconds * SECOND:
+            now = clock.now()
+            for channel, message in robot.advance(now, [message for _, message in link.received()]):
+                link.send(channel, message)
+            if (new := robot.hearing.mode(now)) is not mode:
+                mode = new
+                say(f"[{(now - begun) / SECOND:8.2f} s] {_WORDS[mode]}")
+            clock.sleep_until(robot.next_period)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        link.close()
+    return robot
+
+
+_WORDS = {
+    Mode.OFF: "off: hangs in the gantry",
+    Mode.DAMP: "damps: the gantry holds it",
+    Mode.HOLD: "holds targets: the gantry lowers it to the floor",
+    Mode.RUN: "carries itself",
+}

@@ -1,0 +1,65 @@
+"""`bumblebee deploy`: what cannot be run is one line and status 2, and each line's remedy works as printed."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from bumblebee import cli_deploy
+from tests.test_commands import run
+
+ALONE = ("--unattended", "--clip", "squat")
+
+
+def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
+    assert run("deploy", *words) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    return said
+
+
+def test_what_cannot_be_run_is_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    for words, expected in (
+        (("run", "shipped", "--clip", "squat"), "a terminal, for the dead-man's key"),
+        (("run", "shipped", "--unattended", "--clip", "sqat"), "squat_quick"),
+        (("run", tmp_path, *ALONE), "contract.json"),
+        (("run", "shipped", *ALONE, "--robot", "can"), "sim or lcm"),
+        (("run", "shipped", *ALONE, "--limits", tmp_path / "no.yaml"), "no.yaml"),
+        (("run", "shipped", *ALONE, "--motions", tmp_path), "motion"),
+        (("rollouts", tmp_path / "no.journal", "--out", out), "a journal of"),
+        (("robot", "--dropped", "2"), "dropped: expected a number from 0 to 1"),
+    ):
+        assert expected in refused(capsys, *words, *(("--out", out) if words[0] == "run" else ()))
+    assert not out.exists()
+
+
+def test_a_registered_name_is_told_how_to_become_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    said = refused(capsys, "run", "expert-c0@champion", *ALONE)
+    (line,) = re.findall(r"Run: bumblebee (.*?); then", said)
+    assert run(*line.split(), "--help") == 0 and "registered" in capsys.readouterr().out.lower()
+
+
+def test_without_a_robot_a_simulated_one_can_be_started_as_the_line_says(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bumblebee.wire.preflight._PATIENCE", 0.05)
+    monkeypatch.setattr("bumblebee.wire.realtime.harden", lambda priority: [])
+    said = refused(capsys, "run", "shipped", *ALONE, "--at", tmp_path / "w", "--out", tmp_path / "out")
+    words = said.strip().split("bumblebee ")[-1].split()
+    assert words == ["deploy", "robot"] and not (tmp_path / "out").exists()
+    assert run(*words, "--seconds", "0.1", "--at", tmp_path / "w") == 0
+    assert "a simulated G1 on the wire sim" in capsys.readouterr().out
+
+
+def test_a_run_that_a_rule_ended_says_so_by_its_status(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from bumblebee.wire.console import Ended
+    from bumblebee.wire.screen import Numbers
+
+    for reason, status in (("tilt", cli_deploy.STOPPED), ("", 0)):
+        ended = Ended(reason, Numbers(23), {"permitted": ["memory locked"], "refused": {}})
+        monkeypatch.setattr("bumblebee.wire.session.run", lambda job, say, ended=ended: (ended, None))
+        assert run("deploy", "run", "shipped", *ALONE, "--out", tmp_path) == status
+        assert ("stopped by the rule tilt" in capsys.readouterr().out) == bool(reason)
