@@ -65,7 +65,7 @@ def undone_after(parent: int, found: Path, limits: CompensationLimits) -> Compen
 
 
 def _key(effect: Effect) -> tuple[str, frozenset[str]]:
-    """Key by which it is one effect with another round's."""
+    """Key that an effect has in every round."""
     return effect.effect, frozenset(effect.where)
 
 

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from mlflow import MlflowClient
 
 # Before anything of MLflow is imported: it reads this once, and would otherwise tell its maker of every use.
-os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+NO_TELEMETRY = "MLFLOW_DISABLE_TELEMETRY"
+os.environ.setdefault(NO_TELEMETRY, "true")
 
 SERVERS, DATABASE = Path(".servers"), "mlflow.db"
 SCHEME = "mlflow-artifacts"

@@ -2,6 +2,9 @@
 
 import hashlib
 import json
+import os
+import subprocess
+import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -179,3 +182,11 @@ def test_upstream_is_everything_back_to_the_first_stage(tmp_path: Path) -> None:
 )
 def test_metric_names_are_such_that_mlflow_takes_them(name: str, kept: str) -> None:
     assert registry.metric_name(name) == kept
+
+
+def test_mlflow_reports_no_use_to_its_maker_whoever_asks_the_registry_first() -> None:
+    """MLflow looks when it is imported, so the variable is set before."""
+    code = "import sys, tasks.registry as r, os; assert 'mlflow' not in sys.modules; print(os.environ[r.NO_TELEMETRY])"
+    bare = {name: value for name, value in os.environ.items() if name != registry.NO_TELEMETRY}
+    said = subprocess.run([sys.executable, "-c", code], env=bare, capture_output=True, text=True, check=True)
+    assert said.stdout == "true\n"

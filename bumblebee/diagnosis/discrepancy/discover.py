@@ -68,7 +68,7 @@ class _State:
 
 @dataclass(frozen=True, eq=False)
 class _Means:
-    """Means of the search for discrepancy models."""
+    """Candidates, time limit and progress of the search for discrepancy models."""
 
     offers: Offers
     budget: Budget

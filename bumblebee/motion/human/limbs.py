@@ -17,7 +17,7 @@ ARM = ("shoulder", "elbow", "wrist")
 _PAIRS = 6  # of chains that are tried as legs and as arms, the longest ones
 
 _Score = tuple[int, float, int]
-"""Score of the names, the length of the two long bones, and the steps without a node between."""
+"""Score: agreement of names, length of the two long bones, and steps without a node between."""
 _Chain = tuple[Any, "Placed"] | None
 """The role placed last, behind those before it."""
 _Labelled = tuple[_Score, _Chain]

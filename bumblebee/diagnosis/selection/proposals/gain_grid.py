@@ -39,7 +39,7 @@ Servo = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class _Course:
-    """Comparison of servos: what they are compared by."""
+    """Windows, weights and rules that servos are compared by."""
 
     problem: Problem
     windows: Windows
