@@ -1,6 +1,7 @@
 """A robot's body tree and its surfaces, as the page's 3D player reads them."""
 
 import base64
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from bumblebee.report.looks import dress, is_g1
 
+_ROD = (0.55, 0.58, 0.62)
 _SHOWN = 3  # groups of geoms that MuJoCo's viewer shows at first
 _STEPS = 30_000  # of the largest coordinate; an int16 holds them
 _MOST_BYTES = 1_000_000  # of the surfaces, before they are packed; beyond it they are made coarser
@@ -79,8 +81,11 @@ def _data(model: mujoco.MjModel, parts: list[Surface]) -> dict[str, Any]:
 
 
 def surfaces(model: mujoco.MjModel) -> list[Surface]:
-    """Geoms as triangles: those of MuJoCo's visible groups, or all where none is in these; no floor, nothing unseen."""
-    return _surfaces(model, _SHOWN) or _surfaces(model, mujoco.mjNGROUP)
+    """Geoms as triangles: those of MuJoCo's visible groups, or all where none is in these; no floor, nothing unseen.
+
+    A robot without geoms is drawn as rods from body to body with a ball at each centre of mass.
+    """
+    return _surfaces(model, _SHOWN) or _surfaces(model, mujoco.mjNGROUP) or list(_rods(model))
 
 
 def _surfaces(model: mujoco.MjModel, groups: int) -> list[Surface]:
@@ -95,6 +100,18 @@ def _surfaces(model: mujoco.MjModel, groups: int) -> list[Surface]:
         points = mesh[0] @ turn.reshape(3, 3).T + model.geom_pos[geom]
         found.append(Surface(int(model.geom_bodyid[geom]), points, mesh[1], tuple(colour[:3])))
     return found
+
+
+def _rods(model: mujoco.MjModel) -> Iterator[Surface]:
+    from trimesh import creation
+
+    longest = float(np.linalg.norm(np.concatenate([model.body_pos, model.body_ipos]), axis=1).max()) or 1.0
+    for body in range(1, model.nbody):
+        ball = creation.icosphere(subdivisions=2, radius=0.12 * longest)
+        yield Surface(body, ball.vertices + model.body_ipos[body], ball.faces, _ROD)
+        if model.body_pos[body].any():
+            rod = creation.cylinder(0.06 * longest, segment=[np.zeros(3), model.body_pos[body]], sections=16)
+            yield Surface(int(model.body_parentid[body]), rod.vertices, rod.faces, _ROD)
 
 
 def _triangles(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray] | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bumblebee.diagnosis.dataset import Session
-from bumblebee.diagnosis.report import NO_INLAY, Inlay
+from bumblebee.diagnosis.report import Inlay
 from bumblebee.diagnosis.simulation import Windows, choose_starts, cut, residuals, vary_or_refuse
 from bumblebee.diagnosis.thresholds.report import ExampleWindows
 from bumblebee.quaternions import conjugate, from_rotation_vector, multiply
@@ -86,10 +86,8 @@ def window_takes(session: Session, effects: Sequence[Effect] = (), group: str = 
 
 
 def windows_inlay(session: Session, effects: Sequence[Effect] = ()) -> Inlay:
-    """The 3D replays of a diagnosis' page; nothing for a robot without a surface."""
+    """The 3D replays of a diagnosis' page."""
     takes = window_takes(session, effects)
-    if not takes[0].shape.surfaces:
-        return NO_INLAY
     made = part(takes)
     shown = player(takes[0], "Measured and simulated", f"From the measured state, with the same commands. {made.note}")
     return Inlay(f"{shown}{holder(made)}", style(), script())

@@ -96,6 +96,19 @@ def test_shorter_robots_stand_still_at_their_last_state() -> None:
     assert side_by_side([np.zeros((3, 2)), np.ones((1, 1))]).tolist() == [[0, 0, 1]] * 3
 
 
+def test_a_robot_without_geoms_is_drawn_as_rods_between_its_bodies() -> None:
+    arm = "<body><joint/><inertial pos='0 0 .1' mass='1' diaginertia='1 1 1'/>{}</body>"
+    parts = surfaces(
+        mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{arm.format(arm.format(''))}</worldbody></mujoco>")
+    )
+    assert [part.body for part in parts] == [1, 2]
+    apart = arm.replace("<body>", "<body pos='0 0 .3'>")
+    parts = surfaces(
+        mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{arm.format(apart.format(''))}</worldbody></mujoco>")
+    )
+    assert np.ptp(parts[-1].points[:, 2]) == pytest.approx(0.3)
+
+
 def test_large_meshes_are_made_coarser_and_keep_their_extent(monkeypatch: pytest.MonkeyPatch) -> None:
     parts = surfaces(spec().compile())
     monkeypatch.setattr("bumblebee.report.shape._MOST_BYTES", 2000)

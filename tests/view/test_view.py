@@ -1,6 +1,7 @@
 """The browser's pages: what is played, how a push acts, and one line for what cannot be shown."""
 
 import re
+import shutil
 import socket
 from pathlib import Path
 
@@ -26,7 +27,7 @@ from bumblebee.view.live import LivePolicy
 from bumblebee.view.measured import window_entries
 from bumblebee.view.page import Page
 from bumblebee.view.scene import Picture
-from bumblebee.view.server import open_server
+from bumblebee.view.server import address, open_server, stop
 from bumblebee.view.shipped import shipped_policy
 from bumblebee.view.sources import Entry, found, of_clip
 from bumblebee.view.what import evaluation_entries
@@ -217,3 +218,40 @@ def test_a_damaged_evaluation_is_one_line(evaluation: Path, tmp_path: Path):
     (tmp_path / "states.parquet").write_bytes((evaluation / "states.parquet").read_bytes()[:-9])
     with pytest.raises(BadInput, match=r"expected trials\.csv and states\.parquet of an evaluation"):
         run(["view", str(tmp_path)])
+
+
+@pytest.mark.slow
+def test_in_a_browser_the_page_plays_pauses_scrubs_and_asks_its_own_server_alone(clip):
+    sync_api = pytest.importorskip("playwright.sync_api")
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if not chromium:
+        pytest.skip("no chromium on this machine")
+    server = open_server(0)
+    page = Page(Picture(server), [Entry(clip.name, make=lambda: of_clip(clip, joint_names()))], "Motions")
+    try:
+        with sync_api.sync_playwright() as started:
+            software = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+            browser = started.chromium.launch(executable_path=chromium, args=software)
+            shown, asked = browser.new_page(), []
+            shown.on("request", lambda request: asked.append(request.url))
+            shown.goto(address(server))
+
+            def until(happened) -> bool:
+                """Let the page and the browser run by turns, for a minute at most."""
+                rounds = 0
+                while not happened() and (rounds := rounds + 1) < 1500:
+                    page.run(ticks=4)
+                    shown.wait_for_timeout(20)
+                return happened()
+
+            button = shown.get_by_role("button", name="Pause")
+            assert until(lambda: button.count() > 0)
+            assert until(lambda: page._frame > 0)
+            button.click()
+            assert until(lambda: not page._playing)
+            shown.get_by_role("slider").first.press("End")
+            assert until(lambda: page._frame == clip.frames - 1)
+            assert {url.split("/")[2] for url in asked if "://" in url} == {address(server).split("/")[2]}
+            browser.close()
+    finally:
+        stop(server)
