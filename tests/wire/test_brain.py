@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bumblebee import quaternions
+from bumblebee.deploy.compensation_plan import compensate
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.motion.kinematics import forward_key_positions
 from bumblebee.robot.facts import joint_names, stand_pose
@@ -17,6 +18,7 @@ from bumblebee.wire.messages import State, layout_of
 from bumblebee.wire.questions import Question, decode_answer, encode_answer
 from tests.deploy.conftest import nod
 from tests.deploy.conftest import policy_folder as policy_folder  # a fixture
+from tests.deploy.test_compensation import effect
 from tests.wire.made import state
 
 TURN = quaternions.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(1.1))
@@ -71,3 +73,14 @@ def test_a_policy_that_does_nothing_wants_the_references_targets(policy_folder: 
     assert (read.tick, read.asked_ns, read.sequence) == (4, 9, 7)
     for one, other in zip(vars(answer.wish).values(), vars(read.wish).values(), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_what_a_compensation_undoes_goes_out_with_the_wish(policy_folder: Callable[..., Path]) -> None:
+    knee = joint_names().index("left_knee_joint")
+    policy = ExportedPolicy.load(policy_folder(gain=0.0))
+    effects = [effect("motor_strength", "left_knee_joint", 0.8), effect("encoder_offset", "left_knee_joint", 0.1)]
+    seen = standing(TURN, np.zeros(3))
+    plain, undone = (Brain(policy, nod(), c).answer(Question(0, 0, seen)) for c in (None, compensate(effects)))
+    assert undone.wish.kp[knee] == pytest.approx(plain.wish.kp[knee] / 0.8)
+    assert undone.wish.target[knee] - plain.wish.target[knee] == pytest.approx(0.1, abs=1e-6)
+    assert undone.reference.target[knee] - plain.reference.target[knee] == pytest.approx(0.1, abs=1e-6)
