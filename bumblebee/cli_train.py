@@ -64,7 +64,7 @@ def train(
 
 
 def evaluate(
-    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or `shipped`.")],
+    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or shipped, randomised, imu.")],
     motions: Annotated[str, typer.Argument(metavar="MOTIONS", help="Motion files, or `embedded`.")] = "embedded",
     out: Annotated[Path | None, typer.Option("--out", help="CSV file with a row a rollout.")] = None,
     states: Annotated[
