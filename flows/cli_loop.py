@@ -13,6 +13,7 @@ from bumblebee.errors import BadInput
 
 Name = Annotated[str, typer.Option("--name", help="Workspace under runs/; without, the checkout itself.")]
 PrefectPort = Annotated[int, typer.Option("--prefect-port", help="Port of Prefect's server; 0: a free one.")]
+Workspace = Annotated[Path | None, typer.Option("--workspace", help="An existing workspace, as it is.")]
 MlflowPort = Annotated[int, typer.Option("--mlflow-port", help="Port of MLflow's server; 0: a free one.")]
 
 
@@ -20,7 +21,7 @@ def demo(
     view: Annotated[bool, typer.Option("--view", help="Play the shipped policy in the browser.")] = False,
     motions: Annotated[Path | None, typer.Option("--motions", help="Motion files, not the embedded ones.")] = None,
     name: Annotated[str, typer.Option("--name", help="Workspace under runs/; by default after --motions.")] = "",
-    workspace: Annotated[Path | None, typer.Option("--workspace", help="An existing workspace, as it is.")] = None,
+    workspace: Workspace = None,
     profile: Annotated[str, typer.Option("--profile", help="File of profiles/ on top of params.yaml.")] = "",
     seed: Annotated[str, typer.Option("--seed", help="Seed of the sealed robot, or `null`: it lacks nothing.")] = "",
     prefect_port: PrefectPort = 0,
@@ -42,14 +43,16 @@ def demo(
     raise typer.Exit(guarded(lambda: started(argparse.Namespace(**options, **both))))
 
 
-def serve(name: Name = "", prefect_port: PrefectPort = 0, mlflow_port: MlflowPort = 0) -> None:
+def serve(
+    name: Name = "", workspace: Workspace = None, prefect_port: PrefectPort = 0, mlflow_port: MlflowPort = 0
+) -> None:
     """Open Prefect and MLflow on loopback until Ctrl-C, as `make serve` does."""
     require_checkout("serve")
     from bumblebee.last_line import guarded
     from flows.serve import started
 
-    options = argparse.Namespace(name=name, prefect_port=prefect_port, mlflow_port=mlflow_port)
-    raise typer.Exit(guarded(lambda: started(options)))
+    both = {"prefect_port": prefect_port, "mlflow_port": mlflow_port}
+    raise typer.Exit(guarded(lambda: started(argparse.Namespace(name=name, workspace=workspace, **both))))
 
 
 def report(name: Name = "") -> None:

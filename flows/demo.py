@@ -1,7 +1,6 @@
 """`make demo` and `make smoke`: the whole loop with both servers, in this checkout or in a workspace under runs/."""
 
 import argparse
-import json
 import os
 import re
 import subprocess
@@ -13,12 +12,12 @@ from bumblebee.last_line import EXIT_INTERRUPTED, guarded
 from flows import login
 from flows import workspace as workspaces
 from flows.attend import attend, ended_in_order
+from flows.ending import registry, serve, shown, summarise
 from flows.environment import SERVERS, environment
-from flows.first_look import MODELS
 from flows.owned import require_own
 from flows.servers import Addresses, require_port, servers
 from flows.stages import changed_stages, read_stages, to_run
-from tasks import params, paths, sections
+from tasks import params, sections
 from tasks.lab import on_cluster
 from tasks.private import private_index
 
@@ -144,37 +143,10 @@ def announce(folder: Path, addresses: Addresses) -> None:
     """Where to look while it runs."""
     print(f"workspace  {shown(folder)}")
     print(f"Prefect    {addresses.prefect}   the stages as they run, and the gates")
-    print(f"MLflow     {addresses.mlflow}/{MODELS}   the registered policies, and every run's numbers")
+    print(f"MLflow     {registry(addresses.mlflow)}   the registered policies, and every run's numbers")
     print(f"login      user {login.USER}, password in {shown(folder / SERVERS / login.NAME)} (only you can read it);")
     print("           Prefect's page wants the whole line of that file")
-    print(f"open them again with: {serve_command(folder)}", flush=True)
-
-
-def serve_command(folder: Path) -> str:
-    """How to open this workspace's servers again."""
-    return "make serve" if folder.resolve() == workspaces.HOME else f"make serve NAME={folder.name}"
-
-
-def shown(folder: Path) -> str:
-    """The folder as a person would name it from here."""
-    path = os.path.relpath(folder)
-    return str(folder) if path.startswith("..") else path
-
-
-def summarise(folder: Path) -> None:
-    """Print what there is now: registered models and the report."""
-    published = folder / paths.PUBLISHED
-    if published.exists():
-        models = json.loads(published.read_text())["models"]
-        for name, facts in models.items():
-            version = facts["champion"] or "none yet"
-            proposed = facts.get("proposal")
-            waits = f"; {proposed['version']} is proposed: bumblebee gate show {name}" if proposed else ""
-            print(f"  models:/{name}@champion  version {version}{waits}")
-    report = folder / paths.REPORT
-    if report.exists():
-        print(f"report: {shown(report)}")
-    print(f"history: {serve_command(folder)}")
+    print(f"open them again with: {serve(folder)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,34 +1,20 @@
-"""Answer a gate from any terminal.
-
-`python -m flows.gate_answer approve --workspace PATH --round 1 --seen HASH --by NAME`
+"""Take the answer of `bumblebee gate` for a round: write it, and resume the run that waits for it.
 
 The answer is written to data/approvals of the workspace; a run that waits for it on a reachable Prefect server is
-resumed. `python -m tasks.gate --round 1 --show` prints what came, and this command with the hash of it.
+resumed.
 """
 
-import argparse
 import asyncio
 import os
 import sys
 from pathlib import Path
 from typing import Any
 
-from bumblebee.errors import BadInput
-from bumblebee.last_line import guarded
 from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
 from flows import login, runs, servers
-from flows import workspace as workspaces
 from flows.environment import SERVERS, environment
 from tasks.gate import asked, rule
-
-
-def main(argv: list[str] | None = None) -> int:
-    """Write the answer; resume the run that waits for it."""
-    options = parser().parse_args(argv)
-    place = gate.Gate(chosen(options), options.round)
-    given(place, options.answer, gate.unix_user(options.by), options.seen, options.note, options.change)
-    return 0
 
 
 def given(place: gate.Gate, verb: str, author: gate.Author, seen: str, note: str, change: bool) -> None:
@@ -45,32 +31,6 @@ def given(place: gate.Gate, verb: str, author: gate.Author, seen: str, note: str
         print(f"to go on {words.go_on(table)}")
     elif not resumed:
         print("start the loop again (or `dvc repro`): it goes on from here")
-
-
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    made = argparse.ArgumentParser(prog="python -m flows.gate_answer", description=__doc__)
-    made.add_argument("answer", choices=list(gate.ANSWERS))
-    made.add_argument("--round", type=int, required=True, help="the round that is meant")
-    made.add_argument("--by", default="", help="name of the person who answers; needed")
-    made.add_argument("--seen", default="", help="the hash that `tasks.gate --show` printed; needed")
-    made.add_argument("--change", action="store_true", help="replace an answer that stands; it stays in the history")
-    made.add_argument("--note", default="", help="why; needed with `more`: what is wanted")
-    where = made.add_mutually_exclusive_group()
-    where.add_argument("--workspace", type=Path, help="folder of the workspace; by default this folder")
-    where.add_argument("--name", default="", help="workspace under runs/")
-    return made
-
-
-def chosen(options: argparse.Namespace) -> Path:
-    """The workspace that is meant; never one that nobody named and that is not this folder."""
-    if options.name:
-        return workspaces.named(options.name).resolve()
-    folder = (options.workspace or Path()).resolve()
-    if not (folder / "params.yaml").is_file():
-        do = "Give --workspace PATH, or --name for one under runs/."
-        raise BadInput(folder, "a workspace, with params.yaml", "none", do)
-    return folder
 
 
 def resume(folder: Path, server: str, table: dict[str, Any]) -> list[str]:
@@ -133,7 +93,3 @@ def resume_answered(folder: Path, server: str) -> list[str]:
     for name in resumed:
         print(f"answered meanwhile, resumed: {name}", flush=True)
     return resumed
-
-
-if __name__ == "__main__":
-    raise SystemExit(guarded(main))

@@ -36,7 +36,7 @@ def started(options: argparse.Namespace) -> int:
         try:
             require_port("--prefect-port", options.prefect_port)
             require_port("--mlflow-port", options.mlflow_port)
-            folder = workspaces.named(options.name)
+            folder = options.workspace or workspaces.named(options.name)
             require_own(folder)
             private_index(folder)
             os.environ.update(environment(folder))
@@ -60,6 +60,7 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     made = argparse.ArgumentParser(prog="python -m flows.serve", description=__doc__)
     made.add_argument("--name", default="", help="workspace under runs/; by default the checkout itself")
+    made.add_argument("--workspace", type=Path, help="an existing workspace anywhere, as it is")
     add_ports(made)
     return made
 

@@ -1,12 +1,9 @@
-"""Let a round pass when a person has approved what the ingest stage showed; also the command that answers."""
+"""Let a round pass when a person has approved what the ingest stage showed."""
 
-import argparse
 import sys
 from pathlib import Path
 from typing import Any
 
-from bumblebee.errors import BadInput
-from bumblebee.last_line import guarded
 from bumblebee.measured import gate
 from bumblebee.measured import gate_words as words
 from tasks import paths
@@ -48,25 +45,6 @@ def asked(place: gate.Gate) -> dict[str, Any]:
     return gate.request(place, own.mode == "auto", own.people)
 
 
-def command(argv: list[str]) -> int:
-    """`--show`, `--approve`, `--reject` and `--more`."""
-    options = _parser().parse_args(argv)
-    place = gate.Gate(options.workspace.resolve(), options.round)
-    if not place.workspace.is_dir():
-        raise BadInput(options.workspace, "a workspace", "no such folder", "Check --workspace.")
-    table = asked(place)
-    verb = next((verb for verb in gate.ANSWERS if getattr(options, verb)), None)
-    if verb is None:
-        show(table, place)
-        return 0
-    author = gate.unix_user(options.by)
-    own = rule(place.workspace)
-    table = gate.decide(place, verb, author, options.seen, options.note, options.change, own)
-    then = " Run `dvc repro` to go on." if table["status"] == "approved" else ""
-    print(f"round {options.round}: {words.said(table)}; it answers {words.what(table)}.{then}")
-    return 0
-
-
 def show(table: dict[str, Any], place: gate.Gate) -> None:
     """Print what came, as tables, where the plots are, who answered, and the commands that answer."""
     from rich.console import Console
@@ -95,23 +73,5 @@ def show(table: dict[str, Any], place: gate.Gate) -> None:
         print(f"to go on: {words.go_on(table)}, and of everybody")
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m tasks.gate", description=__doc__)
-    parser.add_argument("--round", type=int, required=True, help="the round that is meant")
-    parser.add_argument("--workspace", type=Path, default=Path(), help="its folder; by default this one")
-    choice = parser.add_mutually_exclusive_group()
-    choice.add_argument("--show", action="store_true", help="print what came and how to answer it")
-    choice.add_argument("--approve", action="store_true", help="let the round go on")
-    choice.add_argument("--reject", action="store_true", help="stop the round")
-    choice.add_argument("--more", action="store_true", help="ask for more rollouts; --note says which")
-    parser.add_argument("--by", default="", help="name of the person who answers; needed")
-    parser.add_argument("--seen", default="", help="the hash that --show printed; needed: nothing else is answered")
-    parser.add_argument("--change", action="store_true", help="replace an answer that stands; it stays in the history")
-    parser.add_argument("--note", default="", help="why")
-    return parser
-
-
 if __name__ == "__main__":
-    if {"--show", "--approve", "--reject", "--more", "--help", "-h"} & set(sys.argv[1:]):
-        raise SystemExit(guarded(lambda: command(sys.argv[1:])))
     run_stage(main)

@@ -2,13 +2,14 @@
 
 import os
 import shlex
-import sys
+import sysconfig
 from pathlib import Path
 from typing import Any
 
 from bumblebee.errors import BadInput
 
 SHORT = 12  # digits of a hash that a person copies
+NOTES = {"approve": "", "reject": " --note WHY", "more": " --note WHAT"}  # what an answer is to say
 
 
 def short(table: dict[str, Any]) -> str:
@@ -18,26 +19,23 @@ def short(table: dict[str, Any]) -> str:
 
 def show_command(workspace: Path, table: dict[str, Any]) -> str:
     """Prints what came and how to answer it."""
-    if "model" in table:
-        return _python("bumblebee", workspace, "gate", "show", table["model"])
-    return f"{_python('tasks.gate', workspace)} --round {table['round']} --show"
+    return _gate(workspace, table, "show")
 
 
 def answer_command(workspace: Path, table: dict[str, Any], verb: str) -> str:
-    """Answers what the request shows and nothing else; NAME is to be filled in, and WHAT for `more`."""
-    wanted = " --note WHAT" if verb == "more" else ""
-    if "model" in table:
-        wanted = " --note WHY" if verb == "reject" else wanted
-        return f"{_python('bumblebee', workspace, 'gate', verb, table['model'])} --seen {short(table)}{wanted}"
-    command = _python("flows.gate_answer", workspace, verb)
-    return f"{command} --round {table['round']} --seen {short(table)}{wanted} --by NAME"
+    """Answers what the request shows and nothing else; WHY is to be filled in for `reject`, WHAT for `more`."""
+    return f"{_gate(workspace, table, verb)} --seen {short(table)}{NOTES[verb]}"
 
 
-def _python(module: str, workspace: Path, *more: str) -> str:
-    """The command up to its options: this Python, and none of the packages that lie where it is typed (-P)."""
-    python = os.path.abspath(sys.executable) if sys.executable else "python3"  # links stay: they find the packages
-    parts = [python, "-P", "-m", module, *more, "--workspace", str(Path(workspace).resolve())]
-    return shlex.join(parts)
+def _gate(workspace: Path, table: dict[str, Any], verb: str) -> str:
+    """The command up to its options; it works in any folder and imports nothing that lies there."""
+    asked = str(table.get("model") or table["round"])
+    return shlex.join([program(), "gate", verb, asked, "--workspace", str(Path(workspace).resolve())])
+
+
+def program() -> str:
+    """Path of this environment's `bumblebee`."""
+    return os.path.join(sysconfig.get_path("scripts"), "bumblebee")
 
 
 def title(table: dict[str, Any]) -> str:
@@ -63,7 +61,7 @@ def how_to_answer(workspace: Path, table: dict[str, Any]) -> str:
         )
     return (
         f"{title(table)} waits for an answer about {what(table)}{so_far(table)}: {look}, then answer with {answer}`, "
-        f"or `reject` in place of `approve`, or `more --note WHAT` to ask for more"
+        f"or with `reject` and `--note WHY`, or `more` and `--note WHAT` to ask for more"
     )
 
 

@@ -2,7 +2,7 @@
 
 Self-contained: inline style and SVG, no script. Every string that came from outside is escaped. The same files give
 the same bytes: no time of day and no folder of this machine is on it, so the commands are those of the workspace's
-folder; `python -m tasks.gate --show` and Prefect's page print them whole.
+folder; `bumblebee gate show` and Prefect's page print them whole.
 """
 
 from collections.abc import Iterable, Iterator
@@ -16,7 +16,7 @@ import pandas as pd
 from bumblebee.io.page_policy import policy_tag
 from bumblebee.io.read import file_hash
 from bumblebee.measured import overview_plots as plots
-from bumblebee.measured.gate_words import SHORT
+from bumblebee.measured.gate_words import NOTES, SHORT
 from bumblebee.measured.overview_plots import Trace, tracking
 from bumblebee.measured.rollout import Rollout
 
@@ -82,17 +82,16 @@ def _asked(summary: dict[str, Any], sha256: str) -> str:
     )
     if not sha256:
         return f"<div class=ask>{text}</div>"
-    command = f"--round {int(summary['round'])} --seen {sha256[:SHORT]} --by NAME"
+    asked, hashed = int(summary["round"]), sha256[:SHORT]
+    answers = [f"bumblebee gate {verb} {asked} --seen {hashed}{note}" for verb, note in NOTES.items()]
     return (
         f"<div class=ask>{text}<p>The answer holds for what this page shows, and for nothing else: "
-        f"<code>{sha256[:SHORT]}</code>. On Prefect's page of the run, choose Resume at the top right "
+        f"<code>{hashed}</code>. On Prefect's page of the run, choose Resume at the top right "
         "(in the menu ⋮ where it is no button); "
         "or in the workspace's folder:</p>"
-        f"<pre>python -m flows.gate_answer approve {command}</pre>"
-        f"<pre>python -m flows.gate_answer reject {command}</pre>"
-        f"<pre>python -m flows.gate_answer more {command} --note WHAT</pre>"
-        f"<p class=note>Whole commands, for any folder: <code>python -m tasks.gate --round {int(summary['round'])} "
-        f"--show</code>. SHA-256 of summary.json: {sha256}</p></div>"
+        f"{''.join(f'<pre>{answer}</pre>' for answer in answers)}"
+        f"<p class=note>Whole commands, for any folder: <code>bumblebee gate show {asked}</code>. "
+        f"SHA-256 of summary.json: {sha256}</p></div>"
     )
 
 

@@ -144,7 +144,7 @@ def test_the_page_holds_tables_plots_and_commands_and_no_markup_from_outside(pla
     come_in(place, 4, motion=EVIL)
     text = gate_page.page(gate.request(place), place)
     assert "| elbow | 10.0 |" in text.replace("\\", "") and "data:image/svg+xml;base64," in text
-    assert f"--workspace {place.workspace} --round 1 --seen " in text
+    assert f"bumblebee gate approve 1 --workspace {place.workspace} --seen " in text
     assert "<script" not in text and "[click]" not in text and "http://" not in text
 
 
@@ -217,5 +217,5 @@ def test_a_gate_that_answers_itself_does_not_overrule_who_asked_for_more(place: 
 def test_the_page_says_who_asked_for_more(place: gate.Gate) -> None:
     gate.decide(place, "more", gate.unix_user("Bob"), gate.request(place)["seen"]["sha256"], EVIL)
     text = gate_page.page(gate.request(place), place)
-    assert "**more asked for by Bob" in text and "Add rollouts" in text and " more --workspace " in text
+    assert "**more asked for by Bob" in text and "Add rollouts" in text and " more 1 --workspace " in text
     assert "<script" not in text and "[click]" not in text

@@ -42,8 +42,8 @@ def walk_of(keeper: int) -> psutil.Process:
 
 def answer_in_a_terminal(folder: Path) -> None:
     seen = gate.request(gate.Gate(folder, 1))["seen"]["sha256"]
-    words = ["approve", "--workspace", str(folder), "--round", "1", "--seen", seen, "--by", "Ada"]
-    subprocess.run([sys.executable, "-m", "flows.gate_answer", *words], cwd=HOME, check=True, timeout=LIMIT)
+    words = ["gate", "approve", "1", "--workspace", str(folder), "--seen", seen, "--by", "Ada"]
+    subprocess.run([sys.executable, "-m", "bumblebee", *words], cwd=HOME, check=True, timeout=LIMIT)
 
 
 def of_page(folder: Path) -> dict[str, str]:

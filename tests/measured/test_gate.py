@@ -71,7 +71,7 @@ def test_the_same_data_keep_their_answer_and_other_data_ask_again(place: gate.Ga
 @pytest.mark.parametrize("seen", ["", "0" * 12, "abc", "nonsense"])
 def test_an_answer_needs_the_hash_of_what_lies_there(place: gate.Gate, seen: str) -> None:
     ask(place)
-    with pytest.raises(BadInput, match=r"--seen.*--show"):
+    with pytest.raises(BadInput, match=r"--seen.*gate show"):
         gate.answer(place, True, ANN, seen)
     assert gate.verdict(place) == "pending"
 

@@ -34,8 +34,9 @@ def page(tmp_path: Path) -> Path:
 def test_the_page_names_the_hash_that_an_answer_needs_and_no_folder_of_this_machine(page: Path) -> None:
     seen = seen_of(page.with_name("summary.json"))["sha256"]
     text = page.read_text()
-    for verb in ("approve", "reject"):
-        assert f"python -m flows.gate_answer {verb} --round 1 --seen {seen[:12]} --by NAME" in text
+    for verb in ("approve", "reject --note WHY", "more --note WHAT"):
+        verb, *note = verb.split(maxsplit=1)
+        assert f"<pre>{' '.join(['bumblebee gate', verb, '1 --seen', seen[:12], *note])}</pre>" in text
     assert str(page.parent) not in text
 
 
@@ -55,7 +56,7 @@ def test_a_round_without_one_good_file_offers_no_approval(tmp_path: Path) -> Non
     (tmp_path / "summary.json").write_text("{}")
     nothing = SUMMARY | {"accepted": 0, "quarantined": 2}
     write_overview(tmp_path / "overview.html", nothing, pd.DataFrame(columns=["fatal", "message"]), [])
-    assert "approve --round" not in (tmp_path / "overview.html").read_text()
+    assert "gate approve" not in (tmp_path / "overview.html").read_text()
 
 
 @pytest.mark.parametrize(("value", "text"), [(1234.5, "1234"), (12.34, "12.3"), (1.234, "1.23"), (0.1234, "0.123")])

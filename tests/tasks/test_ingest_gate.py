@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bumblebee import cli
 from bumblebee.errors import BadInput
+from bumblebee.measured.gate_words import program
 from bumblebee.measured.rollout import read_rollout, write_rollout
 from bumblebee.robot.facts import joints
 from bumblebee.robot.model import gains
@@ -57,8 +59,8 @@ def approval() -> dict:
 
 def answer(verb: str, by: str, *more: str, seen: str = "") -> int:
     """The command, with the hash of what the request shows."""
-    words = ["--round", "1", f"--{verb}", "--by", by, "--seen", seen or approval()["seen"]["sha256"][:12], *more]
-    return gate_task.command(words)
+    seen = seen or approval()["seen"]["sha256"][:12]
+    return cli.run(["gate", verb, "1", "--by", by, "--seen", seen, *more])
 
 
 def test_a_round_waits_for_a_person_and_goes_on_after_the_answer(
@@ -76,10 +78,10 @@ def test_a_round_waits_for_a_person_and_goes_on_after_the_answer(
     assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_PENDING
     line = capsys.readouterr().err
     seen = approval()["seen"]["sha256"][:12]
-    assert line.count("\n") == 1 and f"approve --workspace {Path.cwd()} --round 1 --seen {seen} --by NAME" in line
+    assert line.count("\n") == 1 and f"bumblebee gate approve 1 --workspace {Path.cwd()} --seen {seen}`" in line
     assert not Path("data/gates/round-1.json").exists()
 
-    assert gate_task.command(["--round", "1", "--show"]) == 0
+    assert cli.run(["gate", "show", "1"]) == 0
     shown = capsys.readouterr().out
     assert "finite" in shown and "data/measured/r1/overview.html" in shown
     assert answer("approve", "Ann") == 0
@@ -154,7 +156,7 @@ def test_the_automatic_gate_answers_itself_and_says_so(workspace: Setup, capsys:
 def test_the_automatic_gate_does_not_overrule_a_person(workspace: Setup) -> None:
     workspace("auto")
     ingest.main(1)
-    assert answer("reject", "Bob", "--change") == 0
+    assert answer("reject", "Bob", "--change", "--note", "late") == 0
     ingest.main(1)
     assert status_of(lambda: gate_task.main(1)) == gate_task.EXIT_REJECTED
 
@@ -187,14 +189,14 @@ def test_an_answer_with_the_hash_of_other_data_is_refused(workspace: Setup, caps
     ingest.main(1)
     seen = approval()["seen"]["sha256"]
     capsys.readouterr()
-    gate_task.command(["--round", "1", "--show"])
+    cli.run(["gate", "show", "1"])
     assert seen[:12] in capsys.readouterr().out
     for wrong in ("0" * 12, seen[:3], "nonsense"):
         with pytest.raises(BadInput, match=seen[:12]):
             answer("approve", "Ann", seen=wrong)
         assert approval()["status"] == "pending"
-    with pytest.raises(BadInput, match="--show"):
-        gate_task.command(["--round", "1", "--approve", "--by", "Ann"])
+    with pytest.raises(BadInput, match="gate show"):
+        cli.run(["gate", "approve", "1", "--by", "Ann"])
     assert answer("approve", "Ann", seen=seen[:12]) == 0
     said = capsys.readouterr().out
     assert f"{seen[:12]} (1 files accepted, 1 set aside)" in said
@@ -329,11 +331,11 @@ def test_a_look_from_another_folder_prints_commands_for_this_workspace(
     ingest.main(1)
     monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
     capsys.readouterr()
-    assert gate_task.command(["--round", "1", "--show", "--workspace", str(folder)]) == 0
+    assert cli.run(["gate", "show", "1", "--workspace", str(folder)]) == 0
     shown = capsys.readouterr().out
     for verb in ("approve", "reject"):
-        assert f"-m flows.gate_answer {verb} --workspace {folder} --round 1 --seen " in shown
-    assert sys.executable in shown and not list(Path.cwd().iterdir())
+        assert f"{program()} gate {verb} 1 --workspace {folder} --seen " in shown
+    assert not list(Path.cwd().iterdir())
 
 
 @pytest.mark.parametrize(

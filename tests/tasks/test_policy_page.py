@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import onnx
 import pytest
 import yaml
 
+from bumblebee import cli
 from bumblebee.deploy.compensation_file import write_compensation
 from bumblebee.deploy.compensation_plan import compensate
 from bumblebee.deploy.policy import ExportedPolicy
@@ -48,7 +50,8 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def fetched(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(workspace)
     if not Path("policy").exists():
-        assert fetch.main(["expert-c0@champion", "--out", "policy"]) == 0
+        first = re.findall(r"^    bumblebee (.+)$", PAGE.read_text(), re.MULTILINE)[0]
+        assert cli.run(shlex.split(first)) == 0
     return workspace / "policy"
 
 

@@ -82,7 +82,7 @@ def test_versions_are_made_and_wait_and_the_stage_ends(registry: Registry, capsy
     assert promotion_answer.asked(place())["status"] == "pending"
     said = capsys.readouterr().out
     assert "promotion of generalist waits for an answer" in said
-    assert f"-m bumblebee gate approve generalist --workspace {Path.cwd()} --seen " in said
+    assert f"bumblebee gate approve generalist --workspace {Path.cwd()} --seen " in said
 
 
 def test_an_approval_moves_the_alias_of_this_model_alone_and_says_who_saw_what(registry: Registry) -> None:
