@@ -43,7 +43,7 @@ class GuardLoop:
         self._link, self._console, self._policy = link, console, policy
         self._codec = Codec(self._joints)
         self._guard = Guard(job.plan, job.drives, self._clock.now())
-        self._answer_ns = self._sending = self._missed = self._unwritten = 0
+        self._missed = self._unwritten = 0
 
     def run(self) -> dict[str, object]:
         """Tick until the run is over; how it ended."""
@@ -72,7 +72,7 @@ class GuardLoop:
                 packets.send(self._policy, encode_question(tick.question, self._codec))
         stages = (awake - deadline, heard - awake, thought - heard, sent - thought)
         intake = self._guard.intake
-        entry = Entry(tick, intake.state, intake.came, missed, stages, self._answer_ns)
+        entry = Entry(tick, intake.state, intake.came, missed, stages)
         with suppress(packets.Gone):
             self._unwritten += not packets.send(self._console, RECORD + record(entry, self._joints))
         return missed
@@ -85,9 +85,7 @@ class GuardLoop:
                     self._guard.heard(now, self._codec.state(message))
         with suppress(packets.Gone):
             for message in packets.received(self._policy):
-                answer = decode_answer(message, self._joints)
-                self._answer_ns = now - answer.asked_ns
-                self._guard.answered(answer)
+                self._guard.answered(decode_answer(message, self._joints))
         with suppress(packets.Gone):
             for message in packets.received(self._console):
                 self._guard.told(now, decode_keys(message))

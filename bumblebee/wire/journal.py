@@ -51,7 +51,7 @@ def layout(joints: int) -> np.dtype:
             ("asks", "<i4"),
             ("answers", "<i4"),
             ("asked_ns", "<i8"),
-            ("answer_ns", "<i8"),
+            ("took_ns", "<i8"),
             ("hottest", "<f4"),
             *((name, "<i8") for name in STAGES),
             *((name, "<f4", (joints,)) for name in _VECTORS),
@@ -73,9 +73,7 @@ class Entry:
     missed: int = 0
     """Ticks that were missed before this one."""
     stages: tuple[int, int, int, int] = (0, 0, 0, 0)
-    """Durations of `STAGES` [ns]; that of sending is the tick's before."""
-    answer_ns: int = 0
-    """How long the answer in force took [ns]."""
+    """Durations of `STAGES` [ns]."""
 
 
 def record(entry: Entry, joints: int) -> bytes:
@@ -89,7 +87,7 @@ def record(entry: Entry, joints: int) -> bytes:
         tick.step,
     )
     row["rules"] = sum(1 << bit for bit, name in enumerate(RULES) if name in tick.rules)
-    row["missed"], row["answer_ns"], row["came_ns"] = entry.missed, entry.answer_ns, entry.came_ns
+    row["missed"], row["came_ns"] = entry.missed, entry.came_ns
     row["asks"] = -1 if tick.question is None else tick.question.tick
     row["answers"], row["asked_ns"] = (-1, -1) if answer is None else (answer.tick, answer.asked_ns)
     for name, value in zip(STAGES, entry.stages, strict=True):
@@ -99,7 +97,7 @@ def record(entry: Entry, joints: int) -> bytes:
     row["wanted"] = tick.wish.target
     row["state"] = row["heard"] = -1
     if answer is not None:
-        row["action"] = answer.action
+        row["action"], row["took_ns"] = answer.action, answer.took_ns
     if state is not None:
         for name in ("joint_pos", "joint_vel", "joint_torque", *_PLACES):
             row[name] = getattr(state, name)

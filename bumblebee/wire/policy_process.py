@@ -6,6 +6,8 @@ python -m bumblebee.wire.policy_process POLICY CLIPS COMPENSATION SOCKET     (CO
 import select
 import socket
 import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,8 +45,9 @@ def serve(brain: Brain, end: socket.socket, joints: int) -> None:
     while True:
         select.select([end], [], [])
         try:
-            question = decode_question(packets.received(end)[-1], codec)
-            packets.send(end, encode_answer(brain.answer(question)))
+            newest, begun = packets.received(end)[-1], time.monotonic_ns()
+            answer = brain.answer(decode_question(newest, codec))
+            packets.send(end, encode_answer(replace(answer, took_ns=time.monotonic_ns() - begun)))
         except packets.Gone:
             return
 

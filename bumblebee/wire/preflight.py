@@ -18,7 +18,7 @@ from bumblebee.wire.link import Link
 from bumblebee.wire.messages import CARD, STATE, Card, State, layout_of
 from bumblebee.wire.rules import lean
 
-_PATIENCE = 5.0  # s of wall time for a card, which comes once a second, and a state
+_PATIENCE = 5.0  # s for a card, which comes once a second, and a state
 MAX_LIFT = 0.10
 """Soles of a clip's first frame may be so far off the floor [m], as in the simulation's trials."""
 
@@ -51,7 +51,7 @@ def meet(link: Link, clock: Clock) -> tuple[Card, State]:
     Raises:
         BadInput: nobody is there, two are, or one that speaks another version.
     """
-    cards, states, end = dict[int, Card](), dict[int, bytes](), clock.now() + round(_PATIENCE * 1e9 / clock.slow)
+    cards, states, end = dict[int, Card](), dict[int, bytes](), clock.now() + round(_PATIENCE * 1e9)
     while clock.now() < end and not (cards and states):
         link.wait(0.1)
         for channel, message in link.received():

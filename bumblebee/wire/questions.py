@@ -35,6 +35,8 @@ class Answer:
     reference: Reference
     action: np.ndarray
     """(J,) raw output."""
+    took_ns: int = 0
+    """Time that the policy's process took for it [ns]."""
 
 
 def encode_question(question: Question, codec: Codec) -> bytes:
@@ -52,14 +54,21 @@ def decode_question(message: bytes, codec: Codec) -> Question:
 def _layout(joints: int) -> np.dtype:
     row = ("<f8", (joints,))
     names = ("target", "kp", "kd", "torque", "reference", "action")
-    head = [("tick", "<i8"), ("asked_ns", "<i8"), ("sequence", "<i8"), ("quat", "<f8", (4,)), ("height", "<f8")]
+    head = [
+        ("tick", "<i8"),
+        ("asked_ns", "<i8"),
+        ("sequence", "<i8"),
+        ("took_ns", "<i8"),
+        ("quat", "<f8", (4,)),
+        ("height", "<f8"),
+    ]
     return np.dtype([*head, *((name, *row) for name in names)])
 
 
 def encode_answer(answer: Answer) -> bytes:
     """Bytes of an answer."""
     record = np.zeros((), _layout(len(answer.action)))
-    for name in ("tick", "asked_ns", "sequence", "action"):
+    for name in ("tick", "asked_ns", "sequence", "action", "took_ns"):
         record[name] = getattr(answer, name)
     for name in ("target", "kp", "kd", "torque"):
         record[name] = getattr(answer.wish, name)
@@ -74,4 +83,4 @@ def decode_answer(message: bytes, joints: int) -> Answer:
     wish = Wish(*(read[name].copy() for name in ("target", "kp", "kd", "torque")))
     reference = Reference(read["reference"].copy(), read["quat"].copy(), float(read["height"]))
     tick, asked, sequence = (int(read[name]) for name in ("tick", "asked_ns", "sequence"))
-    return Answer(tick, asked, sequence, wish, reference, read["action"].copy())
+    return Answer(tick, asked, sequence, wish, reference, read["action"].copy(), int(read["took_ns"]))

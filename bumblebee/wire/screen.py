@@ -41,7 +41,7 @@ class Numbers:
             self._note("state age", row["sent_ns"] - row["came_ns"])
             if row["asked_ns"] != self._answer:
                 self._answer = row["asked_ns"]
-                self._note("policy", row["answer_ns"])
+                self._note("policy", row["took_ns"])
             self.missed += int(row["missed"])
             self.rules.update(name for bit, name in enumerate(RULES) if row["rules"] >> bit & 1)
 

@@ -69,7 +69,7 @@ def test_numbers_are_those_of_all_records_and_fit_a_terminal() -> None:
     small = Small()
     small.run(0.1)
     for k in range(1, 101):
-        entry = Entry(small.ticks[-1], small.guard.intake.state, 1, int(k == 7), (k * 10**6, 0, 10**6, 10**6), 0)
+        entry = Entry(small.ticks[-1], small.guard.intake.state, 1, int(k == 7), (k * 10**6, 0, 10**6, 10**6))
         numbers.add(record(entry, 3))
     assert numbers.missed == 1 and numbers.table()["wake"][2] == 100.0
     p50, p99, worst = numbers.table()["wake to send"]
