@@ -20,6 +20,11 @@ class BaseConfig(TrainingConfig):
     the embedded library's training clips and real motions (bumblebee/learning/pretrained/README.md); the randomised one
     real motions on robots that differ, with delays (pretrained/randomised/README.md)."""
 
+    def __post_init__(self) -> None:
+        """Refuse a policy from nothing that nobody trains."""
+        super().__post_init__()
+        self.require(self.init != "scratch" or self.learner != "none", "learner", "ppo or world_model from scratch")
+
 
 def main() -> None:
     """Fill models/base."""

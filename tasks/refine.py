@@ -4,13 +4,9 @@ The simulator is the round's corrected model, the effects that MJCF cannot hold,
 Where a round found nothing and kept no delta action there is nothing new to learn: the expert stays what it is.
 """
 
-import json
-import shutil
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from bumblebee.learning.delta import action_adapter, load_delta
-from bumblebee.learning.learner import CURVE
 from bumblebee.learning.trial import World
 from bumblebee.sim.effects import read_effects, runtime_hooks
 from bumblebee.sim.sensors import load_model
@@ -19,8 +15,8 @@ from bumblebee.tracking.observations import action_scale
 from tasks import paths
 from tasks.experts import ExpertsConfig
 from tasks.sections import parent_of
-from tasks.stage import load, log_run, output_folder, run_stage
-from tasks.training import Job, cluster_clips, train_policy
+from tasks.stage import load, run_stage
+from tasks.training import Job, cluster_clips, keep, train_policy
 
 
 @dataclass(frozen=True)
@@ -38,9 +34,8 @@ def main(round: int, cluster: str) -> None:
     config = load("refine", RefineConfig)
     parent, out = paths.expert(parent_of(round), cluster), paths.expert(round, cluster)
     if not learned(round, cluster):
-        keep(parent, out, round)
         print(f"round {round}, {cluster}: no effect was found: the expert is kept unchanged")
-        log_run("refine", cluster=cluster, round=round, params=config, tags={"kept": "parent"})
+        keep("refine", parent, out, config, cluster, round)
         return
     clips, share, tried = cluster_clips(cluster, config.others)
     job = Job(
@@ -63,16 +58,6 @@ def learned(round: int, cluster: str) -> bool:
     """Whether the round changed the simulator: an effect was found, or the cluster's delta action was kept."""
     effects = read_effects(paths.effects(round))
     return bool(effects) or load_delta(paths.delta(round, cluster)) is not None
-
-
-def keep(parent: Path, out: Path, round: int) -> None:
-    """The parent's policy as this round's; its card says that no step was taken."""
-    card = json.loads((parent / "card.json").read_text())
-    card |= {"stage": "refine", "round": round, "parent": str(parent), "kept": "parent"}
-    card |= {"iterations": 0, "frames": 0, "before": card["after"]}
-    with output_folder(out) as folder:
-        shutil.copytree(parent, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(CURVE, "trials.csv"))
-        (folder / "card.json").write_text(json.dumps(card, indent=1) + "\n")
 
 
 def corrected_world(round: int, cluster: str, physics_hz: float, threads: int) -> World:

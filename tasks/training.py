@@ -1,11 +1,12 @@
-"""Training of base, experts and refine: train a policy, try it before and after, write its folder."""
+"""Training of base, experts and refine: try a policy before and after, or keep the parent's; write its folder."""
 
 import json
 import os
+import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pandas as pd
 import torch
@@ -13,7 +14,7 @@ import torch
 from bumblebee.errors import BadInput
 from bumblebee.learning import pretrained
 from bumblebee.learning.config import PpoConfig
-from bumblebee.learning.export import export_policy
+from bumblebee.learning.export import CONTRACT, export_policy
 from bumblebee.learning.learner import CURVE, Learner
 from bumblebee.learning.learners import Name as LearnerName
 from bumblebee.learning.learners import make_learner, played
@@ -44,8 +45,9 @@ class TrainingConfig(Ranged):
     """Seed of the network, the draws of clips and frames, and the differences between the worlds."""
     env: EnvConfig = field(default_factory=EnvConfig)
     """The task."""
-    learner: LearnerName = "ppo"
-    """Learner: `ppo`, or `world_model`, through a model of the robot; each has the section of its name."""
+    learner: LearnerName | Literal["none"] = "ppo"
+    """Learner: `ppo`, or `world_model`, through a model of the robot; each has the section of its name. `none` trains
+    nothing: the policy that it would start from is kept."""
     ppo: PpoConfig = field(default_factory=PpoConfig)
     """PPO, where it trains."""
     world_model: WorldModelConfig = field(default_factory=WorldModelConfig)
@@ -66,7 +68,7 @@ class TrainingConfig(Ranged):
     @property
     def algorithm(self) -> PpoConfig | WorldModelConfig:
         """The settings of the learner that trains."""
-        return self.ppo if self.learner == "ppo" else self.world_model
+        return self.world_model if self.learner == "world_model" else self.ppo
 
 
 @dataclass(frozen=True)
@@ -131,6 +133,8 @@ def cluster_clips(cluster: str, others: float) -> tuple[list[Clip], ClipShares, 
 def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     """Train, try before and after on the same starts, write the policy's folder; returns its card.
 
+    Without a learner the parent is kept, and nothing is tried.
+
     How long it took stands in MLflow's run alone: the same inputs make the same folder, whichever machine it is.
 
     With several GPUs it starts this stage once for each, of which the first does all but the training alone.
@@ -138,6 +142,10 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
     Raises:
         BadInput: if there are fewer GPUs, or the engine has no use for them.
     """
+    if config.learner == "none":
+        assert job.parent is not None  # a base policy from nothing without a learner is refused with its settings
+        print(f"{job.name}: no learner is set: the policy of {_named(job.parent)} is kept", flush=True)
+        return keep(job.stage, job.parent, job.out, config, job.cluster, job.round)
     torch.set_num_threads(config.env.threads)
     folder = scratch(f"{job.stage}-{job.name}", job.parent or paths.FILTERED, config)
     own = config.env
@@ -188,6 +196,24 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
         metrics=metrics,
         curve=folder / CURVE,
     )
+    return card
+
+
+def keep(
+    stage: str, parent: Path, out: Path, config: TrainingConfig, cluster: str | None, round: int | None
+) -> dict[str, Any]:
+    """The parent's policy as the stage's, to the byte where it was exported before; returns the card, which says so."""
+    card = {"schema": 1, "stage": stage, "cluster": cluster, "round": round, "parent": _named(parent), "kept": "parent"}
+    card |= {"iterations": 0, "frames": 0}
+    with output_folder(out) as folder:
+        if (parent / CONTRACT).exists():
+            shutil.copytree(parent, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(CURVE, "trials.csv"))
+        else:  # the policies that come with the code
+            policy = load_policy(parent)
+            policy.save(folder)
+            export_policy(folder, policy, config.env.physics_hz)
+        (folder / "card.json").write_text(json.dumps(card, indent=1) + "\n")
+    log_run(stage, cluster=cluster, round=round, params=config, tags={"kept": "parent"})
     return card
 
 

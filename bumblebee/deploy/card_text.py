@@ -73,7 +73,7 @@ def made_from(card: Mapping[str, Any], parent: str | None, licences: Mapping[str
     if card.get("frames"):
         yield f"- training: {card['frames']:,} control steps on {len(card.get('training_clips', []))} clips"
     if card.get("kept") == "parent":
-        yield "- training did not make it better: these are its parent's weights"
+        yield "- kept: these are its parent's weights"
     seed = card.get("config", {}).get("seed")
     yield f"- seed: {seed}" if seed is not None else "- seed: not said"
     named = ", ".join(f"{licence} ({count})" for licence, count in licences.items())

@@ -94,7 +94,6 @@ def test_where_nothing_was_found_the_expert_stays_to_the_byte_and_its_card_says_
     workspace: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     diagnosed([])
-    monkeypatch.setattr(refine, "log_run", lambda *_, **__: None)
     monkeypatch.setattr(refine, "train_policy", lambda *_: pytest.fail("nothing is to be learned"))
     refine.main(1, "c0")
     before, after = Path("models/experts/r0/c0"), Path("models/experts/r1/c0")

@@ -59,6 +59,32 @@ def test_base_then_expert(workspace: Path) -> None:
     assert set(trials["name"]) == {"b", "d"}
 
 
+def test_without_a_learner_base_and_expert_are_the_shipped_policy_and_no_world_is_made(
+    workspace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Files that later stages read are there, the cards say that nothing was trained, and so do lines."""
+    params = {"clusters": ["c0", "c1"], "base": {"learner": "none"}, "experts": {"learner": "none"}}
+    Path("params.yaml").write_text(yaml.safe_dump(params))
+    for name in ("make_engine", "try_policy"):
+        monkeypatch.setattr(training, name, lambda *_, **__: pytest.fail("nothing is to be simulated"))
+    base.main()
+    experts.main("c1")
+    shipped = load_policy(pretrained.FOLDER)
+    for place, parent in (("base", "pretrained"), ("experts/r0/c1", "models/base")):
+        folder = Path("models", place)
+        assert {path.name for path in folder.iterdir()} == {"policy.pt", "policy.onnx", "contract.json", "card.json"}
+        kept = load_policy(folder)
+        for name, tensor in shipped.actor.state_dict().items():
+            assert torch.equal(kept.actor.state_dict()[name], tensor)
+        assert kept.critic_state.keys() == shipped.critic_state.keys(), "PPO refines it"
+        card = json.loads((folder / "card.json").read_text())
+        assert (card["kept"], card["frames"], card["parent"]) == ("parent", 0, parent) and "learner" not in card
+    assert came_along(Path("models/base"))
+    files = [Path("models", place, "policy.onnx").read_bytes() for place in ("base", "experts/r0/c1")]
+    assert files[0] == files[1], "the evaluation runs equal files once"
+    assert capsys.readouterr().out.count("no learner is set") == 2
+
+
 MODEL = {
     "env": {"num_worlds": 4, "threads": 1},
     "learner": "world_model",
@@ -92,7 +118,6 @@ def test_a_world_model_trains_base_expert_and_refinement_and_no_later_stage_sees
     monkeypatch.setattr(refine, "learned", lambda *_: True)
     monkeypatch.setattr(refine, "corrected_world", lambda *_: world)
     monkeypatch.setattr(refine.paths, "corrected_model", lambda _: None)
-    monkeypatch.setattr(refine, "log_run", lambda *args, **kwargs: None)
     refine.main(1, "c1")
     for folder in map(Path, folders):
         names, stated = contents(folder)

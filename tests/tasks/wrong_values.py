@@ -138,6 +138,7 @@ WRONG: list[tuple[str, Any, str]] = [
     *_same("base.ppo.entropy", -1),
     *_same("base.ppo.value", -1),
     *_same("base.learner", "dreamer", None),
+    ("base.init", "scratch", "base.learner"),
     *_same("base.world_model.window", 0, 64),
     *_same("base.world_model.gamma", 1.0, NAN),
     *_same("base.ppo.grad_norm", 0),
