@@ -39,13 +39,14 @@ $(STAMP): requirements.lock requirements-torch.lock pyproject.toml
 	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found. Install Python 3.11 or later, or say make PYTHON=<path>." >&2; exit 2; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or later is needed: make PYTHON=<path>." >&2; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { echo "make: $(PYTHON) -m venv $(VENV) failed. On Debian and Ubuntu: install python3-venv." >&2; rm -rf $(VENV); exit 2; }
-	$(BIN)/python -m pip install -q $(PIP_OPTIONS) --no-deps --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install -q --no-compile $(PIP_OPTIONS) --no-deps --require-hashes -r requirements.lock
 	@rm -rf $(WHEEL)
 	$(BIN)/python -m pip download -q $(PIP_OPTIONS) $(PIP_TORCH_INDEX) --no-deps --only-binary :all: -d $(WHEEL) $(TORCH)
-	$(BIN)/python -m pip install -q --no-deps --no-index --find-links $(WHEEL) $(PIP_TORCH)
+	$(BIN)/python -m pip install -q --no-compile --no-deps --no-index --find-links $(WHEEL) $(PIP_TORCH)
 	@rm -rf $(WHEEL)
-	$(BIN)/python -m pip install -q $(PIP_OPTIONS) $(TORCH)  # adds what a CUDA build needs beside, nothing to others
+	$(BIN)/python -m pip install -q --no-compile $(PIP_OPTIONS) $(TORCH)  # adds what a CUDA build needs beside, nothing to others
 	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
+	@$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true  # on all cores, as pip does on one; templates may not compile
 	$(BIN)/python -m tasks.private
 	@touch $@
 

@@ -10,7 +10,7 @@ from bumblebee.baselines.trial import Manner
 from bumblebee.learning import pretrained
 from bumblebee.learning.policy import load_policy
 from bumblebee.motion.clip import Clip
-from bumblebee.motion.embedded import make_library
+from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import EnvConfig, RewardConfig
 from bumblebee.tracking.library import MotionLibrary
@@ -20,7 +20,7 @@ from bumblebee.tracking.rewards import ERRORS, PAPER_WEIGHTS
 
 @pytest.fixture(scope="module")
 def clips() -> list[Clip]:
-    return make_library()[:2]
+    return make_library(EmbeddedConfig(families=("stand",), limit=2))
 
 
 def rows(clips: list[Clip], policy: bool, rewards: RewardConfig = PRINTED) -> pd.DataFrame:

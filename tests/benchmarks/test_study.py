@@ -31,14 +31,14 @@ from benchmarks.study.tables import difference, experts_tables, rate
 from benchmarks.study.training import finished, train
 from benchmarks.study.trying import write_trials
 from bumblebee.errors import BadInput
-from bumblebee.motion.embedded import make_library
+from tests.benchmarks.study_folder import short_clips
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Eight short motions in two clusters, one of each held out."""
     folder = tmp_path_factory.mktemp("motions")
-    clips = sorted(make_library(), key=lambda clip: clip.frames)[:8]
+    clips = short_clips(8)
     splits = ["train", "train", "train", "test"] * 2
     rows = [Packed("made", True, replace(clip, split=split)) for clip, split in zip(clips, splits, strict=True)]
     write_pack(folder / MOTIONS, rows)

@@ -17,7 +17,7 @@ from benchmarks.study.settings import SMALL
 from benchmarks.study.training import train
 from bumblebee.deploy.stand_in_effects import read_sealed
 from bumblebee.errors import BadInput
-from bumblebee.motion.embedded import make_library
+from tests.benchmarks.study_folder import short_clips
 
 CONFIG = RobotsConfig()
 
@@ -26,7 +26,7 @@ CONFIG = RobotsConfig()
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Four short motions in two clusters, and a policy of a few steps."""
     folder = tmp_path_factory.mktemp("motions")
-    clips = sorted(make_library(), key=lambda clip: clip.frames)[:4]
+    clips = short_clips(4)
     write_pack(folder / MOTIONS, [Packed("made", True, replace(clip, split="train")) for clip in clips])
     names = [clip.name for clip in clips]
     labels = pd.DataFrame({"name": names, "motion": names, "group": "made", "family": [c.family for c in clips]})

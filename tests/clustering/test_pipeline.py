@@ -19,6 +19,12 @@ def result(library: list[Clip], table: TokenTable, tiny: ClusterConfig) -> Clust
     return cluster_clips(library, ["c0", "c1"], tiny, table=table)
 
 
+@pytest.fixture(scope="module")
+def quick(tiny: ClusterConfig) -> ClusterConfig:
+    """For tests that are not about the audit: next to none of it."""
+    return replace(tiny, max_k=2, audit_seeds=2)
+
+
 def test_stands_and_walks_are_told_apart(result: Clustering) -> None:
     labels = result.labels
     assert adjusted_rand_score(labels["family"], labels["cluster"]) == 1.0
@@ -35,9 +41,9 @@ def test_summary_counts_every_clip(result: Clustering, library: list[Clip]) -> N
     assert result.elbow["k"].tolist() == list(range(1, 7)) and len(result.curve) == 25
 
 
-def test_held_out_clips_change_nothing(library: list[Clip], table: TokenTable, tiny: ClusterConfig) -> None:
+def test_held_out_clips_change_nothing(library: list[Clip], table: TokenTable, quick: ClusterConfig) -> None:
     """Labels of the training clips are the same whether the held-out ones are there or not."""
-    short = replace(tiny, epochs=3)
+    short = replace(quick, epochs=3)
     training = [clip for clip in library if clip.split == "train"]
     both, alone = (cluster_clips(clips, ["a", "b"], short, table=table).labels for clips in (library, training))
     kept = both[both["split"] == "train"].reset_index(drop=True)
@@ -46,11 +52,11 @@ def test_held_out_clips_change_nothing(library: list[Clip], table: TokenTable, t
 
 
 def test_where_texts_and_families_come_from_the_same_names_there_is_no_agreement_and_no_keyword(
-    library: list[Clip], table: TokenTable, tiny: ClusterConfig
+    library: list[Clip], table: TokenTable, quick: ClusterConfig
 ) -> None:
     """Families read from names agree with clusters of texts made from the same names: that would prove nothing."""
     named = [replace(clip, captions=(caption_from_name(clip.name),), caption_source="name") for clip in library]
-    summary = cluster_clips(named, ["c0", "c1"], replace(tiny, epochs=1), table=table).summary
+    summary = cluster_clips(named, ["c0", "c1"], replace(quick, epochs=1), table=table).summary
     assert summary["audit"]["family_ari"] is None
     assert [row["keywords"] for row in summary["clusters"].values()] == ["", ""]
     assert summary["clips"]["texts"] == {"name": len(library)}
@@ -62,9 +68,9 @@ def test_too_few_clips_are_refused_before_any_work(library: list[Clip], tiny: Cl
 
 
 def test_random_clusters_have_the_same_form_and_say_so(
-    result: Clustering, library: list[Clip], table: TokenTable, tiny: ClusterConfig
+    result: Clustering, library: list[Clip], table: TokenTable, quick: ClusterConfig
 ) -> None:
-    drawn = cluster_clips(library, ["c0", "c1"], replace(tiny, epochs=2, method="random"), table=table)
+    drawn = cluster_clips(library, ["c0", "c1"], replace(quick, epochs=2, method="random"), table=table)
     assert drawn.summary["method"] == drawn.summary["audit"]["method"] == "random"
     assert set(drawn.summary) == set(result.summary) and set(drawn.summary["audit"]) == set(result.summary["audit"])
     assert drawn.labels.dtypes.to_dict() == result.labels.dtypes.to_dict()
@@ -86,10 +92,10 @@ def test_every_figure_of_the_audit_has_its_number_and_interval(result: Clusterin
 
 
 def test_without_any_caption_there_is_nothing_to_retrieve_and_no_text_to_leave_out(
-    library: list[Clip], tiny: ClusterConfig
+    library: list[Clip], quick: ClusterConfig
 ) -> None:
     bare = [replace(clip, captions=(), caption_source="") for clip in library]
-    summary = cluster_clips(bare, ["c0", "c1"], replace(tiny, epochs=2)).summary
+    summary = cluster_clips(bare, ["c0", "c1"], replace(quick, epochs=2)).summary
     assert summary["retrieval"] is None and summary["audit"]["motion_only"] is None
     assert summary["clips"]["texts"] == {"none": 16} and summary["clips"]["windows_with_captions"] == 0
 

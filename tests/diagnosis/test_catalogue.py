@@ -16,7 +16,7 @@ CONFIG = replace(arm.SMALL, beyond=False)
 CASES = [
     ("command_delay", "", (0.012,), "delay", 0.06),
     pytest.param("strength_drift", "j2", (0.04,), "rate", 0.1, marks=pytest.mark.slow),
-    ("cogging", "j1", (0.3, 0.2, 12.0), "periods", 0.01),
+    pytest.param("cogging", "j1", (0.3, 0.2, 12.0), "periods", 0.01, marks=pytest.mark.slow),
     pytest.param("hysteresis", "j2", (0.5, 0.05), "amplitude", 0.1, marks=pytest.mark.slow),
     pytest.param("backlash", "j2", (0.03,), "gap", 0.25, marks=pytest.mark.slow),
 ]

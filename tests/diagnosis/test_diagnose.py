@@ -12,12 +12,12 @@ SINGLES = [
     ("viscous_friction", "j1", 0.3, 0.05),
     ("motor_strength", "j3", 0.85, 0.01),
     pytest.param("command_delay", "j2", 0.013, 0.05, marks=pytest.mark.slow),
-    ("encoder_offset", "j2", 0.03, 0.15),
-    ("link_mass", "l3", 0.9, 0.02),
+    pytest.param("encoder_offset", "j2", 0.03, 0.15, marks=pytest.mark.slow),
+    pytest.param("link_mass", "l3", 0.9, 0.02, marks=pytest.mark.slow),
 ]
 
 
-@pytest.mark.parametrize("seed", [11, 12])
+@pytest.mark.parametrize("seed", [11, pytest.param(12, marks=pytest.mark.slow)])
 def test_a_null_set_raises_no_alarm(diagnosed, seed: int) -> None:
     """A truth that differs by integrator and step alone lacks no effect, and its residual has no structure."""
     document = diagnosed({}, seed).document

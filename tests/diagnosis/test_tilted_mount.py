@@ -50,7 +50,7 @@ def test_it_stands_beside_an_encoder_that_is_off() -> None:
         {("encoder_offset", "j2"): (0.03,)},
         pytest.param({("link_com", "l3"): (0.04, 0.02, 0.12)}, marks=pytest.mark.slow),
         pytest.param({("link_mass", "l3"): (0.9,)}, marks=pytest.mark.slow),
-        {("external_wrench", "l3"): (1.0, 0.5, 0.0, 0.0, 0.0, 0.0)},
+        pytest.param({("external_wrench", "l3"): (1.0, 0.5, 0.0, 0.0, 0.0, 0.0)}, marks=pytest.mark.slow),
     ],
     ids=lambda truth: next(iter(truth))[0],
 )

@@ -40,8 +40,9 @@ KEEPER = """
 import sys
 sys.path.insert(0, {home!r})
 from pathlib import Path
-from flows import attend, runs, servers
+from flows import attend, processes, runs, servers
 servers.FRONT = [sys.executable, "-c", Path({front!r}).read_text()]
+attend.end_tree = lambda pid: processes.end_tree(pid, limit=0.5)  # the stubborn walk is not waited for
 attend.WALK = [sys.executable, "-c", Path({walk!r}).read_text()]
 runs.clear_lost = lambda *_, **__: []
 with attend.ended_in_order():

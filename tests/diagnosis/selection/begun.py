@@ -12,10 +12,13 @@ from bumblebee.diagnosis.thresholds import Thresholds
 from tests.diagnosis import arm
 
 
-def begun(truth: dict[tuple[str, str], float], xml: str = arm.XML) -> SearchState:
-    """With `truth` {(effect, place): value}, declared as `xml`; three rollouts to fit and one to accept by."""
+def begun(truth: dict[tuple[str, str], float], xml: str = arm.XML, windows: int = 15) -> SearchState:
+    """With `truth` {(effect, place): value}, declared as `xml`; three rollouts to fit and one to accept by.
+
+    Of the three come `windows`, of the one a third as many.
+    """
     session = arm.session_of(arm.simulate(truth, count=4, seconds=6.0), xml)
-    problem, other = arm.problem_of(session, [0, 1, 2], 60), arm.problem_of(session, [3], 20)
+    problem, other = arm.problem_of(session, [0, 1, 2], windows), arm.problem_of(session, [3], windows // 3)
 
     def remake(effects: list) -> tuple[list, np.ndarray]:
         return all_candidates(session.plant, session.rollouts, effects), np.full(3, 5.0)

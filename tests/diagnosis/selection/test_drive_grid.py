@@ -30,6 +30,7 @@ def test_a_limit_is_tried_at_its_size_and_explains_more_than_a_weak_motor(sessio
     assert drive_trials(problem, fit, candidates, weights, 1e12) == []
 
 
+@pytest.mark.slow
 def test_both_are_found_by_name(session: Session) -> None:
     found = diagnose(session, arm.SMALL).effects
     sizes = {(e.effect, *e.where): next(iter(e.parameters.values())) for e in found}

@@ -22,7 +22,7 @@ def test_gains_of_all_servos_would_explain_a_load(run: SearchState) -> None:
     assert len(kp) >= 2 and max(kp) < 0.8
 
 
-@pytest.mark.parametrize("friction", [False, True])
+@pytest.mark.parametrize("friction", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_load_is_one_mass_with_or_without_friction_on_all_joints(run: SearchState, friction: bool) -> None:
     dry = FRICTION if friction else {}
     if friction:

@@ -12,7 +12,7 @@ from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.dynamics import Dynamics
 from bumblebee.learning.world_model.imagination import Imagination
 from bumblebee.learning.world_model.memory import Memory, Starts
-from bumblebee.motion.embedded import make_library
+from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.sim.engine_choice import make_engine
 from bumblebee.tracking.config import EnvConfig, ObservationConfig, Randomisation
 from bumblebee.tracking.env import TrackingEnv
@@ -33,7 +33,7 @@ CONFIG = EnvConfig(
 @pytest.fixture(scope="module")
 def env() -> TrackingEnv:
     engine = make_engine("mujoco", task_model(CONFIG), WORLDS, 1)
-    return TrackingEnv(MotionLibrary(make_library()[::12], CONFIG.ahead), engine, CONFIG, seed=3)
+    return TrackingEnv(MotionLibrary(make_library(EmbeddedConfig(limit=5)), CONFIG.ahead), engine, CONFIG, seed=3)
 
 
 def test_a_policy_of_imu_and_encoders_sees_the_same_in_both_and_its_critic_the_state() -> None:
