@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import logging
 import os
 import socket
 import sys
@@ -24,6 +25,7 @@ def open_server(port: int) -> viser.ViserServer:
         BadInput: the port is taken, or may not be used.
     """
     try_port(port)
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # a browser's spare connections are no errors
     with contextlib.redirect_stdout(io.StringIO()):  # its own box with both addresses
         server = viser.ViserServer(host=HOST, port=port, label="BumbleBee", verbose=False)
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)

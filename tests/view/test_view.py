@@ -27,7 +27,7 @@ from bumblebee.view.live import LivePolicy
 from bumblebee.view.measured import window_entries
 from bumblebee.view.page import Page
 from bumblebee.view.scene import Picture
-from bumblebee.view.server import address, open_server, stop
+from bumblebee.view.server import HOST, address, open_server, stop
 from bumblebee.view.shipped import shipped_policy
 from bumblebee.view.sources import Entry, found, of_clip
 from bumblebee.view.what import evaluation_entries
@@ -218,6 +218,18 @@ def test_a_damaged_evaluation_is_one_line(evaluation: Path, tmp_path: Path):
     (tmp_path / "states.parquet").write_bytes((evaluation / "states.parquet").read_bytes()[:-9])
     with pytest.raises(BadInput, match=r"expected trials\.csv and states\.parquet of an evaluation"):
         run(["view", str(tmp_path)])
+
+
+def test_a_connection_that_asks_for_nothing_leaves_no_traceback(caplog: pytest.LogCaptureFixture):
+    server = open_server(0)
+    try:
+        with socket.create_connection((HOST, server.get_port())) as spare:
+            spare.shutdown(socket.SHUT_WR)
+            while spare.recv(4096):  # until the server is done with it
+                pass
+    finally:
+        stop(server)
+    assert [record for record in caplog.records if record.name.startswith("websockets")] == []
 
 
 @pytest.mark.slow
