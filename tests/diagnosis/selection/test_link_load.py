@@ -26,7 +26,7 @@ def test_gains_of_all_servos_would_explain_a_load(run: SearchState) -> None:
 def test_a_load_is_one_mass_with_or_without_friction_on_all_joints(run: SearchState, friction: bool) -> None:
     dry = FRICTION if friction else {}
     if friction:
-        run = begun({("link_mass", "l3"): MASS, **{("coulomb_friction", j): v for j, v in dry.items()}})
+        run = begun({("link_mass", "l3"): MASS, **{("coulomb_friction", j): v for j, v in dry.items()}}, windows=60)
     assert start_with_gain_grid(run)
     found = {(c.effect, c.where): float(run.fit.of(c)[0]) for c in run.fit.chosen}
     assert found["link_mass", "l3"] == pytest.approx(MASS, rel=0.02)

@@ -47,17 +47,17 @@ def _with_gains(run: SearchState) -> None:
     assert "armature" not in {effect for effect, _ in found}
 
 
-def _far_off() -> SearchState:
+def _far_off(windows: int) -> SearchState:
     xml = re.sub(r'kp="(\d+)"', lambda m: f'kp="{30 * int(m[1])}"', arm.XML)
-    return begun({}, re.sub(r'kv="(\d+)"', lambda m: f'kv="{10 * int(m[1])}"', xml))
+    return begun({}, re.sub(r'kv="(\d+)"', lambda m: f'kv="{10 * int(m[1])}"', xml), windows)
 
 
 def test_gains_that_are_far_off_stay_gains_where_all_joints_leave_no_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    run = _far_off()
+    run = _far_off(15)
     monkeypatch.setattr(gain_grid, "fit_all_joints", lambda *_: run.fit)  # which leaves what the declared model leaves
     _with_gains(run)
 
 
 @pytest.mark.slow
 def test_gains_that_are_far_off_stay_gains() -> None:
-    _with_gains(_far_off())
+    _with_gains(_far_off(60))
