@@ -145,8 +145,8 @@ def picture(results: LoopResults) -> str:
         Box("motions", f"{len(results.library)} read"),
         Box("filter", f"{kept} kept"),
         Box("cluster", f"K = {k}, {plural(len(labels), 'clip')}"),
-        Box("base", "one policy for all", "learn"),
-        Box("experts", f"{k}, one a cluster", "learn"),
+        Box("base", trained(results, "base"), "learn"),
+        Box("experts", f"{k}, {trained(results, 'expert-', ' r0')}", "learn"),
         Box("distill", "one generalist", "learn"),
         Box("evaluate", plural(len(results.contract["motions"]), "motion")),
         Box("publish", plural(published, "model")),
@@ -161,9 +161,16 @@ def picture(results: LoopResults) -> str:
         Box("gate", last.gate["status"], "person"),
         Box("diagnose", f"{plural(effects, 'effect')} found"),
         Box("delta", f"{kept_deltas} of {len(last.deltas)} kept", "learn"),
-        Box("refine", "corrected model", "learn"),
+        Box("refine", trained(results, "expert-", f" r{last.n}"), "learn"),
     ]
     return loop_picture(top, bottom, f"{plural(len(results.rounds), 'round')}: measured, explained, refined")
+
+
+def trained(results: LoopResults, begin: str, end: str = "") -> str:
+    """Control steps that each policy whose name begins and ends so was trained on; without a curve it was kept."""
+    curves = [curve for name, curve in results.curves.items() if name.startswith(begin) and name.endswith(end)]
+    steps = max((int(curve["frames"].max()) for curve in curves), default=0)
+    return f"{steps:,} steps" if steps else "kept"
 
 
 def _json(path: Path) -> dict[str, Any]:

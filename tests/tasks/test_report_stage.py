@@ -1,5 +1,6 @@
 """The report's stage: the seal is the stand-in's truth and no other robot's; the film shows what was counted."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +14,7 @@ from bumblebee.report.filmstrip import Film
 from bumblebee.report.results import RoundResults
 from bumblebee.robot.facts import joint_names, stand_pose
 from tasks import film, paths, report
+from tests.report.made import loop_results
 
 
 @pytest.mark.parametrize(("rollouts", "expected"), [("{}", {"effects": []}), ("{source: mine}", None)])
@@ -77,3 +79,13 @@ def test_every_policy_is_compared_with_the_one_that_the_loop_began_with(
     found = report.with_reference({"results": entries, "comparisons": [told]})["comparisons"]
     assert found[0] == told and {(c["from"], c["to"]) for c in found} == {("base", "generalist"), ("base", "other")}
     assert next(c for c in found if c["to"] == "other" and c["split"] == "all")["success"]["value"] == 1.0
+
+
+def test_the_picture_says_how_long_each_policy_trained_and_which_were_kept() -> None:
+    results = loop_results([], None)
+    steps = pd.DataFrame({"frames": [4096, 327_680]})
+    kept = report.picture(replace(results, curves={"expert-c0 r1": steps, "expert-c1 r1": steps}))
+    assert "<b>base</b><span>kept</span>" in kept and "<b>refine</b><span>327,680 steps</span>" in kept
+    assert ", kept</span>" in kept and "<b>base</b><span>327,680 steps</span>" in report.picture(
+        replace(results, curves={"base": steps})
+    )
