@@ -96,7 +96,7 @@ def evaluate(
     if not clips:
         raise BadInput(motions, "a motion", "none")
     table = run(loaded, clips[:limit], repeats=repeats, noise=noise, seed=seed, out=states)
-    print("\n".join(line for line in tried(table, {"train": "motions"}) if line))
+    print("\n".join(line for line in tried(table, {"train": "motions"}, noise) if line))
     if out is not None:
         write_file(out, table.to_csv(index=False))
         print(f"written: {out}")

@@ -56,9 +56,10 @@ def readme(card: dict[str, Any], contract: dict[str, Any], trials: pd.DataFrame,
     )
 
 
-def tried(trials: pd.DataFrame, splits: Mapping[str, str] = SPLITS) -> Iterator[str]:
-    """Lines on success and errors of each split, and the motions that are lost first."""
-    yield "Each motion from its first frame to its last, in MuJoCo at 200 Hz on the declared model, without noise:"
+def tried(trials: pd.DataFrame, splits: Mapping[str, str] = SPLITS, noise: float = 0.0) -> Iterator[str]:
+    """Lines on success and errors of each split, and the motions that are lost first; `noise` as in `evaluate`."""
+    shaken = f"with {noise:g} times the noise of training" if noise else "without noise"
+    yield f"Each motion from its first frame to its last, in MuJoCo at 200 Hz on the declared model, {shaken}:"
     yield ""
     for split, what in splits.items():
         own = trials[trials["split"] == split]
