@@ -8,10 +8,12 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import bumblebee as bb
 from bumblebee.api import training
+from bumblebee.api.policy_card import tried
 from bumblebee.api.recipes import as_seen_by
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
 from bumblebee.tracking.config import EnvConfig
@@ -100,6 +102,12 @@ def test_a_child_sees_what_its_parent_sees_and_is_compared_where_it_can_know_it_
     here, there = (as_seen_by(EnvConfig(), bb.load_policy(name).shape) for name in ("shipped", "imu"))
     assert here == EnvConfig()
     assert there.observation.terms == ("imu",) and there.ahead == (0.1, 0.3, 0.6, 1.0) and there.place == "own"
+
+
+def test_an_evaluation_says_how_much_noise_there_was():
+    table = pd.DataFrame({"name": ["a"], "split": ["train"], "success": [True], "key_error": [0.1], "joint_error": [0.2]})
+    assert next(tried(table)).endswith("without noise:")
+    assert next(tried(table, noise=0.5)).endswith("with 0.5 times the noise of training:")
 
 
 def test_ppo_from_a_policy_without_a_critic_is_one_line_that_names_the_other_learner():
