@@ -105,7 +105,9 @@ def test_a_child_sees_what_its_parent_sees_and_is_compared_where_it_can_know_it_
 
 
 def test_an_evaluation_says_how_much_noise_there_was():
-    table = pd.DataFrame({"name": ["a"], "split": ["train"], "success": [True], "key_error": [0.1], "joint_error": [0.2]})
+    table = pd.DataFrame(
+        {"name": ["a"], "split": ["train"], "success": [True], "key_error": [0.1], "joint_error": [0.2]}
+    )
     assert next(tried(table)).endswith("without noise:")
     assert next(tried(table, noise=0.5)).endswith("with 0.5 times the noise of training:")
 
