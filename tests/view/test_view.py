@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bumblebee.api.policies import ahead_of, load_policy
+from bumblebee.api.policies import load_policy
 from bumblebee.cli import run
 from bumblebee.errors import BadInput
 from bumblebee.learning.trial import World, try_policy
@@ -166,7 +166,7 @@ def evaluation(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out, world = tmp_path_factory.mktemp("evaluation") / "tried", World(load_model(physics_hz=200.0), threads=1)
     kept, shipped = Kept(), load_policy()
     tables = []
-    for policy, name, ahead in ((shipped, "look_left", ahead_of(shipped)), (lambda seen: 0 * seen[:, :23], "walk", ())):
+    for policy, name, ahead in ((shipped, "look_left", shipped.shape.ahead), (lambda seen: 0 * seen[:, :23], "walk", ())):
         clip = make(next(kind for kind in kinds() if kind.name == name), 0, EmbeddedConfig())
         tables.append(try_policy(policy, [clip], world, ahead, None, kept.add))
     kept.write(out, pd.concat(tables, ignore_index=True))
