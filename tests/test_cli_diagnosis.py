@@ -178,6 +178,7 @@ class Done:
 def at_once(data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """`diagnose` without its minutes of work: what is read, tried and written is the product's own."""
     from bumblebee.diagnosis import diagnose, output, report
+    from bumblebee.report import windows
 
     monkeypatch.setenv("TMPDIR", str(data / "elsewhere"))
     (data / "elsewhere").mkdir()
@@ -185,6 +186,7 @@ def at_once(data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(diagnose, "diagnose", lambda session, config, say: Done)
     monkeypatch.setattr(report, "summary", lambda *_: "found")
     monkeypatch.setattr(report, "examples", lambda *_, **__: [])
+    monkeypatch.setattr(windows, "windows_inlay", lambda *_: "")
     files = {name: "x" for name in ("effects.yaml", "model.xml", "report.html")}
     monkeypatch.setattr(output, "contents", lambda made: {"diagnosis.json": json.dumps(made.document), **files})
     return data
@@ -217,7 +219,7 @@ def test_a_mesh_of_the_model_is_an_input(at_once: Path, capsys: pytest.CaptureFi
     (at_once / "with.xml").write_text(text)
     for out in ("parts", "parts/arm.stl"):
         assert run("diagnose", at_once / "with.xml", at_once / "set", "--out", at_once / out, "--overwrite") == 2
-        assert "apart from what is read" in capsys.readouterr().err
+        assert "does not contain the input" in capsys.readouterr().err
 
 
 def test_only_an_earlier_diagnosis_is_replaced_and_what_is_foreign_is_named(

@@ -117,7 +117,7 @@ def test_the_command_writes_the_file_and_shows_what_is_done(tmp_path: Path, caps
     with pytest.raises(BadInput, match="--overwrite"):
         run(["compensate", str(effects), "--out", str(out), "--leave-out"])
     assert run(["compensate", str(effects), "--out", str(out), "--leave-out", "--overwrite"]) == 0
-    with pytest.raises(BadInput, match="apart from what is read"):
+    with pytest.raises(BadInput, match="does not contain the input"):
         run(["compensate", str(effects), "--out", str(effects), "--leave-out", "--overwrite"])
     assert run(["compensate", str(effects)]) == EXIT_BAD_INPUT
 
