@@ -188,7 +188,7 @@ def at_once(data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(report, "examples", lambda *_, **__: [])
     monkeypatch.setattr(windows, "windows_inlay", lambda *_: "")
     files = {name: "x" for name in ("effects.yaml", "model.xml", "report.html")}
-    monkeypatch.setattr(output, "contents", lambda made: {"diagnosis.json": json.dumps(made.document), **files})
+    monkeypatch.setattr(output, "contents", lambda made, *_: {"diagnosis.json": json.dumps(made.document), **files})
     return data
 
 
