@@ -2,11 +2,14 @@
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bumblebee.errors import BadInput, plain
+
+if TYPE_CHECKING:
+    from bumblebee.diagnosis.plan import Plan, PlanConfig
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.xml", help="The declared (nominal) MJCF.")]
 Data = Annotated[Path | None, typer.Argument(metavar="DATASET", help="Folder that holds rollouts/*.parquet.")]
@@ -42,13 +45,27 @@ def plan(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier plan.")] = False,
 ) -> None:
     """Runs for the robot that tell apart what a diagnosis could not, within all limits, with a run sheet."""
-    from bumblebee.diagnosis.dataset import open_session
-    from bumblebee.diagnosis.places import inputs_of, model_files
-    from bumblebee.diagnosis.plan import PlanConfig, claim_plan, make_plan, read_findings, summary, write_plan
-    from bumblebee.measured.model_file import load_spec
+    from bumblebee.diagnosis.plan import PlanConfig, summary, write_plan
     from bumblebee.sim.quiet import quiet_mujoco
 
     quiet_mujoco()
+    _claim(model, dataset, diagnosis, out, overwrite)
+    config = PlanConfig(
+        runs=runs, seconds=seconds, rate=rate, gains=_numbers("--gains", gains),
+        damping=_numbers("--damping", damping) if damping else (), pool=pool, seed=seed, start=start,
+        speed=_by_joint("--speed", speed), torque=_by_joint("--torque", torque),
+        travel=_by_joint("--travel", travel), kp=kp, kd=kd,
+    )  # fmt: skip
+    told = write_plan(_made(model, dataset, diagnosis, config), out, overwrite)
+    print(plain(summary(told)))
+    print(f"written: {out / 'plan.json'}, sheet.html, runs/*.csv, runs/*.parquet")
+
+
+def _claim(model: Path, dataset: Path | None, diagnosis: Path | None, out: Path, overwrite: bool) -> None:
+    """See before the work that `out` can be written, and that a dataset came with its diagnosis or neither."""
+    from bumblebee.diagnosis.places import inputs_of, model_files
+    from bumblebee.diagnosis.plan import claim_plan
+
     inputs = model_files(model) if dataset is None else inputs_of(model, dataset)
     claim_plan(out, overwrite, [*inputs, *([diagnosis] if diagnosis else [])])
     if (dataset is None) != (diagnosis is None):
@@ -58,22 +75,21 @@ def plan(
             "a dataset alone" if diagnosis is None else "a diagnosis alone",
             "Run `bumblebee diagnose MODEL.xml DATASET --out FOUND`, then plan with DATASET --diagnosis FOUND.",
         )
-    config = PlanConfig(
-        runs=runs, seconds=seconds, rate=rate, gains=_numbers("--gains", gains),
-        damping=_numbers("--damping", damping) if damping else (), pool=pool, seed=seed, start=start,
-        speed=_by_joint("--speed", speed), torque=_by_joint("--torque", torque),
-        travel=_by_joint("--travel", travel), kp=kp, kd=kd,
-    )  # fmt: skip
+
+
+def _made(model: Path, dataset: Path | None, diagnosis: Path | None, config: "PlanConfig") -> "Plan":
+    """Read what there is and plan, with a line a step."""
+    from bumblebee.diagnosis.dataset import open_session
+    from bumblebee.diagnosis.plan import make_plan, read_findings
+    from bumblebee.measured.model_file import load_spec
+
     findings = read_findings(diagnosis) if diagnosis else None
     session = open_session(model, dataset, config.thresholds.dataset) if dataset else None
     began = time.monotonic()
-    made = make_plan(
+    return make_plan(
         load_spec(model), model.name, config, session, findings,
         lambda text: print(plain(f"[{time.monotonic() - began:5.1f} s] {text}"), flush=True),
     )  # fmt: skip
-    told = write_plan(made, out, overwrite)
-    print(plain(summary(told)))
-    print(f"written: {out / 'plan.json'}, sheet.html, runs/*.csv, runs/*.parquet")
 
 
 def _numbers(option: str, text: str) -> tuple[float, ...]:

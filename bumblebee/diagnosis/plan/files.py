@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 from bumblebee.diagnosis.plan.config import Gain
 from bumblebee.diagnosis.plan.document import document, run_names
 from bumblebee.diagnosis.plan.plan import Plan
+from bumblebee.diagnosis.plan.predicted import refuse_idle
 from bumblebee.diagnosis.plan.sheet import sheet
 from bumblebee.errors import BadInput
 from bumblebee.io.read import read_json
@@ -45,9 +46,13 @@ def refuse_plan(out: Path, overwrite: bool) -> None:
 
 
 def write_plan(plan: Plan, out: Path, overwrite: bool = False) -> dict:
-    """Write the folder; the document that lies in it. `overwrite` replaces an earlier plan and nothing else."""
+    """Write the folder; the document that lies in it. `overwrite` replaces an earlier plan and nothing else.
+
+    `BadInput`, and nothing written, where effects are open and the plan tells none of them apart.
+    """
     tables = {name: csv_of(plan, k) for k, name in enumerate(run_names(plan))}
     told = document(plan, hashlib.sha256("".join(tables.values()).encode()).hexdigest())
+    refuse_idle(told)
     page = sheet(plan, told)
     refuse_plan(out, overwrite)  # time has passed since the command looked
     with new_folder(out) as folder:

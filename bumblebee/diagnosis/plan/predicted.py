@@ -8,6 +8,7 @@ import numpy as np
 from bumblebee.diagnosis.plan.objective import Question
 from bumblebee.diagnosis.plan.plan import Plan
 from bumblebee.diagnosis.simulation import unit_on
+from bumblebee.errors import BadInput
 from bumblebee.sim.effects import CATALOGUE
 
 
@@ -54,6 +55,23 @@ def pairs(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             hardest | {"resolved": {when: all(r["resolved"][when] for r in both) for when in hardest["resolved"]}}
         )
     return sorted(out, key=lambda row: (row["resolved"]["after"], row["chi2"]["after"]))
+
+
+def refuse_idle(told: dict[str, Any]) -> None:
+    """`BadInput` where effects are open and no run is expected to tell any more of them apart.
+
+    Args:
+        told: the plan's document. One that asks about no open pair is for the intervals, and passes.
+    """
+    asked = pairs(told["predicted"]["classes"])
+    before, after = (sum(row["resolved"][when] for row in asked) for when in ("before", "after"))
+    if before < len(asked) and after <= before:
+        raise BadInput(
+            "plan",
+            "runs that tell effects apart",
+            f"none within the limits: pairs told apart {before} of {len(asked)} now, {after} with all runs",
+            "Nothing is written. Add `--gains 0.5,1,2` or `--damping 0.3` where the robot's gains can be set.",
+        )
 
 
 def _cosine(left: float, alone: float) -> float | None:

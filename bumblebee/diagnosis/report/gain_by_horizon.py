@@ -110,14 +110,22 @@ def leaves_floor(entry: Mapping[str, Any], rules: ReportThresholds) -> bool:
     return bool(entry["after"] > least)
 
 
-def whole_model(gain: GainByHorizon) -> str:
-    """Whether to trust the corrected model as a whole, only where it is better, or not; without a full stop."""
+def whole_model(gain: GainByHorizon, warned: bool) -> str:
+    """Whether to trust the corrected model as a whole, only where it is better, or not; without a full stop.
+
+    Args:
+        gain: verdicts by horizon.
+        warned: whether the document carries a warning, beside which nothing is trusted as a whole.
+    """
     floor = [f"the declared model is at the noise floor {_after(gain, gain.floor)}"] if gain.floor else []
     rest = [f"not surely better {_after(gain, gain.open)}"] if gain.open else []
     worse = [f"it is worse than the declared one {_after(gain, gain.worse)}"] if gain.worse else []
     if gain.whole:
         said = "; ".join([f"better {_after(gain, gain.better)}", *rest, *floor])
-        return f"Trust the corrected model as a whole ({said})"
+        trust = (
+            "Read the warnings before you use the corrected model" if warned else "Trust the corrected model as a whole"
+        )
+        return f"{trust} ({said})"
     if gain.better:
         others = ", ".join([*worse, *rest, *floor])
         return f"Trust the corrected model only where it is better, {_after(gain, gain.better)}: {others}"

@@ -128,7 +128,7 @@ def trusted(document: Mapping[str, Any], rules: ReportThresholds) -> str:
     if not told["trust"]:
         return ""
     gain = gain_of(document, rules)
-    text = whole_model(gain)
+    text = whole_model(gain, bool(document.get("warnings") or document.get("set_aside")))
     if not gain.better and not gain.nothing_to_gain:
         return f"{text}."
     if gain.better:

@@ -16,7 +16,7 @@ from tests.diagnosis.plan.made import planned
 
 
 def test_a_plan_is_written_whole_and_reads_back(tmp_path: Path) -> None:
-    plan, out = planned(), tmp_path / "plan"
+    plan, out = planned(damping=True), tmp_path / "plan"
     told = write_plan(plan, out)
     assert told == json.loads((out / "plan.json").read_text())
     assert sorted(p.name for p in out.iterdir()) == ["plan.json", "runs", "sheet.html"]
@@ -40,7 +40,7 @@ def test_the_sheet_has_a_section_a_run_and_loads_nothing(tmp_path: Path) -> None
 
 
 def test_an_earlier_plan_is_replaced_when_told_and_nothing_else_ever(tmp_path: Path) -> None:
-    plan, out = planned(), tmp_path / "plan"
+    plan, out = planned(damping=True), tmp_path / "plan"
     write_plan(plan, out)
     with pytest.raises(BadInput, match="--overwrite"):
         write_plan(plan, out)
@@ -49,6 +49,13 @@ def test_an_earlier_plan_is_replaced_when_told_and_nothing_else_ever(tmp_path: P
     with pytest.raises(BadInput, match=r"mine\.txt"):
         write_plan(plan, out, overwrite=True)
     assert (out / "runs" / "mine.txt").read_text() == "mine"
+
+
+def test_a_plan_that_tells_no_open_pair_apart_is_one_line_and_no_folder(tmp_path: Path) -> None:
+    """Friction passes for kd at one kd; with `--damping`, as the line says, the plan above tells them apart."""
+    with pytest.raises(BadInput, match=r"pairs told apart 0 of 1 now, 0 with all runs.*--damping"):
+        write_plan(planned(), tmp_path / "plan")
+    assert not (tmp_path / "plan").exists()
 
 
 @pytest.fixture

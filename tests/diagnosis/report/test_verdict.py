@@ -10,6 +10,7 @@ from bumblebee.diagnosis.dataset.session import make_session
 from bumblebee.diagnosis.dataset.undriven import commanded_undriven
 from bumblebee.diagnosis.gap.gap import gap
 from bumblebee.diagnosis.report.gain_by_horizon import gain_of, whole_model
+from bumblebee.diagnosis.report.headline import trusted
 from bumblebee.diagnosis.report.notes import unexplained_error, what_is_left, worse_horizons
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.terminal import summary
@@ -56,10 +57,13 @@ def test_a_page_with_a_red_box_never_trusts_the_model_as_a_whole():
             "summary": {"removed": {"0.2": gone, "1.0": gone}}}  # fmt: skip
     rules = ReportThresholds()
     assert len(worse_horizons(made["error"], rules.verdicts)) == 1
-    said = whole_model(gain_of(made, rules))
+    said = whole_model(gain_of(made, rules), warned=False)
     assert "as a whole" not in said and "worse than the declared one after 1.0 s (base)" in said
     better = {**made, "error": {"before": entries, "after": {"0.2": after["0.2"], "1.0": after["0.2"]}, "floor": {}}}
-    assert "as a whole" in whole_model(gain_of(better, rules))
+    better["summary"] = {**better["summary"], "trust": [{"group": "", "wide": False, "alike": False}]}
+    assert "as a whole" in trusted(better, rules)
+    for box in ({"warnings": ["a single rollout"]}, {"set_aside": [{"rollout": "c", "reason": "row 7"}]}):
+        assert trusted({**better, **box}, rules).startswith("Read the warnings before you use the corrected model")
 
 
 def test_a_large_error_beside_effects_is_said_too():
