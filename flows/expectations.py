@@ -15,7 +15,7 @@ from flows.stages import Stage
 KEPT = 5  # runs of a stage that are remembered
 
 TYPICAL = {
-    "motions": 11, "seal": 40, "filter": 6, "base": 8, "cluster": 20, "experts": 8, "rollouts": 15, "ingest": 7,
+    "motions": 11, "seal": 40, "filter": 6, "base": 32, "cluster": 20, "experts": 60, "rollouts": 15, "ingest": 7,
     "gate": 3, "diagnose": 200, "compensate": 6, "delta": 14, "refine": 95,
     "control": 110, "distill": 12, "evaluate": 17, "publish": 10, "report": 8,
 }  # fmt: skip
