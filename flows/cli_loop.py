@@ -24,6 +24,7 @@ def demo(
     workspace: Workspace = None,
     profile: Annotated[str, typer.Option("--profile", help="File of profiles/ on top of params.yaml.")] = "",
     seed: Annotated[str, typer.Option("--seed", help="Seed of the sealed robot, or `null`: it lacks nothing.")] = "",
+    verbose: Annotated[bool, typer.Option("--verbose", help="Show every line of every stage.")] = False,
     prefect_port: PrefectPort = 0,
     mlflow_port: MlflowPort = 0,
     port: Port = PORT,
@@ -39,8 +40,8 @@ def demo(
     from flows.demo import started
 
     options = {"motions": motions, "name": name, "workspace": workspace, "profile": profile, "seed": seed}
-    both = {"prefect_port": prefect_port, "mlflow_port": mlflow_port}
-    raise typer.Exit(guarded(lambda: started(argparse.Namespace(**options, **both))))
+    more = {"prefect_port": prefect_port, "mlflow_port": mlflow_port, "verbose": verbose}
+    raise typer.Exit(guarded(lambda: started(argparse.Namespace(**options, **more))))
 
 
 def serve(

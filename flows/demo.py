@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.last_line import EXIT_INTERRUPTED, guarded
-from flows import login
+from flows import login, terminal
 from flows import workspace as workspaces
 from flows.attend import attend, ended_in_order
 from flows.ending import registry, serve, shown, summarise
@@ -38,7 +38,7 @@ def started(options: argparse.Namespace) -> int:
             require_port("--prefect-port", options.prefect_port)
             require_port("--mlflow-port", options.mlflow_port)
             folder = options.workspace or choose(options.name, options.profile, options.motions, options.seed)
-            return run(folder, options.prefect_port, options.mlflow_port)
+            return run(folder, options.prefect_port, options.mlflow_port, options.verbose)
         except KeyboardInterrupt:
             print("stopped; the same command continues after the last finished stage", file=sys.stderr)
             return EXIT_INTERRUPTED
@@ -52,6 +52,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--workspace", type=Path, help="an existing workspace anywhere, as it is")
     made.add_argument("--profile", default="", help="file of profiles/ whose values replace those of params.yaml")
     made.add_argument("--seed", default="", help="seed of the robot that is sealed, or `null`: nothing undeclared")
+    made.add_argument("--verbose", action="store_true", help="show every line of every stage, not one a stage")
     add_ports(made)
     return made
 
@@ -89,7 +90,7 @@ def robot_of(seed: str) -> dict[str, dict[str, int]]:
     return {"seal": {"seed": int(seed)}}
 
 
-def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
+def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0, verbose: bool = False) -> int:
     """Bring the workspace up to date through the flow."""
     require_own(folder)
     private_index(folder)
@@ -105,7 +106,8 @@ def run(folder: Path, prefect_port: int = 0, mlflow_port: int = 0) -> int:
     with servers(folder, prefect_port, mlflow_port) as addresses:
         finish_check(check)
         announce(folder, addresses)
-        status = attend(folder, addresses)
+        print(f"log        {shown(folder / terminal.FILE)}   every line of every stage", flush=True)
+        status = attend(folder, addresses, *(["--verbose"] if verbose else []))
     if status == 0:
         summarise(folder)
     return status

@@ -8,6 +8,7 @@ import logging
 import os
 import subprocess
 import sys
+import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -27,6 +28,7 @@ from flows.environment import SERVERS, environment, without_login
 from flows.owned import require_own
 from flows.runs import recorded
 from flows.stages import Stage, changed_stages, downstream, read_stages, to_run
+from flows.terminal import NOTICE, took
 from tasks import params
 from tasks.lab import on_cluster
 
@@ -35,8 +37,8 @@ KEPT = 5  # last lines of a failed stage that its error repeats
 
 
 def is_news(record: logging.LogRecord) -> bool:
-    """Whether a line of Prefect's own says what the stage has not said: its failure stands in its last line already."""
-    return not record.getMessage().startswith("Task run failed with state")
+    """Whether a line of Prefect's own says more than `run_stage` says of a stage that failed."""
+    return not record.getMessage().startswith(("Task run failed with state", "Finished in state Failed("))
 
 
 logging.getLogger("prefect.task_runs").addFilter(is_news)
@@ -50,7 +52,7 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
 
     A failure is a state and no exception: the stage has said what is wrong, a traceback of ours would bury it.
     """
-    log, folder = get_run_logger(), Path(workspace)
+    log, folder, begun = get_run_logger(), Path(workspace), time.monotonic()
     command = [sys.executable, "-m", runner_of(folder), name]
     last: deque[str] = deque(maxlen=KEPT)
     with (
@@ -74,8 +76,12 @@ def run_stage(title: str, name: str, workspace: str) -> State[Any]:
                 last.append(line.rstrip())
                 log.info(line.rstrip())
         told["worked"] &= process.wait() == 0
+    spent = took(time.monotonic() - begun)
     if process.returncode:
-        return Failed(message=f"{title}: " + " / ".join(last))
+        words = " / ".join(last)
+        log.error(f"failed after {spent}: {words}")
+        return Failed(message=f"{title}: {words}")
+    log.log(NOTICE, f"done in {spent}" if told["worked"] else "is up to date")
     return Completed()
 
 
@@ -145,7 +151,7 @@ def walk(folder: Path) -> State[Any]:
     log = get_run_logger()
     stages = read_stages(folder)
     busy = to_run(stages, changed_stages(folder))
-    log.info(f"{len(busy)} of {len(stages)} stages have work to do" if busy else "everything is up to date")
+    log.log(NOTICE, f"{len(busy)} of {len(stages)} stages have work to do" if busy else "everything is up to date")
     close = progress.begin(folder, stages, busy, log)
     running: dict[str, PrefectFuture[Any]] = {}
     waiting: str | None = None

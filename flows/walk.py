@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from bumblebee.last_line import unforeseen
+from flows import terminal
 from flows import workspace as workspaces
 from flows.owned import require_own
 from tasks.parent import end_with_parent
@@ -25,15 +26,16 @@ def main(argv: list[str] | None = None) -> int:
     """Run; 0 done, 1 a stage failed, 3 a gate waits for an answer."""
     parser = argparse.ArgumentParser(prog="python -m flows.walk", description=__doc__)
     parser.add_argument("--deployment", default="", help="serve the loop under this name instead of walking it once")
+    parser.add_argument("--verbose", action="store_true", help="show every line of every stage, not one a stage")
     options = parser.parse_args(argv)
     end_with_parent()
     if options.deployment:
         serve(options.deployment)
         return 0
-    return walk()
+    return walk(options.verbose)
 
 
-def walk() -> int:
+def walk(verbose: bool = False) -> int:
     """Run the flow in this process; only now is Prefect imported, since it reads its settings once."""
     folder = Path(os.environ["BUMBLEBEE_WORKSPACE"])
     lost = Lost()
@@ -44,6 +46,7 @@ def walk() -> int:
     os.chdir(folder)
     logging.getLogger("prefect.flow_runs").addFilter(without_trace)
     try:
+        terminal.to_file(folder, verbose)
         state = loops.loop.with_options(task_runner=loops.runner(folder))(return_state=True)
     except Exception as error:  # of Prefect's own: what a stage or the flow raises is a state
         print(without_server(error, bool(lost)), file=sys.stderr)
@@ -120,7 +123,7 @@ def without_trace(record: logging.LogRecord) -> bool:
 
 def of_a_stage(record: logging.LogRecord) -> bool:
     """Whether a line of the log is a stage's own."""
-    return record.name == "prefect.task_runs" and record.exc_info is None and record.levelno <= logging.INFO
+    return record.name == "prefect.task_runs" and record.exc_info is None and record.levelno <= terminal.NOTICE
 
 
 if __name__ == "__main__":

@@ -66,7 +66,7 @@ def run(cell: Cell, finished: Path, scratch: Path) -> Outcome:
 
 def blow(cell: Cell, name: str, folder: Path, log: Path, fill: "Fill") -> tuple[int | None, float, str, list[str]]:
     """Start the loop, wait until the stage works, hit; (status, seconds until the end, last line, orphans)."""
-    words = ["-m", "flows.demo", "--workspace", str(folder)]
+    words = ["-m", "flows.demo", "--verbose", "--workspace", str(folder)]
     running = start(words, folder, environment(folder), cell.name, log)
     facts = {"stage": name.partition("@")[0], "name": name}
     stage = [word.format(**facts) for word in WORDS["stage"]]
@@ -93,7 +93,8 @@ def goes_on(cell: Cell, name: str, folder: Path, log: Path) -> int | None:
 
     Returns 0 when it is, else the command's exit status, None where it does neither.
     """
-    running = start(["-m", "flows.demo", "--workspace", str(folder)], folder, environment(folder), cell.name, log)
+    words = ["-m", "flows.demo", "--verbose", "--workspace", str(folder)]
+    running = start(words, folder, environment(folder), cell.name, log)
     end = time.monotonic() + PATIENCE
     while running.poll() is None and time.monotonic() < end and not done(folder, name):
         time.sleep(0.5)

@@ -124,7 +124,7 @@ def log_name(number: int, attempt: int) -> str:
 def one(job: Job, record: Record, log: Path, now: Running) -> int | str:
     """One start, to its end; its status, `hung` where it had to be ended, `time` where the soak was over."""
     folder, number = job.folder, job.number
-    command = [sys.executable, "-m", "flows.demo", "--workspace", str(folder)]
+    command = [sys.executable, "-m", "flows.demo", "--verbose", "--workspace", str(folder)]
     with log.open("wb") as out:
         process = subprocess.Popen(
             command,

@@ -21,8 +21,8 @@ NAMED: dict[str, Named] = {
     "no error: how a policy did": (re.compile(r"[:,] success .* key error"), ()),
     "no error of its own: stages that wait for a failed one": (
         re.compile(
-            r"Finished in state (Failed|NotReady)|^\d+ stage\(s\) failed, |ERROR: failed to reproduce|"
-            r"^[a-z]+( round \d+)?( c\d+)?: .* / |the same command goes on from there$"
+            r"Finished in state (Failed|NotReady)|\| failed after \d+:\d\d min: |^\d+ stage\(s\) failed, |"
+            r"ERROR: failed to reproduce|^[a-z]+( round \d+)?( c\d+)?: .* / |the same command goes on from there$"
         ),
         (),
     ),

@@ -204,7 +204,7 @@ def test_lines_that_tell_are_kept_once_for_each_shape() -> None:
 
 
 def test_what_nobody_foresaw_has_no_name_wherever_it_is_said() -> None:
-    line = "publish | Finished in state Failed('publish: this machine / {} OperationalError: connection refused')"
+    line = "publish | failed after 0:09 min: this machine / {} OperationalError: connection refused"
     assert said.name_of(line.format("expected the lab's")) is not None
     assert said.name_of(line.format("internal error:")) is None
     kept = "base | base: its machine was lost; another one goes on from its last checkpoint"

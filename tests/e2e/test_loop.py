@@ -72,7 +72,7 @@ def run_until_base_and_kill(folder: Path) -> tuple[str, list[str]]:
     log = folder / "killed.log"
     with log.open("w") as out:
         flow = subprocess.Popen(
-            [sys.executable, "-m", "flows.demo", "--workspace", str(folder)],
+            [sys.executable, "-m", "flows.demo", "--verbose", "--workspace", str(folder)],
             cwd=folder,
             env=environment(folder),
             stdout=out,
@@ -103,7 +103,7 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> Loop:
     }
     folder = workspaces.create(tmp_path_factory.mktemp("e2e") / "smoke", "smoke", **over)
     killed, left = run_until_base_and_kill(folder)
-    waiting = call(folder, "flows.demo", "--workspace", str(folder))
+    waiting = call(folder, "flows.demo", "--verbose", "--workspace", str(folder))
     assert waiting.returncode == demo.EXIT_WAITING, f"{waiting.returncode}: {waiting.stdout}\n{waiting.stderr}"
     stopped = call(folder, "dvc", "repro")
     answer = call(folder, "bumblebee", *printed_answer(waiting.stderr))

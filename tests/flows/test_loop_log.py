@@ -15,7 +15,8 @@ def record(text: str) -> logging.LogRecord:
 def test_prefects_echo_of_a_failed_stage_is_left_out_and_all_else_is_kept():
     logger = logging.getLogger("prefect.task_runs")
     assert not logger.filter(record("Task run failed with state: Failed(message='base: no')"))
-    assert logger.filter(record("Finished in state Failed('base: no')"))
+    assert not logger.filter(record("Finished in state Failed('base: no')"))
+    assert logger.filter(record("Finished in state Crashed('killed')"))
     assert logger.filter(record("base: no such file"))
 
 

@@ -57,7 +57,7 @@ def test_a_killed_loop_goes_on_from_the_bucket_and_ends_as_on_one_machine(
     made = only(
         workspace(tmp_path, {**stand.content, "ray": {**stand.content["ray"], "remote": remote}}, **LONG), *STAGES
     )
-    words = ["-m", "flows.demo", "--workspace", "."]
+    words = ["-m", "flows.demo", "--verbose", "--workspace", "."]
     with (tmp_path / "said").open("w") as said:
         run = subprocess.Popen([sys.executable, *words], cwd=made, env=environment(made), stdout=said, stderr=said)
         kill_with_a_checkpoint(run, lab)
