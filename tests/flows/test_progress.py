@@ -62,7 +62,7 @@ def test_earlier_runs_are_believed_by_their_median_and_only_so_far_as_this_run_c
 def test_without_earlier_runs_shares_of_typical_durations_take_their_scale_from_this_run() -> None:
     assert expectations.expect(CHAIN, {}, {}).source == "estimate"
     typical = expectations.TYPICAL
-    seen = expectations.expect(CHAIN, {}, {"motions": 3 * typical["motions"], "experts@c0": 3 * typical["experts"]})
+    seen = expectations.expect(CHAIN, {}, {"motions": 3 * typical["motions"], "diagnose": 3 * typical["diagnose"]})
     assert 2 * typical["distill"] < seen.seconds["distill"] < 3 * typical["distill"]
     slow_place = expectations.expect(CHAIN[3:], {"base": [9.0 * typical["base"]]}, {})
     assert slow_place.seconds["distill"] > 4 * typical["distill"] and slow_place.source == "estimate"
