@@ -13,6 +13,7 @@ from flows.environment import SERVERS
 from flows.stages import Stage
 
 KEPT = 5  # runs of a stage that are remembered
+ESTIMATE = "estimate"  # source of what earlier runs of this workspace do not tell
 
 TYPICAL = {
     "motions": 11, "seal": 40, "filter": 6, "base": 32, "cluster": 20, "experts": 60, "rollouts": 15, "ingest": 7,
@@ -86,7 +87,7 @@ def expect(stages: Iterable[Stage], earlier: Mapping[str, list[float]], seen: Ma
     seconds = {name: value * pace if name in known else value for name, value in seconds.items()}
     most = max((len(earlier[name]) for name in known), default=0)
     told = "from this workspace's last run" if most == 1 else "from this workspace's earlier runs"
-    return Expectation(seconds, told if known.keys() >= typical.keys() - seen.keys() and known else "estimate")
+    return Expectation(seconds, told if known.keys() >= typical.keys() - seen.keys() and known else ESTIMATE)
 
 
 def _typical(name: str) -> float:

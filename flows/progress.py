@@ -20,6 +20,7 @@ from rich.text import Text
 
 from flows import expectations
 from flows.stages import Stage
+from flows.terminal import took as took_words
 
 KEY = "progress"  # of the artifact on Prefect's page
 _TICK, _TOLD, _LINE = 1.0, 5.0, 20.0  # seconds between looks, updates of the page, plain lines
@@ -72,7 +73,10 @@ class Progress:
         left = expectations.seconds_left(self.stages, expected.seconds, ended, elapsed, self.width)
         doing = ", ".join(self.titles.get(name, name) for name in elapsed) or "between stages"
         count = f"{len(ended)} of {len(self.stages)} stages done"
-        return share(expected.seconds, ended, elapsed), f"{count}; {words(left)} ({expected.source}); now: {doing}"
+        percent = share(expected.seconds, ended, elapsed)
+        # A first estimate of 12 min became 24 min: what is not measured here is a range, which narrows with the work.
+        most = left * (2 - percent / 100) if expected.source == expectations.ESTIMATE else left
+        return percent, f"{words(left, most)}; now: {doing}; {count} ({expected.source})"
 
 
 def share(expected: Mapping[str, float], ended: Iterable[str], elapsed: Mapping[str, float]) -> float:
@@ -83,12 +87,12 @@ def share(expected: Mapping[str, float], ended: Iterable[str], elapsed: Mapping[
     return 100 * done / total if total else 100.0
 
 
-def words(seconds: float) -> str:
-    """`about 6 min left`: no finer than an estimate is."""
-    if seconds < 50:
-        return "less than a minute left"
-    minutes = round(seconds / 60)
-    return f"about {minutes} min left" if minutes < 90 else f"about {minutes / 60:.1f} h left"
+def words(least: float, most: float) -> str:
+    """`about 12 to 24 min left`, of two numbers of seconds: no finer than an estimate is."""
+    low, high = round(least / 60), round(most / 60)
+    if high == 0:
+        return "less than 1 min left"
+    return f"about {high} min left" if low == high else f"about {low} to {high} min left"
 
 
 def begin(workspace: Path, stages: Iterable[Stage], busy: set[str], log: Any) -> Callable[[str], None]:
@@ -182,7 +186,7 @@ class Show:
     def last(self, word: str) -> None:
         """The last state on the page, with how the run ended."""
         percent, _ = self.progress.state()
-        took = words(self.progress.clock() - self.progress.begun).replace(" left", "")
+        took = took_words(self.progress.clock() - self.progress.begun)
         done = f"{len(self.progress.ended)} of {len(self.progress.stages)} stages done"
         self.to_page(percent, f"{word}: {done} in {took}")
 

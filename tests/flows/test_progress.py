@@ -62,7 +62,7 @@ def test_earlier_runs_are_believed_by_their_median_and_only_so_far_as_this_run_c
 def test_without_earlier_runs_shares_of_typical_durations_take_their_scale_from_this_run() -> None:
     assert expectations.expect(CHAIN, {}, {}).source == "estimate"
     typical = expectations.TYPICAL
-    seen = expectations.expect(CHAIN, {}, {"motions": 3 * typical["motions"], "experts@c0": 3 * typical["experts"]})
+    seen = expectations.expect(CHAIN, {}, {"motions": 3 * typical["motions"], "diagnose": 3 * typical["diagnose"]})
     assert 2 * typical["distill"] < seen.seconds["distill"] < 3 * typical["distill"]
     slow_place = expectations.expect(CHAIN[3:], {"base": [9.0 * typical["base"]]}, {})
     assert slow_place.seconds["distill"] > 4 * typical["distill"] and slow_place.source == "estimate"
@@ -112,7 +112,30 @@ def test_the_line_says_how_far_how_long_and_how_that_is_known(tmp_path: Path) ->
     told.start("experts@c1")
     percent, line = told.state()
     assert percent == pytest.approx(100 * 10 / 130)
-    assert line == "1 of 4 stages done; about 8 min left (from this workspace's last run); now: experts, experts"
+    assert line == "about 8 min left; now: experts, experts; 1 of 4 stages done (from this workspace's last run)"
+
+
+def test_the_time_left_has_one_unit() -> None:
+    assert progress.words(12 * 60, 24 * 60) == "about 12 to 24 min left"
+    assert progress.words(200 * 60, 200 * 60) == "about 200 min left" and progress.words(3, 9) == "less than 1 min left"
+
+
+def test_without_earlier_runs_the_time_left_is_a_range_that_narrows(tmp_path: Path) -> None:
+    told, clock = made(tmp_path)
+    ranges = []
+    for name in ("", "motions", "experts@c0"):
+        if name:
+            told.start(name)
+            clock.now += expectations.TYPICAL[name.partition("@")[0]]
+            told.end(name, worked=True)
+        percent, line = told.state()
+        ranges.append(2 - percent / 100)
+        assert "(estimate)" in line
+    assert ranges[0] == 2 and ranges == sorted(ranges, reverse=True)
+    many = [staged(name) for name in ("diagnose", "control", "refine")]
+    fresh = progress.Progress(tmp_path / "new", many, 1, clock).state()[1]
+    low, high = map(int, re.search(r"about (\d+) to (\d+) min left", fresh).groups())  # type: ignore[union-attr]
+    assert abs(high - 2 * low) <= 1
 
 
 def test_a_server_that_is_gone_costs_one_line_and_not_the_run(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -147,7 +170,7 @@ def test_plain_lines_come_when_stages_ended_and_not_with_every_look(
 
 def test_log_lines_through_the_same_console_stay_whole_above_the_bar(tmp_path: Path) -> None:
     screen = io.StringIO()
-    console = Console(file=screen, force_terminal=True, width=60, color_system=None)
+    console = Console(file=screen, force_terminal=True, width=80, color_system=None)
     told, _ = made(tmp_path)
     shown = progress.Show(told, console, logging.getLogger("test"), None)
     with Live(console=console, transient=True, auto_refresh=False) as live:
@@ -156,8 +179,8 @@ def test_log_lines_through_the_same_console_stay_whole_above_the_bar(tmp_path: P
         shown.look(live)
     lines = re.split(r"[\r\n]|\x1b\[2K", re.sub(r"\x1b\[[?\d]*[hlA]", "", screen.getvalue()))
     assert "motions | 33 motions read" in [line.strip() for line in lines]
-    assert any("0 of 4 stages done" in line for line in lines)
-    assert all(len(line) <= 60 for line in lines if "stages" in line)
+    assert any("min left; now: between stages" in line for line in lines), "what runs fits into a narrow terminal"
+    assert all(len(line) <= 80 for line in lines if "min left" in line)
 
 
 def test_the_bar_goes_through_the_console_of_the_log_lines_and_only_to_a_terminal() -> None:
