@@ -35,8 +35,8 @@ def taking(terms: dict[str, float], lines: list[str] | None = None, **truth: flo
 def test_a_catalogue_effect_is_swapped_in_for_a_table_that_follows_it() -> None:
     lines: list[str] = []
     named = taking({TABLE: 0.05}, lines, friction=(0.0, 0.05))
-    assert "instead of a discrepancy model of pole: coulomb_friction on pole tried" in lines
-    assert "instead of a discrepancy model of pole: refit with coulomb_friction on pole" in lines
+    assert "trying coulomb_friction on pole in place of a discrepancy model of pole" in lines
+    assert "refitting with coulomb_friction on pole in place of a discrepancy model of pole" in lines
     assert named is not None
     assert [c.effect for c in named.chosen] == ["coulomb_friction"]
     assert named.values[0] == pytest.approx(0.05, rel=0.05)

@@ -63,7 +63,7 @@ def test_every_refit_on_the_way_to_a_model_is_told() -> None:
     discovered((), lines, cubic=0.6)
     begin, end = (lines.index(text) for text in ("looking for a discrepancy model of pole", lines[-1]))
     told = [line.removeprefix("discrepancy model of pole: ") for line in lines[begin + 1 : end]]
-    assert told[0] == "refit with q^3" and told[-1] == "what it leaves"
+    assert told[0] == "refit with q^3" and told[-1] == "residual"
     assert lines[-1].startswith("discovered on pole: ")
 
 

@@ -24,6 +24,18 @@ LEROBOT_MAP = "joints: [shoulder, elbow, wrist, _]\nangle_unit: deg\n"
 START = 1_700_000_000 * 10**9  # [ns] of the first row's header
 LOGGED = 3_000_000  # [ns] later the recorder writes it
 
+ARM_MAP = """
+joints: [shoulder, elbow, wrist]
+time: {/joint_states: header, /command: log}
+angle_unit: rad
+columns:
+  joint_pos: /joint_states:position
+  joint_vel: /joint_states:velocity
+  joint_target: /command:data
+order: {/command: [wrist, elbow, shoulder]}
+"""
+SAME_CLOCK = ARM_MAP.replace("{/joint_states: header, /command: log}", "log")
+
 
 def stamps_ns(time: np.ndarray) -> np.ndarray:
     """Stamps [ns] of a rollout's time [s]."""

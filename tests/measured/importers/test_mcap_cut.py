@@ -10,8 +10,7 @@ from bumblebee.io.limits import LIMITS
 from bumblebee.measured.importers import read_rollouts
 from bumblebee.measured.importers.ros.mcap_file import read_mcap
 from bumblebee.measured.importers.ros.recording import Recording
-from tests.measured.importers.recordings import joint_messages, write_mcap
-from tests.measured.importers.test_rosbag import SAME_CLOCK
+from tests.measured.importers.recordings import SAME_CLOCK, joint_messages, write_mcap
 from tests.measured.simulated import ARM_JOINTS, arm_rollout
 
 pytest.importorskip("mcap_ros2")

@@ -8,9 +8,8 @@ import pytest
 from bumblebee.errors import BadInput
 from bumblebee.measured.importers import read_rollouts
 from bumblebee.measured.rollout import Rollout
-from tests.measured.importers.recordings import joint_messages, write_mcap
+from tests.measured.importers.recordings import SAME_CLOCK, joint_messages, write_mcap
 from tests.measured.importers.remedies.recordings import Messages, state, with_other
-from tests.measured.importers.test_rosbag import SAME_CLOCK
 from tests.measured.simulated import ARM_JOINTS, arm_rollout
 
 pytest.importorskip("mcap_ros2")

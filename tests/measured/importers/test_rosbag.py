@@ -12,6 +12,8 @@ from bumblebee.measured.importers import read_rollouts
 from bumblebee.measured.rollout import Rollout
 from bumblebee.robot.facts import joint_names
 from tests.measured.importers.recordings import (
+    ARM_MAP,
+    SAME_CLOCK,
     header,
     joint_messages,
     stamps_ns,
@@ -22,18 +24,6 @@ from tests.measured.importers.recordings import (
 from tests.measured.simulated import ARM_JOINTS, arm_rollout, g1_rollout
 
 pytest.importorskip("mcap_ros2")
-
-ARM_MAP = """
-joints: [shoulder, elbow, wrist]
-time: {/joint_states: header, /command: log}
-angle_unit: rad
-columns:
-  joint_pos: /joint_states:position
-  joint_vel: /joint_states:velocity
-  joint_target: /command:data
-order: {/command: [wrist, elbow, shoulder]}
-"""
-SAME_CLOCK = ARM_MAP.replace("{/joint_states: header, /command: log}", "log")
 
 
 def imported(folder: Path, name: str, text: str) -> list[Rollout]:

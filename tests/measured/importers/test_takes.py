@@ -10,9 +10,8 @@ from bumblebee.errors import BadInput
 from bumblebee.measured.importers import read_rollouts
 from bumblebee.measured.importers.clock import restarts, takes
 from bumblebee.measured.rollout import Rollout
-from tests.measured.importers.recordings import joint_messages, write_lerobot, write_mcap
+from tests.measured.importers.recordings import SAME_CLOCK, joint_messages, write_lerobot, write_mcap
 from tests.measured.importers.remedies.recordings import set_back
-from tests.measured.importers.test_rosbag import SAME_CLOCK
 from tests.measured.simulated import ARM_JOINTS, arm_rollout
 
 LEROBOT = "joints: [shoulder, elbow, wrist, _]\nangle_unit: rad\n"
