@@ -25,7 +25,7 @@ Slow = Annotated[
 
 @app.command("run")
 def run(
-    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or `shipped`.")],
+    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or shipped, randomised, imu.")],
     clip: Annotated[str, typer.Option("--clip", help="Name of the motion to follow.")],
     robot: Annotated[str, typer.Option("--robot", help=_WIRES)] = "sim",
     at: At = "",
@@ -44,6 +44,7 @@ def run(
     operator: Annotated[str, typer.Option("--operator", help="Who runs it, for the log; your login by default.")] = "",
 ) -> None:
     """Check robot and policy, stand up slowly, run one clip, damp; the log is a dataset of measured rollouts."""
+    from bumblebee.learning import pretrained
     from bumblebee.learning.export import export_shipped
     from bumblebee.wire.limits import Limits, read_limits
     from bumblebee.wire.session import Run
@@ -54,7 +55,7 @@ def run(
         _require_keys()
     chosen = _clip(motions, clip)
     with tempfile.TemporaryDirectory() as scratch:
-        folder = export_shipped(Path(scratch) / "shipped") if policy == "shipped" else _folder(policy)
+        folder = export_shipped(Path(scratch) / policy, policy) if policy in pretrained.SHIPPED else _folder(policy)
         job = Run(folder, chosen, robot, out, at, compensation, bounds, unattended=unattended, slow=slow,
                   operator=operator or getpass.getuser())  # fmt: skip
         ended, rollout = go(job, lambda line: print(plain(line), flush=True))

@@ -29,10 +29,10 @@ def export_policy(folder: Path, policy: Policy, physics_hz: float = 200.0) -> No
     write_export(folder, onnx_of(policy), shape.ahead, physics_hz, shape.seen, shape.action, shape.memory)
 
 
-def export_shipped(folder: Path) -> Path:
-    """Export the policy that comes with BumbleBee into a new folder, which is returned."""
+def export_shipped(folder: Path, name: str = "shipped") -> Path:
+    """Export a policy that comes with BumbleBee, by its name in `pretrained.SHIPPED`, into a new folder, returned."""
     folder.mkdir(parents=True)
-    export_policy(folder, load_policy(pretrained.FOLDER))
+    export_policy(folder, load_policy(pretrained.SHIPPED[name]))
     return folder
 
 

@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 import torch
 
+from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.learning import pretrained
+from bumblebee.learning.export import export_shipped
 from bumblebee.learning.policy import FILE, load_policy
 from bumblebee.learning.trial import World, try_policy
 from bumblebee.motion.embedded import EmbeddedConfig, make_library
@@ -42,3 +44,8 @@ def test_the_default_policy_has_the_tasks_own_observation_and_the_imu_policy_nee
     default, imu = (load_policy(pretrained.SHIPPED[name]).shape for name in ("shipped", "imu"))
     assert (default.seen, default.ahead) == (ObservationConfig(), EnvConfig().ahead)
     assert needed(expanded(imu.terms), 23, len(imu.ahead)) == ("imu", "heading", "encoders")
+
+
+def test_the_imu_policy_is_deployed_with_a_contract_that_asks_for_no_odometry(tmp_path: Path) -> None:
+    exported = ExportedPolicy.load(export_shipped(tmp_path / "imu", "imu"))
+    assert exported.contract["sensors"] == ["imu", "heading", "encoders"]
