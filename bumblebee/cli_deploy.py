@@ -77,6 +77,7 @@ def robot(
     jitter: Annotated[float, typer.Option("--jitter", min=0, help="Largest further delay, both ways [ms].")] = 0.5,
     dropped: Annotated[float, typer.Option("--dropped", help="Share of messages lost, both ways.")] = 0.0,
     late: Annotated[float, typer.Option("--late", help="Share of messages 50 ms late, both ways.")] = 0.0,
+    odometry: Annotated[bool, typer.Option(help="Whether it knows its base's velocity and place.")] = True,
     slow: Slow = 1.0,
     seconds: Annotated[float | None, typer.Option("--seconds", min=0, help="End after so long; else Ctrl-C.")] = None,
 ) -> None:
@@ -90,7 +91,7 @@ def robot(
 
     quiet_mujoco()
     faults = LineFaults(delay / 1e3, jitter / 1e3, dropped, late)
-    settings = RobotSettings(seed=seed, states=faults, orders=faults)
+    settings = RobotSettings(seed=seed, odometry=odometry, states=faults, orders=faults)
     effects = read_sealed(sealed) if sealed else []
     harden(ROBOT)
     print(f"a simulated G1 on the wire {wire}; Ctrl-C ends it", flush=True)

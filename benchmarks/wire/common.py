@@ -12,6 +12,7 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import kinds
 from bumblebee.wire.brain import Brain
+from bumblebee.wire.intake import numbers_for
 from bumblebee.wire.journal import layout, record
 from bumblebee.wire.limits import drives_of
 from bumblebee.wire.line import LineFaults
@@ -35,6 +36,8 @@ def clips(names: list[str]) -> list[Clip]:
 def rehearsed(policy: ExportedPolicy, clip: Clip, effects: list[dict[str, Any]], seed: int) -> tuple[Rehearsal, Any]:
     """A run, and its journal's records."""
     brain, robot = Brain(policy, clip), WireRobot(effects, RobotSettings(seed=seed, states=LINE, orders=LINE), 0)
-    plan = Plan(7, robot.card.robot, 4, clip.frames, brain.hold(), unattended=True, ramps=SHORT)
+    plan = Plan(
+        7, robot.card.robot, 4, clip.frames, brain.hold(), numbers_for(policy.sensors), unattended=True, ramps=SHORT
+    )
     run = Rehearsal(robot, brain, plan, drives_of(policy.contract))
     return run, np.frombuffer(b"".join(record(entry, 23) for entry in run.entries()), layout(23))

@@ -24,7 +24,7 @@ _AFTER = 0.2  # s for which orders to be off go out before the run ends
 
 @dataclass(frozen=True)
 class Tick:
-    """What one tick of the guard decided."""
+    """Decisions of one tick of the guard."""
 
     order: Order
     question: Question | None
@@ -50,7 +50,7 @@ class Guard:
 
     def __init__(self, plan: Plan, drives: Drives, now: int) -> None:
         self._plan, self._drives, self._layout = plan, drives, layout_of(drives.joints)
-        self.intake = Intake(plan.robot, self._layout, now)
+        self.intake = Intake(plan.robot, self._layout, plan.numbers, now)
         self._watch = Watch(drives, plan.limits, 1.0 / ORDER_HZ)
         self.phase, self.reason = Phase.WAIT, ""
         """Phase now, and the rule that ended the run; "" where it ended in good order."""
@@ -169,7 +169,7 @@ class Guard:
         return Question(tick, now, state)
 
     def _wish(self, now: int, state: State | None) -> Wish:
-        """What this phase wants of the drives, before any rule."""
+        """Order that this phase wants, before any rule."""
         gone, ramps, drives = (now - self._since) / SECOND, self._plan.ramps, self._drives
         zero = np.zeros_like(drives.kp)
         if self.phase is Phase.RISE:
@@ -188,7 +188,7 @@ class Guard:
         return self._still(state)
 
     def _sent(self, state: State, wish: Wish, step: Step) -> tuple[Wish, np.ndarray]:
-        """What goes out, and which drives (J,) bool are cut at their torque."""
+        """Order that goes out, and which drives (J,) bool are cut at their torque."""
         none = np.zeros(len(wish.target), dtype=bool)
         if self.phase in (Phase.WAIT, Phase.OFF):
             return replace(self._still(state), kd=np.zeros_like(wish.kd)), none

@@ -1,12 +1,24 @@
 """Which states of the robot count: newer than the last, of the same robot and joints, with numbers in them."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
 from bumblebee.wire.messages import State
 
-_NUMBERS = ("joint_pos", "joint_vel", "joint_torque", "base_quat", "base_ang_vel", "base_lin_vel", "base_pos")
+_ALWAYS = ("joint_pos", "joint_vel", "base_quat", "base_ang_vel")
+_ODOMETRY = {"velocity": "base_lin_vel", "height": "base_pos", "place": "base_pos"}
+
+
+def numbers_for(sensors: Sequence[str]) -> tuple[str, ...]:
+    """Fields of a state that must be numbers for a policy that needs these `sensors`; others may be NaN."""
+    return (*_ALWAYS, *dict.fromkeys(field for sensor, field in _ODOMETRY.items() if sensor in sensors))
+
+
+def without_numbers(state: State, names: Sequence[str]) -> str:
+    """First of these fields of a state that is not all numbers; "" for none."""
+    return next((name for name in names if not np.isfinite(getattr(state, name)).all()), "")
 
 
 class Intake:
@@ -15,11 +27,12 @@ class Intake:
     Args:
         robot: the one that was checked before the start.
         layout: of its joints.
+        numbers: its states' fields that must be numbers.
         now: when watching begins [ns].
     """
 
-    def __init__(self, robot: int, layout: int, now: int) -> None:
-        self._robot, self._layout = robot, layout
+    def __init__(self, robot: int, layout: int, numbers: Sequence[str], now: int) -> None:
+        self._robot, self._layout, self._numbers = robot, layout, numbers
         self.state: State | None = None
         """Newest usable one."""
         self.came = now
@@ -48,4 +61,4 @@ class Intake:
             return "repeated"
         if last is not None and (state.sequence < last.sequence or state.stamp_ns <= last.stamp_ns):
             return "out of order"
-        return "" if all(np.isfinite(getattr(state, name)).all() for name in _NUMBERS) else "no numbers"
+        return "no numbers" if without_numbers(state, self._numbers) else ""

@@ -1,4 +1,4 @@
-"""What the console hands to the processes that it starts: one JSON object each, on the command line."""
+"""The guard's part of a run, handed over by the console as one JSON object on the command line."""
 
 import json
 from dataclasses import asdict, dataclass, fields
@@ -28,10 +28,11 @@ def encode_job(job: Job) -> str:
 
 
 def decode_job(text: str) -> Job:
-    """What `encode_job` wrote."""
+    """Job from the text of `encode_job`."""
     read = json.loads(text)
     plan = read["plan"]
-    inner = {"hold": np.array(plan["hold"]), "limits": Limits(**plan["limits"]), "ramps": Ramps(**plan["ramps"])}
+    inner = {"hold": np.array(plan["hold"]), "numbers": tuple(plan["numbers"])}
+    inner |= {"limits": Limits(**plan["limits"]), "ramps": Ramps(**plan["ramps"])}
     return Job(**read | {"plan": Plan(**plan | inner), "drives": _drives(read["drives"])})
 
 

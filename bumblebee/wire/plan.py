@@ -1,4 +1,4 @@
-"""What a run is given before it begins, and what the policy's worker says first."""
+"""Facts of a run that are fixed before it begins."""
 
 from dataclasses import dataclass, field
 
@@ -13,7 +13,7 @@ ORDER_HZ = 200
 
 @dataclass(frozen=True)
 class Plan:
-    """What the guard was told after everything had been checked."""
+    """Orders of the console to the guard, after everything has been checked."""
 
     controller: int
     """Our number, drawn for this run."""
@@ -25,6 +25,8 @@ class Plan:
     """Control steps of the clip."""
     hold: np.ndarray
     """(J,) targets that carry the first frame [rad]."""
+    numbers: tuple[str, ...]
+    """Fields of a state that must be numbers, see `intake.numbers_for`."""
     unattended: bool = False
     """Nobody holds a key: with a simulated robot alone."""
     limits: Limits = field(default_factory=Limits)

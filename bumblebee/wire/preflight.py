@@ -1,4 +1,4 @@
-"""What is refused before anything moves: each a line that names what was expected, what came and what to do."""
+"""Refusals before anything moves: each a line that names what was expected, what came and what to do."""
 
 import secrets
 from collections.abc import Mapping, Sequence
@@ -12,6 +12,7 @@ from bumblebee.motion.clip import Clip
 from bumblebee.motion.kinematics import sole_points
 from bumblebee.robot.facts import ROBOT
 from bumblebee.wire.clock import Clock
+from bumblebee.wire.intake import without_numbers
 from bumblebee.wire.lcm_codec import Codec, decode_card
 from bumblebee.wire.limits import Drives, Limits
 from bumblebee.wire.link import Link
@@ -25,7 +26,7 @@ MAX_LIFT = 0.10
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a run needs of its robot."""
+    """Needs of a run that its robot must meet."""
 
     contract: Mapping[str, Any]
     drives: Drives
@@ -36,6 +37,8 @@ class Wanted:
     clip: Clip
     hold: np.ndarray
     """(J,) targets that carry its first frame [rad]."""
+    numbers: tuple[str, ...]
+    """Fields of a state that must be numbers."""
     limits: Limits
     unattended: bool
 
@@ -115,9 +118,11 @@ def _check_state(card: Card, state: State, wanted: Wanted) -> None:
     if state.controller:
         do = "End it first; a robot forgets a controller half a second after its last order."
         raise BadInput("wire: controller", "a robot that listens to nobody", f"controller {state.controller}", do)
-    for name in ("joint_pos", "joint_vel", "base_quat", "base_ang_vel", "base_lin_vel", "base_pos"):
-        if not np.isfinite(getattr(state, name)).all():
-            raise BadInput(f"wire: state: {name}", "numbers", "NaN or infinity", "Check the robot's sensors.")
+    if name := without_numbers(state, wanted.numbers):
+        do = "Check the robot's sensors."
+        if name in ("base_lin_vel", "base_pos"):
+            do = "Deploy a policy that needs no odometry, as `imu`."
+        raise BadInput(f"wire: state: {name}", "numbers, which the policy needs", "NaN or infinity", do)
     if (bad := np.flatnonzero(state.error)).size:
         joint, code = wanted.drives.joints[bad[0]], int(state.error[bad[0]])
         raise BadInput(f"wire: motor of {joint}", "no error", f"error {code}", "Clear it at the robot.")

@@ -39,13 +39,15 @@ class RobotSettings(Ranged):
     """How the robot and its line behave."""
 
     seed: Seed = 0
-    """Of noise, faults and the robot's clock."""
+    """Seed of noise, faults and the robot's clock."""
     state_hz: Annotated[int, Range(least=50, most=1000)] = 500
     """States a second; a whole number of milliseconds apart."""
     clock_ppm: Annotated[float, Range(least=-1000, most=1000)] = 40.0
     """How much faster than the controller's its clock runs [parts in a million]."""
     noise: Annotated[float, Range(least=0, most=10)] = 1.0
     """Factor on the sensors' noise."""
+    odometry: bool = True
+    """Whether it measures the base's velocity and place; NaN without."""
     gains_share: Annotated[float, Range(above=0, most=100)] = 2.0
     """Largest gains that its drives take, in units of the declared ones."""
     states: LineFaults = field(default_factory=LineFaults)
@@ -162,6 +164,7 @@ class WireRobot:
         sequence, self._sequence = self._sequence, self._sequence + 1
         clock = self._stamp(self._elapsed)
         since = self._next - hearing.came if order is not None else 0
+        known = 1.0 if self._settings.odometry else np.nan
         return State(
             self.card.robot,
             layout_of(self.card.joints),
@@ -172,8 +175,8 @@ class WireRobot:
             true.joint_torque[0],
             read.base_quat[0],
             read.base_ang_vel[0],
-            read.base_lin_vel[0],
-            self._place,
+            known * read.base_lin_vel[0],
+            known * self._place,
             true.foot_force[0, :, 2],
             np.full(len(self._kd), np.nan),
             np.zeros(len(self._kd), dtype=np.int64),

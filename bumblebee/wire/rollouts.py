@@ -40,6 +40,7 @@ def rollout_of(about: Mapping[str, Any], rows: np.ndarray) -> Rollout:
         raise BadInput(about["id"], "a run in which the policy was asked twice", f"{len(asks)} questions")
     now, then = rows[asks], rows[asks + 1]
     values = {name: now[name].astype(np.float64) for name in _MEASURED}
+    values = {name: value for name, value in values.items() if np.isfinite(value).all()}  # a robot may lack odometry
     values["base_quat"] /= np.linalg.norm(values["base_quat"], axis=1, keepdims=True)
     reason = ended_by(rows)
     notes = [f"ended by {reason}"] if reason else []

@@ -18,6 +18,7 @@ from bumblebee.robot.model import write_xml
 from bumblebee.wire.brain import Brain
 from bumblebee.wire.clock import Clock
 from bumblebee.wire.console import Ended, operate
+from bumblebee.wire.intake import numbers_for
 from bumblebee.wire.job import Job
 from bumblebee.wire.journal import read_journal
 from bumblebee.wire.limits import Limits, drives_of
@@ -34,7 +35,7 @@ JOURNAL = ".journal"
 
 @dataclass(frozen=True)
 class Run:
-    """What is to run, on which wire, and where it is written."""
+    """Policy, clip, wire and output of one run."""
 
     policy: Path
     clip: Clip
@@ -71,7 +72,8 @@ def run(job: Run, say: Callable[[str], None] = lambda line: None) -> tuple[Ended
     check(card, state, wanted)
     say(f"{card.name}, {'simulated' if card.simulated else 'REAL'}, {card.state_hz:g} states a second: nothing refused")
     controller, frames = new_controller(), job.clip.frames
-    plan = Plan(controller, card.robot, round(every), frames, wanted.hold, job.unattended, job.limits, job.ramps)
+    numbers, rest = numbers_for(policy.sensors), (job.unattended, job.limits, job.ramps)
+    plan = Plan(controller, card.robot, round(every), frames, wanted.hold, numbers, *rest)
     journal, about = _journal(job, policy, compensation)
     to_guard = Job(job.wire, job.at, job.slow, plan, wanted.drives)
     ended = operate(to_guard, job.policy, job.clip, job.compensation, journal, about, say)
@@ -103,7 +105,8 @@ def _wanted(job: Run, policy: ExportedPolicy, compensation: Compensation | None)
     kp, kd = (drives.kp, drives.kd) if compensation is None else (compensation.kp, compensation.kd)
     hold = Brain(policy, job.clip, compensation).hold()
     largest = (np.maximum(drives.kp, kp), np.maximum(drives.kd, kd))
-    return Wanted(policy.contract, drives, *largest, job.clip, hold, job.limits, job.unattended)
+    numbers = numbers_for(policy.sensors)
+    return Wanted(policy.contract, drives, *largest, job.clip, hold, numbers, job.limits, job.unattended)
 
 
 def _journal(job: Run, policy: ExportedPolicy, compensation: Compensation | None) -> tuple[Path, dict[str, object]]:

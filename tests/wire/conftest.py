@@ -9,6 +9,7 @@ import pytest
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.learning.export import export_shipped
 from bumblebee.wire.brain import Brain
+from bumblebee.wire.intake import numbers_for
 from bumblebee.wire.limits import drives_of
 from bumblebee.wire.phases import Ramps
 from bumblebee.wire.plan import Plan
@@ -28,11 +29,18 @@ def shipped(tmp_path_factory: pytest.TempPathFactory) -> ExportedPolicy:
 def rehearsal(shipped: ExportedPolicy) -> Callable[..., Rehearsal]:
     """Makes a run of a clip of half a second; what is given changes the robot's settings."""
 
-    def make(effects: list[dict[str, Any]] | None = None, frames: int = 25, **settings: Any) -> Rehearsal:
+    def make(
+        effects: list[dict[str, Any]] | None = None,
+        frames: int = 25,
+        policy: ExportedPolicy = shipped,
+        **settings: Any,
+    ) -> Rehearsal:
         clip, values = nod(frames=frames), {"state_hz": 250, "noise": 0.0} | settings
-        brain, robot = Brain(shipped, clip), WireRobot(effects or [], RobotSettings(**values), 0)
-        plan = Plan(7, robot.card.robot, 4, clip.frames, brain.hold(), unattended=True, ramps=SHORT)
-        return Rehearsal(robot, brain, plan, drives_of(shipped.contract))
+        brain, robot = Brain(policy, clip), WireRobot(effects or [], RobotSettings(**values), 0)
+        plan = Plan(
+            7, robot.card.robot, 4, clip.frames, brain.hold(), numbers_for(policy.sensors), unattended=True, ramps=SHORT
+        )
+        return Rehearsal(robot, brain, plan, drives_of(policy.contract))
 
     return make
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from bumblebee.wire.guard import PERIOD, Guard, Tick
+from bumblebee.wire.intake import numbers_for
 from bumblebee.wire.journal import Entry, record
 from bumblebee.wire.keys import Keys
 from bumblebee.wire.limits import Drives
@@ -29,7 +30,7 @@ def drives() -> Drives:
 
 def plan(frames: int = FRAMES, **other: Any) -> Plan:
     values: dict[str, Any] = {"unattended": True, "ramps": QUICK}
-    return Plan(CONTROLLER, 11, 4, frames, HOLD, **values | other)
+    return Plan(CONTROLLER, 11, 4, frames, HOLD, numbers_for(("velocity", "place")), **values | other)
 
 
 @dataclass

@@ -13,6 +13,7 @@ import pytest
 
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
+from bumblebee.learning.export import export_shipped
 from bumblebee.measured.intake import intake
 from bumblebee.measured.rollout import read_rollout
 from bumblebee.robot.facts import joint_names
@@ -137,3 +138,22 @@ def test_a_run_that_never_carried_itself_is_no_rollout(tmp_path: Path) -> None:
     writer.close()
     assert write_down(tmp_path / "a.journal", tmp_path / "dataset") is None
     assert not (tmp_path / "dataset").exists()
+
+
+def test_a_policy_of_imu_and_encoders_runs_a_robot_without_odometry_whose_log_lacks_the_column(
+    rehearsal: Callable[..., Rehearsal], tmp_path: Path
+) -> None:
+    imu = ExportedPolicy.load(export_shipped(tmp_path / "imu", "imu"))
+    run = rehearsal(policy=imu, odometry=False)
+    rollout = rollout_of(G1, rows_of(run))
+    assert run.guard.reason == "" and not run.guard.intake.refused
+    assert len(rollout.time) >= 25 and rollout.base_lin_vel is None and rollout.base_ang_vel is not None
+
+
+def test_a_policy_that_needs_odometry_never_begins_where_there_is_none(rehearsal: Callable[..., Rehearsal]) -> None:
+    run = rehearsal(odometry=False)
+    run.longest = 2.0
+    list(run.entries())
+    assert (
+        run.guard.reason == "silent" and run.guard.intake.state is None and run.guard.intake.refused["no numbers"] > 0
+    )

@@ -1,4 +1,4 @@
-"""What does not fit is refused before anything moves, in one line that names it and what to do."""
+"""A robot or a clip that does not fit is refused before anything moves, in one line that says what to do."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,6 +11,7 @@ import pytest
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.errors import BadInput
 from bumblebee.wire.clock import Clock
+from bumblebee.wire.intake import numbers_for
 from bumblebee.wire.lcm_codec import Codec, encode_card
 from bumblebee.wire.limits import Limits, drives_of, read_limits
 from bumblebee.wire.link import Link, open_link
@@ -31,7 +32,17 @@ def there() -> tuple[Card, State]:
 @pytest.fixture
 def wanted(shipped: ExportedPolicy) -> Wanted:
     drives = drives_of(shipped.contract)
-    return Wanted(shipped.contract, drives, drives.kp, drives.kd, nod(), nod().joint_pos[0], Limits(), True)
+    return Wanted(
+        shipped.contract,
+        drives,
+        drives.kp,
+        drives.kd,
+        nod(),
+        nod().joint_pos[0],
+        numbers_for(shipped.sensors),
+        Limits(),
+        True,
+    )
 
 
 def swapped(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -67,6 +78,7 @@ STATES: dict[str, tuple[dict[str, Any], str]] = {
     "another robot on the wire": ({"robot": 4}, "another robot is on this wire"),
     "a second controller": ({"controller": 77}, "listens to nobody, came controller 77"),
     "no numbers": ({"base_quat": np.full(4, np.nan)}, "base_quat: expected numbers"),
+    "no odometry": ({"base_pos": np.full(3, np.nan)}, "base_pos: expected numbers.*as `imu`"),
     "a drive with an error": (
         {"error": np.arange(23)},
         "motor of left_hip_roll_joint: expected no error, came error 1",
@@ -82,6 +94,15 @@ CLIPS = {"turned": (turned, "pelvis within"), "in the air": (lifted, "soles with
 
 def test_the_robot_as_it_is_is_not_refused(there: tuple[Card, State], wanted: Wanted) -> None:
     check(*there, wanted)
+
+
+def test_a_policy_that_needs_no_odometry_takes_a_robot_without(there: tuple[Card, State], wanted: Wanted) -> None:
+    card, state = there
+    lost = {"base_lin_vel": np.full(3, np.nan), "base_pos": np.full(3, np.nan), "joint_torque": np.full(23, np.nan)}
+    blind = replace(wanted, numbers=numbers_for(("imu", "heading", "encoders")))
+    check(card, replace(state, **lost), blind)
+    with pytest.raises(BadInput, match="joint_vel: expected numbers"):
+        check(card, replace(state, joint_vel=np.full(23, np.nan)), blind)
 
 
 @pytest.mark.parametrize("what", CARDS)
