@@ -19,6 +19,7 @@ from typing import Any
 from bumblebee.errors import BadInput
 from bumblebee.last_line import guarded
 from bumblebee.report.held_out import error_line
+from bumblebee.report.names import label, reference
 from bumblebee.report.opening import effect_rows
 from bumblebee.report.results import LoopResults
 from bumblebee.report.success_steps import step_differences, success_steps
@@ -98,7 +99,7 @@ def code_of(page: str) -> str:
 def _round(results: LoopResults) -> Json:
     turn, sealed = results.rounds[-1], results.sealed or {}
     found, undeclared, false = hits(sealed["effects"], turn.diagnosis["effects"])
-    steps = success_steps(results.evaluation, turn)
+    steps = success_steps(results.evaluation, turn, label(results, reference(results.evaluation)))
     return {
         "undeclared": undeclared,
         "found": found,

@@ -99,7 +99,12 @@ def run(options: argparse.Namespace) -> int:
             _tell(options.out / CURVE)
         if options.gpus == 1 and clock.due("save", _SAVE_EVERY):  # the ranks must save together
             trainer.save_checkpoint()
-        return (not options.iterations and trainer._seconds >= 60 * options.minutes) or clock.over
+        return done() or clock.over
+
+    def done() -> bool:
+        if options.iterations:
+            return trainer.iteration >= options.iterations
+        return trainer._seconds >= 60 * options.minutes
 
     trainer.train("world model", enough)
     trainer.save_checkpoint()
@@ -113,7 +118,7 @@ def run(options: argparse.Namespace) -> int:
         "model, RMS in held-out worlds: " + ", ".join(f"{name} {value:.1f}" for name, value in errors.items()),
         flush=True,
     )
-    if options.jobs and not clock.over:
+    if options.jobs and done():
         report(
             [Tried("world_model", options.out, Manner(settings.env.observation))],
             options.motions,

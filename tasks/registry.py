@@ -223,12 +223,9 @@ def log_run(
     points = [Point(metric_name(name), value, end, step) for name, step, value in numbers]
     settings = [Param(key, fitted(value, LONGEST_PARAM, LINEAGE)) for key, value in settings_of.items()]
     written = [RunTag(key, value) for key, value in _fitted_tags(labels).items()]
-    for start in range(0, max(len(points), 1), 1000):
-        client.log_batch(run_id, metrics=points[start : start + 1000])
-    for start in range(0, len(settings), 100):
-        client.log_batch(run_id, params=settings[start : start + 100])
-    for start in range(0, len(written), 100):
-        client.log_batch(run_id, tags=written[start : start + 100])
+    for kind, entries, most in (("metrics", points, 1000), ("params", settings, 100), ("tags", written, 100)):
+        for first in range(0, len(entries), most):
+            client.log_batch(run_id, **{kind: entries[first : first + most]})
     client.log_text(run_id, origin, LINEAGE)
     made = manifest(current_stage()[1] if outputs is None else outputs)
     client.log_text(run_id, _text(made), MANIFEST)

@@ -148,17 +148,10 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
         return keep(job.stage, job.parent, job.out, config, job.cluster, job.round)
     torch.set_num_threads(config.env.threads)
     folder = scratch(f"{job.stage}-{job.name}", job.parent or paths.FILTERED, config)
-    own = config.env
     if config.gpus > 1 and "RANK" not in os.environ:
         return _train_together(job, config)
     ranks = join() if config.gpus > 1 else Ranks()
-    world, buffers = job.world, own.buffers
-    model = task_model(own, job.model)
-    engine = make_engine(own.engine, model, own.num_worlds, own.threads, world.hooks, buffers, ranks.device)
-    clips, share = played(config.algorithm, job.clips, job.share)
-    library = MotionLibrary(clips, own.ahead, device=engine.device)
-    env = TrackingEnv(library, engine, own, ranks.seed(config.seed), world.action_adapter, share)
-    trainer = make_learner(config.algorithm, env, folder, config.seed, job.parent, ranks)
+    trainer = make_learner(config.algorithm, _env(job, config, ranks), folder, config.seed, job.parent, ranks)
     # A child has its parent's layers: card and run say which.
     config = replace(config, **{config.learner: trainer.config})
     if not ranks.first:
@@ -197,6 +190,16 @@ def train_policy(job: Job, config: TrainingConfig) -> dict[str, Any]:
         curve=folder / CURVE,
     )
     return card
+
+
+def _env(job: Job, config: TrainingConfig, ranks: Ranks) -> TrackingEnv:
+    """This rank's worlds, with the clips that its learner's worlds play."""
+    own, world = config.env, job.world
+    model = task_model(own, job.model)
+    engine = make_engine(own.engine, model, own.num_worlds, own.threads, world.hooks, own.buffers, ranks.device)
+    clips, share = played(config.algorithm, job.clips, job.share)
+    library = MotionLibrary(clips, own.ahead, device=engine.device)
+    return TrackingEnv(library, engine, own, ranks.seed(config.seed), world.action_adapter, share)
 
 
 def keep(

@@ -24,6 +24,7 @@ from bumblebee.diagnosis.thresholds import Thresholds
 from bumblebee.diagnosis.thresholds.dataset import DatasetThresholds, TimeSteps
 from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout, write_rollout
+from bumblebee.report.windows import windows_inlay
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,8 @@ def _diagnosed(drawn: Drawn, folder: Path, config: DiagnosisConfig) -> dict[str,
     for rollout in drawn.rollouts:
         write_rollout(dataset / "rollouts" / f"{rollout.rollout_id}.parquet", rollout)
     session = open_session(model, dataset, config.thresholds.dataset)
-    write_diagnosis(diagnose(session, config), out)
+    found = diagnose(session, config)
+    write_diagnosis(found, out, replays=windows_inlay(found.session, found.effects))
     document = json.loads((out / "diagnosis.json").read_text())
     mujoco.MjModel.from_xml_path(str(out / "model.xml"))
     named = [{"effect": e["effect"], "where": e["where"]} for e in document["effects"]]

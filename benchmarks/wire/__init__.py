@@ -1,1 +1,1 @@
-"""What the wire costs and what its safety layer does: latency, tripped rules, faults, success, the loop."""
+"""Cost of the wire and answers of its safety layer: latency, tripped rules, faults, success, the loop."""

@@ -62,7 +62,7 @@ class StandInRobots:
         self._body.step(command, robots, cycles)
 
     def issued(self, command: ServoCommand) -> ServoCommand:
-        """What becomes of a command to all robots when it is issued; `go_on` moves them under it."""
+        """Command to all robots as it is after it was issued; `go_on` moves them under it."""
         return self._body.issued(command)
 
     def go_on(self, arrived: ServoCommand, cycles: int) -> None:

@@ -49,7 +49,7 @@ class Take:
     fps: float
     robots: tuple[Drawn, ...]
     shape: Shape
-    """Of each of the robots."""
+    """States of each of the robots."""
     note: str = ""
     """Line under the picture."""
 
@@ -63,7 +63,7 @@ class Part:
     names: tuple[tuple[str, str], ...]
     """(group, name) of the replays that are in it."""
     note: str = ""
-    """What was thinned or left out for size; "" for nothing."""
+    """Note on frames and clips that were left out for size; "" for none."""
 
 
 def side_by_side(robots: Sequence[np.ndarray]) -> np.ndarray:

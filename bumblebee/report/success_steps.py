@@ -23,7 +23,7 @@ class Step:
     control: bool = False
 
 
-def success_steps(summary: Json, turn: RoundResults, base: str = "base") -> tuple[Step, ...]:
+def success_steps(summary: Json, turn: RoundResults, base: str) -> tuple[Step, ...]:
     """Steps that were evaluated: the loop's beginning, before, compensated, refined, the generalist, the two controls.
 
     Args:

@@ -68,5 +68,5 @@ def observe_imu(state: RobotState, ref: ReferenceFrame, last_action: Tensor) -> 
 
 
 def _others(points: Tensor) -> Tensor:
-    """Of key bodies (B, K, 3) all but the pelvis; slices, since a list of numbers would be copied from the host."""
+    """All key bodies of (B, K, 3) but the pelvis; slices, since a list of numbers would be copied from the host."""
     return torch.cat((points[:, :_PELVIS], points[:, _PELVIS + 1 :]), dim=1)

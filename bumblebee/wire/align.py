@@ -26,7 +26,7 @@ class Alignment:
 
 
 def aligned(pos: np.ndarray, quat: np.ndarray, clip_pos: np.ndarray, clip_quat: np.ndarray) -> Alignment:
-    """What puts a robot at pos (3,) [m], quat (4,) over the clip's first frame, heading as that one does."""
+    """Alignment that puts a robot at pos (3,) [m], quat (4,) over the clip's first frame, heading as that one does."""
     turn = quaternions.multiply(quaternions.heading(clip_quat), quaternions.conjugate(quaternions.heading(quat)))
     shift = clip_pos - quaternions.rotate(turn, pos)
     return Alignment(turn, shift * np.array([1.0, 1.0, 0.0]))

@@ -56,7 +56,7 @@ class Brain:
 
     @torch.inference_mode()
     def answer(self, question: Question) -> Answer:
-        """What the policy wants; a question at tick 0 puts the clip's first frame where the robot is."""
+        """The policy's answer; a question at tick 0 puts the clip's first frame where the robot is."""
         state, clip = question.state, self._clip
         if question.tick == 0 or self._alignment is None:
             self._alignment = aligned(state.base_pos, state.base_quat, clip.root_pos[0], clip.root_quat[0])

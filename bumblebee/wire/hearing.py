@@ -45,7 +45,7 @@ class Hearing:
             self.order, self.came = order, now
 
     def mode(self, now: int) -> Mode:
-        """What the drives do at `now` [ns]: as the order says, DAMP where it is too old, OFF without one."""
+        """Mode of the drives at `now` [ns]: as the order says, DAMP where it is too old, OFF without one."""
         if self.order is not None and now - self.came > RELEASE * SECOND:
             self.order = None
         if self.order is None:

@@ -142,7 +142,7 @@ class Writer:
 
 
 def read_journal(path: Path) -> tuple[dict[str, Any], np.ndarray]:
-    """What a journal says of its run, and its records.
+    """A journal's facts about its run, and its records.
 
     Raises:
         BadInput: no journal, or one of another version.

@@ -31,7 +31,7 @@ def encode_keys(keys: Keys) -> bytes:
 
 
 def decode_keys(message: bytes) -> Keys:
-    """What `encode_keys` wrote."""
+    """Keys from the bytes of `encode_keys`."""
     return Keys(*(int(value) for value in np.frombuffer(message, _LAYOUT, 1)[0]))
 
 

@@ -52,11 +52,11 @@ class Codec:
         return _packed("order_t", self.joints, order)
 
     def state(self, message: bytes) -> State:
-        """What `encode_state` wrote; BadInput for bytes that are no such message."""
+        """State from the bytes of `encode_state`; BadInput for bytes that are no such message."""
         return State(**_moded("state", _unpacked("state", self.joints, message)))
 
     def order(self, message: bytes) -> Order:
-        """What `encode_order` wrote; BadInput for bytes that are no such message."""
+        """Order from the bytes of `encode_order`; BadInput for bytes that are no such message."""
         return Order(**_moded("order", _unpacked("order", self.joints, message)))
 
 
@@ -75,7 +75,7 @@ def encode_card(card: Card) -> bytes:
 
 
 def decode_card(message: bytes) -> Card:
-    """What `encode_card` wrote; BadInput for bytes that are no such message."""
+    """Card from the bytes of `encode_card`; BadInput for bytes that are no such message."""
     try:
         mark, version, count, robot, simulated = struct.unpack_from(_CARD, message)
         _check("card", mark, version)

@@ -39,7 +39,7 @@ MODES = {
     Phase.DAMP: Mode.DAMP,
     Phase.OFF: Mode.OFF,
 }
-"""What the drives are told in each phase."""
+"""Mode that the drives are told in each phase."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ _HEAD = np.dtype([("tick", "<i8"), ("asked_ns", "<i8")])
 
 @dataclass(frozen=True)
 class Question:
-    """What does the policy want at this tick?"""
+    """A state at a control tick, for which the policy's wish is asked."""
 
     tick: int
     """Control step of the clip; each question with 0 begins it anew from where the robot is."""
@@ -24,13 +24,13 @@ class Question:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the policy wants."""
+    """Wish of the policy for a question."""
 
     tick: int
     asked_ns: int
     """That of the question."""
     sequence: int
-    """Of the state that it answers."""
+    """Sequence of the state that it answers."""
     wish: Wish
     reference: Reference
     action: np.ndarray
@@ -46,7 +46,7 @@ def encode_question(question: Question, codec: Codec) -> bytes:
 
 
 def decode_question(message: bytes, codec: Codec) -> Question:
-    """What `encode_question` wrote."""
+    """Question from the bytes of `encode_question`."""
     head = np.frombuffer(message, _HEAD, 1)[0]
     return Question(int(head["tick"]), int(head["asked_ns"]), codec.state(message[_HEAD.itemsize :]))
 
@@ -78,7 +78,7 @@ def encode_answer(answer: Answer) -> bytes:
 
 
 def decode_answer(message: bytes, joints: int) -> Answer:
-    """What `encode_answer` wrote."""
+    """Answer from the bytes of `encode_answer`."""
     read = np.frombuffer(message, _layout(joints), 1)[0]
     wish = Wish(*(read[name].copy() for name in ("target", "kp", "kd", "torque")))
     reference = Reference(read["reference"].copy(), read["quat"].copy(), float(read["height"]))

@@ -1,4 +1,4 @@
-"""What a process can do to be woken in time: no collector, memory locked, first in the queue where it is permitted."""
+"""Steps by which a process is woken in time: no collector, memory locked, first in the queue where it is permitted."""
 
 import ctypes
 import gc

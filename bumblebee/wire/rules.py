@@ -51,7 +51,7 @@ class Reference:
     quat: np.ndarray
     """(4,) orientation of the pelvis in the robot's own world, wxyz."""
     height: float
-    """Of the pelvis above the floor [m]."""
+    """Height of the pelvis above the floor [m]."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ FINDING = "3 effects were not in its model; 2 found. Followed: 58\u00a0% before 
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """What a finished loop left, in this folder."""
+    """Outputs of a finished loop, in this folder."""
     monkeypatch.chdir(tmp_path)
     folder = Path("runs/my lab")
     for path in (folder / paths.REPORT, folder / paths.PUBLISHED):

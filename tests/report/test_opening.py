@@ -74,7 +74,7 @@ def test_rows_that_were_not_evaluated_are_left_out() -> None:
     made = won_back()
     some = [e for e in made.evaluation["results"] if e["policy"] in ("experts-r0", "experts-r1")]
     results = replace(made, evaluation={**made.evaluation, "results": some})
-    assert [s.called for s in success_steps(results.evaluation, made.rounds[0])] == ["before", "refined"]
+    assert [s.called for s in success_steps(results.evaluation, made.rounds[0], "base")] == ["before", "refined"]
     assert "compensated" not in headline(results)
     assert step_differences(results.evaluation, made.rounds[0]) == [
         "refined against before: +58 points [+41, +75], p = 0.0004: better"

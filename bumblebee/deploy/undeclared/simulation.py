@@ -163,7 +163,7 @@ class TrueRobots:
         self.go_on(ServoCommand(arrived), CYCLES)
 
     def issued(self, command: ServoCommand) -> ServoCommand:
-        """What becomes of a command to all robots when it is issued."""
+        """Command to all robots as it is after it was issued."""
         for i in self._acting["tick"]:
             command = self.laws[i].tick(self.world, command)
         return command

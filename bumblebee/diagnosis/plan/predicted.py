@@ -70,7 +70,7 @@ def refuse_idle(told: dict[str, Any]) -> None:
             "plan",
             "runs that tell effects apart",
             f"none within the limits: pairs told apart {before} of {len(asked)} now, {after} with all runs",
-            "Nothing is written. Add `--gains 0.5,1,2` or `--damping 0.3` where the robot's gains can be set.",
+            "Nothing is written. Where the robot's kd can be set, add `--damping 0.3`.",
         )
 
 

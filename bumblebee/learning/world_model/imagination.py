@@ -125,7 +125,7 @@ class Imagination:
         return Rollout.of(shown, after, rewards, losses, self._left(starts))
 
     def _valued(self, seen: Tensor, state: RobotState, ref: ReferenceFrame, last: Tensor) -> Tensor:
-        """What the value sees (B, V) where the policy sees `seen` (B, D)."""
+        """Observations of the value (B, V) where the policy sees `seen` (B, D)."""
         return torch.cat((seen, see(self.beside, state, ref, last)), dim=-1) if self.beside else seen
 
     def _advance(

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import mujoco
 
@@ -36,5 +37,10 @@ def friction(half: float = 0.1) -> tuple[dict, list]:
 def planned(damping: bool = False, seed: int = 0) -> Plan:
     """A plan after `friction`, with another kd to set or without."""
     more = {"damping": (0.2,), "runs": 3, "pool": 16} if damping else {}
-    config = replace(LIMITS, seed=seed, **more)
+    return planned_with(seed=seed, **more)
+
+
+def planned_with(**settings: Any) -> Plan:
+    """A plan after `friction`, with other settings."""
+    config = replace(LIMITS, **settings)
     return make_plan(mujoco.MjSpec.from_string(XML), "arm.xml", config, slow_session(), findings_of(*friction()))
