@@ -82,10 +82,9 @@ def _muon(matrices: list[nn.Parameter]) -> torch.optim.Muon:
 
 
 class Learning:
-    """A gradient step of several networks, which ranks take together; one rank alone records it on a GPU.
+    """A gradient step of several networks, which ranks take together; recorded on a GPU.
 
-    Several ranks exchange their gradients between two halves. The first could be recorded alone, but on two H100 CUDA
-    refused to (its backward pass reaches for the legacy stream).
+    Several ranks exchange their gradients inside the recording, as NCCL allows once a few steps were taken.
 
     Args:
         differentiate: takes the gradients of all `descents`.
@@ -102,18 +101,15 @@ class Learning:
         ranks: Ranks,
     ) -> None:
         self._differentiate, self._apply, self._descents, self._ranks = differentiate, apply, descents, ranks
-        self._recorded = Recorded(self._whole, descents[0].rate.device, lambda: [])
+        self._recorded = Recorded(self._step, descents[0].rate.device, lambda: [])
 
     def __call__(self) -> None:
         """Learn once."""
-        if self._ranks.count == 1:
-            self._recorded()
-            return
-        self._differentiate()
-        for descent in self._descents:
-            descent.exchange(self._ranks)
-        self._apply()
+        self._recorded()
 
-    def _whole(self) -> None:
+    def _step(self) -> None:
         self._differentiate()
+        if self._ranks.count > 1:
+            for descent in self._descents:
+                descent.exchange(self._ranks)
         self._apply()
