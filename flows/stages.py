@@ -48,9 +48,9 @@ class Stage:
 
     @property
     def title(self) -> str:
-        """For people: `refine round 1 c0`."""
-        number, cluster = self.option("round"), self.option("cluster")
-        parts = [self.kind, f"round {number}" if number else "", cluster or ""]
+        """For people: `refine round 1 c0`, `control round 1 c0 delta`."""
+        number, cluster, kind = (self.option(name) for name in ("round", "cluster", "kind"))
+        parts = [self.kind, f"round {number}" if number else "", cluster or "", kind or ""]
         return " ".join(part for part in parts if part)
 
 

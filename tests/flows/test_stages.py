@@ -31,6 +31,11 @@ def test_a_change_touches_what_follows_and_nothing_else():
     assert downstream(DIAMOND, "a") == {"b", "c", "d"}
 
 
+def test_titles_of_the_real_pipeline_differ():
+    stages = read_stages(Path.cwd())
+    assert len({each.title for each in stages}) == len(stages)
+
+
 def test_a_title_names_round_and_cluster():
     refine = stage("refine@after0-c1", command="python -m tasks.refine --round 1 --cluster c1")
     assert (refine.kind, refine.title, refine.option("round")) == ("refine", "refine round 1 c1", "1")
