@@ -20,6 +20,7 @@ from torch import Tensor
 from torch import distributed as dist
 
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
+from bumblebee.learning.update_graph import forget_recordings
 
 T = TypeVar("T")
 _LAUNCHED = "BUMBLEBEE_LAUNCHED"
@@ -132,6 +133,7 @@ def _wait_for_end() -> None:
 def leave() -> None:
     """Take leave of the other ranks, if there are any."""
     if dist.is_initialized():
+        forget_recordings()
         dist.destroy_process_group()
 
 

@@ -7,12 +7,15 @@ recorded goes on without a graph.
 
 import contextlib
 import sys
+import weakref
 from collections.abc import Callable, Iterable, Iterator
 
 import torch
 from torch import Tensor
 
 _EAGER_CALLS = 3  # real calls before the recording: kernels, libraries and Adam's state are loaded by then
+
+_ALL: "weakref.WeakSet[Recorded]" = weakref.WeakSet()
 
 Place = tuple[int, tuple[int, ...]]
 
@@ -42,11 +45,16 @@ class Recorded:
         self._graph: torch.cuda.CUDAGraph | None = None
         self._places: tuple[Place, ...] = ()
         self._stream: torch.cuda.Stream | None = None
+        _ALL.add(self)
 
     def renew(self) -> None:
         """Forget a recording that is of other tensors than those in use now; once an update is enough."""
         if self._graph is not None and self._places != self._now():
-            self._graph, self._calls = None, 0
+            self.forget()
+
+    def forget(self) -> None:
+        """Work without the recording until there is a new one."""
+        self._graph, self._calls = None, 0
 
     def __call__(self) -> None:
         """Do the work once."""
@@ -98,6 +106,12 @@ class Recorded:
         assert self._graph is not None
         with torch.cuda.device(self._device), torch.inference_mode():
             self._graph.replay()
+
+
+def forget_recordings() -> None:
+    """Free every recording of this process: NCCL waits at its end for all graphs that hold exchanges of its own."""
+    for recorded in list(_ALL):
+        recorded.forget()
 
 
 @contextlib.contextmanager

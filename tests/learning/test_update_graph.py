@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from bumblebee.learning.update_graph import Recorded
+from bumblebee.learning.update_graph import Recorded, forget_recordings
 from tests.learning.test_update import CONFIG, algorithm, learned, networks
 
 GPU = pytest.mark.skipif(not torch.cuda.is_available(), reason="no NVIDIA GPU")
@@ -61,6 +61,19 @@ def test_a_recording_is_renewed_when_a_tensor_has_moved(pretended: Callable[...,
         recorded.renew()
         recorded()
     assert calls == ["work"] * 3 + ["record", "replay"]
+
+
+def test_ranks_that_part_free_their_recordings(pretended: Callable[..., Recorded]) -> None:
+    """NCCL's end waits for graphs that hold its exchanges; work after that is not a replay."""
+    calls: list[str] = []
+    recorded = pretended(calls, [])
+    for _ in range(5):
+        recorded()
+    forget_recordings()
+    assert recorded._graph is None
+    calls.clear()
+    recorded()
+    assert calls == ["work"]
 
 
 def test_a_recording_that_fails_is_told_once_and_work_goes_on(
