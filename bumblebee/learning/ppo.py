@@ -134,7 +134,10 @@ class Trainer(Learner):
 
     def _start_from(self, parent: Policy, name: str) -> None:
         if not parent.critic_state:
-            wanted, do = "a policy with its critic, as PPO leaves it", "Set `learner: world_model`, which needs none."
+            wanted, do = (
+                "a policy with a critic, as training leaves it",
+                "Set `learner: world_model`, which needs none.",
+            )
             raise BadInput(f"{name}: critic", wanted, "none", do)
         here, there = shape_of(self.env, self.config.hidden), parent.shape
         if here.critic_observation != there.critic_observation:

@@ -37,7 +37,6 @@ TINY = [
     "learner.policy_batch=8",
     "learner.model_batch=8",
     "learner.model_hidden=[8]",
-    "learner.value_hidden=[8]",
     "residual.window=4",
     "residual.updates=2",
     "residual.batch=4",

@@ -36,15 +36,13 @@ class WorldModelConfig(Ranged):
     model_hidden: Widths = (1024, 1024, 1024)
     """Widths of the model's layers, each with layer normalisation and SiLU."""
     hidden: Widths = (1024, 512, 256)
-    """Widths of the policy's layers, ELU."""
+    """Widths of the policy's and the value's layers, ELU."""
     model_rate: Rate = 1e-3
     """Learning rate of the model at first; it falls to a tenth along a cosine."""
     policy_rate: Rate = 5e-4
     """Learning rate of the policy at first; it falls likewise."""
-    value_hidden: Widths = (512, 256, 128)
-    """Widths of the layers of the value, which says what comes after the imagined steps, ELU."""
     value_rate: Rate = 1e-3
-    """Learning rate of the value at first; it falls likewise."""
+    """Learning rate at first of the value, which says what comes after the imagined steps; it falls likewise."""
     value_average: Share = 0.99
     """Weight of the past in the average of the value's weights, which its targets and the policy see."""
     trace: Share = 0.95

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from bumblebee.errors import BadInput
 from bumblebee.files import save_tensors
 from bumblebee.learning.checkpoint import load_checkpoint
+from bumblebee.learning.policy import load_policy
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.context import context_of
@@ -216,4 +217,5 @@ class ContinuedTrainer(WorldModelTrainer):
         whole = corrected(model, None if residual is None else residual.to(env.device))
         actor = self.policy_update.actor
         self.policy_update = PolicyUpdate(actor, whole, self.imagination, self.memory, self.config)
+        self._begin_value(None if parent is None else load_policy(parent))
         self._resume()  # into the networks that are used

@@ -2,10 +2,11 @@
 
 Values are counted in the mean reward of a control step to come, (1 - gamma) times the discounted sum, so that they are
 of the size of a reward whatever the discount. A failure earns nothing after it. A clip's end is no failure: as in PPO,
-the value of the step before it stands for what would follow.
+the value of the step before it stands for what would follow. So the value is PPO's critic but for a factor, and either
+learner goes on from the other's.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 
 import torch
@@ -19,18 +20,25 @@ class Critic(nn.Module):
     """A network of the value, and a slow average of it that the targets are made of.
 
     Args:
-        observation: V, entries of what it sees.
+        observation: V, entries of what it sees: the first of what PPO's critic sees.
+        whole: entries of what PPO's critic sees, V at least.
         hidden: widths of the layers, ELU.
     """
 
-    def __init__(self, observation: int, hidden: Sequence[int]) -> None:
+    def __init__(self, observation: int, whole: int, hidden: Sequence[int]) -> None:
         super().__init__()
         self.network = MLP(observation, 1, list(hidden), "elu")
         with torch.no_grad():  # values, and the gradient that they give the policy, begin at zero
             self.network[-1].weight.zero_()
             self.network[-1].bias.zero_()
         self.average = deepcopy(self.network).requires_grad_(False)
-        self.normalizer = EmpiricalNormalization(observation).eval()
+        self.normalizer = EmpiricalNormalization(whole).eval()
+        self._seen = observation
+
+    def normalised(self, seen: Tensor) -> Tensor:
+        """Observations (..., V) in units of their spread."""
+        mean, std = (tensor[0, : self._seen] for tensor in (self.normalizer._mean, self.normalizer._std))
+        return (seen - mean) / (std + self.normalizer.eps)
 
     def forward(self, seen: Tensor) -> Tensor:
         """Values (...) of normalised observations (..., V), by the network that learns."""
@@ -43,6 +51,28 @@ class Critic(nn.Module):
     def follow(self, share: float) -> None:
         """Move the average by this share of the way to the network."""
         torch._foreach_lerp_(list(self.average.parameters()), list(self.network.parameters()), share)
+
+    def to_ppo(self, factor: float) -> dict[str, Tensor]:
+        """The state of rsl_rl's critic that values a state `factor` times as high, whatever it sees beside."""
+        layers = self.average.state_dict()
+        first, last = "0.weight", f"{len(self.average) - 1}"
+        layers[first] = nn.functional.pad(layers[first], (0, self.normalizer._mean.shape[1] - self._seen))
+        for name in (f"{last}.weight", f"{last}.bias"):
+            layers[name] = factor * layers[name]
+        normalizer = self.normalizer.state_dict()
+        state = {f"obs_normalizer.{n}": v for n, v in normalizer.items()} | {f"mlp.{n}": v for n, v in layers.items()}
+        return {name: value.detach().cpu().clone() for name, value in state.items()}
+
+    def from_ppo(self, state: Mapping[str, Tensor], factor: float) -> None:
+        """Begin as such a critic, for which what it sees beside is at its mean."""
+        layers = {name.removeprefix("mlp."): value for name, value in state.items() if name.startswith("mlp.")}
+        last = f"{len(self.network) - 1}"
+        layers |= {name: layers[name] / factor for name in (f"{last}.weight", f"{last}.bias")}
+        layers["0.weight"] = layers["0.weight"][:, : self._seen]
+        normalizer = {n.removeprefix("obs_normalizer."): v for n, v in state.items() if n.startswith("obs_normalizer.")}
+        for network in (self.network, self.average):
+            network.load_state_dict(layers)
+        self.normalizer.load_state_dict(normalizer)
 
 
 def targets(rollout: Rollout, values: Tensor, gamma: float, trace: float) -> Tensor:

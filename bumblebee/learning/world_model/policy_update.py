@@ -1,5 +1,6 @@
 """The policy's update: it learns to earn more in what the model imagines, and the value what comes after that."""
 
+from collections.abc import Mapping
 from copy import deepcopy
 from typing import Any
 
@@ -41,7 +42,8 @@ class PolicyUpdate:
     ) -> None:
         device = model.mean.device
         self.actor, self.average = actor, deepcopy(actor).requires_grad_(False)
-        self.critic = Critic(imagination.value_size, config.value_hidden).to(device)
+        whole = imagination.env.get_observations()["critic"].shape[1]
+        self.critic = Critic(imagination.value_size, whole, config.hidden).to(device)
         self._seen, self._valued = (deepcopy(n).train() for n in (actor.obs_normalizer, self.critic.normalizer))
         self._model, self._imagination, self._memory, self._config = model, imagination, memory, config
         self.descents = {
@@ -56,8 +58,13 @@ class PolicyUpdate:
         """Learn once."""
         self._learn()
 
+    def value_from(self, state: Mapping[str, Tensor], factor: float) -> None:
+        """Begin with the value of rsl_rl's critic of that state, which is `factor` times as high."""
+        self.critic.from_ppo(state, factor)
+        self._valued.load_state_dict(self.critic.normalizer.state_dict())
+
     def look(self, seen: Tensor, exact: Tensor) -> None:
-        """Normalise by these observations (N, D) too, and the value by what it sees (N, V), where the tensors are."""
+        """Normalise by these observations (N, D) too, and the value by a critic's (N, W), where the tensors are."""
         self._seen.update(seen)
         self._valued.update(exact)
         self.critic.normalizer.load_state_dict(self._valued.state_dict())
@@ -87,7 +94,7 @@ class PolicyUpdate:
         """Gradients of both networks; the value's depends on the policy by what was imagined alone."""
         config = self._config
         rollout = self._imagination.rollout(self._act, self._model, self._memory.starts(config.policy_batch))
-        seen, after = self.critic.normalizer(rollout.seen), self.critic.normalizer(rollout.after)
+        seen, after = self.critic.normalised(rollout.seen), self.critic.normalised(rollout.after)
         last = self.critic.steady(after)
         self.descents["policy"].differentiate(-objective(rollout, last, config.gamma))
         with torch.no_grad():

@@ -67,7 +67,7 @@ class WorldModelTrainer(Learner):
         if device.type == "cuda":
             torch.set_float32_matmul_precision("high")
         self.shape = shape_of(env, config.hidden)
-        actor = (origin.actor if origin is not None else new_actor(self.shape)).to(device)
+        actor = (origin.actor if origin is not None else new_actor(self.shape, config.noise)).to(device)
         drawn = draw_fields(env.engine.model, env.cfg.randomisation, env.num_envs, env.seed)
         context = context_of(env.engine.model, drawn, env.num_envs, self.ranks).to(device)
         delay = float(env.engine.model.actuator_delay.max()) + env.cfg.randomisation.delay[1]
@@ -77,6 +77,7 @@ class WorldModelTrainer(Learner):
         self.imagination = Imagination(env, config.horizon, config.compile)
         self.policy_update = PolicyUpdate(actor, model.frozen(), self.imagination, self.memory, config, self.ranks)
         self.model_update = ModelUpdate(model, self.memory, config, self.ranks)
+        self._begin_value(origin)
         self._collect = Collector(env, self.memory, config.noise)
         self._frames_before = 0
         self._kept: int | None = None
@@ -94,10 +95,10 @@ class WorldModelTrainer(Learner):
         return super()._coming() + fill * self.env.num_envs * self.ranks.count
 
     def policy(self) -> Policy:
-        """The average of the policy as it is now; a copy."""
+        """The average of the policy as it is now, with the value as PPO's critic; a copy."""
         actor = new_actor(self.shape)
         actor.load_state_dict(self.policy_update.average.state_dict())
-        return Policy(actor, {}, self.shape)
+        return Policy(actor, self.policy_update.critic.to_ppo(self._factor), self.shape)
 
     def accuracy(self) -> Accuracy:
         """Errors of the model as it is now on the held-out worlds; all ranks must ask."""
@@ -184,12 +185,26 @@ class WorldModelTrainer(Learner):
         rate = float(self.policy_update.descents["policy"].rate)
         return env.statistics.take() | told | {"learning_rate": rate, "threshold": env.threshold}
 
+    @property
+    def _factor(self) -> float:
+        """How many times as high PPO's critic values a state: it adds up rewards, and the value is their mean."""
+        return self.env.dt / (1 - self.config.gamma)
+
+    def _begin_value(self, origin: Policy | None) -> None:
+        """Let the value go on from the parent's critic, if that one saw what the critic sees here."""
+        if (
+            origin is not None
+            and origin.critic_state
+            and origin.shape.critic_observation == self.shape.critic_observation
+        ):
+            self.policy_update.value_from(origin.critic_state, self._factor)
+
     def _look(self, seen: TensorDict) -> None:
         """Let policy and value be normalised by what was seen too, unless what was collected is no numbers."""
         if (fault := self.memory.fault()) is not None:
             do = "Look for it in the motions and the robot's model."
             raise BadInput("what the simulator gave", "numbers", fault, do)
-        self.policy_update.look(seen["policy"], seen["critic"][:, : self.imagination.value_size])
+        self.policy_update.look(seen["policy"], seen["critic"])
 
     def _diverged(self, expected: str, came: str, setting: str) -> BadInput:
         """The line for a training that leads nowhere."""

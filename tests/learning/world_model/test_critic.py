@@ -1,7 +1,10 @@
 """The value beyond the horizon: what it learns, and what gradient it gives the policy."""
 
 import torch
+from rsl_rl.models import MLPModel
+from tensordict import TensorDict
 
+from bumblebee.learning.policy import model_config
 from bumblebee.learning.world_model.critic import Critic, error, objective, targets
 from bumblebee.learning.world_model.imagination import Rollout
 
@@ -81,10 +84,40 @@ def test_what_the_value_predicts_after_an_end_counts_for_nothing():
 
 
 def test_the_average_follows_the_network_slowly_and_a_new_value_gives_the_policy_no_gradient():
-    critic, seen = Critic(2, (8,)), torch.rand(5, 2, requires_grad=True)
+    critic, seen = Critic(2, 2, (8,)), torch.rand(5, 2, requires_grad=True)
     assert not torch.autograd.grad(critic.steady(seen).sum(), seen)[0].any()
     with torch.no_grad():
         critic.network[-1].bias.fill_(1.0)
     critic.follow(0.25)
     torch.testing.assert_close(critic.steady(seen), torch.full((5,), 0.25))
     torch.testing.assert_close(critic(seen), torch.ones(5))
+
+
+def ppo_critic(entries: int) -> MLPModel:
+    """An untrained critic as PPO has it, which knows the mean and the spread of what it sees."""
+    seen = TensorDict({"critic": torch.zeros(1, entries)}, batch_size=[1])
+    made = MLPModel(seen, {"critic": ["critic"]}, "critic", 1, **model_config((8, 4), None))
+    made.obs_normalizer.update(3.0 + 2.0 * torch.randn(64, entries))
+    return made.eval()
+
+
+def test_ppo_values_a_state_as_the_value_does_whatever_it_sees_beside():
+    critic, ppo, seen = Critic(3, 5, (8, 4)), ppo_critic(5), torch.randn(6, 5)
+    torch.nn.init.normal_(critic.average[-1].weight)
+    critic.normalizer.train().update(1.0 + torch.randn(64, 5))
+    ppo.load_state_dict(critic.to_ppo(0.5))
+    wanted = 0.5 * critic.steady(critic.normalised(seen[:, :3]))
+    torch.testing.assert_close(ppo(TensorDict({"critic": seen}, batch_size=[6]))[:, 0], wanted)
+
+
+def test_the_value_begins_as_a_critic_of_ppo_for_which_all_beside_is_usual():
+    critic, ppo, seen = Critic(3, 5, (8, 4)), ppo_critic(5), torch.randn(6, 5)
+    critic.from_ppo(ppo.state_dict(), 0.5)
+    seen[:, 3:] = ppo.obs_normalizer.mean[3:]
+    valued = critic.normalised(seen[:, :3])
+    wanted = ppo(TensorDict({"critic": seen}, batch_size=[6]))[:, 0] / 0.5
+    torch.testing.assert_close(critic.steady(valued), wanted)
+    torch.testing.assert_close(critic(valued), wanted)
+    again = Critic(3, 5, (8, 4))
+    again.from_ppo(critic.to_ppo(0.5), 0.5)
+    torch.testing.assert_close(again(again.normalised(seen[:, :3])), wanted)

@@ -8,6 +8,8 @@ import pytest
 import torch
 from rsl_rl.models import MLPModel
 
+from bumblebee.learning.config import PpoConfig
+from bumblebee.learning.ppo import Trainer
 from bumblebee.learning.world_model.collector import Collector
 from bumblebee.learning.world_model.config import WorldModelConfig
 from bumblebee.learning.world_model.dynamics import Dynamics
@@ -27,7 +29,6 @@ SMALL = WorldModelConfig(
     policy_batch=32,
     model_hidden=(32,),
     hidden=(32,),
-    value_hidden=(32,),
     warm_up=5,
     checkpoint_every=3,
 )
@@ -62,7 +63,8 @@ def test_the_policies_are_normalised_by_all_that_was_seen_in_tensors_that_stay(t
     assert own.count == looks * TASK.num_worlds
     places = {name: value.data_ptr() for name, value in own.state_dict().items()}
     mean = own.mean
-    update.look(torch.full((4, update.actor.obs_dim), 9.0), torch.full((4, update.actor.obs_dim), 9.0))
+    known = trained.shape.critic_observation
+    update.look(torch.full((4, update.actor.obs_dim), 9.0), torch.full((4, known), 9.0))
     assert places == {name: value.data_ptr() for name, value in own.state_dict().items()}
     assert not torch.equal(own.mean, mean)
     assert torch.equal(own.mean, kept.mean) and torch.equal(own.std, kept.std)
@@ -76,6 +78,24 @@ def test_the_model_is_normalised_by_its_own_first_steps_whoever_the_policys_pare
     assert torch.equal(weights(child)[".policy.actor.mlp.0.weight"], weights(trained)[".policy.average.mlp.0.weight"])
     child.train()
     assert (child.model_update.model.scale != 1).all()
+
+
+def test_ppo_goes_on_from_a_world_models_policy_and_it_from_ppos(trained: WorldModelTrainer, tmp_path: Path) -> None:
+    """Exploration and value are the parent's, each in the child's own units."""
+    trained.policy().save(tmp_path)
+    ppo = Trainer(env_of(TASK), PpoConfig(iterations=1, steps=4), tmp_path / "ppo", parent=tmp_path)
+    assert (ppo.algorithm.actor.state_dict()["distribution.std_param"] == SMALL.noise).all()
+    seen = ppo.env.get_observations()
+    own, factor = trained.policy_update.critic, 0.02 / (1 - SMALL.gamma)
+    value = own.steady(own.normalised(seen["critic"][:, : trained.imagination.value_size]))
+    torch.testing.assert_close(ppo.algorithm.critic(seen)[:, 0], factor * value)
+    ppo.train()
+    (tmp_path / "grown").mkdir()
+    ppo.policy().save(tmp_path / "grown")
+    child = WorldModelTrainer(env_of(TASK), SMALL, tmp_path / "child", parent=tmp_path / "grown")
+    layers = child.policy_update.critic.network.state_dict()
+    torch.testing.assert_close(factor * layers["2.bias"], ppo.algorithm.critic.state_dict()["mlp.2.bias"])
+    child.train()
 
 
 def test_resets_do_not_count_when_the_model_is_normalised() -> None:
