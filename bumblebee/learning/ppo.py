@@ -135,7 +135,7 @@ class Trainer(Learner):
     def _start_from(self, parent: Policy, name: str) -> None:
         if not parent.critic_state:
             wanted, do = (
-                "a policy with a critic, as training leaves it",
+                "a policy with its critic",
                 "Set `learner: world_model`, which needs none.",
             )
             raise BadInput(f"{name}: critic", wanted, "none", do)
