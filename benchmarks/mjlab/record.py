@@ -1,4 +1,4 @@
-"""What was followed against time, as `followed.csv`; imports nothing of ours, as mjlab's environment reads it too."""
+"""Table `followed.csv`: motions followed against time. Imports nothing of ours, as mjlab's environment reads it too."""
 
 import csv
 from collections.abc import Mapping

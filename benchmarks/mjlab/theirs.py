@@ -54,7 +54,7 @@ class Joined(MotionCommand):
 
 
 class Tried(Joined):
-    """The same, each robot on a motion of its own from the first frame."""
+    """Each robot on a motion of its own, from the first frame."""
 
     def _uniform_sampling(self, env_ids):
         self.time_steps[env_ids] = self.first[env_ids % len(self.first)]
