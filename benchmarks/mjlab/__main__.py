@@ -90,13 +90,14 @@ def table(runs: list[Path]) -> str:
         if not (run / FOLLOWED).exists():
             raise BadInput(run / FOLLOWED, "a run of this benchmark", "no such file")
         rows = pd.read_csv(run / FOLLOWED)
-        each = rows.groupby("trained_s").agg({"with_start_s": "first", "frames": "first"}).reset_index()
-        each["n"], each["share"] = (rows.groupby("trained_s")[name].sum().to_numpy() for name in ("followed", "share"))
+        each = rows.groupby("with_start_s", as_index=False).agg(
+            {"trained_s": "first", "frames": "first", "followed": "sum", "share": "mean"}
+        )
         count, last, firsts = rows["motion"].nunique(), each.iloc[-1], []
         for least in (count / 2, count):
-            found = each[each["n"] >= least]
+            found = each[each["followed"] >= least]
             firsts.append(_when(found.iloc[0]) if len(found) else "not reached")
-        end = f"{last.n:.0f} of {count}, {last.share / count:.2f} of their frames: {_when(last)}"
+        end = f"{last.followed:.0f} of {count}, {last.share:.2f} of their frames: {_when(last)}"
         lines.append("| " + " | ".join([rows["learner"].iloc[0], *firsts, end]) + " |")
     return "\n".join(lines)
 

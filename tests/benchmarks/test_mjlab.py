@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.mjlab.__main__ import BEGIN, END, followed, motions, parse, run
+from benchmarks.mjlab.__main__ import BEGIN, END, followed, motions, parse, run, table
 from benchmarks.mjlab.record import CURVE, FOLLOWED, compiling, write_followed
 from benchmarks.motion_pack import Packed, read_pack, write_pack
 from bumblebee.errors import BadInput
@@ -57,6 +57,13 @@ def test_the_table_says_when_half_and_all_were_first_followed_and_replaces_the_o
     half, whole = (f"{t} min ({s} from its start), {n}.0 M steps" for t, s, n in ((0.7, 1.8, 20), (1.0, 2.2, 30)))
     assert a == f"| a | {half} | {whole} | 3 of 3, 1.00 of their frames: {whole} |"
     assert b == f"| b | not reached | not reached | 1 of 3, 0.67 of their frames: {whole} |"
+
+
+def test_actors_that_were_kept_while_compiling_are_counted_apart(tmp_path: Path):
+    folder = a_run(tmp_path / "a", "a")
+    marks = {61.0: 70.0, 62.0: 71.0}
+    write_followed(folder, "a", marks, {mark: {"walk": (True, 1.0)} for mark in marks})
+    assert "1 of 1, 1.00 of their frames" in table([folder])
 
 
 def test_a_page_without_the_mark_and_a_run_without_its_file_are_one_line(tmp_path: Path):
