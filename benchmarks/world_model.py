@@ -16,7 +16,7 @@ from pathlib import Path
 
 import torch
 
-from benchmarks.baselines.__main__ import SETTINGS, Clock, _tell, main, make_env, training_clips
+from benchmarks.baselines.__main__ import SETTINGS, Clock, _tell, keep_actor, main, make_env, training_clips
 from benchmarks.baselines.methods import RANDOMISATIONS, changed, method
 from benchmarks.baselines.trial import Tried, report
 from benchmarks.motion_pack import read_pack
@@ -56,6 +56,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=12, help="processes that try the policy; 0: none is tried")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--randomisation", choices=tuple(RANDOMISATIONS), default="light")
+    parser.add_argument(
+        "--keep-every", type=float, default=0.0, help="seconds of training between actors that are kept"
+    )
     parser.add_argument("--parent", type=Path, help="folder of a policy to start from")
     parser.add_argument("--set", nargs="*", default=[], metavar="PATH=VALUE")
     return parser.parse_args(arguments)
@@ -99,6 +102,8 @@ def run(options: argparse.Namespace) -> int:
             _tell(options.out / CURVE)
         if options.gpus == 1 and clock.due("save", _SAVE_EVERY):  # the ranks must save together
             trainer.save_checkpoint()
+        if ranks.first:
+            keep_actor(trainer, options.out, options.keep_every)
         return done() or clock.over
 
     def done() -> bool:

@@ -8,7 +8,7 @@ clusters, experts and delta actions (its "General Init"), the others are those o
 the same motions for the same time on the same engine; a method with a student gives it 30 % of that time. The
 curriculum follows the time. `--call-minutes` ends a run early; the same command goes on from `resume.pt` in the output
 folder, with new episodes. `--set env.threshold_end=0.3 ppo.entropy=0.003` changes single settings. `--variety 2` adds
-two varied copies of each motion that is learned from, `--snapshots 150` keeps the actor of 150 million steps.
+two varied copies of each motion that is learned from, `--keep-every 30` keeps the actor of each half minute.
 """
 
 import argparse
@@ -31,7 +31,7 @@ from bumblebee.baselines.library import MovingLibrary
 from bumblebee.errors import EXIT_BAD_INPUT, BadInput
 from bumblebee.files import save_tensors
 from bumblebee.learning.distill import DistillConfig, distill
-from bumblebee.learning.learner import CURVE
+from bumblebee.learning.learner import CURVE, Learner
 from bumblebee.learning.policy import Policy, load_policy
 from bumblebee.learning.ppo import Trainer
 from bumblebee.motion.clip import Clip
@@ -125,8 +125,7 @@ def train_teacher(
             _tell(options.out / CURVE)
         if clock.due("save", _SAVE_EVERY):
             _save(trainer, options.out / RESUME)
-        for mark in options.snapshots:
-            _keep(trainer, mark, options.out / f"at-{mark:g}M")
+        keep_actor(trainer, options.out, options.keep_every)
         return trainer._seconds >= 60 * minutes or clock.over
 
     if trainer._seconds < 60 * minutes:
@@ -135,12 +134,14 @@ def train_teacher(
     return trainer
 
 
-def _keep(trainer: Trainer, mark: float, folder: Path) -> None:
-    """Keep the actor as it is when `mark` million steps have been seen."""
-    if trainer.frames >= 1e6 * mark and not folder.exists():
-        folder.mkdir()
-        policy = trainer.policy()
-        Policy(policy.actor, {}, policy.shape).save(folder)
+def keep_actor(trainer: Learner, out: Path, every: float) -> None:
+    """Keep the actor as it is after each `every` seconds of training, as `at-<seconds>s` in `out`; 0: never."""
+    if every and (mark := trainer._seconds // every):
+        folder = out / f"at-{mark * every:g}s"
+        if not folder.exists():
+            folder.mkdir()
+            policy = trainer.policy()
+            Policy(policy.actor, {}, policy.shape).save(folder)
 
 
 def _save(trainer: Trainer, path: Path) -> None:
@@ -239,7 +240,7 @@ def run(options: argparse.Namespace) -> int:
     rows = read_pack(options.motions)
     settings = {"method": own.name, "minutes": options.minutes, "env": asdict(own.env), "ppo": asdict(own.ppo)}
     settings |= {"student": asdict(own.student) if own.student else None, "parent": str(options.parent or "")}
-    settings |= {name: getattr(options, name) for name in ("variety", "seed", "embedded", "std", "snapshots")}
+    settings |= {name: getattr(options, name) for name in ("variety", "seed", "embedded", "std", "keep_every")}
     if (options.out / RESUME).exists() and (options.out / SETTINGS).exists():
         require_kept(settings, options.out / SETTINGS)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -291,7 +292,9 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--parent", type=Path, help="folder of a policy to start from")
     parser.add_argument("--std", type=float, default=0.0, help="the actions' first deviation, instead of the parent's")
     parser.add_argument("--variety", type=int, default=0, help="varied copies of each motion, drawn as often in all")
-    parser.add_argument("--snapshots", type=float, nargs="*", default=[], help="million steps to keep the actor at")
+    parser.add_argument(
+        "--keep-every", type=float, default=0.0, help="seconds of training between actors that are kept"
+    )
     parser.add_argument("--set", nargs="*", default=[], metavar="PATH=VALUE")
     return parser.parse_args(arguments)
 
