@@ -47,6 +47,8 @@ class PpoConfig(Ranged):
     """Widths of the actor's and the critic's layers, ELU."""
     initial_std: Positive = 0.8
     """First standard deviation of the action; 0.3 was a dead end."""
+    value_first: Annotated[int, Range(least=0, most=1_000_000)] = 0
+    """First iterations in which the value alone learns, for a policy that comes without a critic or to another task."""
     symmetry: bool = False
     """Learn from every sample's reflection too, left and right exchanged; doubles the batch."""
     captured: bool | None = None

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch import nn
 
 from bumblebee.errors import BadInput
 from bumblebee.learning.bounded_ppo import BoundedPpo
@@ -19,6 +20,7 @@ from bumblebee.learning.config import PpoConfig
 from bumblebee.learning.learner import Learner, parent_policy
 from bumblebee.learning.policy import Policy, model_config, new_actor, shape_of
 from bumblebee.learning.ranks import Ranks
+from bumblebee.learning.update import TOLD
 from bumblebee.sim.warp_limits import within_memory
 from bumblebee.tracking.env import TrackingEnv
 from bumblebee.tracking.mirror import augmentation
@@ -133,17 +135,16 @@ class Trainer(Learner):
         self.iteration, self._seconds = saved["iteration"], saved["seconds"]
 
     def _start_from(self, parent: Policy, name: str) -> None:
-        if not parent.critic_state:
-            wanted, do = (
-                "a policy with its critic",
-                "Set `learner: world_model`, which needs none.",
-            )
-            raise BadInput(f"{name}: critic", wanted, "none", do)
+        if not parent.critic_state and not self.config.value_first:
+            do = "Set `ppo.value_first: 20`: so many iterations the value learns alone; or `learner: world_model`."
+            raise BadInput(f"{name}: critic", "a policy with its critic", "none", do)
         here, there = shape_of(self.env, self.config.hidden), parent.shape
+        self.algorithm.actor.load_state_dict(parent.actor.state_dict())
+        if not parent.critic_state:
+            return
         if here.critic_observation != there.critic_observation:
             wanted = f"{here.critic_observation} entries as in `env`"
             raise BadInput(f"{name}: critic", wanted, str(there.critic_observation), "Start from another policy.")
-        self.algorithm.actor.load_state_dict(parent.actor.state_dict())
         self.algorithm.critic.load_state_dict(parent.critic_state)
 
     def _iterate(self) -> dict[str, float]:
@@ -160,7 +161,7 @@ class Trainer(Learner):
             algorithm.compute_returns(observations)
             std = float(algorithm.actor.output_std.mean())
         env.engine.check()
-        losses = algorithm.update()
+        losses = self._learn_value() if self.iteration < config.value_first else algorithm.update()
         self.ranks.add(env.statistics.sums)
         losses = self.ranks.mean({name: float(value) for name, value in losses.items()}, env.device)
         scalars = env.statistics.take() | {f"loss_{name}": value for name, value in losses.items()}
@@ -168,3 +169,20 @@ class Trainer(Learner):
         if not np.isfinite(scalars["loss_value"]):
             raise FloatingPointError(f"the critic's loss is no number at iteration {self.iteration}")
         return scalars
+
+    def _learn_value(self) -> dict[str, float]:
+        """Fit the critic to what was collected, and leave the policy as it is; the losses, of which one counts."""
+        algorithm, critic, total = self.algorithm, self.algorithm.critic, 0.0
+        for batch in algorithm.storage.mini_batch_generator(self.config.mini_batches, self.config.epochs):
+            loss = (critic(batch.observations) - batch.returns).square().mean()
+            algorithm.optimizer.zero_grad()  # Adam leaves what has no gradient, as the actor here, where it is
+            loss.backward()
+            if algorithm.is_multi_gpu:
+                algorithm.reduce_parameters()
+            nn.utils.clip_grad_norm_(critic.parameters(), algorithm.max_grad_norm)
+            algorithm.optimizer.step()
+            total += loss.item()
+        critic.update_normalization(algorithm.storage.observations.flatten(0, 1))
+        algorithm.storage.clear()
+        told = TOLD if algorithm.symmetry else TOLD[:-1]
+        return dict.fromkeys(told, 0.0) | {"value": total / (self.config.mini_batches * self.config.epochs)}

@@ -1,6 +1,7 @@
 """PPO around the environment: learning, resuming, configuration, the curve."""
 
 import inspect
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import torch
 from rsl_rl.algorithms import PPO
 from rsl_rl.models import MLPModel
 
+from bumblebee.errors import BadInput
 from bumblebee.learning.config import PAPER, PpoConfig
 from bumblebee.learning.curve import CurveWriter
 from bumblebee.learning.learner import CHECKPOINT, CURVE
@@ -91,6 +93,26 @@ def test_a_child_starts_as_its_parent(model: mujoco.MjModel, tmp_path: Path) -> 
     seen = torch.randn(5, parent.policy().shape.observation)
     assert torch.equal(child.policy()(seen), parent.policy()(seen))
     assert child.iteration == 0
+
+
+def test_at_first_the_value_may_learn_alone(model: mujoco.MjModel, tmp_path: Path) -> None:
+    """For a parent without a critic, as the line says that refuses it; then the policy learns, too."""
+    parent = trainer(model, tmp_path / "parent").policy()
+    parent.critic_state = {}
+    parent.save(tmp_path)
+    with pytest.raises(BadInput, match="critic") as refused:
+        trainer(model, tmp_path / "child", parent=tmp_path)
+    (first,) = re.findall(r"`ppo.value_first: (\d+)`", refused.value.do)
+    assert int(first) >= 1
+    child = trainer(model, tmp_path / "child", replace(PPO_CONFIG, iterations=3, value_first=2), parent=tmp_path)
+    begun, critic = weights(child), child.policy().critic_state
+    child.train(enough=lambda: child.iteration == 2)
+    assert torch.equal(weights(child), begun)
+    assert not torch.equal(child.policy().critic_state["mlp.0.weight"], critic["mlp.0.weight"])
+    child.train()
+    assert not torch.equal(weights(child), begun)
+    losses = pd.read_csv(tmp_path / "child" / CURVE)
+    assert (losses["loss_value"] > 0).all() and (losses["loss_surrogate"] != 0).tolist() == [False, False, True]
 
 
 def test_it_learns_what_is_rewarded(model: mujoco.MjModel, tmp_path: Path) -> None:
