@@ -37,8 +37,8 @@ help:  ## these lines
 setup: $(STAMP)  ## a virtual environment with the locked packages; does nothing when it is up to date
 
 $(STAMP): requirements.lock requirements-torch.lock pyproject.toml
-	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found. Install Python 3.11 or later, or say make PYTHON=<path>." >&2; exit 2; }
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or later is needed: make PYTHON=<path>." >&2; exit 2; }
+	@command -v $(PYTHON) >/dev/null || { echo "make: $(PYTHON) not found. Install Python 3.11 or 3.12, or say make PYTHON=<path>." >&2; exit 2; }
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' || { echo "make: $(PYTHON) is $$($(PYTHON) -V 2>&1), Python 3.11 or 3.12 is needed: make PYTHON=<path>." >&2; exit 2; }
 	@echo "make setup: about 4 minutes on two cores; the steps below: locked packages, torch's download, torch, BumbleBee"
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { echo "make: $(PYTHON) -m venv $(VENV) failed. On Debian and Ubuntu: install python3-venv." >&2; rm -rf $(VENV); exit 2; }
 	$(BIN)/python -m pip install -q --no-compile $(PIP_OPTIONS) --no-deps --require-hashes -r requirements.lock

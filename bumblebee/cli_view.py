@@ -26,7 +26,7 @@ Ticks = Annotated[int | None, typer.Option("--ticks", hidden=True, help="Rounds 
 
 def view(
     path: Annotated[
-        Path, typer.Argument(metavar="PATH", help="Motions, a policy, an evaluation, or measured rollouts.")
+        Path, typer.Argument(metavar="PATH", help="Motions, a policy or its name, an evaluation, or measured rollouts.")
     ],
     motions: Annotated[Path | None, typer.Option("--motions", help="Motions for a policy; without, ours.")] = None,
     model: Annotated[
@@ -47,17 +47,20 @@ def view(
     """Show motions, a policy live, an evaluation, or measured rollouts beside their simulation, in the browser."""
     if out is not None:
         _claim(out, [given for given in (path, motions, model, effects) if given])
-    entries, title, make = _found(path, motions, model, effects, settings or [])
-    if out is None:
-        _play(entries, title, port, meshes, ticks, make)
-        return
-    from bumblebee.io.write import write_file
-    from bumblebee.report.looks import meshes_of_user
-    from bumblebee.view.replay import record
-    from bumblebee.view.sources import named
+    from bumblebee.view.shipped import at_hand
 
-    entry = named(entries, name, path)
-    text = record(entry.make(), entry.name, meshes_of_user(meshes), seconds, make)
+    with at_hand(path) as place:
+        entries, title, make = _found(place, motions, model, effects, settings or [])
+        if out is None:
+            _play(entries, title, port, meshes, ticks, make)
+            return
+        from bumblebee.io.write import write_file
+        from bumblebee.report.looks import meshes_of_user
+        from bumblebee.view.replay import record
+        from bumblebee.view.sources import named
+
+        entry = named(entries, name, path)
+        text = record(entry.make(), entry.name, meshes_of_user(meshes), seconds, make)
     write_file(out, text)
     print(f"written: {out}, {len(text) / 1e6:.1f} MB; it opens in a browser without a server")
 

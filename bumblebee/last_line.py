@@ -58,8 +58,10 @@ def guarded(command: Callable[[], int | None]) -> int:
     except BadInput as error:
         return _say(str(error), EXIT_BAD_INPUT)
     except KeyboardInterrupt:
+        _end_workers()
         return _say("stopped", EXIT_INTERRUPTED)
     except Stopped as stop:
+        _end_workers()
         return _say(f"stopped by {stop}", 128 + stop.number)
     except Exception as error:
         if isinstance(error, OSError) and _stdout_is_gone():
@@ -68,6 +70,13 @@ def guarded(command: Callable[[], int | None]) -> int:
             error.filename = error.filename or "the standard output"
         line = full_disk(error)
         return _say(line, EXIT_BAD_INPUT) if line else _say(unforeseen(error), EXIT_UNFORESEEN)
+
+
+def _end_workers() -> None:
+    """End the processes that work for this one: its exit would wait, for one just being started without end."""
+    if "multiprocessing" in sys.modules:
+        for child in sys.modules["multiprocessing"].active_children():
+            child.terminate()
 
 
 def full_disk(error: Exception) -> str | None:

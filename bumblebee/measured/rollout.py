@@ -37,6 +37,7 @@ WIDTHS: dict[str, int | str] = {
 REQUIRED = ("time", "joint_pos", "joint_vel")
 COMMANDS = ("joint_target", "joint_torque_cmd")
 VECTORS = (*WIDTHS, "foot_force")
+_IMPORT = "Logs of another layout become one: `bumblebee import --help`."
 
 
 class BadRollout(BadInput):
@@ -190,7 +191,7 @@ def rollout_files(folder: Path) -> list[Path]:
     """The rollout files of a dataset folder, sorted by name."""
     inner = Path(folder) / "rollouts"
     if not inner.is_dir():
-        raise BadInput(folder, "a dataset folder that holds rollouts/*.parquet", "no folder rollouts in it")
+        raise BadInput(folder, "a dataset folder that holds rollouts/*.parquet", "no folder rollouts in it", _IMPORT)
     return sorted(file for file in inner.glob("*.parquet") if not file.name.startswith("."))
 
 

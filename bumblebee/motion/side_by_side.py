@@ -43,9 +43,12 @@ def in_order(work: Callable[[Item], Result], items: Iterable[Item], processes: i
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()
-        finally:
+        except BaseException:
             for future in waiting:
                 future.cancel()
+            for process in list((pool._processes or {}).values()):  # `terminate_workers` from Python 3.14 on
+                process.terminate()  # nobody waits for what they do now, which may take minutes
+            raise
 
 
 def cores() -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from bumblebee.deploy.policy import ExportedPolicy
 from bumblebee.learning.export import export_shipped
+from bumblebee.learning.pretrained import SHIPPED
 from bumblebee.motion.embedded import EmbeddedConfig, make
 from bumblebee.motion.embedded.kinds import Kind, kinds
 from bumblebee.view.live import LivePolicy
@@ -20,6 +21,16 @@ def shipped_policy() -> Iterator[ExportedPolicy]:
     """The shipped policy as it is deployed, from a folder that is gone afterwards."""
     with tempfile.TemporaryDirectory() as folder:
         yield ExportedPolicy.load(export_shipped(Path(folder) / "policy"))
+
+
+@contextmanager
+def at_hand(path: Path) -> Iterator[Path]:
+    """The path, or for the name of a policy that comes along its folder as it is deployed, which is gone afterwards."""
+    if str(path) not in SHIPPED or path.exists():
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        yield export_shipped(Path(folder) / path, str(path))
 
 
 def embedded_entries(policy: ExportedPolicy) -> list[Entry]:

@@ -26,6 +26,21 @@ if __name__ == "__main__":
     list(in_order(time.sleep, items(), 2))
 """
 
+INTERRUPTED = """
+import sys, time
+from bumblebee.last_line import guarded
+from bumblebee.motion.side_by_side import in_order
+
+def items():
+    for number in range(40):
+        if number == 12:
+            print("working", flush=True)
+        yield 0.0 if number < 8 else 600.0
+
+if __name__ == "__main__":
+    sys.exit(guarded(lambda: list(in_order(time.sleep, items(), 2))))
+"""
+
 
 @pytest.mark.parametrize("processes", [1, 2])
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 40])
@@ -55,6 +70,20 @@ def test_items_are_taken_only_as_there_is_room():
     assert taken <= 50 + 8
     results.close()
     assert taken <= 50 + 8
+
+
+def test_an_interrupted_parent_waits_for_no_process(tmp_path: Path):
+    """Ctrl-C is the parent's alone, and its workers would work for minutes yet."""
+    script = tmp_path / "parent.py"
+    script.write_text(INTERRUPTED)
+    parent = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert parent.stdout is not None and parent.stdout.readline() == "working\n"
+        parent.send_signal(signal.SIGINT)
+        assert parent.wait(timeout=60) == 130
+    finally:
+        parent.kill()
+        parent.wait()
 
 
 def test_no_process_outlives_a_parent_that_is_killed(tmp_path: Path):
