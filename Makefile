@@ -48,7 +48,8 @@ $(STAMP): requirements.lock requirements-torch.lock pyproject.toml
 	@rm -rf $(WHEEL)
 	$(BIN)/python -m pip install -q --no-compile $(PIP_OPTIONS) $(TORCH)  # adds what a CUDA build needs beside, nothing to others
 	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
-	@$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true  # on all cores, as pip does on one; templates may not compile
+	@# On all cores, as pip does on one, but for what is hardly ever imported; templates may not compile.
+	@$(BIN)/python -m compileall -qq -j 0 -x '/tests/|/transformers/models/' $(VENV)/lib bumblebee tasks flows || true
 	$(BIN)/python -m tasks.private
 	@touch $@
 
