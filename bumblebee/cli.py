@@ -49,7 +49,9 @@ def diagnose(
     dataset: Data,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the diagnosis.")] = None,
     overwrite: Overwrite = False,
-    quick: Annotated[bool, typer.Option("--quick", help="A first look: the best leads; writes nothing.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A first look: `gap`, then the best leads; writes nothing.")
+    ] = False,
     held: Annotated[
         str | None, typer.Option("--hold-out", help="Rollouts that take no part: NAME=VALUE[,VALUE] of a condition.")
     ] = None,
