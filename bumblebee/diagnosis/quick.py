@@ -86,7 +86,7 @@ def told(look: FirstLook, whole: str) -> str:
             f"  {place}: {', '.join(_sized(look, s, 2) for s in some)}" for place, some in _places(found.together)
         ]
     if found.alone:
-        lines.append(f"leads, each fitted {'beside these' if found.together else 'alone'}:")
+        lines.append("leads, each fitted alone:")
     for place, (best, *others) in _places(found.alone):
         rivals = ", ".join(f"{lead.candidate.effect} ({100 * lead.explains:.0f} %)" for lead in others)
         said = f"{_sized(look, best)} (z = {best.z:.1f})"

@@ -185,12 +185,7 @@ def start_with_gain_grid(run: SearchState) -> bool:
     for c, z in zip(fit.chosen, walds(run.problem, fit, weights, fit.chosen), strict=True):
         run.steps.append(evidence(c, float(z), len(run.candidates)))
         run.say(f"found {c.effect} on {c.where}, far from the declared value: {fit.of(c).round(5)}")
-    begin_with_gains(run, fit)
-    return True
-
-
-def begin_with_gains(run: SearchState, fit: Fit) -> None:
-    """Take the servos of `far_gains`; the search then goes on beside them."""
     run.screened_cost = 0.0
     run.renew(fit)
     run.given = len(fit.chosen)
+    return True
