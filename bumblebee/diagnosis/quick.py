@@ -15,7 +15,7 @@ from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.gap import Gap, gap
 from bumblebee.diagnosis.report import missing_lines, told_horizon
 from bumblebee.diagnosis.selection import Lead, Leads, leads
-from bumblebee.diagnosis.simulation import of_joint, unit_on
+from bumblebee.diagnosis.simulation import Plant, of_joint, unit_on
 from bumblebee.sim.effects import CATALOGUE
 
 
@@ -39,8 +39,7 @@ class FirstLook:
     report: Gap
     """Where the declared model errs, on the same windows."""
     leads: Leads
-    units: dict[tuple[str, str, str], str]
-    """(effect, place, parameter) -> unit."""
+    plant: Plant
     notes: list[str]
     """Notes of the report, and on models and steps that failed."""
 
@@ -61,15 +60,10 @@ def first_look(
         quiet = [j for j in plant.joints if j not in lacking or not lacking[j]["significant"]]
         with threadpool_limits(1, user_api="blas"):
             found = leads(m.problem, m.holdout, m.remade, config.search, say, quick.candidates, quiet)
-    units = {
-        (c.effect, c.where, p.name): unit_on(plant, c.effect, c.where, p.unit)
-        for c in (lead.candidate for lead in (*found.together, *found.alone))
-        for p in CATALOGUE[c.effect].parameters
-    }
     notes = [*plant.failures.notes(quick.notes), *report.document["notes"]]
     more = len(notes) - quick.notes
     notes = [*notes[: quick.notes], f"{more} more: `bumblebee gap` lists them"] if more > 0 else notes
-    return FirstLook(report, found, units, notes)
+    return FirstLook(report, found, plant, notes)
 
 
 def told(look: FirstLook, whole: str) -> str:
@@ -118,10 +112,10 @@ def _places(found: Sequence[Lead]) -> list[tuple[str, list[Lead]]]:
 
 def _sized(look: FirstLook, lead: Lead, digits: int = 4) -> str:
     """Effect with its free parameters."""
-    c, parts = lead.candidate, []
-    for i, (name, value) in enumerate(
-        zip((p.name for p in CATALOGUE[c.effect].parameters), c.at(lead.values).values(), strict=True)
-    ):
-        if i in c.free:
-            parts.append(f"{name} = {value:.{digits}g} {look.units[c.effect, c.where, name]}".rstrip())
+    c, values = lead.candidate, list(lead.candidate.at(lead.values).values())
+    parts = []
+    for i in c.free:
+        p = CATALOGUE[c.effect].parameters[i]
+        unit = unit_on(look.plant, c.effect, c.where, p.unit)
+        parts.append(f"{p.name} = {values[i]:.{digits}g} {unit}".rstrip())
     return f"{c.effect} {', '.join(parts)}"
