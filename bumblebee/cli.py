@@ -3,6 +3,7 @@
 Status 0: done, 2: unusable input or output, 1: an internal error; one line on standard error each.
 """
 
+import shlex
 import sys
 import time
 from collections.abc import Callable
@@ -48,7 +49,9 @@ def diagnose(
     dataset: Data,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for the diagnosis.")] = None,
     overwrite: Overwrite = False,
-    quick: Annotated[bool, typer.Option("--quick", help="A first look: the best leads; writes nothing.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A first look: `gap`, then the best leads; writes nothing.")
+    ] = False,
     held: Annotated[
         str | None, typer.Option("--hold-out", help="Rollouts that take no part: NAME=VALUE[,VALUE] of a condition.")
     ] = None,
@@ -75,7 +78,8 @@ def diagnose(
             raise BadInput("--out", "no folder with --quick, which writes nothing", str(out))
         work = QuickConfig() if max_windows is None else QuickConfig(windows=max_windows)
         session = open_session(model, dataset, None, held_out)
-        print(plain(told(first_look(session, DiagnosisConfig(seed=seed), work, _teller()))))
+        whole = shlex.join(["bumblebee", "diagnose", str(model), str(dataset), "--out", "found"])
+        print(plain(told(first_look(session, DiagnosisConfig(seed=seed), work, _teller()), whole)))
         return
     if out is None:
         raise BadInput("--out", "a folder for the diagnosis, or --quick", "neither")

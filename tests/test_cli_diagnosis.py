@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pytest
 import bumblebee
 from bumblebee import cli
 from bumblebee.diagnosis.thresholds import Thresholds
+from bumblebee.errors import BadInput
 from bumblebee.measured.rollout import Rollout, write_rollout
 
 XML = """<mujoco><compiler angle="radian"/><option timestep="0.005"/><worldbody>
@@ -58,7 +60,13 @@ def test_a_first_look_writes_nothing(data: Path, capsys: pytest.CaptureFixture[s
     assert run("diagnose", data / "model.xml", data / "set") == 2
 
 
-def test_a_first_look_takes_as_many_windows_as_are_asked_for(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def begun(*given) -> None:
+    raise BadInput("the diagnosis", "to be begun", "begun")
+
+
+def test_a_first_look_takes_as_many_windows_as_are_asked_for_and_names_the_whole_diagnosis(
+    data: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     time = np.arange(500) / 50
     q, v = 0.2 * np.sin(3 * time)[:, None], 0.6 * np.cos(3 * time)[:, None]
     for name in ("a", "b"):
@@ -67,7 +75,13 @@ def test_a_first_look_takes_as_many_windows_as_are_asked_for(data: Path, capsys:
     command = ("diagnose", data / "model.xml", data / "long", "--quick")
     for options, count in ((("--max-windows", "8"), 8), ((), 40)):
         assert run(*command, *options) == 0
-        assert f"] {count} windows of 0.2 s" in capsys.readouterr().out
+        said = capsys.readouterr().out
+        assert f"] {count} windows of 0.2 s" in said
+    (whole,) = (line for line in said.splitlines() if line.startswith("  bumblebee diagnose "))
+    monkeypatch.chdir(data)
+    monkeypatch.setattr("bumblebee.diagnosis.diagnose.diagnose", begun)
+    assert run(*shlex.split(whole)[1:]) == 2
+    assert "begun" in capsys.readouterr().err
 
 
 def test_replay_and_gap_end_well(data: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,21 +1,21 @@
-"""A first look: the error of the declared model, and the candidates that explain most of it when each is taken alone.
+"""A first look: what `gap` finds, on few windows, and the effects that explain most of it when each is taken alone.
 
-Fewer windows and one round of the search: each candidate alone, and where the model is far off the effects of many
-joints that the search begins with. What it names is a lead, not a finding: effects that come together, or that pass for
-one another, are told apart by the diagnosis alone.
+What a lead explains is measured on windows that took no part in its fit. That it is this effect, and what comes beside
+it, the diagnosis alone can tell.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset import Session
-from bumblebee.diagnosis.prepare import Material, gather
-from bumblebee.diagnosis.selection import Lead, leads
-from bumblebee.diagnosis.simulation import joint_units, residuals, unit_on, vary
+from bumblebee.diagnosis.gap import Gap, gap
+from bumblebee.diagnosis.report import missing_lines, told_horizon
+from bumblebee.diagnosis.selection import Lead, Leads, leads
+from bumblebee.diagnosis.simulation import Plant, of_joint, unit_on
 from bumblebee.sim.effects import CATALOGUE
 
 
@@ -28,32 +28,20 @@ class QuickConfig:
     validation_windows: int = 20
     candidates: int = 3
     """Leads at most."""
-    joints: int = 3
-    """Joints that are furthest off, listed with their error."""
     notes: int = 3
-    """Failures told at most; how many more follows."""
+    """Notes told at most; how many more follows."""
 
 
 @dataclass(frozen=True, eq=False)
 class FirstLook:
     """Outcome of a first look."""
 
-    horizon: float
-    """[s] of the windows."""
-    errors: list[tuple[str, float, str]]
-    """Joint, RMS position error of the declared model at the end of the windows, unit; the furthest first."""
-    together: list[Lead]
-    """Effects of many joints that were fitted together, as the declared model is far off."""
-    leads: list[Lead]
-    """Single effects beside them."""
-    bound: float
-    """z that a candidate had to reach."""
-    units: dict[tuple[str, str, str], str]
-    """(effect, place, parameter) -> unit."""
+    report: Gap
+    """Where the declared model errs, on the same windows."""
+    leads: Leads
+    plant: Plant
     notes: list[str]
-    """Notes on the dataset (what was set aside), and on models and steps of the search that failed."""
-    warnings: tuple[str, ...] = ()
-    """Warnings about the dataset that must not be overlooked."""
+    """Notes of the report, and on models and steps that failed."""
 
 
 def first_look(
@@ -65,55 +53,69 @@ def first_look(
     """The declared model's errors and the candidates that explain most of them."""
     quick, config = quick or QuickConfig(), config or DiagnosisConfig()
     config = replace(config, max_windows=quick.windows, max_holdout_windows=quick.validation_windows, grow=False)
-    with threadpool_limits(1, user_api="blas"):
-        material = gather(session, config, np.random.default_rng(config.seed), say)
-        found = leads(material.problem, material.holdout, material.remade, config.search, say, quick.candidates)
-    plant = material.session.plant
-    units = {
-        (c.effect, c.where, p.name): unit_on(plant, c.effect, c.where, p.unit)
-        for c in (lead.candidate for lead in (*found.together, *found.alone))
-        for p in CATALOGUE[c.effect].parameters
-    }
-    notes = [*material.session.notes, *plant.failures.notes(quick.notes)]
-    errors = _errors(material, quick.joints)
-    together, alone, warnings = found.together, found.alone, material.session.warnings
-    return FirstLook(config.horizon, errors, together, alone, found.bound, units, notes, warnings)
+    report, found, plant = gap(session, quick.windows, config, say), Leads([], []), session.plant
+    if report.torque is not None:
+        m, lacking = report.torque.material, report.document["missing_torque"]
+        plant = m.session.plant
+        quiet = [j for j in plant.joints if j not in lacking or not lacking[j]["significant"]]
+        with threadpool_limits(1, user_api="blas"):
+            found = leads(m.problem, m.holdout, m.remade, config.search, say, quick.candidates, quiet)
+    notes = [*plant.failures.notes(quick.notes), *report.document["notes"]]
+    more = len(notes) - quick.notes
+    notes = [*notes[: quick.notes], f"{more} more: `bumblebee gap` lists them"] if more > 0 else notes
+    return FirstLook(report, found, plant, notes)
 
 
-def _errors(material: Material, most: int) -> list[tuple[str, float, str]]:
-    """Joints whose position the declared model misses most at the end of the fitted windows, with unit."""
-    problem, plant = material.problem, material.session.plant
-    raw = residuals(plant, problem.layout, problem.windows, [vary(plant, [])], problem.fine)[0]
-    last = raw[:, -1, problem.layout.slices["joint_pos"]]
-    rms = np.sqrt(np.nanmean(np.where(np.isfinite(last), last, np.nan) ** 2, axis=0))
-    units, order = joint_units(plant), np.argsort(-rms)[:most]
-    return [(plant.joints[j], float(rms[j]), units[plant.joints[j]]["position"]) for j in order]
+def told(look: FirstLook, whole: str) -> str:
+    """A first look as text: what is sure, the leads, what stays open; `whole` is the command of the whole diagnosis."""
+    document, rules, found = look.report.document, look.report.thresholds.report, look.leads
+    lines = [f"WARNING: {text}" for text in document["warnings"]]
+    lines += [_furthest(document, rules.matters.places)]
+    lines += ["torque that the declared model lacks, nothing fitted; sure where a size is given:"]
+    lines += missing_lines(document, rules.verdicts)
+    if found.together:
+        share = 100 * found.together[0].explains
+        lines.append(f"leads, drives far from the declared ones (sizes to the steps of a grid), explain {share:.0f} %:")
+        lines += [
+            f"  {place}: {', '.join(_sized(look, s, 2) for s in some)}" for place, some in _places(found.together)
+        ]
+    if found.alone:
+        lines.append("leads, each fitted alone:")
+    for place, (best, *others) in _places(found.alone):
+        rivals = ", ".join(f"{lead.candidate.effect} ({100 * lead.explains:.0f} %)" for lead in others)
+        said = f"{_sized(look, best)} (z = {best.z:.1f})"
+        lines.append(f"  {place}: {said}, explains {100 * best.explains:.0f} %")
+        lines += [f"    or {rivals}"] if rivals else []
+    if found.together or found.alone:
+        lines += ["open: which of these it is, and what comes beside it. To tell them apart:", f"  {whole}"]
+    else:
+        lines.append("no effect of the catalogue is sure alone")
+    return "\n".join([*lines, *(f"note: {note}" for note in look.notes)])
 
 
-def told(look: FirstLook) -> str:
-    """A first look as text."""
-    lines = [f"WARNING: {text}" for text in look.warnings]
-    lines += [f"declared model, after {look.horizon:g} s, the joints that are furthest off:"]
-    lines += [f"  {joint:<28} {1e3 * error:.3g} m{unit}" for joint, error, unit in look.errors]
-    notes = [f"note: {note}" for note in look.notes]
-    if look.together:
-        lines.append(f"leads, fitted together, explain {100 * look.together[0].explains:.0f} %; the model is far off:")
-        lines += [_line(look, lead, "") for lead in look.together]
-    if look.leads:
-        beside = "beside these" if look.together else "alone"
-        said = "effects that come together or pass for one another are not told apart"
-        lines.append(f"leads, each fitted {beside}; {said}:")
-        lines += [_line(look, lead, f", explains {100 * lead.explains:.0f} %") for lead in look.leads]
-    if not look.together and not look.leads:
-        lines.append(f"no effect of the catalogue is sure alone (z of {look.bound:.2g} asked)")
-    return "\n".join([*lines, *notes])
+def _furthest(document: Mapping[str, Any], most: int) -> str:
+    """Joints whose position the declared model misses most, in one line."""
+    horizon = told_horizon(document["error"])
+    if horizon is None:
+        return "the runs are too short to say how far the declared model is off"
+    each = document["error"][horizon]["joint_pos_rmse"]["per_joint"]
+    sizes = sorted(((e["value"], joint) for joint, e in each.items() if e["value"] is not None), reverse=True)[:most]
+    said = (f"{joint} {1e3 * value:.3g} m{of_joint(document, joint, 'position')}" for value, joint in sizes)
+    return f"declared model, after {horizon} s, the joints that are furthest off: {', '.join(said)}"
 
 
-def _line(look: FirstLook, lead: Lead, explains: str) -> str:
-    c, parts = lead.candidate, []
-    values = dict(zip((p.name for p in CATALOGUE[c.effect].parameters), c.at(lead.values).values(), strict=True))
-    for i, (name, value) in enumerate(values.items()):
-        if i in c.free:
-            parts.append(f"{name} = {value:.4g} {look.units[c.effect, c.where, name]}".rstrip())
-    place = c.where or "whole robot"
-    return f"  {c.effect:<20} {place:<28} {', '.join(parts)}{explains} (z = {lead.z:.1f})"
+def _places(found: Sequence[Lead]) -> list[tuple[str, list[Lead]]]:
+    """Leads by where they act, in their order."""
+    places = dict.fromkeys(lead.candidate.where for lead in found)
+    return [(where or "whole robot", [s for s in found if s.candidate.where == where]) for where in places]
+
+
+def _sized(look: FirstLook, lead: Lead, digits: int = 4) -> str:
+    """Effect with its free parameters."""
+    c, values = lead.candidate, list(lead.candidate.at(lead.values).values())
+    parts = []
+    for i in c.free:
+        p = CATALOGUE[c.effect].parameters[i]
+        unit = unit_on(look.plant, c.effect, c.where, p.unit)
+        parts.append(f"{p.name} = {values[i]:.{digits}g} {unit}".rstrip())
+    return f"{c.effect} {', '.join(parts)}"

@@ -1,6 +1,6 @@
 """The gap report: where a model errs before anything is fitted, by horizon, joint, motion, and in torque."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -37,19 +37,25 @@ class Gap:
     """Thresholds that it was made with."""
 
 
-def gap(session: Session, budget: int = 120, config: DiagnosisConfig | None = None) -> Gap:
+def gap(
+    session: Session,
+    budget: int = 120,
+    config: DiagnosisConfig | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Gap:
     """Compare the declared model of `session` with all its rollouts; nothing is fitted.
 
     Args:
         session: the declared model and all rollouts.
         budget: windows for each horizon of the errors.
         config: of the diagnosis whose tests say what the model lacks.
+        say: is told of each step.
     """
     config = config or DiagnosisConfig()
     rules = config.thresholds
     cuts = horizon_windows(session, list(range(len(session.rollouts))), budget, rules.report.prediction_error)
     still = still_joints(session.plant, session.rollouts, session.sigma)
-    torque, untested = _tested(session, config)
+    torque, untested = _tested(session, config, say)
     units = joint_units(session.plant)
     document = {
         **_heading(session, units),
@@ -69,10 +75,12 @@ def gap(session: Session, budget: int = 120, config: DiagnosisConfig | None = No
     return Gap(document, examples(session, rule=rules.report.example_windows), torque, rules)
 
 
-def _tested(session: Session, config: DiagnosisConfig) -> tuple[MissingTorque | None, list[str]]:
+def _tested(
+    session: Session, config: DiagnosisConfig, say: Callable[[str], None]
+) -> tuple[MissingTorque | None, list[str]]:
     """Missing torque of the declared model; where no window can be cut, None and a note why."""
     try:
-        return missing_torque(session, config), []
+        return missing_torque(session, config, say), []
     except BadInput as error:
         return None, [f"missing torques could not be tested: {error}"]
 

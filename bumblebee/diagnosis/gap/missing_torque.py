@@ -3,6 +3,7 @@
 The windows, their whitening and the tests are those of `diagnose`, so that both say the same of the same logs.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ from bumblebee.diagnosis.config import DiagnosisConfig
 from bumblebee.diagnosis.dataset import Session
 from bumblebee.diagnosis.discrepancy import JointActivity, LackOfFit, lack_of_fit
 from bumblebee.diagnosis.estimation import gauss_newton
-from bumblebee.diagnosis.prepare import gather
+from bumblebee.diagnosis.prepare import Material, gather
 from bumblebee.diagnosis.residuals import window_weights
 from bumblebee.diagnosis.thresholds.gap import Naming
 
@@ -23,8 +24,8 @@ class MissingTorque:
     """Missing torque of the declared model by the tests, on J joints."""
 
     left: LackOfFit
-    still: tuple[str, ...]
-    """Joints that never move; nothing is said of them."""
+    material: Material
+    """Windows and candidates that it was tested on; nothing is said of its joints that never move."""
 
     def cloud(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Position, velocity and missing torque [N m], (N,) each, of a joint in every segment of the fitted windows."""
@@ -39,7 +40,7 @@ class MissingTorque:
         functions' sizes are no more than first guesses.
         """
         implied = self.left.scene.evidence.implied
-        rows = [(k, j, implied(k)) for k, j in enumerate(self.left.joints) if j.joint not in self.still]
+        rows = [(k, j, implied(k)) for k, j in enumerate(self.left.joints) if j.joint not in self.material.still]
         return {
             j.joint: {
                 "unit": units[j.joint]["torque"],
@@ -72,11 +73,11 @@ class MissingTorque:
         return float(evidence.test(joint, np.ones((1, *evidence.score[joint].shape))).size[0])
 
 
-def missing_torque(session: Session, config: DiagnosisConfig) -> MissingTorque:
+def missing_torque(session: Session, config: DiagnosisConfig, say: Callable[[str], None]) -> MissingTorque:
     """Test the declared model; `BadInput` where no rollout has a stretch as long as a window."""
     with threadpool_limits(1, user_api="blas"):
-        material = gather(session, config, np.random.default_rng(config.seed), lambda text: None)
+        material = gather(session, config, np.random.default_rng(config.seed), say)
         problem = material.problem
         fit = gauss_newton(problem, (), (), window_weights(problem.residual([[]])[0]))
         left = lack_of_fit(problem, material.holdout.problem, fit, JointActivity(material.typical, material.still))
-    return MissingTorque(left, tuple(material.still))
+    return MissingTorque(left, material)

@@ -16,7 +16,7 @@ from bumblebee.diagnosis.report.html import (
     table,
     warning,
 )
-from bumblebee.diagnosis.report.notes import ALONE, nothing_seen, unseen_notes
+from bumblebee.diagnosis.report.notes import ALONE, nothing_seen, told_horizon, unseen_notes
 from bumblebee.diagnosis.report.page import render_report
 from bumblebee.diagnosis.report.prediction_error import (
     HorizonWindows,
@@ -27,7 +27,7 @@ from bumblebee.diagnosis.report.prediction_error import (
 )
 from bumblebee.diagnosis.report.surface_notes import surface_notes
 from bumblebee.diagnosis.report.svg import cloud_picture, line_picture
-from bumblebee.diagnosis.report.terminal import gap_summary, plot, summary
+from bumblebee.diagnosis.report.terminal import gap_summary, missing_lines, plot, summary
 
 __all__ = [
     "ALONE",
@@ -51,6 +51,7 @@ __all__ = [
     "law_notes",
     "line_picture",
     "loss_entries",
+    "missing_lines",
     "nothing_seen",
     "number",
     "plot",
@@ -60,6 +61,7 @@ __all__ = [
     "summary",
     "surface_notes",
     "table",
+    "told_horizon",
     "unseen_notes",
     "warning",
 ]

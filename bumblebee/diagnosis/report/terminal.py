@@ -120,7 +120,7 @@ def gap_summary(
         *_errors({"model": error, "floor": document["floor"]}),
     ]
     lines += _joints(document)
-    lines += ["", "residual torque, which the model lacks:", *_missing(document, rules.verdicts)]
+    lines += ["", "residual torque, which the model lacks:", *missing_lines(document, rules.verdicts)]
     lines += _reported(document)
     lines += ["", "worst motions:"]
     for m in document["motions"][: rules.listing.motions]:
@@ -154,7 +154,8 @@ def _reported(document: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _missing(document: dict[str, Any], rule: Verdicts) -> list[str]:
+def missing_lines(document: dict[str, Any], rule: Verdicts) -> list[str]:
+    """Missing torque of every joint, a line each."""
     lacking = document["missing_torque"]
     if not lacking:
         return ["  too few windows to say"]

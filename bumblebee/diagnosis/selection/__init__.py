@@ -3,7 +3,7 @@
 from bumblebee.diagnosis.selection.confounding import alike, detectable, rivals
 from bumblebee.diagnosis.selection.final_fit import Refined, half_widths, refine, with_other_laws
 from bumblebee.diagnosis.selection.forward import Search, search
-from bumblebee.diagnosis.selection.leads import Lead, leads
+from bumblebee.diagnosis.selection.leads import Lead, Leads, leads
 from bumblebee.diagnosis.selection.proposals.encoder_resolution import entries, grids
 from bumblebee.diagnosis.selection.proposals.surface_contact import contact_share
 from bumblebee.diagnosis.selection.score_tests import score_tests
@@ -13,6 +13,7 @@ from bumblebee.diagnosis.selection.trial import try_one
 
 __all__ = [
     "Lead",
+    "Leads",
     "Loss",
     "Refined",
     "Search",

@@ -175,6 +175,16 @@ def _one_by_one(run: SearchState, config: SearchConfig, budget: Budget) -> None:
 def look_around(run: SearchState) -> tuple[list[Trial], list[Candidate], bool]:
     """Trials of single effects, those looked at; and whether the search began anew with effects of all joints."""
     attempt = run.problem.plant.failures.attempt
+    tried, looked = single_trials(run)
+    anew = attempt(_ALL_JOINTS, partial(start_far_off, run, tried), _no)
+    if not anew and not _explains_much(tried, run):
+        anew = attempt(_ALL_JOINTS, partial(start_with_all_joints, run), _no)
+    return tried, looked, anew
+
+
+def single_trials(run: SearchState) -> tuple[list[Trial], list[Candidate]]:
+    """Trials of single effects, and those looked at; drives far from the declared ones first."""
+    attempt = run.problem.plant.failures.attempt
     tried, looked = [], []
     if not run.given:
         tried = attempt("drives far from the declared ones", partial(_drives, run), list)
@@ -182,10 +192,7 @@ def look_around(run: SearchState) -> tuple[list[Trial], list[Candidate], bool]:
     if all(t.candidate.effect in SATURATIONS for t in tried):  # a limit alone does not say that slopes are none
         more, looked = attempt("trials of the best candidates", run.trials, lambda: ([], []))
         tried += more
-    anew = attempt(_ALL_JOINTS, partial(start_far_off, run, tried), _no)
-    if not anew and not _explains_much(tried, run):
-        anew = attempt(_ALL_JOINTS, partial(start_with_all_joints, run), _no)
-    return tried, looked, anew
+    return tried, looked
 
 
 class _Touching:

@@ -1,6 +1,6 @@
 """The candidates that explain most when each is taken alone: a first look, no search."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +8,11 @@ import numpy as np
 from bumblebee.diagnosis.candidates import Candidate
 from bumblebee.diagnosis.comparison import Holdout, walds
 from bumblebee.diagnosis.config import SearchConfig
-from bumblebee.diagnosis.estimation import Fit, gauss_newton
-from bumblebee.diagnosis.residuals import Problem
-from bumblebee.diagnosis.selection.forward import begin, look_around
+from bumblebee.diagnosis.estimation import Fit
+from bumblebee.diagnosis.residuals import Problem, window_weights
+from bumblebee.diagnosis.selection.forward import single_trials
 from bumblebee.diagnosis.selection.moves import Terms, refitted
+from bumblebee.diagnosis.selection.proposals.gain_grid import far_gains
 from bumblebee.diagnosis.selection.state import SearchState
 from bumblebee.diagnosis.selection.trial import Trial
 from bumblebee.sim.effects import Effect
@@ -19,7 +20,7 @@ from bumblebee.sim.effects import Effect
 
 @dataclass(frozen=True, eq=False)
 class Lead:
-    """One candidate, fitted alone beside what the search begins with."""
+    """One candidate, fitted alone, or one of the servos' gains that are far off together."""
 
     candidate: Candidate
     values: np.ndarray
@@ -32,14 +33,12 @@ class Lead:
 
 @dataclass(frozen=True, eq=False)
 class Leads:
-    """Findings of the first step of a search."""
+    """Findings of a first look."""
 
     together: list[Lead]
-    """Effects of many joints that were fitted together, as the declared model is far off; each explains what all do."""
+    """Gains and friction of servos far from the declared ones, by a grid's steps; each explains what all do."""
     alone: list[Lead]
-    """Single effects beside them, the best first."""
-    bound: float
-    """z that a single one had to reach."""
+    """Single effects where no gains are far off, the best first."""
 
 
 def leads(
@@ -49,16 +48,27 @@ def leads(
     config: SearchConfig,
     say: Callable[[str], None],
     count: int,
+    quiet: Collection[str] = (),
 ) -> Leads:
-    """The `count` candidates whose trials cost least, beside what the search begins with.
+    """The servos' gains where these are far off, else the `count` candidates whose trials cost least.
 
-    A search begins with effects of all joints where the declared model is far off. An effect in one place is one lead,
-    by the candidate whose trial costs least, however many of its parameters are tested together.
+    None of these on the joints `quiet`, whose residual shows nothing. An effect in one place is one lead, by the
+    candidate whose trial costs least, however many of its parameters are tested together.
     """
-    run = begin(problem, holdout, remake, config, say)
-    tried, looked, anew = look_around(run)
-    if anew or not looked:
-        tried = [*([] if anew else tried), *run.trials()[0]]
+    run, attempt = SearchState(problem, holdout, remake, config, say), problem.plant.failures.attempt
+    gains = attempt("gains far from the declared ones", lambda: far_gains(run), lambda: None)
+    if gains is not None:
+        return Leads(_together(run, gains), [])
+
+    def shown(effects: Sequence[Effect]) -> tuple[list[Candidate], np.ndarray]:
+        candidates, typical = remake(effects)
+        return [c for c in candidates if c.where not in quiet], typical
+
+    run.remake = shown
+    run.open()
+    tried, looked = single_trials(run)
+    if not looked:
+        tried = [*tried, *run.trials()[0]]
     found = []
     cheapest: dict[tuple[str, str], Trial] = {}
     for trial in sorted(tried, key=lambda t: t.cost):
@@ -69,18 +79,14 @@ def leads(
         if move is not None:
             share = _explains(run, run.fit, move.after)
             found.append(Lead(trial.candidate, move.after.of(trial.candidate), move.z, share))
-    return Leads(_together(run), sorted(found, key=lambda lead: -lead.explains), run.bound)
+    return Leads([], sorted(found, key=lambda lead: -lead.explains))
 
 
-def _together(run: SearchState) -> list[Lead]:
-    """Sure effects that the search began with, the surest first."""
-    if not run.fit.chosen:
-        return []
-    declared = gauss_newton(run.problem, (), (), run.weights, iterations=0)
-    share = _explains(run, declared, run.fit)
-    sizes = walds(run.problem, run.fit, run.weights, run.fit.chosen)
-    found = [Lead(c, run.fit.of(c), float(z), share) for c, z in zip(run.fit.chosen, sizes, strict=True)]
-    return sorted((lead for lead in found if lead.z >= run.bound), key=lambda lead: -lead.z)
+def _together(run: SearchState, gains: Fit) -> list[Lead]:
+    """Servos' gains and friction by the grid, joint by joint."""
+    share = _explains(run, run.fit, gains)
+    sizes = walds(run.problem, gains, window_weights(gains.clean(run.problem)), gains.chosen)
+    return [Lead(c, gains.of(c), float(z), share) for c, z in zip(gains.chosen, sizes, strict=True)]
 
 
 def _explains(run: SearchState, before: Fit, after: Fit) -> float:

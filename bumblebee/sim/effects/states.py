@@ -75,10 +75,14 @@ class State:
                 out[k] = now
                 now += min(max(wanted[k] - now, -reach), reach)
             return out
-        now = u[..., 0]
-        for k in range(v.shape[-1]):
+        now, most = u[..., 0].copy(), np.moveaxis(reaches, -1, 0).copy()
+        step, least = np.empty_like(now), -most
+        for k, wanted in enumerate(np.moveaxis(u, -1, 0).copy()):
             out[..., k] = now
-            now = now + np.clip(u[..., k] - now, -reaches[..., k], reaches[..., k])
+            np.subtract(wanted, now, out=step)
+            np.maximum(step, least[k], out=step)  # `np.clip` takes five times as long on few numbers
+            np.minimum(step, most[k], out=step)
+            now += step
         return out
 
 

@@ -67,7 +67,7 @@ def test_rollouts_in_which_the_joint_follows_its_command_speak_against_it(tmp_pa
     assert [r.rollout_id for r in made.rollouts] == ["moving0", "moving1"]
     (warning,) = made.warnings
     assert "4 of 6 rollouts were set aside by rule response-sign on j2" in warning and "scale" in warning
-    assert f"WARNING: {warning}" in told(first_look(made, CONFIG))
+    assert f"WARNING: {warning}" in told(first_look(made, CONFIG), "")
 
 
 def test_a_few_reversed_rollouts_are_set_aside_as_ever(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ import numpy as np
 
 from bumblebee.diagnosis.candidates import Candidate, effects_at
 from bumblebee.diagnosis.comparison import compare, evidence, walds
-from bumblebee.diagnosis.estimation import gauss_newton, typical_power
+from bumblebee.diagnosis.estimation import Fit, gauss_newton, typical_power
 from bumblebee.diagnosis.residuals import Problem, window_weights
 from bumblebee.diagnosis.selection.proposals.all_joints import begin_with, fit_all_joints
 from bumblebee.diagnosis.selection.state import SearchState
@@ -158,19 +158,22 @@ def _effects(names: Sequence[str], servos: Sequence[Servo]) -> list[Effect]:
     ]
 
 
-def start_with_gain_grid(run: SearchState) -> bool:
-    """Begin with servos far from the declared ones, where residuals are that large."""
-    if typical_power(run.fit.residual) < run.config.far:
-        return False
-    found = gains_by_grid(run.problem, run.candidates)
+def far_gains(run: SearchState) -> Fit | None:
+    """Servos far from the declared ones, where residuals are that large and the validation windows agree."""
+    found = [] if typical_power(run.fit.residual) < run.config.far else gains_by_grid(run.problem, run.candidates)
     if not found:
-        return False
+        return None
     chosen, values = [c for c, _ in found], np.array([v for _, v in found])
     weights = window_weights(run.problem.residual([effects_at(chosen, values)])[0])
     fit = gauss_newton(run.problem, chosen, values, weights, iterations=0, coarse=True)
     gain = compare(run.problem, run.holdout, run.fit, fit)
-    rules = run.problem.thresholds.comparison
-    if not gain.passes(rules.validation):
+    return fit if gain.passes(run.problem.thresholds.comparison.validation) else None
+
+
+def start_with_gain_grid(run: SearchState) -> bool:
+    """Begin with servos far from the declared ones, or with the usual effects of all joints if that leaves less."""
+    fit, rules = far_gains(run), run.problem.thresholds.comparison
+    if fit is None:
         return False
     # What leaves as much as would call for another beginning is none.
     below = min(fit.power(run.problem), run.config.far)
@@ -178,6 +181,7 @@ def start_with_gain_grid(run: SearchState) -> bool:
     if usual is not None and compare(run.problem, run.holdout, fit, usual).passes(rules.together):
         begin_with(run, usual)
         return True
+    weights = window_weights(run.problem.residual([fit.effects])[0])
     for c, z in zip(fit.chosen, walds(run.problem, fit, weights, fit.chosen), strict=True):
         run.steps.append(evidence(c, float(z), len(run.candidates)))
         run.say(f"found {c.effect} on {c.where}, far from the declared value: {fit.of(c).round(5)}")
