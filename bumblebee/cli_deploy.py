@@ -1,8 +1,11 @@
-"""Command line: `bumblebee deploy run`, `robot`, `rollouts`."""
+"""Command line: `bumblebee deploy sheet`, `run`, `robot`, `rollouts`."""
 
 import getpass
 import sys
 import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,17 +26,66 @@ Slow = Annotated[
 ]
 
 
+Policy = Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or shipped, randomised, imu.")]
+Motions = Annotated[str, typer.Option("--motions", help="Motion files, or `embedded`.")]
+Bounds = Annotated[Path | None, typer.Option("--limits", help="YAML file of limits; docs/deploy.md.")]
+
+
+@app.command("sheet")
+def sheet(
+    policy: Policy,
+    clips: Annotated[list[str] | None, typer.Option("--clip", help="A motion to try; repeat it. All without.")] = None,
+    motions: Motions = "embedded",
+    robots: Annotated[int, typer.Option("--robots", min=1, max=1000, help="Robots that differ, for each motion.")] = 16,
+    minutes: Annotated[float, typer.Option("--minutes", min=0, help="No motion begins after so long.")] = 10.0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the robots, starts and sensor noise.")] = 0,
+    limits: Bounds = None,
+    out: Annotated[Path, typer.Option("--out", help="New folder for sheet.html and sheet.json.")] = Path("sheet"),
+) -> None:
+    """Try motions on robots that differ, in simulation, and order them by risk: what to watch, when to stop."""
+    from bumblebee.deploy.policy import ExportedPolicy
+    from bumblebee.io.write import refuse_existing, try_output, write_folder
+    from bumblebee.progress import progress
+    from bumblebee.sim.quiet import quiet_mujoco
+    from bumblebee.view.sheet_page import sheet_page
+    from bumblebee.wire.limits import Limits, read_limits
+    from bumblebee.wire.sheet import make_sheet
+    from bumblebee.wire.sheet_file import NAME, as_json, watch
+
+    quiet_mujoco()
+    refuse_existing(out)
+    try_output(out)
+    bounds = read_limits(limits) if limits else Limits()
+    chosen = _clips(motions, clips or [])
+    with _exported(policy) as folder, progress(len(chosen), "run sheet", "motions") as shown:
+        loaded = ExportedPolicy.load(folder)
+        made = make_sheet(loaded, chosen, robots, bounds, seed, 60 * minutes, lambda said: shown.update(1, said))
+    for one in made.tried:
+        print(
+            plain(
+                f"{one.motion:<20} {100 * one.share:3.0f} % not to the end, tilt {one.tilt_deg:3.0f} deg; {watch(one)}"
+            )
+        )
+    if made.untried:
+        print(plain(f"not tried, the time was over: {', '.join(made.untried)}"))
+    write_folder(out, {"sheet.html": sheet_page(made), NAME: as_json(made)})
+    print(f"written: {out / 'sheet.html'}; for a run: --sheet {out}")
+
+
 @app.command("run")
 def run(
-    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or shipped, randomised, imu.")],
+    policy: Policy,
     clip: Annotated[str, typer.Option("--clip", help="Name of the motion to follow.")],
     robot: Annotated[str, typer.Option("--robot", help=_WIRES)] = "sim",
     at: At = "",
-    motions: Annotated[str, typer.Option("--motions", help="Motion files, or `embedded`.")] = "embedded",
+    motions: Motions = "embedded",
     out: Annotated[Path, typer.Option("--out", help="Dataset folder; a run adds a journal and a rollout.")] = Path(
         "deployed"
     ),
-    limits: Annotated[Path | None, typer.Option("--limits", help="YAML file of limits; docs/deploy.md.")] = None,
+    limits: Bounds = None,
+    sheet: Annotated[
+        Path | None, typer.Option("--sheet", help="Run sheet; one of another policy, motion or limits is refused.")
+    ] = None,
     compensation: Annotated[
         Path | None, typer.Option("--compensation", help="File of `bumblebee compensate`, undone on the way.")
     ] = None,
@@ -44,18 +96,20 @@ def run(
     operator: Annotated[str, typer.Option("--operator", help="Who runs it, for the log; your login by default.")] = "",
 ) -> None:
     """Check robot and policy, stand up slowly, run one clip, damp; the log is a dataset of measured rollouts."""
-    from bumblebee.learning import pretrained
-    from bumblebee.learning.export import export_shipped
+    from bumblebee.deploy.policy import ExportedPolicy
     from bumblebee.wire.limits import Limits, read_limits
     from bumblebee.wire.session import Run
     from bumblebee.wire.session import run as go
+    from bumblebee.wire.sheet_file import before_run, read_sheet
 
     bounds = read_limits(limits) if limits else Limits()
     if not unattended:
         _require_keys()
-    chosen = _clip(motions, clip)
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = export_shipped(Path(scratch) / policy, policy) if policy in pretrained.SHIPPED else _folder(policy)
+    tried = read_sheet(sheet) if sheet else None
+    (chosen,) = _clips(motions, [clip])
+    with _exported(policy) as folder:
+        if tried:
+            print(plain(before_run(tried, ExportedPolicy.load(folder).sha256, chosen, bounds)))
         job = Run(folder, chosen, robot, out, at, compensation, bounds, unattended=unattended, slow=slow,
                   operator=operator or getpass.getuser())  # fmt: skip
         ended, rollout = go(job, lambda line: print(plain(line), flush=True))
@@ -120,26 +174,34 @@ def _require_keys() -> None:
         raise BadInput("bumblebee deploy run", "a terminal, for the dead-man's key", "none", do)
 
 
-def _folder(policy: str) -> Path:
-    if "@" in policy and not Path(policy).exists():
+@contextmanager
+def _exported(policy: str) -> Iterator[Path]:
+    """Folder of a policy that comes along, or of the user's."""
+    from bumblebee.learning import pretrained
+    from bumblebee.learning.export import export_shipped
+
+    if policy in pretrained.SHIPPED:
+        with tempfile.TemporaryDirectory() as scratch:
+            yield export_shipped(Path(scratch) / policy, policy)
+    elif "@" in policy and not Path(policy).exists():
         do = f"Run: bumblebee fetch {policy} --out policy; then deploy the folder policy."
         raise BadInput(policy, "a policy's folder", "a registered name", do)
-    return Path(policy)
+    else:
+        yield Path(policy)
 
 
-def _clip(motions: str, name: str) -> "Clip":
+def _clips(motions: str, names: Sequence[str]) -> "list[Clip]":
+    """Motions by their names; all without."""
     from bumblebee.motion.embedded import EmbeddedConfig, make
     from bumblebee.motion.embedded.kinds import kinds
-
-    if motions == "embedded":
-        made = {kind.name: kind for kind in kinds()}
-        if name in made:
-            return make(made[name], 0, EmbeddedConfig())
-        raise BadInput("--clip", f"one of {', '.join(made)}", repr(name)[:60])
     from bumblebee.motion.folder import read_folder
     from bumblebee.motion.settings import ReadConfig
 
-    clips = {clip.name: clip for clip in read_folder(Path(motions), ReadConfig()).clips}
-    if name not in clips:
-        raise BadInput("--clip", f"one of {', '.join(sorted(clips)[:20])}", repr(name)[:60])
-    return clips[name]
+    if motions == "embedded":
+        made = {kind.name: partial(make, kind, 0, EmbeddedConfig()) for kind in kinds()}
+    else:
+        made = {clip.name: partial(lambda clip: clip, clip) for clip in read_folder(Path(motions), ReadConfig()).clips}
+    for name in names:
+        if name not in made:
+            raise BadInput("--clip", f"one of {', '.join(made)}"[:1000], repr(name)[:60])
+    return [made[name]() for name in names or made]
