@@ -26,7 +26,13 @@ Slow = Annotated[
 ]
 
 
-Policy = Annotated[str, typer.Argument(metavar="POLICY", help="A policy's folder, or shipped, randomised, imu.")]
+Policy = Annotated[
+    str,
+    typer.Argument(metavar="POLICY", help="A policy's folder, NAME@ALIAS (registered), or shipped, randomised, imu."),
+]
+Workspace = Annotated[
+    Path, typer.Option("--workspace", help="Of a registered policy: folder with .servers; by default this one.")
+]
 Motions = Annotated[str, typer.Option("--motions", help="Motion files, or `embedded`.")]
 Bounds = Annotated[Path | None, typer.Option("--limits", help="YAML file of limits; docs/deploy.md.")]
 
@@ -40,6 +46,7 @@ def sheet(
     minutes: Annotated[float, typer.Option("--minutes", min=0, help="No motion begins after so long.")] = 10.0,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the robots, starts and sensor noise.")] = 0,
     limits: Bounds = None,
+    workspace: Workspace = Path(),
     out: Annotated[Path, typer.Option("--out", help="New folder for sheet.html and sheet.json.")] = Path("sheet"),
 ) -> None:
     """Try motions on robots that differ, in simulation, and order them by risk: what to watch, when to stop."""
@@ -57,7 +64,7 @@ def sheet(
     try_output(out)
     bounds = read_limits(limits) if limits else Limits()
     chosen = _clips(motions, clips or [])
-    with _exported(policy) as folder, progress(len(chosen), "run sheet", "motions") as shown:
+    with _exported(policy, workspace) as folder, progress(len(chosen), "run sheet", "motions") as shown:
         loaded = ExportedPolicy.load(folder)
         made = make_sheet(loaded, chosen, robots, bounds, seed, 60 * minutes, lambda said: shown.update(1, said))
     for one in made.tried:
@@ -83,6 +90,7 @@ def run(
         "deployed"
     ),
     limits: Bounds = None,
+    workspace: Workspace = Path(),
     sheet: Annotated[
         Path | None, typer.Option("--sheet", help="Run sheet; one of another policy, motion or limits is refused.")
     ] = None,
@@ -107,7 +115,7 @@ def run(
         _require_keys()
     tried = read_sheet(sheet) if sheet else None
     (chosen,) = _clips(motions, [clip])
-    with _exported(policy) as folder:
+    with _exported(policy, workspace) as folder:
         if tried:
             print(plain(before_run(tried, ExportedPolicy.load(folder).sha256, chosen, bounds)))
         job = Run(folder, chosen, robot, out, at, compensation, bounds, unattended=unattended, slow=slow,
@@ -175,19 +183,21 @@ def _require_keys() -> None:
 
 
 @contextmanager
-def _exported(policy: str) -> Iterator[Path]:
-    """Folder of a policy that comes along, or of the user's."""
+def _exported(policy: str, workspace: Path) -> Iterator[Path]:
+    """Folder of a policy that comes along, of a registered one, or of the user's."""
     from bumblebee.learning import pretrained
     from bumblebee.learning.export import export_shipped
+    from bumblebee.wire.registered import fetched
 
-    if policy in pretrained.SHIPPED:
-        with tempfile.TemporaryDirectory() as scratch:
-            yield export_shipped(Path(scratch) / policy, policy)
-    elif "@" in policy and not Path(policy).exists():
-        do = f"Run: bumblebee fetch {policy} --out policy; then deploy the folder policy."
-        raise BadInput(policy, "a policy's folder", "a registered name", do)
-    else:
-        yield Path(policy)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / policy.replace("/", "-")
+        if policy in pretrained.SHIPPED:
+            yield export_shipped(folder, policy)
+        elif "@" in policy and not Path(policy).exists():
+            print(plain(fetched(policy, workspace, folder)), flush=True)
+            yield folder
+        else:
+            yield Path(policy)
 
 
 def _clips(motions: str, names: Sequence[str]) -> "list[Clip]":
