@@ -4,7 +4,7 @@ import getpass
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,6 +15,7 @@ from bumblebee.errors import BadInput, plain
 
 if TYPE_CHECKING:
     from bumblebee.motion.clip import Clip
+    from bumblebee.wire.console import Ended
 
 STOPPED = 4
 """Exit status of a run that a safety rule ended."""
@@ -97,6 +98,10 @@ def run(
     compensation: Annotated[
         Path | None, typer.Option("--compensation", help="File of `bumblebee compensate`, undone on the way.")
     ] = None,
+    page: Annotated[
+        int | None,
+        typer.Option("--page", min=0, max=65535, help="Show the run on this port of loopback; 0: a free one."),
+    ] = None,
     unattended: Annotated[
         bool, typer.Option("--unattended", help="No keys: goes on by itself; simulated robots only.")
     ] = False,
@@ -105,6 +110,9 @@ def run(
 ) -> None:
     """Check robot and policy, stand up slowly, run one clip, damp; the log is a dataset of measured rollouts."""
     from bumblebee.deploy.policy import ExportedPolicy
+    from bumblebee.io.write import write_file
+    from bumblebee.view.after_page import after_page
+    from bumblebee.view.operator_process import operator_page
     from bumblebee.wire.limits import Limits, read_limits
     from bumblebee.wire.session import Run
     from bumblebee.wire.session import run as go
@@ -116,17 +124,37 @@ def run(
     tried = read_sheet(sheet) if sheet else None
     (chosen,) = _clips(motions, [clip])
     with _exported(policy, workspace) as folder:
-        if tried:
-            print(plain(before_run(tried, ExportedPolicy.load(folder).sha256, chosen, bounds)))
+        line = before_run(tried, ExportedPolicy.load(folder).sha256, chosen, bounds) if tried else ""
         job = Run(folder, chosen, robot, out, at, compensation, bounds, unattended=unattended, slow=slow,
                   operator=operator or getpass.getuser())  # fmt: skip
-        ended, rollout = go(job, lambda line: print(plain(line), flush=True))
-    print("\n".join(ended.numbers.lines()[1:]))
-    print(f"guard: {', '.join(ended.told['permitted'])}; refused states: {ended.told['refused'] or 'none'}")
-    print(f"written: {rollout}" if rollout else "nothing measured: the policy did not carry the robot")
+        with nullcontext() if page is None else operator_page(page, workspace, _say) as watcher:
+            if line:
+                _say(line)
+            if watcher:
+                watcher.show({"run": {"sheet": line}})
+            ended, rollout = go(job, _say, watcher)
+            _tell(ended, rollout)
+            if rollout:
+                after = out / "pages" / f"{rollout.stem}.html"
+                counts, missed = dict(ended.numbers.rules.most_common()), ended.numbers.missed
+                write_file(after, after_page(ended.reason, counts, missed, rollout, out, workspace))
+                _say(f"written: {after}")
+                if watcher and not unattended:
+                    watcher.show({"after": str(after.resolve())})
+                    input("The page shows what came; Enter ends it.")
     if ended.reason:
         print(f"stopped by the rule {ended.reason}")
         raise typer.Exit(STOPPED)
+
+
+def _say(line: str) -> None:
+    print(plain(line), flush=True)
+
+
+def _tell(ended: "Ended", rollout: Path | None) -> None:
+    print("\n".join(ended.numbers.lines(ended.numbers.table())[1:]))
+    print(f"guard: {', '.join(ended.told['permitted'])}; refused states: {ended.told['refused'] or 'none'}")
+    print(f"written: {rollout}" if rollout else "nothing measured: the policy did not carry the robot", flush=True)
 
 
 @app.command("robot")

@@ -64,7 +64,7 @@ def test_keys_come_at_once_without_enter_and_the_terminal_is_as_it_was_afterward
 
 def test_numbers_are_those_of_all_records_and_fit_a_terminal() -> None:
     numbers = Numbers(3)
-    assert numbers.lines() == ["waiting for the guard"]
+    assert numbers.lines(numbers.table()) == ["waiting for the guard"]
     numbers.add(small_records(0.3))
     small = Small()
     small.run(0.1)
@@ -74,5 +74,5 @@ def test_numbers_are_those_of_all_records_and_fit_a_terminal() -> None:
     assert numbers.missed == 1 and numbers.table()["wake"][2] == 100.0
     p50, p99, worst = numbers.table()["wake to send"]
     assert worst == 2.0 and p99 == 2.0 and p50 in (0.0, 2.0)
-    lines = numbers.lines()
+    lines = numbers.lines(numbers.table())
     assert "missed ticks 1" in lines[-1] and max(map(len, lines)) < 120 and np.isfinite(worst)
