@@ -234,3 +234,17 @@ def test_an_experts_success_is_one_curve_over_the_rounds() -> None:
         "nominal/expert-c0/success": {0: 0.2, 1: 0.6},
         "nominal/base/success": {0: 0.1},
     }
+
+
+def test_over_the_wire_the_rollouts_come_from_the_guards_journal(workspace: Path, sealed: Callable[..., None]) -> None:
+    """What the stand-in knows of its base is odometry, and the wire's latency is in the notes."""
+    (workspace / "params.yaml").write_text(
+        PARAMS.replace("motions: 1, repeats: 2", "motions: 1, repeats: 1, wire: lcm")
+    )
+    sealed()
+    rollouts.main(round=1, cluster="c0")
+    (rollout,) = read_dataset(workspace / "data/rollouts/r1/c0").rollouts
+    assert rollout.base_pos is None and rollout.base_lin_vel is not None
+    assert rollout.meta["policy"]["version"] == "r0" and rollout.meta["cluster"] == "c0"
+    assert rollout.meta["notes"].startswith("ran to the end") and "stamp to drives" in rollout.meta["notes"]
+    assert np.ptp(np.diff(rollout.time)) > 0  # the robot's own stamps
