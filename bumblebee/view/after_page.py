@@ -73,14 +73,16 @@ def _next(measured: Rollout, out: Path, workspace: Path) -> list[Block]:
     model, folder = str(out / "model.xml"), str(out)
     if measured.base_lin_vel is None:
         return [text("Without odometry there is no base_lin_vel, which gap and diagnose ask for of a floating base.")]
-    commands = (
+    commands = [
         ("where the model errs", ["bumblebee", "gap", model, folder]),
         ("which effects it lacks", ["bumblebee", "diagnose", model, folder, "--out", f"{folder}-found"]),
-        ("what the loop asks people, to approve, reject or ask for more",
-         ["bumblebee", "gate", "list", "--workspace", str(workspace)]),
-    )  # fmt: skip
-    return [
-        text("Look at the log before the next motion."),
-        bullets([f"{what}: {join(words)}" for what, words in commands]),
-        note("The loop takes the folder by rollouts.source; its gate shows what came, and waits for people."),
     ]
+    more = []
+    if (workspace / "dvc.yaml").is_file():
+        asked = ["bumblebee", "gate", "list", "--workspace", str(workspace.resolve())]
+        commands.append(("what the loop asks people, to approve, reject or ask for more", asked))
+        more.append(
+            note("The loop takes the folder by rollouts.source; its gate shows what came, and waits for people.")
+        )
+    said = bullets([f"{what}: {join(words)}" for what, words in commands])
+    return [text("Look at the log before the next motion."), said, *more]

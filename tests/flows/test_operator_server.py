@@ -110,6 +110,8 @@ def measured(tmp_path: Path, **more: Any) -> Path:
 
 def test_the_page_after_a_run_shows_what_came_and_commands_that_are_ones(tmp_path: Path) -> None:
     rollout = measured(tmp_path, base_lin_vel=np.zeros((40, 3)))
+    assert "bumblebee gate" not in after_page("", {}, 0, rollout, tmp_path / "set", tmp_path)
+    (tmp_path / "dvc.yaml").touch()
     page = after_page("tilt", {"tilt": 1}, 2, rollout, tmp_path / "set", tmp_path)
     for words in ("The rule tilt ended it", "40 at 50 Hz, 0.8 s", "&lt;nod&gt;", "ann", "100 mrad RMS"):
         assert words in page, words
