@@ -4,7 +4,7 @@ import getpass
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -141,7 +141,8 @@ def run(
                 _say(f"written: {after}")
                 if watcher and not unattended:
                     watcher.show({"after": str(after.resolve())})
-                    input("The page shows what came; Enter ends it.")
+                    with suppress(EOFError, KeyboardInterrupt):
+                        input("The page shows what came; Enter ends it.")
     if ended.reason:
         print(f"stopped by the rule {ended.reason}")
         raise typer.Exit(STOPPED)

@@ -47,7 +47,7 @@ def _row(one: Tried) -> tuple[str | Cell, ...]:
 
 def _uses(sheet: Sheet) -> Block:
     rules = [*DAMPING, "torque"]
-    rows = [(one.motion, *(_use(one, rule) for rule in rules)) for one in sheet.tried]
+    rows = [[one.motion, *(_use(one, rule) for rule in rules)] for one in sheet.tried]
     caption = (
         "Largest on any robot that did not fall; 100 % is where the rule acts. Torque beyond is cut, the others damp."
     )

@@ -134,5 +134,5 @@ def _uses(rollout: Rollout, clip: Clip, drives: Drives, limits: Limits) -> dict[
     quat, pos, torque, action = rollout.base_quat, rollout.base_pos, rollout.joint_torque, rollout.action
     assert quat is not None and pos is not None and torque is not None and action is not None  # the simulation's
     measured = Measured(rollout.joint_pos, rollout.joint_vel, torque, action, quat, pos[:, 2])
-    reference = (part[: rollout.frames].astype(float) for part in (clip.root_quat, clip.root_pos[:, 2]))
-    return uses(measured, *reference, drives, limits)
+    turned, height = (part[: rollout.frames].astype(float) for part in (clip.root_quat, clip.root_pos[:, 2]))
+    return uses(measured, turned, height, drives, limits)

@@ -60,6 +60,6 @@ def test_a_run_that_a_rule_ended_says_so_by_its_status(
 
     for reason, status in (("tilt", cli_deploy.STOPPED), ("", 0)):
         ended = Ended(reason, Numbers(23), {"permitted": ["memory locked"], "refused": {}})
-        monkeypatch.setattr("bumblebee.wire.session.run", lambda job, say, ended=ended: (ended, None))
+        monkeypatch.setattr("bumblebee.wire.session.run", lambda job, say, watcher, ended=ended: (ended, None))
         assert run("deploy", "run", "shipped", *ALONE, "--out", tmp_path) == status
         assert ("stopped by the rule tilt" in capsys.readouterr().out) == bool(reason)
