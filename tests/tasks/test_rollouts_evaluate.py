@@ -236,15 +236,14 @@ def test_an_experts_success_is_one_curve_over_the_rounds() -> None:
     }
 
 
-def test_over_the_wire_the_rollouts_come_from_the_guards_journal(workspace: Path, sealed: Callable[..., None]) -> None:
-    """What the stand-in knows of its base is odometry, and the wire's latency is in the notes."""
-    (workspace / "params.yaml").write_text(
-        PARAMS.replace("motions: 1, repeats: 2", "motions: 1, repeats: 1, wire: lcm")
-    )
-    sealed()
+@pytest.mark.parametrize(
+    ("wire", "module"), [("none", "bumblebee.deploy.stand_in"), ("lcm", "bumblebee.wire.stand_in")]
+)
+def test_the_settings_say_whether_the_stand_in_runs_over_the_wire(
+    wire: str, module: str, workspace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (workspace / "params.yaml").write_text(PARAMS.replace("motions: 1,", f"motions: 1, wire: {wire},"))
+    started = list[list[str]]()
+    monkeypatch.setattr(rollouts, "start_stand_in", lambda *given, module: started.append(list(module)))
     rollouts.main(round=1, cluster="c0")
-    (rollout,) = read_dataset(workspace / "data/rollouts/r1/c0").rollouts
-    assert rollout.base_pos is None and rollout.base_lin_vel is not None
-    assert rollout.meta["policy"]["version"] == "r0" and rollout.meta["cluster"] == "c0"
-    assert rollout.meta["notes"].startswith("ran to the end") and "stamp to drives" in rollout.meta["notes"]
-    assert np.ptp(np.diff(rollout.time)) > 0  # the robot's own stamps
+    assert started == [["-m", module]]
